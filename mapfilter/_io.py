@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import glob
 import hashlib
 import json
 import os
@@ -17,10 +16,12 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib.metadata import version
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
 from mapfilter._inputs import is_unicode, open_input, read_input
+from mapfilter._partial import is_left, new_partial, partials
 from mapfilter._replace import ASIDE, NEW, discard, exchange, note_old
 from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fail
 
@@ -35,7 +36,14 @@ VERSION = version("mapfilter")
 def sha256_file(path: Path) -> str:
     """Return the SHA-256 of a file's bytes as hexadecimal digits."""
     with open_input(path, StoreError) as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+        return sha256_of(stream)
+
+
+def sha256_of(stream: BufferedReader) -> str:
+    """Return the SHA-256 of an open file, which is then again at its beginning."""
+    digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    stream.seek(0)
+    return digest
 
 
 @contextlib.contextmanager
@@ -104,11 +112,16 @@ def replaced_files(folder: Path, older: Callable[[], Iterable[Path]]) -> Iterato
             yield new
         with _into_place(folder, folder):
             stale = set(older())
-            for file in sorted(path for path in new.rglob("*") if not path.is_dir()):
+            files = sorted(path for path in new.rglob("*") if not path.is_dir())
+            for file in files:
+                _sync(file)
+            for file in files:
                 target = folder / file.relative_to(new)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 file.replace(target)
                 stale.discard(target)
+            for within in {(folder / file.relative_to(new)).parent for file in files}:
+                _sync(within)
             for path in sorted(stale):
                 path.unlink(missing_ok=True)
                 if path.parent != folder and not any(path.parent.iterdir()):
@@ -119,8 +132,8 @@ def replaced_files(folder: Path, older: Callable[[], Iterable[Path]]) -> Iterato
 
 def left_aside(path: Path) -> Path | None:
     """Return the folder moved aside by a replacement that was cut short, if there is one."""
-    found = path.parent.glob(f"{glob.escape(f'.{path.name}.partial-')}*/{ASIDE}")
-    return next((aside for aside in sorted(found) if aside.is_dir()), None)
+    found = (partial / ASIDE for partial in partials(path))
+    return next((aside for aside in found if aside.is_dir()), None)
 
 
 def check_replaceable(folder: Path, head: str, what: str, own: Callable[[str], bool]) -> None:
@@ -274,27 +287,16 @@ def _partial_folder(path: Path) -> tuple[Path, Path]:
     """Return the target of a path that may be a link, and a new hidden folder beside it."""
     path = Path(os.path.realpath(path)) if path.is_symlink() else path
     ensure_writable_folder(path.parent)
-    prefix = f".{path.name}.partial-"
-    for stale in path.parent.glob(f"{glob.escape(prefix)}*"):
-        if not _is_alive(stale.name.removeprefix(prefix).split("-")[0]):
+    for stale in partials(path):
+        if is_left(stale):
             if (stale / ASIDE).is_dir() and not path.exists():
                 # Its process died between the two renames of an exchange.
                 (stale / ASIDE).rename(path)
             discard(stale, path)
     try:
-        folder = tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent)
+        return path, new_partial(path)
     except OSError as error:
         raise _not_writable(path, error) from error
-    return path, Path(folder)
-
-
-def _is_alive(pid: str) -> bool:
-    try:
-        with contextlib.suppress(PermissionError):
-            os.kill(int(pid), 0)
-    except (ValueError, OverflowError, ProcessLookupError):
-        return False
-    return True
 
 
 def _sync(path: Path) -> None:

@@ -8,8 +8,9 @@ of the folder's name (:class:`FinishedParts`: parts of other inputs are not foun
 from __future__ import annotations
 
 import contextlib
+import glob
 import hashlib
-import os
+import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
@@ -21,7 +22,9 @@ from mapfilter._io import ensure_writable_folder, read_json, write_json
 from mapfilter.errors import ConfigError, InputError, OutputError, Stopped, fail
 
 _CODE = "code_sha256"
+_CODE_NAME = "version of mapfilter and libraries"
 _CHECKSUM_BYTES = 32
+_KEY_DIGITS = 16
 _LARGEST_PART_BYTES = 1 << 30
 
 
@@ -82,11 +85,13 @@ def check_same(
     Parameters and errors are those of :func:`start_or_resume`.
     """
     found, head = read_json(head_file), with_code(head)
-    names = {**(names or {key: key for key in head}), _CODE: "version of mapfilter and libraries"}
+    names = {**(names or {key: key for key in head}), _CODE: _CODE_NAME}
     changed = [name for key, name in names.items() if found.get(key) != head[key]]
     if changed:
         expected = f"the same {', '.join(names.values())} to resume"
-        hint = "settings changed since; start without --resume, or in another folder"
+        of_code = changed == [_CODE_NAME]
+        cause = "mapfilter or a library was updated" if of_code else "settings changed"
+        hint = f"{cause} since; start without --resume, or in another folder"
         raise fail(
             ConfigError, str(head_file), expected, f"another {', another '.join(changed)}", hint
         )
@@ -115,7 +120,8 @@ def load_part(file: Path) -> bytes | None:
 
 def save_part(file: Path, part: bytes) -> None:
     """Write a finished part with a checksum of it and its name; OutputError where that fails."""
-    temporary = file.with_name(f"{file.name}.{os.getpid()}")
+    # Hosts that share the folder may have processes of the same number.
+    temporary = file.with_name(f"{file.name}.{secrets.token_hex(8)}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_bytes(_checksum(file.name, part) + part)
@@ -132,6 +138,8 @@ class FinishedParts:
 
     As a context manager it removes the folder when the block succeeds, or fails by an input error
     or because nothing can be written; it stays when the block is interrupted or a worker dies.
+    When the block succeeds, folders of the same result that were left by other inputs or other code
+    are removed, too.
 
     ``digest`` gives that of everything that determines the parts, and is called once, when it is
     first needed. With ``keep`` parts that are there already are taken over, else removed; their
@@ -148,7 +156,9 @@ class FinishedParts:
     def folder(self) -> Path:
         """Folder of the parts; emptied on first use, unless they are kept."""
         digest = hashlib.sha256(f"{self._digest()} {code_digest()}".encode()).hexdigest()
-        folder = self._result.with_name(f".{self._result.name}.{self._name}s-{digest[:16]}")
+        folder = self._result.with_name(
+            f".{self._result.name}.{self._name}s-{digest[:_KEY_DIGITS]}"
+        )
         if not self.keep:
             shutil.rmtree(folder, ignore_errors=True)
         return folder
@@ -164,6 +174,10 @@ class FinishedParts:
         used = "folder" in vars(self)
         if used and (kind is None or issubclass(kind, InputError | OutputError)):
             shutil.rmtree(self.folder, ignore_errors=True)
+        if used and kind is None:
+            pattern = f".{glob.escape(self._result.name)}.{self._name}s-{'[0-9a-f]' * _KEY_DIGITS}"
+            for other in self._result.parent.glob(pattern):
+                shutil.rmtree(other, ignore_errors=True)
         if used and isinstance(error, KeyboardInterrupt | Stopped) and self.folder.is_dir():
             error.add_note(f"finished {self._name}s are kept: go on with --resume")
 

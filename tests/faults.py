@@ -48,7 +48,8 @@ from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
 
 _BEYOND = 1.5
 """A writer is killed within so many times the time that it takes: it may be the next one."""
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
+"""A process at the lowest priority of a busy machine takes a minute to start."""
 
 _TURNS = (*("build", "merge", "sweep") * 3, "learn")
 
@@ -203,10 +204,12 @@ def kill(work: Path, count: int, seed: int = 1) -> Counter[str]:
             ready, rng = context.Event(), np.random.default_rng((seed, number))
             writer = context.Process(target=_keep_writing, args=(name, work, number, ready))
             writer.start()
-            assert ready.wait(PATIENCE_S)
-            time.sleep(rng.uniform(0, longest_s[name]))
-            writer.kill()
-            writer.join()
+            try:
+                assert ready.wait(PATIENCE_S)
+                time.sleep(rng.uniform(0, longest_s[name]))
+            finally:
+                writer.kill()
+                writer.join()
             outcomes[f"{name}: {_judged(jobs[name].look(), whole[name], number)}"] += 1
             outcomes.keep()
         for name, job in jobs.items():

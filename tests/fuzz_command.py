@@ -21,7 +21,9 @@ from typing import Any
 from fuzz import fuzz
 from fuzz_readers import Target, targets
 
-BATCH = 200
+BATCH = 1000
+_MEMORY = Path("/dev/shm")
+"""Where it is there, copies are written to it: a file system in memory."""
 _LONGEST_BATCH_S = 600.0
 _KEYS = ("read", "refused", "longest_s")
 
@@ -37,7 +39,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--batch", type=int, default=BATCH)
     given = parser.parse_args(arguments)
     counts: dict[str, Any] = json.loads(given.out.read_text()) if given.out.exists() else {}
-    with tempfile.TemporaryDirectory(prefix="mapfilter-fuzz-") as folder:
+    within = _MEMORY if _MEMORY.is_dir() else None
+    with tempfile.TemporaryDirectory(prefix="mapfilter-fuzz-", dir=within) as folder:
         every = [one for one in targets(Path(folder)) if given.only in one.name]
         for one in every:
             one.read(one.path)

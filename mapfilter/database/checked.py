@@ -104,6 +104,23 @@ class Part:
         return fail(StoreError, str(self.file), expected, got, "changed after it was written")
 
 
+@dataclass(frozen=True, slots=True)
+class HeldPart:
+    """The bytes of a part that were compared with their checksum, and where they come from."""
+
+    path: Path
+    data: bytes
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    @contextmanager
+    def open(self) -> Iterator[pa.NativeFile]:
+        """Open the bytes for Arrow."""
+        with pa.BufferReader(self.data) as source:
+            yield source
+
+
 class _CheckedFile(io.RawIOBase):
     """Gives out bytes of blocks whose checksums are right."""
 

@@ -8,6 +8,7 @@ that was not measured at a place may be received there, and which cell serves is
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +18,9 @@ import numpy as np
 import pyarrow as pa
 from scipy.ndimage import distance_transform_edt
 
+from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Floats32, Ints32
+from mapfilter.database.checked import HeldPart
 from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS, describe_part
 from mapfilter.database.parquet import Source, dictionary, read_columns, write_columns
 from mapfilter.errors import InputError, StoreError, fail
@@ -35,6 +38,7 @@ _READINGS = {
     "serving": np.bool_,
 }
 _LARGEST_READ_PX = 1 << 25
+_LARGEST_READINGS_BYTES = 1 << 31
 _DEVIATIONS = ("cell", "row", "col", "deviation_db")
 
 
@@ -201,9 +205,36 @@ def deviations_at_points(
 
 def write_readings(readings: Readings, path: Path) -> None:
     """Write the readings of a survey as Parquet."""
+    path.write_bytes(readings_parquet(readings))
+
+
+def readings_parquet(readings: Readings) -> bytes:
+    """Return the bytes of the file that :func:`write_readings` writes."""
+    sink = pa.BufferOutputStream()
+    write_columns(_readings_table(readings), sink)
+    return bytes(sink.getvalue())
+
+
+def _readings_table(readings: Readings) -> pa.Table:
     columns = {name: pa.array(getattr(readings, name)) for name in _READINGS}
     columns["cell"] = dictionary(readings.cell, readings.cell_ids or ("",))
-    write_columns(pa.table(columns), path)
+    return pa.table(columns)
+
+
+def read_checked_readings(path: Path, sha256: str | None) -> Readings:
+    """Read a survey's readings, whose checksum the rasters of the survey state.
+
+    Raises
+    ------
+    StoreError
+        The file is missing or damaged, or it is not the one of the rasters.
+    """
+    data = read_input(path, _LARGEST_READINGS_BYTES, "readings", StoreError)
+    if hashlib.sha256(data).hexdigest() != sha256:
+        expected, got = "the readings of the survey's rasters", "others, by their SHA-256"
+        hint = "edited, damaged, or predict was stopped; run mapfilter predict again"
+        raise fail(StoreError, str(path), expected, got, hint)
+    return read_readings(HeldPart(path, data))
 
 
 def read_readings(source: Source) -> Readings:

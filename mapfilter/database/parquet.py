@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from mapfilter._types import Floats
-from mapfilter.database.checked import Part
+from mapfilter.database.checked import HeldPart, Part
 from mapfilter.errors import MapfilterError, StoreError, fail
 from mapfilter.geodesy import Lattice, same_crs
 
@@ -25,8 +25,8 @@ _WKB_POINT = np.dtype([("order", "u1"), ("kind", "<u4"), ("east", "<f8"), ("nort
 Window = tuple[int, int, int, int]
 """Row, column, rows and columns on a lattice."""
 
-Source = Part | Path
-"""A part with its checksums, or a file without."""
+Source = Part | HeldPart | Path
+"""A part with its checksums, one whose bytes were compared already, or a file without."""
 
 _EVERYWHERE = (-(2**62), 2**62)
 _NEAR_M = 1e-3
@@ -66,7 +66,8 @@ def opened(source: Source, footer: pq.FileMetaData | None = None) -> Iterator[pq
     """
     try:
         with ExitStack() as stack:
-            given = stack.enter_context(source.open()) if isinstance(source, Part) else source
+            of_path = isinstance(source, Path)
+            given = source if of_path else stack.enter_context(source.open())
             file = pq.ParquetFile(given, metadata=footer, page_checksum_verification=True)
             stack.enter_context(file)
             if isinstance(source, Part) and file.metadata.num_rows != source.rows:

@@ -229,7 +229,8 @@ def _blocks(text: str, path: Path, faults: Faults) -> list[tuple[int, dict[str, 
             continue
         try:
             # Some writers have Fortran's exponent.
-            value = float("?" if "_" in given else given.strip().replace("D", "E"))
+            plain = given.isascii() and "_" not in given
+            value = float(given.strip().replace("D", "E") if plain else "?")
         except ValueError:
             value = np.nan
         if not np.isfinite(value):

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import shapely
 from pyarrow.lib import ArrowException
 
-from mapfilter._inputs import check_file
+from mapfilter._inputs import open_input
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.filters.contract import Reason, Status
@@ -68,9 +68,10 @@ def read_estimate(path: str | Path) -> TrackEstimate:
     """
     path = Path(path)
     try:
-        # The message of pyarrow for a missing file is only its name.
-        check_file(path, StoreError)
-        with pq.ParquetFile(path, page_checksum_verification=True) as source:
+        with (
+            open_input(path, StoreError) as stream,
+            pq.ParquetFile(stream, page_checksum_verification=True) as source,
+        ):
             table = source.read()
     except OSError as error:
         raise fail(StoreError, str(path), "an estimate", error.strerror or error) from error

@@ -203,7 +203,9 @@ def locate(
         # A tail is as large as a belief.
         outputs.append(StepOutput(output.fix, output.evidence, output.unused))
         if recorder is not None:
+            paused_s = time.process_time()
             recorder.record(before, epoch, drawn, state, output)
+            began_s += time.process_time() - paused_s
         if smoother is not None:
             smoother.add(before, state)
         if snapshots:

@@ -33,9 +33,11 @@ _LARGEST_GAP_DEG = 15.0
 _LARGEST_LOSS_DB = 200.0
 _SECTIONS = ("HORIZONTAL", "VERTICAL")
 _REAL = r"\d{1,15}+(?:\.\d{1,30}+)?"
-_GAIN = re.compile(rf"([+-]?{_REAL})\s{{0,9}}\(?\s{{0,9}}(dbd|dbi)?\s{{0,9}}\)?", re.I)
-_FREQUENCY = re.compile(rf"({_REAL})(?:\s{{0,9}}-\s{{0,9}}({_REAL}))?\s{{0,9}}(mhz|ghz)?", re.I)
-_TILT = re.compile(rf"([+-]?{_REAL})\b.*")
+_GAIN = re.compile(rf"([+-]?{_REAL})\s{{0,9}}\(?\s{{0,9}}(dbd|dbi)?\s{{0,9}}\)?", re.I | re.A)
+_FREQUENCY = re.compile(
+    rf"({_REAL})(?:\s{{0,9}}-\s{{0,9}}({_REAL}))?\s{{0,9}}(mhz|ghz)?", re.I | re.A
+)
+_TILT = re.compile(rf"([+-]?{_REAL})\b.*", re.A)
 
 
 def read_antennas(folder: Path | str, names: Iterable[str]) -> dict[str, MeasuredAntenna]:
@@ -181,7 +183,7 @@ def _cut(
 def _pair(where: str, words: list[str], faults: Faults) -> tuple[float, float]:
     """Return an angle and a loss; NaN where they are faulty."""
     try:
-        angle, loss = (float("?" if "_" in word else word) for word in words)
+        angle, loss = (float(word if word.isascii() and "_" not in word else "?") for word in words)
     except ValueError:
         text = " ".join(words)
         hint = "a decimal comma" if "," in text else ""

@@ -55,7 +55,7 @@ class Table:
 
 
 def number(text: str, *, decimal_comma: bool = False) -> float | None:
-    """Return a text as a finite number, or None.
+    """Return a text as a finite number, or None; digits of other scripts are none.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def number(text: str, *, decimal_comma: bool = False) -> float | None:
     if decimal_comma and text.count(",") == 1 and "." not in text:
         text = text.replace(",", ".")
     try:
-        value = float("?" if "_" in text else text)
+        value = float(text if text.strip().isascii() and "_" not in text else "?")
     except ValueError:
         return None
     return value if math.isfinite(value) else None

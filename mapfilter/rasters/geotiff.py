@@ -30,6 +30,8 @@ from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, without_nodata
 
 _PIXELS_TAG = "PIXELS_SHA256"
+READINGS_TAG = "READINGS_SHA256"
+"""Tag of a survey's rasters: the checksum of the file with its readings."""
 QUANTITY_TAG = "MAPFILTER_QUANTITY"
 """Tag of a file that states which quantity its bands hold."""
 _UNITS: dict[str, Quantity] = {"dbm": "level", "db": "loss"}
@@ -182,6 +184,16 @@ def is_as_written(path: Path) -> bool:
     except (MapfilterError, RasterioError, UnicodeDecodeError):
         return False
     return bool(expected == pixels.hexdigest())
+
+
+def tag_of(path: Path, name: str) -> str | None:
+    """Return a tag of a GeoTIFF; None without it, or where the file cannot be read."""
+    try:
+        with open_raster(path) as source:
+            found = source.tags().get(name)
+    except (MapfilterError, RasterioError, UnicodeDecodeError):
+        return None
+    return None if found is None else str(found)
 
 
 @dataclass(frozen=True, slots=True)

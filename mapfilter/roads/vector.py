@@ -22,6 +22,7 @@ from pyarrow import ArrowException
 from pyproj.exceptions import CRSError, ProjError
 from shapely.errors import GEOSException
 
+from mapfilter._inputs import open_input
 from mapfilter._ogr import PARQUET, VectorSource, vector_source
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
@@ -103,7 +104,8 @@ def read_layer(
         path, name = Path(source), str(source)
         place = vector_source(path)
         if path.suffix.lower() in PARQUET:
-            frame = _guarded(name, lambda: geopandas.read_parquet(path))
+            with open_input(path) as stream:
+                frame = _guarded(name, lambda: geopandas.read_parquet(stream))
         elif path.suffix.lower() == ".shp":
             hint = "the .prj file was left behind"
     if frame is not None:

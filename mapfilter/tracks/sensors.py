@@ -13,8 +13,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mapfilter._inputs import check_file
-from mapfilter._io import read_json, sha256_file
+from mapfilter._inputs import open_input
+from mapfilter._io import read_json, sha256_file, sha256_of
 from mapfilter.errors import Faults, InputError, StoreError, fail
 
 FOLDER = "sensors"
@@ -86,11 +86,13 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
     faults, tables = Faults(), {}
     for name, path in paths.items():
         known = sums.get(f"{FOLDER}/{path.name}")
-        if known is not None and known != sha256_file(path):
-            raise fail(StoreError, str(path), f"SHA-256 {known}", "another", "changed or cut off")
         try:
-            check_file(path)
-            rows = pd.read_csv(path) if path.suffix == ".csv" else pq.read_table(path).to_pandas()
+            with open_input(path) as stream:
+                if known is not None and known != sha256_of(stream):
+                    hint = "changed or cut off"
+                    raise fail(StoreError, str(path), f"SHA-256 {known}", "another", hint)
+                is_csv = path.suffix == ".csv"
+                rows = pd.read_csv(stream) if is_csv else pq.read_table(stream).to_pandas()
         except (pa.ArrowException, ValueError, OSError) as error:
             got = (str(error).splitlines() or ["nothing"])[0]
             raise fail(InputError, str(path), "a readable table", got, "cut off") from error

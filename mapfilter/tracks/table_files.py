@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.csv as arrow_csv
 import pyarrow.parquet as pq
 
-from mapfilter._inputs import check_file, read_input
+from mapfilter._inputs import open_input, read_input
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.tracks.schema import SCHEMA
@@ -53,8 +53,7 @@ def read_table(table: str, path: Path) -> ReadTable:
     try:
         if path.suffix == ".csv":
             return _read_csv(table, path)
-        check_file(path)
-        with pq.ParquetFile(path) as source:
+        with open_input(path) as stream, pq.ParquetFile(stream) as source:
             rows = _as_frame(source.read(use_threads=False))
         return ReadTable(rows, np.arange(1, len(rows) + 1))
     except pd.errors.EmptyDataError as error:

@@ -173,7 +173,8 @@ def _model(run: ViewedRun) -> BayesModel | None:
 def _why(runs: Sequence[ViewedRun], cells: Sequence[str]) -> dict[str, Any] | None:
     """Return the constants of the first map filter's model."""
     model = next((found for run in runs if (found := _model(run)) is not None), None)
-    if model is None:
+    if type(model) is not BayesModel:
+        # Over measured maps serving cells count where they were measured, which is not in the page.
         return None
     site = dict(zip(model.area.cell_ids, model.area.site_of.tolist(), strict=True))
     return {**constants(model), "site": [site.get(cell, -1) for cell in cells]}

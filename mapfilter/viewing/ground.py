@@ -8,23 +8,22 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-import shapely
 from scipy.ndimage import distance_transform_edt
 
-from mapfilter._types import Floats32, Ints
+from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import Points, RadioField, RadioRouteDatabase
 from mapfilter.models.level_errors import roughness
 from mapfilter.positioning.bayes.area_map import BELOW_FLOOR_DB
 from mapfilter.radio.cells import CellPlan
 from mapfilter.viewing.arrays import packed, places, starts
+from mapfilter.viewing.streets import middle_lines
 
 LEVEL_DB = 0.3
 """Step of levels; 254 of them reach from below the floor to beside an antenna."""
 
 _MOST_LEVELS = 1_500_000
-_MOST_BEST_PX, _MOST_POINTS = 512, 400_000
+_MOST_BEST_PX, _MOST_POINTS, _MOST_PX = 512, 400_000, 12_000_000
 _FILLED_PX = 3
-_SIMPLER_M = 0.75
 _STEPS = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100)
 _LARGEST_STEP_M = 25.0
 
@@ -79,7 +78,7 @@ def cells_of(plan: CellPlan, frame: ViewFrame) -> list[dict[str, Any]]:
 def background(database: RadioRouteDatabase, frame: ViewFrame) -> dict[str, Any]:
     """Return streets and best servers of a whole database."""
     points = database.points()
-    few = len(points) <= _MOST_POINTS
+    few = len(points) <= _MOST_POINTS and database.lattice.rows * database.lattice.cols < _MOST_PX
     streets, ways = _streets(points, database, frame) if few else (_no_streets(), [])
     return {
         "streets": streets,
@@ -105,51 +104,22 @@ def _no_streets() -> dict[str, Any]:
 def _streets(
     points: Points, database: RadioRouteDatabase, frame: ViewFrame
 ) -> tuple[dict[str, Any], list[dict[str, str]]]:
-    """Join neighbouring points of a way to lines."""
+    """Return the points of ways, which lie two and more abreast, as lines along their middle."""
     lattice = database.lattice
-    order = np.argsort(points.point, kind="stable")
-    point, way = points.point[order], points.way_id[order]
-    east_m, north_m = lattice.east_north(points.row[order], points.col[order])
-    place = np.column_stack([east_m, north_m])
-    inner = points.col[order]
-    pairs = []
-    for right, down in ((1, 0), (0, 1), (1, 1), (-1, 1)):
-        target = point + down * lattice.cols + right
-        at = np.minimum(np.searchsorted(point, target), point.size - 1)
-        inside = (inner + right >= 0) & (inner + right < lattice.cols)
-        joined = (point[at] == target) & inside & (way[at] == way) & (way != 0)
-        if right and down:
-            # A diagonal where there is a way round it would be drawn as a triangle.
-            beside = _has(point, way, point + right) | _has(point, way, point + lattice.cols)
-            joined &= ~beside
-        pairs.append(np.column_stack([np.flatnonzero(joined), at[joined]]))
-    pair = np.concatenate(pairs)
-    ids, number = np.unique(way[pair[:, 0]], return_inverse=True)
-    lines = shapely.linestrings(place[pair])
-    found, owner = [], []
-    by_way = np.argsort(number, kind="stable")
-    for way_number, some in enumerate(
-        np.split(by_way, np.cumsum(np.bincount(number, minlength=ids.size))[:-1])
-    ):
-        merged = shapely.line_merge(shapely.multilinestrings(lines[some]))
-        parts = shapely.get_parts(shapely.simplify(merged, _SIMPLER_M * lattice.resolution_m))
-        found += list(parts)
-        owner += [way_number] * len(parts)
-    if not found:
+    way = np.zeros((lattice.rows, lattice.cols), dtype=np.int64)
+    way[points.row, points.col] = points.way_id
+    lines, ids = middle_lines(way)
+    if not lines:
         return _no_streets(), []
-    corner = shapely.get_coordinates(found)
+    corner = np.concatenate(lines)
+    east_m, north_m = lattice.east_north(corner[:, 0], corner[:, 1])
+    names, number = np.unique(np.array(ids, dtype=np.int64), return_inverse=True)
     return {
-        "first": starts(shapely.get_num_coordinates(found)),
-        "east": frame.east(corner[:, 0]),
-        "north": frame.north(corner[:, 1]),
-        "way": packed(owner, "u4"),
-    }, [{"id": str(one), "name": ""} for one in ids.tolist()]
-
-
-def _has(point: Ints, way: Ints, target: Ints) -> Any:
-    """Return whether there is a point of the same way at each target."""
-    at = np.minimum(np.searchsorted(point, target), point.size - 1)
-    return (point[at] == target) & (way[at] == way)
+        "first": starts([len(line) for line in lines]),
+        "east": frame.east(east_m),
+        "north": frame.north(north_m),
+        "way": packed(number.astype(np.int64), "u4"),
+    }, [{"id": str(one), "name": ""} for one in names.tolist()]
 
 
 def _bits(points: Points, database: RadioRouteDatabase, frame: ViewFrame) -> dict[str, Any]:

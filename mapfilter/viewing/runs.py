@@ -205,8 +205,9 @@ class _Readings:
         index = {cell: number for number, cell in enumerate(plan.ids)}
         why = {(one.time_s, one.kind, one.what): one.reason for one in estimate.unused}
         never = {one.kind for one in estimate.unused if one.reason is Reason.NOT_USED_BY_FILTER}
-        place = np.searchsorted(estimate.time_s, [epoch.time_s for epoch in epochs(log)])
-        of_epoch = dict(zip(place.tolist(), epochs(log), strict=True))
+        merged = epochs(log)
+        place = np.searchsorted(estimate.time_s, [epoch.time_s for epoch in merged])
+        of_epoch = dict(zip(place.tolist(), merged, strict=True))
         for number, at in enumerate(kept.tolist()):
             epoch = of_epoch.get(at)
             if epoch is None:

@@ -13,9 +13,10 @@ from mapfilter.config.sections import Config
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
-from mapfilter.database.measured import Readings, read_readings
+from mapfilter.database.measured import Readings, read_checked_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, StoreError, fail
+from mapfilter.rasters.geotiff import READINGS_TAG, tag_of
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
 from mapfilter.workflows.world import (
@@ -152,12 +153,23 @@ def run_dry_build(config: Config) -> BuildEstimate:
 
 
 def _measured(config: Config) -> tuple[Readings, RxLevRasters] | None:
-    """Return what the survey that made the rasters measured; None where it was not kept."""
+    """Return what the survey that made the rasters measured; None where it was not kept.
+
+    Raises
+    ------
+    StoreError
+        The readings, the levels and the deviations are not of one survey.
+    """
     if config.surveyed_plan is None or not config.readings_path.exists():
         return None
     if not config.deviation_path.exists():
         return None
-    return read_readings(config.readings_path), open_rasters(config.deviation_path)
+    readings_sha256 = tag_of(config.rasters_path, READINGS_TAG)
+    if tag_of(config.deviation_path, READINGS_TAG) != readings_sha256:
+        expected, hint = f"the survey of {config.rasters_path.name}", "run mapfilter predict again"
+        raise fail(StoreError, str(config.deviation_path), expected, "another one", hint)
+    readings = read_checked_readings(config.readings_path, readings_sha256)
+    return readings, open_rasters(config.deviation_path)
 
 
 def _draw(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
@@ -12,10 +13,11 @@ import numpy as np
 from mapfilter._io import VERSION, atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
-from mapfilter.database.measured import Readings, write_readings
+from mapfilter.database.measured import Readings, readings_parquet
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
+from mapfilter.rasters.geotiff import READINGS_TAG
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
@@ -176,6 +178,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
     validation = left_out.validation if left_out is not None else None
     factor = validation.deviation_factor if validation is not None else 1.0
     survey = fit_survey(measurements, options, plan=plan, predicted=predicted)
+    readings = readings_parquet(readings_of(measurements))
     ids = write_survey(
         survey,
         lattice,
@@ -183,11 +186,15 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         deviation,
         fill=section.fill,
         deviation_factor=factor,
-        tags={"SOFTWARE": f"mapfilter {VERSION}", "MODEL": f"survey {options.method}"},
+        tags={
+            "SOFTWARE": f"mapfilter {VERSION}",
+            "MODEL": f"survey {options.method}",
+            READINGS_TAG: hashlib.sha256(readings).hexdigest(),
+        },
         progress=progress,
     )
     with atomic_file(config.readings_path) as temporary:
-        write_readings(readings_of(measurements), temporary)
+        temporary.write_bytes(readings)
     plan_path = config.output.dir / "cells.csv"
     cells = surveyed_plan(
         survey,

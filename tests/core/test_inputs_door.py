@@ -12,16 +12,27 @@ from pathlib import Path
 
 import geopandas
 import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 import rasterio
 import shapely
 
 import mapfilter
+from mapfilter import _inputs
 from mapfilter._gdal import open_raster
 from mapfilter._inputs import open_input, read_input
 from mapfilter._ogr import vector_source
 from mapfilter.errors import InputError
+from mapfilter.experiments.sweep.table import SCHEMA, read_runs
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.estimate_store import read_estimate, write_estimate
+from mapfilter.roads import vector
 from mapfilter.roads.vector import read_layer
+from mapfilter.tracks.log import make_log
+from mapfilter.tracks.sensors import read_sensors
+from mapfilter.tracks.store import write_log
+from mapfilter.tracks.table_files import read_table as read_log_table
 
 CRS = "EPSG:32635"
 BOX = (385000.0, 6671000.0, 386000.0, 6672000.0)
@@ -258,6 +269,46 @@ def test_every_reader_refuses_a_pipe(tmp_path):
     assert sum(line.startswith("refused") for line in said) == len(calls)
 
 
+def swapped_after_check(path, monkeypatch):
+    """Put something else in a file's place as soon as it was found to be a regular file."""
+    check = _inputs._check_regular
+
+    def checked(checked_path, mode, kind):
+        check(checked_path, mode, kind)
+        if Path(checked_path) == path:
+            path.unlink()
+            path.write_bytes(b"of somebody else")
+
+    monkeypatch.setattr(_inputs, "_check_regular", checked)
+
+
+def test_what_was_checked_is_what_is_read(tmp_path, monkeypatch):
+    """And not what took its place under the same name."""
+    log = tmp_path / "log"
+    rows = pd.DataFrame({"time_s": [0.0, 1.0], "x_mps2": 1.0, "y_mps2": 0.0, "z_mps2": 9.8})
+    motion = pd.DataFrame({"time_s": [0.0, 1.0], "step_m": 1.0, "heading_rad": 0.0})
+    write_log(make_log(CRS, motion=motion), log, sensors={"accelerometer": rows})
+    estimate = tmp_path / "estimate.parquet"
+    write_estimate(TrackEstimate.of_fixes(CRS, "candidate", ()), estimate)
+    layer = tmp_path / "roads.parquet"
+    line = shapely.LineString([(385100, 6671100), (385900, 6671900)])
+    geopandas.GeoDataFrame({"a": [1]}, geometry=[line], crs=CRS).to_parquet(layer)
+    runs = tmp_path / "runs.parquet"
+    pq.write_table(SCHEMA.empty_table(), runs)
+    monkeypatch.setattr(vector, "vector_source", lambda _: None)
+    for path, read in (
+        (estimate, lambda: read_estimate(estimate)),
+        (log / "motion.parquet", lambda: read_log_table("motion", log / "motion.parquet")),
+        (log / "sensors" / "accelerometer.parquet", lambda: read_sensors(log)),
+        (runs, lambda: read_runs(runs)),
+        (layer, lambda: read_layer(layer, CRS, BOX, None, [])),
+    ):
+        with monkeypatch.context() as patch:
+            swapped_after_check(path, patch)
+            read()
+        assert path.read_bytes() == b"of somebody else", path
+
+
 DOORS = {"_inputs.py", "_gdal.py", "_ogr.py", "roads/vector.py"}
 """Modules that may open what others made, or give GDAL what has passed a door."""
 ALLOWED = {
@@ -266,7 +317,7 @@ ALLOWED = {
     ("experiments/", "read_table"), ("experiments/", "load"), ("database/export.py", "open"),
     ("positioning/estimate_store.py", "ParquetFile"), ("learning/tracks.py", "load"),
     ("survey/survey_rasters.py", "load"), ("survey/survey_rasters.py", "open"),
-    # After check_file, or from bytes that were read.
+    # From files that a door opened, or from bytes that were read.
     ("tracks/sensors.py", "read_csv"), ("tracks/sensors.py", "read_table"),
     ("tracks/table_files.py", "read_csv"), ("tracks/table_files.py", "ParquetFile"),
     ("tracks/readers/lines.py", "read_csv"), ("positioning/fingerprints/tables.py", "read_csv"),

@@ -251,7 +251,7 @@ def test_what_cannot_be_kept_is_not_removed_and_kept_by_the_next_write(tmp_path,
             (new / "part").write_text("new")
             (folder / "mine").write_text("of the user")
     assert read_folder(folder) == {"part": "new"}
-    monkeypatch.setattr(_io, "_is_alive", lambda _: False)
+    monkeypatch.setattr(_io, "is_left", lambda _: True)
     write_folder(folder, "newer")
     assert read_folder(tmp_path / "folder.kept") == {"mine": "of the user"}
     assert names(tmp_path) == ["folder", "folder.kept"]

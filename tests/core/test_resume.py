@@ -43,8 +43,11 @@ def test_a_computation_of_other_code_is_not_resumed(tmp_path, monkeypatch):
     part.touch()
     assert start_or_resume(head, {"seed": 1}, [part], resume=True)
     monkeypatch.setattr(_resume, "code_digest", lambda: "of other code")
-    with pytest.raises(ConfigError, match="found another version of mapfilter"):
+    with pytest.raises(ConfigError, match="found another version of mapfilter") as caught:
         start_or_resume(head, {"seed": 1}, [part], resume=True, names={"seed": "seed"})
+    assert "mapfilter or a library was updated since" in str(caught.value)
+    with pytest.raises(ConfigError, match="settings changed since"):
+        start_or_resume(head, {"seed": 2}, [part], resume=True, names={"seed": "seed"})
     assert part.exists()
     assert not start_or_resume(head, {"seed": 1}, [part], resume=False)
     assert not part.exists()
@@ -64,6 +67,18 @@ def test_no_flipped_bit_of_a_part_is_overlooked(tmp_path):
     for size in range(len(whole)):
         file.write_bytes(whole[:size])
         assert load_part(file) is None
+
+
+def test_two_hosts_write_a_part_beside_each_other(tmp_path, monkeypatch):
+    """Their processes may have one number."""
+    beside = []
+    monkeypatch.setattr(
+        type(tmp_path), "write_bytes", lambda self, _: (beside.append(self.name), self.touch())
+    )
+    for _ in range(2):
+        save_part(tmp_path / "part-1", b"finished")
+    assert len(set(beside)) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["part-1"]
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), Stopped(15)], ids=repr)

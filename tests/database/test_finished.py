@@ -282,6 +282,30 @@ def test_tiles_stay_only_where_going_on_makes_sense(tmp_path, error, kept):
     assert tiles.folder.exists() is kept
 
 
+@pytest.mark.parametrize("error", [None, InputError, KeyboardInterrupt])
+def test_tiles_left_by_other_code_go_when_the_database_is_finished(tmp_path, error):
+    """After an update nobody would take them over, or remove them."""
+    older = FinishedParts(tmp_path / "db", lambda: "before the update", name="tile")
+    others = [
+        FinishedParts(tmp_path / "db", lambda: "k", name="journey"),
+        FinishedParts(tmp_path / "db2", lambda: "k", name="tile"),
+        FinishedParts(tmp_path / "[d]b", lambda: "k", name="tile"),
+    ]
+    for one in (older, *others):
+        one.save(0, b"rows")
+    (tmp_path / ".db.tiles-of-mine").mkdir()
+    with (
+        contextlib.suppress(BaseException),
+        FinishedParts(tmp_path / "db", lambda: "now", name="tile") as tiles,
+    ):
+        tiles.save(0, b"rows")
+        if error is not None:
+            raise error(())
+    assert older.folder.exists() is (error is not None)
+    assert all(one.folder.exists() for one in others)
+    assert (tmp_path / ".db.tiles-of-mine").exists()
+
+
 def test_who_never_asked_for_tiles_needs_no_key(tmp_path):
     with FinishedParts(tmp_path / "db", lambda: pytest.fail("the key was asked for"), name="tile"):
         pass

@@ -57,6 +57,8 @@ def test_the_usual_options():
         "converge_log_odds": -12.0,
         "converge_threshold": 2.0,
         "map_nats_per_m": 0.04,
+        "unclear_below_mass": 0.8,
+        "clear_from_mass": 0.95,
     }
     evidence = EvidenceOptions()
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)
@@ -77,7 +79,7 @@ def test_the_usual_options():
     rest = {name: getattr(usual, name) for name in ("slow_db", "fast_db", "white_db")}
     assert replace(levels, **rest) == usual
     assert replace(model.evidence, levels=usual) == evidence
-    particles = ParticleOptions(switch_mass=0.995, switch_hold_m=20.0, split_mass=0.8)
+    particles = ParticleOptions(switch_mass=0.995, switch_hold_m=20.0)
     assert (bound.options, bound.rules) == (particles, AlternativeRules())
     # The step of timing advance is rounded to decimetres in the options.
     assert (bound.satellites, bound.timing) == (GnssOptions(), TimingOptions(step_m=553.5))

@@ -1,5 +1,7 @@
 """``check`` looks at the log or recordings that a configuration names, and at a survey's times."""
 
+import math
+
 import pandas as pd
 import pytest
 from command_line import ONE, change, mapfilter, settings
@@ -35,6 +37,16 @@ def test_cells_that_the_plan_lacks(check, log):
     assert check(log)["log-cells-unknown"]["severity"] == "error"
     change(log / "radio.csv", cell=lambda c: c.where(c.isna()), arfcn=lambda n: n.where(n.isna()))
     assert "No serving cell is named" in check(log)["log-cells-unknown"]["evidence"]
+
+
+def test_headings_by_a_compass_are_a_finding(check, log):
+    change(log / "motion.csv", heading_rad=lambda heading: math.pi / 2 - heading)
+    found = check(log)
+    assert set(found) == {"log-headings"}
+    assert found["log-headings"]["severity"] == "warning"
+    assert found["log-headings"]["where"] == str(log)
+    assert "headings run clockwise from north" in found["log-headings"]["evidence"]
+    assert "pi/2 minus a" in found["log-headings"]["remedy"]
 
 
 def test_motion_alone_is_no_fault(check, log):

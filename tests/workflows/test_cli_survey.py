@@ -10,6 +10,7 @@ from command_line import assert_done, assert_refused, contents, mapfilter, setti
 from mapfilter.geodesy import unproject
 from mapfilter.rasters.raster_set import open_rasters
 
+OF_SURVEY = ("readings.parquet", "deviation.tif")
 HEADER = "cell,lat,lon,level_dbm,time,accuracy_m\n"
 
 
@@ -85,6 +86,29 @@ def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):
         )
     ).json
     assert built["points"] > 1000
+
+
+def test_readings_of_another_survey_or_damaged_ones_are_refused(survey, tmp_path):
+    """One flipped bit of the footer could end the process in the Parquet library."""
+    config, folders = survey / "survey.toml", (tmp_path / "one", tmp_path / "other")
+    fast = settings(prediction__survey__cross_validate="false")
+    for folder, seed in zip(folders, (0, 1), strict=True):
+        drives = settings(prediction__survey__files=f'["{survey}/drives/drive-{seed}.csv"]')
+        assert_done(mapfilter("predict", "-c", config, "--out", folder, *drives, *fast))
+    one, other = folders
+    build = "build", "-c", config, "--out", one, *settings(cells__plan=one / "cells.csv")
+    whole = {name: (one / f"rxlev-{name}").read_bytes() for name in OF_SURVEY}
+    flipped = bytearray(whole["readings.parquet"])
+    flipped[-6] ^= 4
+    for name, data in (
+        ("readings.parquet", bytes(flipped)),
+        ("readings.parquet", (other / "rxlev-readings.parquet").read_bytes()),
+        ("deviation.tif", (other / "rxlev-deviation.tif").read_bytes()),
+    ):
+        (one / f"rxlev-{name}").write_bytes(data)
+        assert_refused(mapfilter(*build), f"rxlev-{name}", "run mapfilter predict again")
+        (one / f"rxlev-{name}").write_bytes(whole[name])
+    assert_done(mapfilter(*build))
 
 
 def test_a_survey_calibrates_a_prediction(survey, world, tmp_path):

@@ -11,8 +11,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mapfilter._inputs import check_file
-from mapfilter._io import atomic_file, read_json, sha256_file, write_json
+from mapfilter._inputs import open_input
+from mapfilter._io import atomic_file, read_json, sha256_file, sha256_of, write_json
 from mapfilter._resume import load_part, save_part
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import Accuracy
@@ -143,13 +143,14 @@ def read_runs(path: Path) -> pd.DataFrame:
     StoreError
         It is missing, changed, cut off or no table of a sweep.
     """
-    if path.exists():
-        check_file(path, StoreError)
-    if path.with_name(HEAD).is_file() and not is_whole(path):
-        hint = "changed after it was written, or a sweep that is not finished: go on with --resume"
-        raise fail(StoreError, str(path), f"the table of {HEAD}", "another", hint)
+    head = path.with_name(HEAD)
     try:
-        table = pq.read_table(path)
+        with open_input(path, StoreError) as stream:
+            if head.is_file() and read_json(head).get(_SHA256) != sha256_of(stream):
+                hint = "changed after it was written, or a sweep that "
+                hint += "is not finished: go on with --resume"
+                raise fail(StoreError, str(path), f"the table of {HEAD}", "another", hint)
+            table = pq.read_table(stream)
     except (OSError, pa.ArrowInvalid) as error:
         raise fail(StoreError, str(path), "the table of a sweep", error, "cut off") from error
     lacking = set(SCHEMA.names) - set(table.column_names)

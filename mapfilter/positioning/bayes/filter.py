@@ -147,7 +147,8 @@ class BayesPositioner(Filter[BayesState]):
         """
         belief = self.filters[True].init(Start(None, True, east_m, north_m, sd_m), rng)
         near = -expm1(-0.5 * (NEAR_M / sd_m) ** 2) if sd_m > 0 else 1.0
-        status = Status.TRACKING if near > self.options.split_mass else Status.SEARCHING
+        least = max(self.options.split_mass, self.rules.unclear_below_mass)
+        status = Status.TRACKING if near > least else Status.SEARCHING
         return replace(self.begin(), belief=replace(belief, status=status), status=status)
 
     def step(
@@ -156,7 +157,10 @@ class BayesPositioner(Filter[BayesState]):
         """Process one epoch."""
         if epoch.fix and not (isfinite(epoch.fix.east_m) and isfinite(epoch.fix.north_m)):
             epoch = replace(epoch, fix=None)
-        before, spacing_m = state.status, state.particle_spacing_m
+        unclear, spacing_m = state.unclear, state.particle_spacing_m
+        if unclear:
+            state = replace(state, status=Status.TRACKING, unclear=False)
+        before = state.status
         heard = epoch.radio
         watch, epoch, (motion, radio) = watched(state.watch, epoch)
         state, unused = self._moved(replace(state, watch=watch), epoch, rng)
@@ -180,7 +184,9 @@ class BayesPositioner(Filter[BayesState]):
             reason = reason if why is Reason.USED else why
             if state.belief is not None:
                 belief, status = report(before, state.belief, state.status)
-                state = self._split(replace(state, belief=belief, status=status))
+                state = replace(state, belief=belief, status=status)
+                measured = motion is Reason.USED
+                state = self._in_one_place(state, measured=measured, was_unclear=unclear)
         if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
@@ -379,18 +385,24 @@ class BayesPositioner(Filter[BayesState]):
         )
         return after, Reason.USED
 
-    def _split(self, state: BayesState) -> BayesState:
-        """Return a state that is LOST if its belief has spread over more than one place.
+    def _in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
+        """Return a state that is LOST while its belief is spread over more than one place.
 
-        Readings apply this rule, too, but motion may go on without any.
+        Below the mass at which it searches again, it has to converge anew. Motion that is not
+        measured spreads it to all sides, so it is LOST earlier, but kept as found: it is clear
+        again when it has gathered.
         """
-        belief = state.belief
+        belief, rules = state.belief, self.rules
         if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
             return state
-        if belief.summary.mass_50m >= self.options.split_mass:
-            return state
-        belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
-        return replace(state, belief=belief, status=Status.LOST)
+        mass = belief.summary.mass_50m
+        if mass < self.options.split_mass:
+            belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
+            return replace(state, belief=belief, status=Status.LOST)
+        least = 0.0 if measured else rules.unclear_below_mass
+        if was_unclear:
+            least = rules.clear_from_mass
+        return state if mass >= least else replace(state, status=Status.LOST, unclear=True)
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator

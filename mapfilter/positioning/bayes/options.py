@@ -48,9 +48,6 @@ _VEHICLE_MOTION: Mapping[str, float] = {
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
 
-_SPLIT_MASS = 0.8
-"""Share of the belief within 50 m of the leading hypothesis below which the filter is lost."""
-
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
 _CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
@@ -245,12 +242,20 @@ class BayesFilter(Options):
             min_particles=self.min_particles,
             switch_mass=self.switch_mass,
             switch_hold_m=self.switch_hold_m,
-            split_mass=min(_SPLIT_MASS, self.switch_mass),
         )
         rules = AlternativeRules()
+        rules = replace(
+            rules,
+            unclear_below_mass=min(rules.unclear_below_mass, self.switch_mass),
+            clear_from_mass=min(rules.clear_from_mass, self.switch_mass),
+        )
         if not area.cell_ids:
             rules = replace(
-                rules, converge_log_odds=_CONVERGE_BY_MAP, map_nats_per_m=_NATS_PER_M_BY_MAP
+                rules,
+                converge_log_odds=_CONVERGE_BY_MAP,
+                map_nats_per_m=_NATS_PER_M_BY_MAP,
+                unclear_below_mass=0.0,
+                clear_from_mass=0.0,
             )
             particles = replace(
                 particles,
@@ -258,7 +263,6 @@ class BayesFilter(Options):
                 min_search_particles=_MORE_BY_MAP * self.min_search_particles,
                 switch_mass=max(self.switch_mass, _LEAST_MASS_BY_MAP),
                 switch_hold_m=max(self.switch_hold_m, _LEAST_HOLD_BY_MAP_M),
-                split_mass=ParticleOptions().split_mass,
             )
         satellites = GnssOptions(
             zenith_m=self.satellite_sd_m,

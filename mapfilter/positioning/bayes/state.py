@@ -35,6 +35,8 @@ class BayesState:
         None before the first report with a known cell, fix or satellite.
     status : Status
         As reported; that of the belief may differ while it is LOST.
+    unclear : bool
+        LOST only because the belief is spread over more than one place.
     sources : mapping of str to object
         State of each source of evidence by its name.
     reckoning : DeadReckoning
@@ -59,6 +61,7 @@ class BayesState:
 
     belief: MapBelief | None = None
     status: Status = Status.SEARCHING
+    unclear: bool = False
     sources: Mapping[str, Any] = field(default_factory=dict)
     reckoning: DeadReckoning = field(default_factory=DeadReckoning)
     heading_rad: float = nan

@@ -18,15 +18,16 @@ def joined_parts(parts: list[pd.DataFrame]) -> pd.DataFrame:
         return parts.pop()
     names = list(parts[0].columns)
     columns = {}
+    # Column by column, so that no table is in memory twice.
+    tables = [dict(part.items()) for part in parts]
+    parts.clear()
     for name in names:
-        # Column by column, so that no table is in memory twice.
-        own = [part.pop(name) for part in parts]
+        own = [table.pop(name) for table in tables]
         if isinstance(own[0].dtype, pd.CategoricalDtype):
             every = union_categoricals(own, sort_categories=True)
             columns[name] = _categories(every.codes, every.categories.tolist())
         else:
             columns[name] = np.concatenate([values.to_numpy() for values in own])
-    parts.clear()
     return pd.DataFrame(columns, copy=False)
 
 

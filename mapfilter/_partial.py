@@ -1,0 +1,77 @@
+"""Names of half-written results, which tell whether their process still lives.
+
+A name is ``.NAME.partial-HOST-PID-TOKEN``: folders are shared by hosts whose process numbers mean
+nothing to each other. TOKEN is random, and tells apart the results that one process writes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import glob
+import hashlib
+import os
+import platform
+import re
+import tempfile
+import time
+import uuid
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ABANDONED_S = 7 * 86400.0
+"""So long after its last change, the folder of a process of another host is taken for left."""
+_NAME = re.compile(r"(?:(?P<host>h[0-9a-f]{8})-)?(?P<pid>\d+)-[^-]*")
+
+
+def new_partial(path: Path) -> Path:
+    """Make a new hidden folder beside a path; raises OSError."""
+    prefix = f"{_prefix(path)}{_host()}-{os.getpid()}-"
+    return Path(tempfile.mkdtemp(prefix=prefix, dir=path.parent))
+
+
+def partials(path: Path) -> Iterator[Path]:
+    """Yield the folders of half-written results of a path."""
+    yield from sorted(path.parent.glob(f"{glob.escape(_prefix(path))}*"))
+
+
+def is_left(partial: Path) -> bool:
+    """Return whether nobody writes into a folder any more.
+
+    Of a process of this host that is known; one of another host may be at work for a week since
+    the last change of a file.
+    """
+    found = _NAME.fullmatch(partial.name.rpartition(".partial-")[2])
+    if found is None:
+        return True
+    if found["host"] in (None, _host()):
+        return not _is_alive(found["pid"])
+    return time.time() - _changed_s(partial) > ABANDONED_S
+
+
+def _prefix(path: Path) -> str:
+    return f".{path.name}.partial-"
+
+
+@cache
+def _host() -> str:
+    """Return a short name of this host; two containers on it have two."""
+    known = f"{platform.node()}\0{uuid.getnode()}"
+    return f"h{hashlib.sha256(known.encode()).hexdigest()[:8]}"
+
+
+def _changed_s(folder: Path) -> float:
+    newest_s = 0.0
+    for path in (folder, *folder.rglob("*")):
+        with contextlib.suppress(OSError):
+            newest_s = max(newest_s, path.lstat().st_mtime)
+    return newest_s
+
+
+def _is_alive(pid: str) -> bool:
+    try:
+        with contextlib.suppress(PermissionError):
+            os.kill(int(pid), 0)
+    except (ValueError, OverflowError, ProcessLookupError):
+        return False
+    return True

@@ -1,0 +1,112 @@
+"""Half-written results of processes that live, of those that ended, and of other hosts."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mapfilter import _partial
+from mapfilter._io import atomic_file, replaced_files
+from mapfilter._partial import ABANDONED_S, is_left, new_partial, partials
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.fixture
+def ended():
+    """The number of a process that has ended."""
+    done = subprocess.run([sys.executable, "-c", ""], check=True)
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        process.wait()
+    assert done.returncode == 0
+    return process.pid
+
+
+@pytest.fixture
+def on(monkeypatch):
+    """Make this process one of another host."""
+
+    def on(name):
+        monkeypatch.setattr(_partial.platform, "node", lambda: name)
+        _partial._host.cache_clear()
+
+    yield on
+    monkeypatch.undo()
+    _partial._host.cache_clear()
+
+
+def test_what_a_process_of_another_host_writes_is_left_alone(tmp_path, on, monkeypatch, ended):
+    """Its number is that of a process that has ended here."""
+    path = tmp_path / "result"
+    on("there")
+    monkeypatch.setattr(_partial.os, "getpid", lambda: ended)
+    partial = new_partial(path)
+    (partial / "new").write_text("half")
+    on("here")
+    assert list(partials(path)) == [partial]
+    assert not is_left(partial)
+    with atomic_file(path) as temporary:
+        temporary.write_text("of this host")
+    assert partial.name in names(tmp_path)
+    on("there")
+    assert is_left(partial)
+    with atomic_file(path) as temporary:
+        temporary.write_text("of that host")
+    assert names(tmp_path) == ["result"]
+
+
+def test_a_folder_of_another_host_is_removed_a_week_after_its_last_change(tmp_path, on):
+    on("there")
+    partial = new_partial(tmp_path / "result")
+    (partial / "new").write_text("half")
+    on("here")
+    long_ago_s = partial.stat().st_mtime - ABANDONED_S - 60
+    os.utime(partial, (long_ago_s, long_ago_s))
+    assert not is_left(partial), "a file in it is younger"
+    os.utime(partial / "new", (long_ago_s, long_ago_s))
+    assert is_left(partial)
+
+
+def test_names_of_one_process_differ(tmp_path):
+    one, other = new_partial(tmp_path / "a-b"), new_partial(tmp_path / "a-b")
+    assert one != other
+    assert not is_left(one)
+    assert set(partials(tmp_path / "a-b")) == {one, other}
+    assert not list(partials(tmp_path / "a"))
+
+
+@pytest.mark.parametrize("name", ["", "x", "0x-1", "h12345678-x-1"])
+def test_names_without_a_process_are_of_nobody(tmp_path, name):
+    (tmp_path / f".result.partial-{name}").mkdir()
+    assert is_left(tmp_path / f".result.partial-{name}")
+
+
+def test_files_are_on_the_disk_before_they_replace_others(tmp_path, monkeypatch):
+    folder = tmp_path / "report"
+    (folder / "deep").mkdir(parents=True)
+    (folder / "a.txt").write_text("old")
+    events = []
+    fsync, replace = os.fsync, type(tmp_path).replace
+
+    def flushed(handle):
+        events.append(("flushed", Path(f"/proc/self/fd/{handle}").readlink().name))
+        fsync(handle)
+
+    def replaced(self, target):
+        events.append(("replaced", target.name))
+        return replace(self, target)
+
+    monkeypatch.setattr(os, "fsync", flushed)
+    monkeypatch.setattr(type(tmp_path), "replace", replaced)
+    with replaced_files(folder, lambda: ()) as new:
+        (new / "a.txt").write_text("new")
+        (new / "deep").mkdir()
+        (new / "deep" / "b.txt").write_text("new")
+    for name in ("a.txt", "b.txt"):
+        assert events.index(("flushed", name)) < events.index(("replaced", name))
+    after = [name for what, name in events[events.index(("replaced", "b.txt")) :]]
+    assert {"deep", "report"} <= set(after), "the lists of names are flushed, too"

@@ -1,0 +1,88 @@
+"""A belief that is spread over two places is lost, and tracked again once it has gathered."""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pytest
+from made_town import Town
+
+from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.epochs import Epoch
+
+SEARCHING, TRACKING, LOST = Status.SEARCHING, Status.TRACKING, Status.LOST
+
+
+@pytest.fixture(scope="module")
+def positioner():
+    few = BayesFilter(max_particles=2000, min_search_particles=500, min_particles=200)
+    return few.over_area(Town.of(1).area())
+
+
+def in_places(state, *shares):
+    """The state with shares of its belief in places 300 m apart."""
+    place = state.belief.state.copy()
+    which = np.arange(place.shape[1]) % len(shares)
+    place[0], place[1] = 100.0 + 300.0 * which, 100.0
+    weight = np.array(shares)[which]
+    belief = replace(state.belief, state=place, log_weight=np.log(weight / weight.sum()))
+    return replace(state, belief=belief)
+
+
+UNMEASURED, STANDING = MotionStep(nan, nan), MotionStep(0.0, nan)
+
+
+def statuses(positioner, *sequence, motion=UNMEASURED):
+    """Status reported, and that of the belief, after epochs with beliefs of given shares.
+
+    The standing of an epoch leaves the belief as it is given.
+    """
+    rng = np.random.default_rng(1)
+    state = positioner.begin_at(500_100.0, 4_500_100.0, 5.0, rng)
+    for time_s, shares in enumerate(sequence):
+        epoch = Epoch(float(time_s), (motion,))
+        state, output = positioner.step(in_places(state, *shares), epoch, rng)
+        yield output.fix.status, state.belief.status
+
+
+def test_without_motion_a_belief_in_two_places_is_lost_until_it_has_gathered(positioner):
+    leading = 0.85, 0.75, 0.9, 0.97, 0.9, 0.6
+    assert list(statuses(positioner, *((x, 1 - x) for x in leading))) == [
+        (TRACKING, TRACKING),
+        (LOST, TRACKING),
+        (LOST, TRACKING),
+        (TRACKING, TRACKING),
+        (TRACKING, TRACKING),
+        (LOST, TRACKING),
+    ]
+
+
+def test_a_belief_that_is_more_probably_elsewhere_searches_again(positioner):
+    found = list(statuses(positioner, (0.4, 0.3, 0.3), (0.97, 0.02, 0.01)))
+    assert found == [(LOST, SEARCHING), (LOST, SEARCHING)]
+
+
+def test_with_motion_half_of_the_belief_is_enough(positioner):
+    found = list(statuses(positioner, (0.85, 0.15), (0.55, 0.45), motion=STANDING))
+    assert found == [(TRACKING, TRACKING)] * 2
+
+
+def test_what_was_lost_by_its_spread_is_not_held_to_the_rules_of_a_new_search(positioner):
+    """The null hypothesis may be anything that does not prevail by itself."""
+    rng = np.random.default_rng(2)
+    state = positioner.begin_at(500_100.0, 4_500_100.0, 5.0, rng)
+    state = replace(state, null=replace(state.null, log_odds=-0.1))
+    state, output = positioner.step(in_places(state, 0.7, 0.3), Epoch(0.0, (UNMEASURED,)), rng)
+    assert (output.fix.status, state.unclear) == (LOST, True)
+    # Motion that is measured again does not make it clear.
+    state, output = positioner.step(in_places(state, 0.9, 0.1), Epoch(1.0, (STANDING,)), rng)
+    assert (output.fix.status, state.unclear) == (LOST, True)
+    state, output = positioner.step(in_places(state, 0.99, 0.01), Epoch(2.0, (STANDING,)), rng)
+    assert (output.fix.status, state.unclear) == (TRACKING, False)
+
+
+def test_a_wide_known_start_counts_as_several_places(positioner):
+    rng = np.random.default_rng(3)
+    assert positioner.begin_at(500_100.0, 4_500_100.0, 27.0, rng).status is TRACKING
+    assert positioner.begin_at(500_100.0, 4_500_100.0, 29.0, rng).status is SEARCHING

@@ -1,0 +1,34 @@
+"""Values that a plan lacks and that take a default are named where the plan is used."""
+
+import pandas as pd
+import pytest
+from command_line import assert_done, mapfilter, settings
+
+NOTES = [
+    "eirp_dbm = 47 for 3 of 3 cells without one",
+    "frequency_mhz = 2100 for 3 of 3 cells without one",
+]
+
+
+@pytest.fixture
+def plain(world, tmp_path):
+    """Settings of a plan without power and frequency, its columns named by others."""
+    plan = pd.read_csv(world.plan).drop(columns=["eirp_dbm", "frequency_mhz"])
+    plan.rename(columns={"height_m": "Height"}).to_csv(tmp_path / "plan.csv", index=False)
+    given = {"cells__plan": tmp_path / "plan.csv", "cells__eirp_dbm": 47.0}
+    return settings(**given, cells__frequency_mhz=2100.0, cells__columns='{height_m="Height"}')
+
+
+@pytest.mark.parametrize("command", ["predict", "build"])
+def test_defaults_are_noted(command, world, plain, tmp_path):
+    if command == "build":
+        rasters = settings(rasters__path=world.rasters, rasters__quantity='"level"')
+        plain = [*plain, *rasters]
+    done = mapfilter(command, "-c", world.toml, "--out", tmp_path / "out", "--json", *plain)
+    notes = assert_done(done).json["notes"]
+    assert [note for note in notes if "without one" in note] == NOTES
+
+
+def test_a_whole_plan_needs_no_note(world, tmp_path):
+    done = mapfilter("predict", "-c", world.toml, "--out", tmp_path / "out", "--json")
+    assert not [note for note in assert_done(done).json["notes"] if "without one" in note]
