@@ -154,6 +154,15 @@ def test_two_filters_share_their_time(browser, replay):
         assert maps.count() == 1
 
 
+def test_what_the_map_shows_can_be_switched_off(browser, replay):
+    with page(browser, replay, at="#t=70") as view:
+        pictures = "(MF.frameSvg(MF.page).match(/<image/g) || []).length"
+        with_belief = view.page.evaluate(pictures)
+        view.page.locator(".legend").first.evaluate("(one) => { one.open = true; }")
+        view.page.get_by_label("belief", exact=True).first.uncheck()
+        assert view.page.evaluate(pictures) == with_belief - 1
+
+
 def test_names_of_others_are_text(browser, replay):
     with page(browser, replay) as view:
         assert view.page.locator("img, iframe, object, embed").count() == 0

@@ -115,8 +115,8 @@
     if (points) picture(pen, points, layer && !layer.plain ? 0.35 : 1);
     if (ground.streets) {
       const plain = !layer || layer.plain;
-      pen.lines(ground.streets, { stroke: plain ? MF.color.street : MF.color.card, alpha: plain ? 1 : 0.4,
-        width: MF.clamp(STREET_M * camera.scale, 0.6, 24) });
+      pen.lines(ground.streets, { stroke: plain ? MF.color.street : MF.color.card, alpha: plain ? 1 : 0.3,
+        width: MF.clamp((plain ? STREET_M : 1.2) * camera.scale, 0.6, 24) });
     }
     if (run) {
       MF.drawTruth(pen, run);

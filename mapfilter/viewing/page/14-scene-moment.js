@@ -32,6 +32,8 @@
     const at = (one) => [camera.x(one.east, view), camera.y(one.north, view)];
     const e = run.epochs;
     const here = run.place(i);
+    const way = e.way?.[i] > 0 && show.hypotheses ? ground.wayLines(e.way[i] - 1) : null;
+    if (way) pen.lines(way, { stroke: color.accent, alpha: 0.3, width: MF.clamp(5 * camera.scale, 2, 20) });
     if (show.belief && density) MF.drawPicture(pen, density);
     MF.drawTrack(pen, run, Math.max(0, i - TRAIL), i, { width: 4, alpha: 1 });
 
@@ -76,13 +78,13 @@
   };
 
   // The place that somebody pointed at.
-  MF.drawPlace = (pen, place) => {
+  MF.drawPlace = (pen, place, words = "there") => {
     const x = pen.camera.x(place.east, pen.view);
     const y = pen.camera.y(place.north, pen.view);
     for (const [stroke, width] of [[MF.color.halo, 6], [MF.color.there, 3]]) {
       pen.path([[x - 8, y - 8], [x + 8, y + 8]], { stroke, width });
       pen.path([[x - 8, y + 8], [x + 8, y - 8]], { stroke, width });
     }
-    pen.text("there", x + 13, y, { fill: MF.color.there, halo: MF.color.halo, size: 12, weight: 650 });
+    pen.text(words, x + 13, y, { fill: MF.color.there, halo: MF.color.halo, size: 12, weight: 650 });
   };
 })();

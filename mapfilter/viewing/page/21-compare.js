@@ -1,8 +1,8 @@
 "use strict";
 // "Why here?" as rows: what each reading says for the estimate against another place.
 (() => {
-  const TERMS = { streets: "Streets and motion", serving: "Serving cell", level: "Level", absent: "Expected cells that are missing",
-    bound: "Levels known as bounds", timing: "Timing advance", fix: "Position fix", gnss: "Satellites", map: "Map", other: "Other readings" };
+  const TERMS = { streets: "Streets, motion", serving: "Serving cell", level: "Level", absent: "Cells not reported",
+    bound: "Levels as bounds", timing: "Timing advance", fix: "Position fix", gnss: "Satellites", map: "Map", other: "Other readings" };
   const nameOf = (ground, term, cell) => {
     const words = TERMS[term] ?? term;
     return cell >= 0 && (term === "serving" || term === "level" || term === "timing") ? `${words} ${ground.cellName(cell)}` : words;
