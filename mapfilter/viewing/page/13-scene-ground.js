@@ -1,7 +1,7 @@
 "use strict";
 // What stays while time runs: streets, buildings, a layer, sites with their sectors, the whole track, the scale bar.
 (() => {
-  // Streets are rows of lattice points 5 m apart: a little wider, and they close.
+  // Width of streets on the map: centre lines are what the database has.
   const STREET_M = 6;
 
   const picture = (pen, one, alpha = 1) => {

@@ -41,6 +41,12 @@
     const marks = show.radio ? links(pen, ground, readings, known(here) ? here : null) : new Map();
     MF.drawSites(pen, ground, marks);
 
+    const truth = run.truthAt(i);
+    if (known(truth)) {
+      const [tx, ty] = at(truth);
+      if (known(here)) pen.path([at(here), [tx, ty]], { stroke: color.truth, width: 1, dash: [2, 2] });
+      pen.path([[tx, ty - 8], [tx + 8, ty], [tx, ty + 8], [tx - 8, ty]], { fill: color.card, stroke: color.truth, width: 2.4 }, true);
+    }
     if (known(here)) {
       const [x, y] = at(here);
       const status = MF.statusColor(run.status(i));
@@ -51,12 +57,6 @@
           pen.circle(x, y, e.r50[i] * camera.scale, { fill: status, alpha: 0.16 });
           pen.circle(x, y, e.r50[i] * camera.scale, { stroke: status, width: 1.2, dash: [5, 3] });
         }
-      }
-      const truth = run.truthAt(i);
-      if (known(truth)) {
-        const [tx, ty] = at(truth);
-        pen.path([[x, y], [tx, ty]], { stroke: color.truth, width: 1, dash: [2, 2] });
-        pen.path([[tx, ty - 8], [tx + 8, ty], [tx, ty + 8], [tx - 8, ty]], { fill: color.card, stroke: color.truth, width: 2.4 }, true);
       }
       const runner = { east: e.runner_east?.[i], north: e.runner_north?.[i] };
       if (show.hypotheses && known(runner) && e.runner_mass[i] > 0) {
