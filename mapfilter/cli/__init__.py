@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Annotated
 
 import typer
+from typer.main import get_command
 
 from mapfilter._io import VERSION
 from mapfilter.cli.chain import (
@@ -86,4 +87,5 @@ def _version(
 
 def main() -> None:
     """Run the command line; a user's error gives one message and exit code 2."""
-    sys.exit(guarded(app))
+    # The command itself, because a Typer app puts its own hook for exceptions in place.
+    sys.exit(guarded(get_command(app)))

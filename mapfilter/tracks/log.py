@@ -64,6 +64,8 @@ class TrackLog:
         What was sorted, dropped and ignored.
     imu : ImuNoise or None
         Errors of ``motion``, as measured when it was made of raw sensors; None where unknown.
+    vehicle : bool or None
+        Whether ``motion`` is a vehicle's, such as of its wheels; None where unknown.
     """
 
     crs: str
@@ -76,6 +78,7 @@ class TrackLog:
     truth: pd.DataFrame
     notes: tuple[str, ...] = ()
     imu: ImuNoise | None = None
+    vehicle: bool | None = None
 
     def __repr__(self) -> str:
         """Return CRS, duration, start and the number of rows per table."""
@@ -164,6 +167,7 @@ def make_log(
     start_utc_s: float = float("nan"),
     notes: Sequence[str] = (),
     imu: ImuNoise | None = None,
+    vehicle: bool | None = None,
     names: Mapping[str, str] | None = None,
     row_numbers: Mapping[str, ArrayLike] | None = None,
 ) -> TrackLog:
@@ -187,6 +191,8 @@ def make_log(
         Earlier notes on the tables.
     imu : ImuNoise, optional
         Errors of ``motion``, where they were measured.
+    vehicle : bool, optional
+        Whether ``motion`` is a vehicle's, where that is known.
     names : mapping, optional
         Name of each table (such as its file) in messages; ``log`` for the whole.
     row_numbers : mapping, optional
@@ -248,9 +254,8 @@ def make_log(
         where, rows = called.get("pseudoranges", "pseudoranges"), tables["pseudoranges"]
         tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)
         every_note += more
-    return TrackLog(
-        str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)), imu=imu
-    )
+    every_note = tuple(dict.fromkeys(every_note))
+    return TrackLog(str(crs), start_utc_s, **tables, notes=every_note, imu=imu, vehicle=vehicle)
 
 
 def rows_by_kind(log: TrackLog) -> dict[Kind, pd.DataFrame]:

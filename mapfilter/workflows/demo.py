@@ -12,6 +12,7 @@ from typing import Any
 from mapfilter._io import ensure_writable_folder
 from mapfilter.config.load import load_config
 from mapfilter.workflows.build import run_build
+from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import ReplayedLog, run_replay
 from mapfilter.workflows.simulate import run_simulate
@@ -96,12 +97,13 @@ def run_demo(
         taken_s = seconds.get(counted or name, 0.0) + time.perf_counter() - began_s
         seconds[counted or name] = round(taken_s, 3)
 
-    with stage("predict"):
-        predicted = run_predict(config)
-    with stage("build"):
-        built = run_build(config)
-    with stage("simulate"):
-        simulated = run_simulate(config)
+    with compiled_beside():
+        with stage("predict"):
+            predicted = run_predict(config)
+        with stage("build"):
+            built = run_build(config)
+        with stage("simulate"):
+            simulated = run_simulate(config)
     with stage("replay"):
         walk = run_replay(config, out / "replay", html=True).logs[0]
     with stage("candidate", "replay"):

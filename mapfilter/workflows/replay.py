@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -24,6 +25,7 @@ from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import Lattice
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import PositionedTrack
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
@@ -43,6 +45,7 @@ from mapfilter.viewing.page import write_page
 from mapfilter.viewing.runs import ViewedRun
 from mapfilter.viewing.trace import TraceRecorder
 from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.pictures import (
     ESTIMATES,
@@ -295,8 +298,9 @@ def run_replay(
         cannot be written.
     """
     options = filter_choice(config.filter)
-    database = _database(config, options)
-    journeys = _Logs(config, database)
+    with compiled_beside() if isinstance(options, BayesFilter) else nullcontext():
+        database = _database(config, options)
+        journeys = _Logs(config, database)
 
     @cache
     def sites(crs: str) -> CellPlan:

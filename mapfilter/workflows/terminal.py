@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mapfilter._printing import printable, printable_json, write
+from mapfilter._printing import printable, printable_json, quiet_callbacks, write
 from mapfilter.errors import MapfilterError, Stopped
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def guarded(run: Callable[[], int | None]) -> int:
     When a signal stops it, stderr gets what is kept, and the code is 128 and the signal's number.
     """
     try:
-        with stop_signals():
+        with quiet_callbacks(), stop_signals():
             return run() or 0
     except Stopped as error:
         print_message(stopped_text(error))
