@@ -57,7 +57,7 @@ def place_at(level, east_m, north_m):
 def test_plays_pauses_steps_and_seeks(browser, replay):
     with page(browser, replay) as view:
         view.press("Space")
-        view.page.wait_for_function("MF.page.store.state.time > 1")
+        view.until("MF.page.store.state.time > 1")
         view.press("Space")
         assert view.state("playing") is False
         view.press("Home")
@@ -135,7 +135,7 @@ def test_a_click_on_the_map_asks_why_not_there(browser, replay):
         view.page.locator(".sheet").first.focus()
         view.press("Enter")
         assert view.state("place") is not None
-        view.page.mouse.move(box["x"] + 200, box["y"] + 150)
+        view.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         assert "dBm" in view.page.inner_text(".tip >> visible=true")
 
 
