@@ -26,6 +26,7 @@ from mapfilter.cli.convert import convert
 from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
 from mapfilter.cli.learning import learn
 from mapfilter.cli.options import DONE
+from mapfilter.cli.serving import serve
 from mapfilter.workflows.terminal import guarded
 
 __all__ = ["app", "main"]
@@ -56,6 +57,7 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
         "--db area/database --log walk --filter bayes --out located",
         "howto/which-filter.rst",
     ),
+    (serve, "--db area/database --state sessions", "howto/serve.rst"),
     (learn, "area/database --logs walks --out learned", "tutorial/learn.rst"),
     (sweep, "-c sweep.toml --out sweep --workers 4", "howto/sweep.rst"),
     (reproduce, "khalaf-allah-2007 --trials 20 --out paper", "explanation/success-statistics.rst"),
