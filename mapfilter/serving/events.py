@@ -195,7 +195,8 @@ class EventStream:
     async def _next(self, gone: asyncio.Future[None]) -> bytes | None:
         """Return the next event, a comment after a quiet while, None at the end."""
         waiting = asyncio.ensure_future(self.listener.waiting.get())
-        await asyncio.wait({waiting, gone}, timeout=_QUIET_S, return_when=asyncio.FIRST_COMPLETED)
+        either: set[asyncio.Future[Any]] = {waiting, gone}
+        await asyncio.wait(either, timeout=_QUIET_S, return_when=asyncio.FIRST_COMPLETED)
         if waiting.done():
             return waiting.result()
         waiting.cancel()

@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from math import nan
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,6 +29,8 @@ from mapfilter.serving.events import Channel, fix_document, json_bytes
 from mapfilter.serving.limits import ServiceLimits
 from mapfilter.serving.store import SessionStore
 from mapfilter.tracks.identify import PlanNames
+
+ResultT = TypeVar("ResultT")
 
 _SEED_BITS = 63
 _EMPTY_STATE_BYTES = 20_000
@@ -65,7 +67,7 @@ class Progress:
         if self.state.alternative is not None:
             beliefs.append(self.state.alternative.belief)
         arrays = [getattr(b, name) for b in beliefs for name in _ARRAYS if hasattr(b, name)]
-        return _EMPTY_STATE_BYTES + sum(one.nbytes for one in arrays)
+        return _EMPTY_STATE_BYTES + sum(int(one.nbytes) for one in arrays)
 
 
 _ARRAYS = ("state", "log_weight", "kept")
@@ -265,8 +267,9 @@ class Sessions:
         if session.progress is None:
             assert self.store is not None
             saved = await self._in(self.saver, partial(self.store.read, session.id))
-            values = (saved[name] for name in ("state", "rng", "epochs", "time_s"))
-            session.take(Progress(*values, last=saved["last"].encode()))
+            state, rng, epochs = saved["state"], saved["rng"], saved["epochs"]
+            last = saved["last"].encode()
+            session.take(Progress(state, rng, epochs, saved["time_s"], last))
         assert session.progress is not None
         return session.progress
 
@@ -289,10 +292,10 @@ class Sessions:
         if session.ended:
             await self._in(self.saver, partial(self.store.remove, session.id))
 
-    async def _run(self, work: Callable[[], Any]) -> Any:
+    async def _run(self, work: Callable[[], ResultT]) -> ResultT:
         return await self._in(self.pool, work)
 
-    async def _in(self, pool: ThreadPoolExecutor, work: Callable[[], Any]) -> Any:
+    async def _in(self, pool: ThreadPoolExecutor, work: Callable[[], ResultT]) -> ResultT:
         return await asyncio.get_running_loop().run_in_executor(pool, work)
 
     def close(self) -> None:

@@ -48,7 +48,7 @@ class SessionStore:
     binding: str
 
     @classmethod
-    def open(cls, folder: Path, binding: str) -> SessionStore:
+    def in_folder(cls, folder: Path, binding: str) -> SessionStore:
         """Make the folder where there is none; raise OutputError where it cannot be written."""
         ensure_writable_folder(folder)
         return cls(folder, binding)

@@ -109,7 +109,7 @@ def run_serve(
     made = listen(options.host, options.port, token)
     with made:
         if options.state is not None:
-            store = SessionStore.open(options.state, _binding(config, opened))
+            store = SessionStore.in_folder(options.state, _binding(config, opened))
             found, lost = store.read_all()
             for line in lost:
                 print_message(f"not restored: {line}")
