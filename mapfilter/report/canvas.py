@@ -9,6 +9,7 @@ state that outlives a call. Equal data give equal bytes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,13 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 """Versions and dates are left out of files: they would change the bytes from one to the next."""
 
+_WRITER: dict[str, dict[str, Any]] = {
+    # A third of the time of the default level, and files a tenth larger.
+    "png": {"pil_kwargs": {"compress_level": 3}},
+    "svg": {},
+    "pdf": {},
+}
+
 styled = matplotlib.rc_context(_STYLE)
 """Decorator of all functions that draw: fonts, sizes and colours of the package."""
 
@@ -128,9 +136,26 @@ def save(drawn: Drawn, path: Path) -> Path:
     if kind not in _METADATA:
         raise fail(OutputError, str(path), "a name that ends in .png, .svg or .pdf", path.name)
     figure = drawn if isinstance(drawn, Figure) else figure_of(drawn)
-    with atomic_file(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=DPI, metadata=_METADATA[kind])
+    with atomic_file(path) as temporary, _laid_out(figure):
+        figure.savefig(temporary, format=kind, dpi=DPI, metadata=_METADATA[kind], **_WRITER[kind])
     return path
+
+
+@contextmanager
+def _laid_out(figure: Figure) -> Iterator[None]:
+    """Lay a figure out now, and not while it is saved: matplotlib would draw it twice to do so."""
+    engine, dpi = figure.get_layout_engine(), figure.dpi
+    if engine is None:
+        yield
+        return
+    figure.set_dpi(DPI)
+    engine.execute(figure)
+    figure.set_layout_engine(None)
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
+        figure.set_dpi(dpi)
 
 
 def tidy(axes: Axes, *, grid: bool = True) -> None:
