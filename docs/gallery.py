@@ -60,7 +60,7 @@ PICTURES = {
 """Pictures of the gallery, and the files of the two commands that they are."""
 
 _WIDTH_PX, _QUALITY = 1000, 78
-_FRAMES, _FRAME_MS, _LAST_MS, _FRAME_DPI = 28, 280, 2600, 110
+_FRAMES, _FRAME_MS, _LAST_MS, _FRAME_DPI = 24, 500, 2600, 150
 
 
 def shrink(source: Path, target: Path) -> Path:

@@ -196,17 +196,22 @@ def stretches(where: Bools) -> Iterator[tuple[int, int]]:
 
 
 def bottom_legend(
-    figure: Figure, most_columns: int, handles: Sequence[Artist] | None = None
+    figure: Figure,
+    most_columns: int,
+    handles: Sequence[Artist] | None = None,
+    title: str | None = None,
 ) -> None:
     """Put a legend under the axes, in as many columns as there is room for.
 
-    It shows the handles, or without any all that is labelled, if anything is.
+    It shows the handles, or without any all that is labelled, if anything is; the title is a line
+    above them.
     """
     if handles is None and not any(ax.get_legend_handles_labels()[0] for ax in figure.axes):
         return
     given: dict[str, Any] = {} if handles is None else {"handles": handles, "handletextpad": 0.4}
+    given |= {"title": title, "title_fontsize": 9, "frameon": False}
     for columns in range(most_columns, 0, -1):
-        legend = figure.legend(loc="outside lower center", ncols=columns, frameon=False, **given)
+        legend = figure.legend(loc="outside lower center", ncols=columns, **given)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()

@@ -179,13 +179,14 @@ def plot_errors_apart(
             axes.plot(estimates[other].time_s, errors_m[other], **look)
         axes.set_title(name, fontsize=10.5)
         tidy(axes, grid=False)
-        axes.tick_params(labelbottom=index + _PANELS_WIDE >= len(estimates))
+        if index + _PANELS_WIDE >= len(estimates):
+            axes.set_xlabel("time / s")
+            axes.tick_params(labelbottom=True)
     panels[0].set(yscale="log", xlim=(float(truth.time_s[0]), float(truth.time_s[-1])))
     panels[0].set_ylim(bottom=_LEAST_M)
     panels[0].yaxis.set_major_formatter("{x:g}")
     for axes in panels[len(estimates) :]:
         axes.set_visible(False)
-    figure.supxlabel("time / s", fontsize=10)
     figure.supylabel("position error / m", fontsize=10)
     shaded = panels[0].get_legend_handles_labels()[0]
     others = Line2D([], [], color="#c8c8c8", linewidth=0.9, label="the others")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import ceil, sqrt
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -43,6 +44,7 @@ _PANEL_IN = 4.0
 _SIDE_M, _MOST_SQUARES = 10.0, 200
 _DECADES, _FAINTEST = 2.0, 0.12
 _FAINTEST_CANDIDATE = 0.15
+_LETTERS_PER_IN = 13
 _HELD, _MARGIN_SHARE, _LEAST_MARGIN_M, _LEAST_SIDE = 0.95, 0.06, 30.0, 0.6
 _OFF_STREETS = (
     "Squares of {side_m:.0f} m. A little of the belief lies off the streets, in water, too: "
@@ -146,6 +148,8 @@ def _plot_panels(
     columns = count if count <= 3 else ceil(count / 2)
     rows = ceil(count / columns)
     height_in = rows * (map_height_in(base, _PANEL_IN) + 0.45) + (1.15 if note else 0.9)
+    if columns == 1:
+        height_in += 0.7  # the legend takes several lines
     figure = new_figure(columns * (_PANEL_IN + 0.1) + 0.6, height_in)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for index, (axes, snapshot) in enumerate(zip(panels, snapshots, strict=False)):
@@ -156,7 +160,8 @@ def _plot_panels(
         travelled = f"{snapshot.travelled_m:.0f} m by dead reckoning"
         if truth is not None:
             travelled = f"{float(truth.distance_at(snapshot.time_s)):.0f} m travelled"
-        title = f"({'abcdef'[index]}) {travelled}, {text(snapshot)}"
+        letter = f"({'abcdef'[index]}) " if count > 1 else ""
+        title = f"{letter}{travelled}, {text(snapshot)}"
         axes.set_title(title, fontsize=10.5)
         if index % columns:
             axes.set_ylabel("")
@@ -175,9 +180,8 @@ def _plot_panels(
     if any(np.isfinite(s.east_m) for s in snapshots):
         ring = Look(markerfacecolor="none", markeredgecolor=VERMILLION, markeredgewidth=2.0)
         handles.append(mark("estimate", "o", 9, **ring))
-    bottom_legend(figure, len(handles), handles)
-    if note:
-        figure.supxlabel(note, fontsize=9)
+    line = int(_LETTERS_PER_IN * figure.get_figwidth())
+    bottom_legend(figure, len(handles), handles, fill(note, line) or None)
     return figure
 
 
