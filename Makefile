@@ -7,14 +7,18 @@ BIN := $(VENV)/bin
 # Also for the build backend, which pip installs apart.
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 export PIP_BUILD_CONSTRAINT := $(CURDIR)/constraints.txt
+# Every process of a test would compile every module again.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test check docs mutants clean
 
 demo: $(VENV)/.demo
 	$(BIN)/mapfilter demo --out out/demo
 
-test: check docs
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+# Style and documentation beside each other; the tests alone, as some of them watch a clock.
+test: $(VENV)/.test
+	$(MAKE) -j2 check docs
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 check: $(VENV)/.test
 	$(BIN)/ruff check .

@@ -48,15 +48,18 @@ def open_raster(path: Path, *, quiet: bool = True) -> Iterator[Any]:
         It is damaged; while it is open, too.
     """
     _check_sidecars(path)
-    with warnings.catch_warnings():
-        if quiet:
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-        # The absolute path, because GDAL takes a name such as "GTIFF_DIR:1:a.tif" for a command.
-        source = rasterio.open(path.absolute(), driver="GTiff")
-    with source:
-        _check_inside(path, source)
-        check_blocks(path, source)
-        yield source
+    try:
+        with warnings.catch_warnings():
+            if quiet:
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            # The absolute path, as GDAL takes a name such as "GTIFF_DIR:1:a.tif" for a command.
+            source = rasterio.open(path.absolute(), driver="GTiff")
+        with source:
+            _check_inside(path, source)
+            check_blocks(path, source)
+            yield source
+    except UnicodeDecodeError as error:
+        raise RasterioError(f"names or notes in no UTF-8 ({error.reason})") from error
 
 
 def _check_sidecars(path: Path) -> None:

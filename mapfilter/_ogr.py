@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
+
+import pyogrio
 
 from mapfilter._inputs import check_file, open_input
 from mapfilter.errors import InputError, MapfilterError, fail
@@ -52,6 +55,14 @@ _MAINS = frozenset(
 )
 _ELSEWHERE = "a vector file that holds its data itself"
 _OPEN_OPTIONS = {"GML": {"WRITE_GFS": "NO", "DOWNLOAD_SCHEMA": "NO"}}
+
+
+_SEALED = {
+    # Else a table of a SQLite file may be one of any other file or address, opened as it is listed.
+    "OGR_SQLITE_STATIC_VIRTUAL_OGR": "NO",
+    # GDAL's own default, which the environment may have changed.
+    "ALLOW_OGR_SQL_FUNCTIONS_FROM_TRIGGER_AND_VIEW": "NO",
+}
 
 
 class VectorSource(NamedTuple):
@@ -100,6 +111,17 @@ def vector_source(path: Path) -> VectorSource:
         with open_input(schema) as stream:
             _check_sheet(schema, stream.read(_LARGEST_SHEET_BYTES))
     return VectorSource(path.absolute(), _OPEN_OPTIONS.get(kind, {}))
+
+
+@contextmanager
+def sealed_gdal() -> Iterator[None]:
+    """Let tables of a file be of that file within the block: every read of GDAL is in one."""
+    before = {name: pyogrio.get_gdal_config_option(name) for name in _SEALED}
+    pyogrio.set_gdal_config_options(_SEALED)
+    try:
+        yield
+    finally:
+        pyogrio.set_gdal_config_options(before)
 
 
 def _check_beside(path: Path) -> None:

@@ -6,7 +6,11 @@ terminal may lack the letters of a result, which is no reason to lose the result
 
 from __future__ import annotations
 
+import contextlib
 import re
+import sys
+from collections.abc import Iterator
+from types import TracebackType
 from typing import TextIO
 
 _LONGEST_LINE = 2000
@@ -55,3 +59,27 @@ def _cut(line: str, longest: int) -> str:
 def _escaped(found: re.Match[str]) -> str:
     code = ord(found[0])
     return f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"
+
+
+@contextlib.contextmanager
+def quiet_callbacks() -> Iterator[None]:
+    """Print no traceback within the block where a library's callback cannot decode a message.
+
+    GDAL's messages cite bytes of damaged files; rasterio decodes them where nobody can catch the
+    error, and Python would print it. What GDAL found wrong is raised in any case.
+    """
+    before = sys.excepthook, sys.unraisablehook
+
+    def hook(kind: type[BaseException], error: BaseException, where: TracebackType | None) -> None:
+        if not isinstance(error, UnicodeDecodeError):
+            before[0](kind, error, where)
+
+    def unraisable(lost: sys.UnraisableHookArgs) -> None:
+        if not isinstance(lost.exc_value, UnicodeDecodeError):
+            before[1](lost)
+
+    sys.excepthook, sys.unraisablehook = hook, unraisable
+    try:
+        yield
+    finally:
+        sys.excepthook, sys.unraisablehook = before

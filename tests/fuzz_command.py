@@ -24,7 +24,10 @@ from fuzz_readers import Target, targets
 BATCH = 1000
 _MEMORY = Path("/dev/shm")
 """Where it is there, copies are written to it: a file system in memory."""
-_LONGEST_BATCH_S = 600.0
+_LONGEST_BATCH_S = 1200.0
+"""Of processor time."""
+_WAITING_S = 300.0
+"""A child that has used no processor time for so long waits for ever."""
 _KEYS = ("read", "refused", "longest_s")
 
 
@@ -101,9 +104,8 @@ def _apart(target: Target, sample: bytes, number: int, count: int) -> dict[str, 
     child = fork.Process(target=_batch, args=(target, sample, number, count, answer))
     child.start()
     answer.close()
-    began_s = time.monotonic()
     found: dict[str, Any] = {}
-    if answers.poll(_LONGEST_BATCH_S):
+    if _answered(answers, child.pid):
         try:
             found = answers.recv()
         except EOFError:
@@ -112,11 +114,35 @@ def _apart(target: Target, sample: bytes, number: int, count: int) -> dict[str, 
             what = signal.Signals(-code).name if code < 0 else f"exit code {code}"
             found = {"fault": f"the process ended: {what}"}
     else:
-        found = {"fault": f"no answer after {time.monotonic() - began_s:.0f} s"}
+        found = {"fault": f"no answer after {_used_s(child.pid):.0f} s of processor time"}
         child.kill()
     child.join()
     target.path.write_bytes(sample)
     return found
+
+
+def _answered(answers: Any, pid: int) -> bool:
+    """Wait for a child's answer, as long as it is at work."""
+    used_s, since_s = 0.0, time.monotonic()
+    while not answers.poll(5.0):
+        now_s = _used_s(pid)
+        if now_s > _LONGEST_BATCH_S:
+            return False
+        if now_s > used_s:
+            used_s, since_s = now_s, time.monotonic()
+        elif time.monotonic() - since_s > _WAITING_S:
+            return False
+    return True
+
+
+def _used_s(pid: int) -> float:
+    """Return a process's processor time; elsewhere than under Linux, the time of the clock."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return time.monotonic()
+    user, system = fields[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
 def _batch(target: Target, sample: bytes, number: int, count: int, answer: Any) -> None:

@@ -31,9 +31,11 @@ from mapfilter.survey.measurements import read_measurements
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.store import read_log, write_log
+from mapfilter.workflows.info import run_info
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 12, 9)
+_SHOWN = ("raster GeoTIFF", "layer gpkg", "layer fgb", "map osm.gz", "recording csv", "cell plan")
 WAYS = [
     (1, {"highway": "residential", "oneway": "yes"}, [(10, 10), (60, 10), (61, 40)]),
     (2, {"highway": "footway"}, [(50, 50), (90, 50), (90, 80)]),
@@ -49,7 +51,14 @@ class Target(NamedTuple):
 
 
 def targets(folder: Path) -> Iterator[Target]:
-    """Write a good file of each format, and yield it with its reader."""
+    """Write a good file of each format, and yield it with its reader; some with ``info``, too."""
+    for one in _readers(folder):
+        yield one
+        if one.name in _SHOWN:
+            yield Target(f"info {one.name}", one.path, run_info)
+
+
+def _readers(folder: Path) -> Iterator[Target]:
     for name, (file, text, *_) in MADE.items():
         path = _new(folder, f"recording {name}") / file
         path.write_bytes(text.encode())

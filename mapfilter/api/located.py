@@ -20,6 +20,9 @@ from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, f
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.placeless import in_frame
+from mapfilter.viewing.notebook import View
+from mapfilter.viewing.runs import ViewedRun
+from mapfilter.viewing.trace import TraceRecorder
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -35,11 +38,14 @@ class Track:
     positioned : PositionedTrack
         The filter's result: an estimate, snapshots of its hypotheses, and the processor time of
         this process in seconds, without reading the database.
+    trace : TraceRecorder or None
+        The beliefs and explanations that :meth:`view` shows, where ``record`` asked for them.
     """
 
     positioned: PositionedTrack
     log: TrackLog
     database: RadioRouteDatabase
+    trace: TraceRecorder | None = None
 
     @property
     def estimate(self) -> TrackEstimate:
@@ -63,6 +69,22 @@ class Track:
     def _repr_html_(self) -> str:
         """Return the summary and the last epochs, as notebooks show them."""
         return f"<p>{escape(repr(self))}</p>{self.to_dataframe().tail().to_html()}"
+
+    def view(self, *, height_px: int = 720) -> View:
+        """Return the replay as an interactive page, which notebooks show in place.
+
+        Without ``record=True`` in :func:`locate` the page has no belief and explains nothing.
+
+        Parameters
+        ----------
+        height_px : int
+            Height of the frame in a notebook.
+        """
+        from mapfilter.viewing.bundle import replay_bundle
+
+        estimate = self.estimate
+        run = ViewedRun(estimate.filter, estimate, self.log, trace=self.trace)
+        return View(replay_bundle(f"Replay by {estimate.filter}", [run], self.database), height_px)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each epoch: position (m), radii (m), status, reason and so on."""
@@ -96,6 +118,7 @@ def locate(
     ways: bool = True,
     snapshots: bool = False,
     risk: float = DEFAULT_RISK,
+    record: bool = False,
 ) -> Track:
     """Locate a log from an unknown start.
 
@@ -118,6 +141,8 @@ def locate(
         Whether to keep the filter's hypotheses at some epochs, for pictures.
     risk : float
         Probability, at each epoch, that the error exceeds the protection level (``protection_m``).
+    record : bool
+        Whether to record what :meth:`Track.view` explains; takes a few times as long.
 
     Raises
     ------
@@ -135,7 +160,9 @@ def locate(
     notes = (*notes, STREETS_ALONE) if alone else notes
     bound = as_filter(options, database.without_cells() if alone else database, ways=ways)
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
-    return Track(loop.locate(log, bound, rng, snapshots=snapshots, risk=risk), log, database)
+    trace = TraceRecorder(bound) if record else None
+    found = loop.locate(log, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)
+    return Track(found, log, database, trace)
 
 
 @dataclass(frozen=True, repr=False, eq=False)

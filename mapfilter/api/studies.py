@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, fields
+from html import escape
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -117,6 +118,10 @@ class Sweep:
 
     def __repr__(self) -> str:
         return f"Sweep: {len(self.runs)} runs in {len(success_cells(self.runs))} cells of its grid"
+
+    def _repr_html_(self) -> str:
+        """Return the summary and the success rates, as notebooks show them."""
+        return f"<p>{escape(repr(self))}</p>{self.to_dataframe().head(20).to_html()}"
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return success rates with 95 % intervals and mean errors, one row for each grid cell."""

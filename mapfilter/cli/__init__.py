@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Annotated
 
 import typer
+from typer.main import get_command
 
 from mapfilter._io import VERSION
 from mapfilter.cli.chain import (
@@ -26,6 +27,7 @@ from mapfilter.cli.convert import convert
 from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
 from mapfilter.cli.learning import learn
 from mapfilter.cli.options import DONE
+from mapfilter.cli.views import film, view
 from mapfilter.workflows.terminal import guarded
 
 __all__ = ["app", "main"]
@@ -56,6 +58,8 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
         "--db area/database --log walk --filter bayes --out located",
         "howto/which-filter.rst",
     ),
+    (view, "located/replay other/replay --out both.html", "howto/see-a-replay.rst"),
+    (film, "located/replay --out walk.gif", "howto/see-a-replay.rst"),
     (learn, "area/database --logs walks --out learned", "tutorial/learn.rst"),
     (sweep, "-c sweep.toml --out sweep --workers 4", "howto/sweep.rst"),
     (reproduce, "khalaf-allah-2007 --trials 20 --out paper", "explanation/success-statistics.rst"),
@@ -83,4 +87,5 @@ def _version(
 
 def main() -> None:
     """Run the command line; a user's error gives one message and exit code 2."""
-    sys.exit(guarded(app))
+    # The command itself, because a Typer app puts its own hook for exceptions in place.
+    sys.exit(guarded(get_command(app)))

@@ -30,7 +30,13 @@ from mapfilter.cli.options import (
 )
 from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.schema import Without
-from mapfilter.workflows.terminal import print_message, print_result, print_text, progress_bar
+from mapfilter.workflows.terminal import (
+    print_message,
+    print_result,
+    print_text,
+    progress_bar,
+    stage_bar,
+)
 
 
 def check(
@@ -205,13 +211,16 @@ def demo(
     as_json: JsonOption = False,
 ) -> None:
     """Run the whole chain on the embedded map of central Helsinki."""
-    from mapfilter.workflows.demo import run_demo
+    from mapfilter.workflows.demo import WHAT_ONE_SEES, run_demo
 
-    with progress_bar("demo") as progress:
+    with stage_bar("demo") as progress:
         result = run_demo(
             (out or Path("mapfilter-demo")).absolute(), settings or (), seed=seed, progress=progress
         )
+    address = result.pop("open")
     print_result(result, as_json)
+    if not as_json:
+        print_text(f"\nOpen {address} in a browser.\n{WHAT_ONE_SEES}")
 
 
 def simulate(
@@ -339,6 +348,10 @@ def replay(
             help="Probability, at each epoch, that the error exceeds the protection level (1e-3).",
         ),
     ] = None,
+    html: Annotated[
+        bool,
+        typer.Option("--html", help="Write replay.html, too: a page that plays and explains it."),
+    ] = False,
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
@@ -371,7 +384,7 @@ def replay(
     check_custom_filter(loaded)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
-        result = run_replay(loaded, folder, progress=progress)
+        result = run_replay(loaded, folder, html=html, progress=progress)
     print_result(replay_figures(result), as_json)
     for warning in result.warnings:
         print_message(warning)

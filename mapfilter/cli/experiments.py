@@ -135,7 +135,11 @@ def bench(
 def evaluate(
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME", help="global-positioning, audit, ottawa or single-reports."),
+        typer.Argument(
+            metavar="NAME",
+            help="Simulated: global-positioning, audit. Of recordings (--data): all, ottawa, "
+            "fingerprints, kitti, mall, smartloc, belgium, mountain-view, denver, single-reports.",
+        ),
     ],
     map_file: Annotated[
         Path | None,
@@ -192,6 +196,7 @@ def evaluate(
     from mapfilter.workflows.evaluate_foreign import load_foreign, other_world, run_foreign
     from mapfilter.workflows.evaluate_ottawa import RUNS as OTTAWA_RUNS
     from mapfilter.workflows.evaluate_ottawa import run_ottawa
+    from mapfilter.workflows.evaluate_recorded import ALL, BENCHMARKS, run_all, run_recorded
     from mapfilter.workflows.evaluate_single_reports import SETS, run_single_reports
 
     check_benchmark(name, data)
@@ -205,6 +210,22 @@ def evaluate(
         with rate_bar("evaluate", "sessions") as progress:
             result = run_ottawa(data, folder, runs=runs or OTTAWA_RUNS, progress=progress, **common)
         print_result(result, as_json)
+        return
+    if name in (ALL, *BENCHMARKS) and data is not None:
+        unused = {"--map": map_file, "--bbox": bbox, "--filter": filter_name, "--world": world}
+        refuse(unused | {"--config": config, "--set": settings}, name)
+        folder = (out or Path("out") / name).absolute()
+        with rate_bar("evaluate", "runs") as progress:
+            if name == ALL:
+                refuse({"--case": cases, "--runs": runs}, name)
+                result = run_all(data, folder, progress=progress, **common)
+            else:
+                result = run_recorded(
+                    name, data, folder, parts=cases or (), runs=runs, progress=progress, **common
+                )
+        print_result(result, as_json)
+        if name == ALL and result.missing:
+            raise typer.Exit(PARTIAL)
         return
     if name == "single-reports" and data is not None:
         unused = {"--map": map_file, "--bbox": bbox, "--filter": filter_name, "--config": config}

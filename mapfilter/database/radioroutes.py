@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from mapfilter._html import html_table, shortened
 from mapfilter._types import Bools, Floats32, Ints, Ints32
 from mapfilter.database.checked import Part
 from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS
@@ -177,6 +178,21 @@ class RadioRouteDatabase:
             f"RadioRouteDatabase({str(self.path)!r}, {len(self.plan)} cells, {points} points;\n"
             f"  {self.lattice}; margin {self.margin_db:g} dB, floor {self.floor_dbm:g} dBm)"
         )
+
+    def _repr_html_(self) -> str:
+        """Return a table, as notebooks show it."""
+        counts = self.manifest.get("counts", {})
+        rows: dict[str, object] = {
+            "folder": self.path,
+            "points": counts.get("points", "unknown"),
+            "cells": f"{len(self.plan)}: {shortened(self.plan.ids)}" if len(self.plan) else "none",
+            "lattice": self.lattice,
+            "margin": f"{self.margin_db:g} dB",
+            "floor": f"{self.floor_dbm:g} dBm",
+        }
+        if self.attribution:
+            rows["map"] = self.attribution
+        return html_table("Radio-route database", rows)
 
     @property
     def cell_ids(self) -> tuple[str, ...]:

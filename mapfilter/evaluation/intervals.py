@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy.special import gammaincinv
 
 from mapfilter._types import Floats, Ints
 from mapfilter.evaluation.success import wilson_interval_of_routes
@@ -130,5 +130,6 @@ def _drawn(count: int) -> Ints:
 
 
 def _garwood(events: float, km: float) -> tuple[float, float]:
-    low = stats.chi2.ppf(0.025, 2 * events) / 2 if events else 0.0
-    return float(low / km), float(stats.chi2.ppf(0.975, 2 * events + 2) / 2 / km)
+    # Quantiles of chi square, halved; scipy.stats takes half a second to import.
+    low = gammaincinv(events, 0.025) if events else 0.0
+    return float(low / km), float(gammaincinv(events + 1, 0.975) / km)

@@ -116,11 +116,14 @@ class Cloud(NamedTuple):
         What each hypothesis keeps besides, such as errors that are summed out; W may be 0.
     shared : object
         What all of them share.
+    withheld : float
+        Log evidence of the last reading that is not in the weights.
     """
 
     state: Floats32
     kept: Floats32
     shared: Any = None
+    withheld: float = 0.0
 
 
 class WeighingModel(Protocol[ReadingT]):
@@ -245,7 +248,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
     ) -> tuple[ParticleBelief, UpdateInfo]:
         """Weigh all particles, apply the switch rule, and resample where that is due."""
         options, log_weight = self.options, belief.log_weight.copy()
-        (state, kept, shared), reason = self.model.weigh(belief.cloud, log_weight, reading)
+        (state, kept, shared, withheld), reason = self.model.weigh(
+            belief.cloud, log_weight, reading
+        )
         weight = np.empty(log_weight.size, dtype=np.float32)
         if reason is Reason.USED:
             log_total, effective = normalise(log_weight, weight)
@@ -289,7 +294,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             kept=kept,
             shared=shared,
             log_weight=log_weight,
-            log_evidence=belief.log_evidence + log_total,
+            log_evidence=belief.log_evidence + log_total + withheld,
             status=status,
             agreement_start_m=agreement_start_m,
         )

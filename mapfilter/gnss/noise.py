@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 from scipy.special import log_ndtr
 
 from mapfilter._types import Floats
@@ -75,6 +74,9 @@ def correlated_along(
 
     The columns of the result, (K, columns), are independent.
     """
+    # Slow to import (it imports scipy.stats), and few commands need it.
+    from scipy.signal import lfilter
+
     travelled = np.asarray(travelled_m, dtype=np.float64)
     drawn = rng.standard_normal((travelled.size, columns))
     keep = np.exp(-np.diff(travelled) / correlation_m)

@@ -64,6 +64,9 @@ class LevelErrors(Options):
         Further standard deviation of the level of a cell that is absent from a report.
     weight : float
         Exponent of the likelihood; below 1, as real errors come in bursts.
+    tracking_share : float
+        Share of this exponent where a position is tracked: dead reckoning and the map know more
+        than levels there, whose errors along two ways differ for hundreds of metres.
     """
 
     slow_db: NotNegative = 7.0
@@ -79,6 +82,7 @@ class LevelErrors(Options):
     fault_m: Positive = 300.0
     absent_db: NotNegative = 3.0
     weight: Share = 0.35
+    tracking_share: Share = 0.3
 
     def check(self, faults: Faults) -> None:
         """Add shares that leave no error of a cell's own."""

@@ -19,7 +19,10 @@ SLOTS = 24
 """Most cells whose errors are estimated at a time."""
 
 _ABSENT_BY_FAULT = log(0.7)
-_OTHER_DBM, _OTHER_SD_DB, _OTHER_M = -90.0, 15.0, 150.0
+OTHER_DBM, OTHER_SD_DB = -90.0, 15.0
+"""Mean and standard deviation of the level of a cell that the prediction is wrong about."""
+
+_OTHER_M = 150.0
 _NEGLIGIBLE = 1e-3
 
 
@@ -73,8 +76,8 @@ class LevelMemory:
             np.full(slots, -1, dtype=np.int32),
             covariance,
             covariance,
-            np.full(slots, _OTHER_DBM),
-            np.full(slots, _OTHER_SD_DB**2),
+            np.full(slots, OTHER_DBM),
+            np.full(slots, OTHER_SD_DB**2),
             np.full(slots, -1),
         )
 
@@ -153,7 +156,7 @@ class LevelMemory:
             kept[part + at] = by.astype(np.float32) @ kept[part + rest]
         kept[2 * slots + 1 + at] = self.errors.fault_log_odds
         other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
-        other_dbm[at], other_db2[at], used[at] = _OTHER_DBM, _OTHER_SD_DB**2, self.reports
+        other_dbm[at], other_db2[at], used[at] = OTHER_DBM, OTHER_SD_DB**2, self.reports
         return replace(
             self,
             band=band,
@@ -177,8 +180,8 @@ class LevelMemory:
         return replace(
             self,
             covariance_db2=self.covariance_db2 * both + self.prior_db2 * (1 - both),
-            other_dbm=_OTHER_DBM + (self.other_dbm - _OTHER_DBM) * keep,
-            other_db2=_OTHER_SD_DB**2 + (self.other_db2 - _OTHER_SD_DB**2) * keep**2,
+            other_dbm=OTHER_DBM + (self.other_dbm - OTHER_DBM) * keep,
+            other_db2=OTHER_SD_DB**2 + (self.other_db2 - OTHER_SD_DB**2) * keep**2,
         ), decay.astype(np.float32)
 
     def updated(

@@ -7,6 +7,7 @@ of a log, a live application for every one that comes in: equal epochs give equa
 
 from __future__ import annotations
 
+import copy
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
@@ -65,6 +66,15 @@ class Smoother(Protocol):
 
     def smoothed(self, estimate: TrackEstimate, rng: np.random.Generator) -> TrackEstimate:
         """Return the estimate with positions given the whole log; statuses stay."""
+
+
+class Recorder(Protocol):
+    """Sees every step of a filter, to show or explain it afterwards."""
+
+    def record(
+        self, before: Any, epoch: Epoch, rng: np.random.Generator, after: Any, output: StepOutput
+    ) -> None:
+        """Record one step; ``rng`` is a copy of the generator as it was before the step."""
 
 
 class Filter(ABC, Generic[StateT]):
@@ -147,6 +157,7 @@ def locate(
     *,
     snapshots: bool = False,
     risk: float = DEFAULT_RISK,
+    recorder: Recorder | None = None,
 ) -> PositionedTrack:
     """Locate a log: the one loop over epochs.
 
@@ -161,6 +172,8 @@ def locate(
     risk : float
         Probability, at each epoch, that the error exceeds the protection level. Positions that are
         smoothed have a level only where the smoother gives one.
+    recorder : Recorder, optional
+        Sees every step; the result is the same with and without one.
 
     Raises
     ------
@@ -183,11 +196,16 @@ def locate(
     state = filter_.begin(kinds_of(log))
     for epoch in merged:
         before = state
+        drawn = copy.deepcopy(rng) if recorder is not None else rng
         state, output = filter_.step(before, epoch, rng)
         if risk != DEFAULT_RISK:
             output = output.protected(output.tail, risk)
         # A tail is as large as a belief.
         outputs.append(StepOutput(output.fix, output.evidence, output.unused))
+        if recorder is not None:
+            paused_s = time.process_time()
+            recorder.record(before, epoch, drawn, state, output)
+            began_s += time.process_time() - paused_s
         if smoother is not None:
             smoother.add(before, state)
         if snapshots:

@@ -28,8 +28,9 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
 
     Errors of motion that were measured (``log.imu``) are those that the filter assumes; the step of
     timing advance is that of the technology of all reports that have one; a step of levels (the
-    column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of levels. Turns
-    without headings are taken for a vehicle's odometry by several signs
+    column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of levels. The
+    motion of wheels is a vehicle's (``log.vehicle``); where a log does not state it, turns without
+    headings are taken for a vehicle's odometry by several signs
     (:class:`mapfilter.positioning.vehicle_signs.VehicleSigns`).
     Options that are no dataclass, lack these fields, or have other values than the defaults, are
     not changed.
@@ -48,14 +49,11 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         error_db = hypot(default["level_error_db"], step_db / 12**0.5)
         changes["level_error_db"] = error_db
         notes.append(f"levels in steps of {step_db:g} dB: level_error_db = {error_db:.2f}")
-    signs = vehicle_signs(log) if _is_default(options, default, "vehicle") else None
-    if signs is not None and signs.fast:
-        if signs.vehicle:
-            changes["vehicle"] = True
-        whose = "a vehicle's" if signs.vehicle else "a cyclist's, no vehicle's"
-        notes.append(
-            f"motion: turns without headings, {signs}: taken for {whose} (filter.bayes.vehicle)"
-        )
+    if _is_default(options, default, "vehicle"):
+        vehicle, note = _whose_motion(log)
+        if vehicle is not None:
+            changes["vehicle"] = vehicle
+        notes += [note] if note else []
     measured = {
         name: value
         for name, value in _motion_errors(log).items()
@@ -81,6 +79,21 @@ def by_streets_alone(options: object, log: TrackLog, database: RadioRouteDatabas
     measured = (log.radio, log.gnss, log.pseudoranges, log.tdoa)
     moved = log.motion["step_m"].notna().any()
     return bool(database.cell_ids and moved) and all(table.empty for table in measured)
+
+
+def _whose_motion(log: TrackLog) -> tuple[bool | None, str]:
+    """Return whether motion is a vehicle's, None where nothing speaks for one, and a note."""
+    if log.vehicle is not None:
+        whose = "a vehicle's" if log.vehicle else "no vehicle's"
+        return log.vehicle, f"motion: {whose}, as the log states it (filter.bayes.vehicle)"
+    signs = vehicle_signs(log)
+    if signs is None or not signs.fast:
+        return None, ""
+    whose = "a vehicle's" if signs.vehicle else "a cyclist's, no vehicle's"
+    return (
+        signs.vehicle or None,
+        f"motion: turns without headings, {signs}: taken for {whose} (filter.bayes.vehicle)",
+    )
 
 
 def _motion_errors(log: TrackLog) -> dict[str, float]:

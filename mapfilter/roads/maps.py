@@ -29,6 +29,7 @@ from pyrosm.utils import get_bounding_box
 from shapely.errors import GEOSException
 
 from mapfilter._inputs import check_file, open_input
+from mapfilter._ogr import sealed_gdal
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.roads.ways import Bounds, on_earth
@@ -153,7 +154,7 @@ def _read_layer(
     listed = {key: ", ".join(f"'{value}'" for value in of) for key, of in query.wanted.items()}
     wanted = (f'"{k}" IN ({of})' if of else f'"{k}" IS NOT NULL' for k, of in listed.items())
     try:
-        with warnings.catch_warnings():
+        with sealed_gdal(), warnings.catch_warnings():
             # GDAL warns of each area that does not close; what cannot be built is left out.
             warnings.filterwarnings("ignore", category=RuntimeWarning)
             found = pyogrio.read_dataframe(

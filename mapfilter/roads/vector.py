@@ -23,7 +23,7 @@ from pyproj.exceptions import CRSError, ProjError
 from shapely.errors import GEOSException
 
 from mapfilter._inputs import open_input
-from mapfilter._ogr import PARQUET, VectorSource, vector_source
+from mapfilter._ogr import PARQUET, VectorSource, sealed_gdal, vector_source
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.roads.maps import box_deg, boxes_overlap
@@ -189,7 +189,7 @@ def _box(name: str, crs: str, bounds_m: Bounds, source_crs: Any) -> tuple[float,
 
 def _guarded(name: str, read: Callable[[], T]) -> T:
     try:
-        with warnings.catch_warnings():
+        with sealed_gdal(), warnings.catch_warnings():
             # GDAL warns of much that it copes with; what it cannot read has no geometry.
             warnings.simplefilter("ignore", RuntimeWarning)
             warnings.simplefilter("ignore", UserWarning)

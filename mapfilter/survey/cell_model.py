@@ -4,6 +4,9 @@ A trend is ``offset + slope * covariate``: the covariate is the loss over distan
 nothing. It is fitted by generalised least squares, because neighbouring levels err together, with
 normal priors, because a cell may have been received along one street only. Residuals are those of a
 Gaussian process, or of nearest neighbours.
+
+scikit-learn is imported where it is used: every command reads the options of a survey, few fit one,
+and the import takes a sixth of the start of a command.
 """
 
 from __future__ import annotations
@@ -14,9 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import minimize
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-from sklearn.neighbors import NearestNeighbors
 
 from mapfilter._types import Floats, Ints
 from mapfilter.survey.measurements import Points
@@ -181,6 +181,8 @@ class Shadowing:
     @property
     def kernel(self) -> object:
         """As a kernel of scikit-learn."""
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
         shadow = ConstantKernel(self.variance_db2) * Matern(self.correlation_m, nu=0.5)
         return shadow + WhiteKernel(self.noise_db2)
 
@@ -203,6 +205,8 @@ def learn_shadowing(
     There are one of ``points`` and ``trends`` per cell, see :func:`most_telling`. ``start`` is also
     returned where there is none.
     """
+    from sklearn.gaussian_process import GaussianProcessRegressor
+
     processes = []
     for some, trend in zip(points, trends, strict=True):
         if len(some) < 2:
@@ -236,6 +240,8 @@ class GaussianField:
     """
 
     def __init__(self, points: Points, trend: Trend, shadowing: Shadowing) -> None:
+        from sklearn.gaussian_process import GaussianProcessRegressor
+
         design = trend.design(points.east_m, points.north_m)
         residual_db = points.level_dbm - design @ [trend.offset_dbm, trend.slope]
         process = GaussianProcessRegressor(shadowing.kernel, optimizer=None)
@@ -293,6 +299,8 @@ class NeighbourField:
 
 class _Nearest:
     def __init__(self, places: Floats, values: Floats, neighbours: int) -> None:
+        from sklearn.neighbors import NearestNeighbors
+
         count = min(neighbours, len(places))
         self._search = NearestNeighbors(n_neighbors=count).fit(places)
         self._values = values

@@ -135,6 +135,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         start_utc_s=start_s if alignment.absolute else float("nan"),
         notes=notes,
         imu=moved.imu,
+        vehicle=moved.vehicle,
     )
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)

@@ -46,11 +46,12 @@ def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A motion table, its errors and its rows' further columns, as far as there are any."""
+    """A motion table, its errors, its rows' further columns, and whose it is, as far as known."""
 
     rows: pd.DataFrame | None = None
     imu: ImuNoise | None = None
     reckoning: pd.DataFrame | None = None
+    vehicle: bool | None = None
 
 
 def journey_motion(
@@ -99,7 +100,7 @@ def journey_motion(
             _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))
             moved, imu, words = reckon_odometry(rows)
             notes += words
-            return Moved(moved, imu)
+            return Moved(moved, imu, vehicle=True)
         poses = name == "poses"
         moved = motion_from_poses(rows) if poses else by_compass(rows, frame.convergence_rad)
         return Moved(moved.assign(heading_rad=wrap_rad(moved["heading_rad"])))
@@ -184,4 +185,5 @@ def _receiver_note(recording: Recording, imu: ImuNoise | None, source: str, how:
     if imu is not None:
         text += f"; steps ± {imu.sigma_trans_m:.2g} m, headings ± {imu.sigma_orient_deg:.0f} deg, "
         text += f"{how}"
+        text += f", scale {imu.scale:.0%}" if imu.scale else ""
     return f"{text}; it fails where GNSS does, and shares errors with the positions"

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from mapfilter._html import html_table, shortened
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
@@ -63,6 +64,8 @@ class TrackLog:
         What was sorted, dropped and ignored.
     imu : ImuNoise or None
         Errors of ``motion``, as measured when it was made of raw sensors; None where unknown.
+    vehicle : bool or None
+        Whether ``motion`` is a vehicle's, such as of its wheels; None where unknown.
     """
 
     crs: str
@@ -75,6 +78,7 @@ class TrackLog:
     truth: pd.DataFrame
     notes: tuple[str, ...] = ()
     imu: ImuNoise | None = None
+    vehicle: bool | None = None
 
     def __repr__(self) -> str:
         """Return CRS, duration, start and the number of rows per table."""
@@ -87,6 +91,16 @@ class TrackLog:
         notes = f"; {len(self.notes)} notes" if self.notes else ""
         crs = short_crs(self.crs)
         return f"TrackLog({crs}, {self.duration_s:.1f} s{began}; {held}{notes})"
+
+    def _repr_html_(self) -> str:
+        """Return a table, as notebooks show it."""
+        began = "unknown"
+        if np.isfinite(self.start_utc_s):
+            began = datetime.fromtimestamp(self.start_utc_s, UTC).isoformat(" ", "seconds")
+        rows = {f"rows of {name}": n for name in TABLES if (n := len(getattr(self, name)))}
+        head = {"CRS": short_crs(self.crs), "start": began, "seconds": f"{self.duration_s:.1f}"}
+        notes = {"notes": shortened(self.notes)} if self.notes else {}
+        return html_table("Track log", {**head, **rows, **notes})
 
     @property
     def duration_s(self) -> float:
@@ -153,6 +167,7 @@ def make_log(
     start_utc_s: float = float("nan"),
     notes: Sequence[str] = (),
     imu: ImuNoise | None = None,
+    vehicle: bool | None = None,
     names: Mapping[str, str] | None = None,
     row_numbers: Mapping[str, ArrayLike] | None = None,
 ) -> TrackLog:
@@ -176,6 +191,8 @@ def make_log(
         Earlier notes on the tables.
     imu : ImuNoise, optional
         Errors of ``motion``, where they were measured.
+    vehicle : bool, optional
+        Whether ``motion`` is a vehicle's, where that is known.
     names : mapping, optional
         Name of each table (such as its file) in messages; ``log`` for the whole.
     row_numbers : mapping, optional
@@ -237,9 +254,8 @@ def make_log(
         where, rows = called.get("pseudoranges", "pseudoranges"), tables["pseudoranges"]
         tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)
         every_note += more
-    return TrackLog(
-        str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)), imu=imu
-    )
+    every_note = tuple(dict.fromkeys(every_note))
+    return TrackLog(str(crs), start_utc_s, **tables, notes=every_note, imu=imu, vehicle=vehicle)
 
 
 def rows_by_kind(log: TrackLog) -> dict[Kind, pd.DataFrame]:

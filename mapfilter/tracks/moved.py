@@ -15,6 +15,9 @@ _MAD_TO_SD = 1.4826
 _LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG = 0.05, 1.0, 90.0
 _COURSE_BIAS_DEG = 1.0
 _MOVING_SD = 2.0
+_PART_S, _LONGEST_WAY_S = 1.0, 30.0
+_CHORD_SCALE = 0.1
+"""Straight ways between positions cut corners: a right angle in the middle of one takes 30 %."""
 
 
 def by_compass(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
@@ -204,7 +207,8 @@ def course_errors(motion: pd.DataFrame, east_m: Floats, north_m: Floats) -> ImuN
     if not moving.any():
         return None
     heading_sd = _MAD_TO_SD * float(np.degrees(np.median(np.abs(turned[moving]))))
-    return _receiver_noise(motion["time_s"].to_numpy(), step_sd_m, heading_sd, _COURSE_BIAS_DEG)
+    time_s = motion["time_s"].to_numpy()
+    return _receiver_noise(time_s, step_sd_m, heading_sd, bias_sd_deg=_COURSE_BIAS_DEG)
 
 
 def motion_from_positions(
@@ -212,9 +216,12 @@ def motion_from_positions(
 ) -> tuple[pd.DataFrame, ImuNoise]:
     """Return steps and headings from each position to the next, and their errors.
 
-    The errors of positions are their scatter about the straight line between the one before and
-    the one after, which holds turns and changes of speed, too. A step of less than two of its
-    standard deviations has no heading. A step over a gap goes straight from its begin to its end.
+    The way between two positions is parted into equal steps of at most 1 s, so that a filter
+    compares each with what it receives and with the streets. The errors of a way are the scatter of
+    positions about the straight line between the one before and the one after, which holds turns
+    and changes of speed, too; a part of n has them by 1/√n. A way of less than two of its standard
+    deviations has no heading. One that lasts longer than 30 s is one step, straight from its begin
+    to its end.
 
     Parameters
     ----------
@@ -236,19 +243,33 @@ def motion_from_positions(
         off = [p[1:-1] - (1 - part) * p[:-2] - part * p[2:] for p in (east_m, north_m)]
         scaled = np.abs(off) / np.sqrt(1 + part**2 + (1 - part) ** 2)
         sd_m = _MAD_TO_SD * float(np.median(scaled))
-    step_sd_m = max(np.sqrt(2) * sd_m, _LEAST_STEP_SD_M)
-    moving = step_m > _MOVING_SD * step_sd_m
-    usual_m = float(np.median(step_m[moving])) if moving.any() else step_sd_m
+    way_sd_m = max(np.sqrt(2) * sd_m, _LEAST_STEP_SD_M)
+    moving = step_m > _MOVING_SD * way_sd_m
+    lasted_s = np.diff(time_s)
+    parts = np.where(lasted_s > _LONGEST_WAY_S, 1.0, np.ceil(lasted_s / _PART_S)).astype(np.int64)
+    way = np.repeat(np.arange(len(parts)), parts)
+    # Each part's number in its way, from 1.
+    number = np.arange(1, len(way) + 1) - (np.cumsum(parts) - parts)[way]
+    at_s = np.where(
+        number == parts[way],
+        time_s[1:][way],
+        time_s[:-1][way] + number * (lasted_s / parts)[way],
+    )
     motion = pd.DataFrame(
         {
-            "time_s": time_s,
-            "step_m": np.concatenate([[0.0], step_m]),
-            "heading_rad": np.concatenate([[np.nan], np.where(moving, heading, np.nan)]),
+            "time_s": np.concatenate([time_s[:1], at_s]),
+            "step_m": np.concatenate([[0.0], (step_m / parts)[way]]),
+            "heading_rad": np.concatenate([[np.nan], np.where(moving, heading, np.nan)[way]]),
             "turn_rad": np.nan,
         }
     )
-    heading_sd = float(np.degrees(np.arctan2(step_sd_m, usual_m)))
-    return motion, _receiver_noise(time_s, step_sd_m, heading_sd, 0.0)
+    # Those of the usual way while moving.
+    usual = moving if moving.any() else np.ones(len(parts), dtype=bool)
+    count = float(np.median(parts[usual])) if len(parts) else 1.0
+    usual_m = float(np.median(step_m[moving])) if moving.any() else way_sd_m
+    step_sd_m = max(way_sd_m / np.sqrt(count), _LEAST_STEP_SD_M)
+    heading_sd = float(np.degrees(np.arctan2(step_sd_m, usual_m / count)))
+    return motion, _receiver_noise(at_s, step_sd_m, heading_sd, scale=_CHORD_SCALE)
 
 
 def _chords(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
@@ -266,7 +287,12 @@ def _long(lasted_s: Floats) -> Bools:
 
 
 def _receiver_noise(
-    time_s: Floats, step_sd_m: float, heading_sd_deg: float, bias_sd_deg: float
+    time_s: Floats,
+    step_sd_m: float,
+    heading_sd_deg: float,
+    *,
+    bias_sd_deg: float = 0.0,
+    scale: float = 0.0,
 ) -> ImuNoise:
     period_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
     return ImuNoise(
@@ -276,4 +302,5 @@ def _receiver_noise(
             np.clip(heading_sd_deg, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG)
         ),
         bias_sd_deg=bias_sd_deg,
+        scale=scale,
     )

@@ -42,7 +42,7 @@ ALMANAC = "almanac.txt"
 _SUFFIXES = (".parquet", ".csv")
 FORMAT = "mapfilter track log"
 VERSION = 1
-_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "imu", "parts")
+_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "imu", "vehicle", "parts")
 _WRITTEN = {
     f"{name}{suffix}"
     for name in (*TABLES, *(f"{FOLDER}/{sensor}" for sensor in SENSOR_COLUMNS))
@@ -155,6 +155,8 @@ def write_log(
         }
         if log.imu is not None:
             head["imu"] = asdict(log.imu)
+        if log.vehicle is not None:
+            head["vehicle"] = log.vehicle
         head["parts"] = parts
         write_json(new / HEAD, head)
 
@@ -188,6 +190,7 @@ def read_log(folder: str | Path) -> TrackLog:
         start_utc_s=start_utc_s,
         notes=(*head.get("notes", ()), *ignored, *notes),
         imu=parse_imu_noise(head.get("imu"), f"{where}, imu"),
+        vehicle=head.get("vehicle"),
         names={"log": where} | {table: str(path) for table, path in paths.items()},
         row_numbers={table: read.row_numbers for table, read in tables.items()},
     )
@@ -248,6 +251,9 @@ def _check_head(head: dict[str, Any], where: str) -> float:
     start = head.get("start_utc_s")
     if start is not None and (isinstance(start, bool) or not isinstance(start, int | float)):
         faults.add(f"{where}, start_utc_s", "UTC seconds, or null", shown(start))
+    vehicle = head.get("vehicle")
+    if not (vehicle is None or isinstance(vehicle, bool)):
+        faults.add(f"{where}, vehicle", "true, false or null", shown(vehicle))
     notes = head.get("notes", [])
     if not (isinstance(notes, list) and all(isinstance(note, str) for note in notes)):
         faults.add(f"{where}, notes", "a list of texts", shown(notes))

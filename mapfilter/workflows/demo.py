@@ -3,21 +3,43 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from mapfilter._io import ensure_writable_folder
-from mapfilter._parallel import Progress
 from mapfilter.config.load import load_config
 from mapfilter.workflows.build import run_build
+from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import ReplayedLog, run_replay
 from mapfilter.workflows.simulate import run_simulate
+from mapfilter.workflows.views import run_view
 
-_STAGES = ("predict", "build", "simulate", "replay")
+_STAGES = {
+    "predict": "predicting levels (the first run compiles kernels, some 20 s once)",
+    "build": "building the database, with its pictures",
+    "simulate": "simulating a walk",
+    "replay": "replaying it by the Bayes map filter, with its pictures",
+    "candidate": "replaying it by the candidate filter",
+    "view": "putting both into one page",
+}
+"""Names of the stages, and what the bar says of each."""
+
+VIEW_HTML = "replay.html"
+
+WHAT_ONE_SEES = """\
+The page plays the walk. Space starts and stops it, the arrow keys step, the slider seeks.
+Shading is the belief: first nearly every street is as likely, then a few, then one.
+The line is the estimate, coloured by status, with its 50 and 95 % circles; truth is beside it.
+Click a moment: each reading's contribution in nats, to the leading hypothesis and the runner-up.
+Click a place on the map to ask why the position is not there; charts and map move together.\
+"""
+StageProgress = Callable[[int, int, str], None]
+"""Called with stages done, stages in all, and what the next one does."""
+
 _OLD_FILTER = "candidate"
 _FIGURES = (
     "switched",
@@ -34,9 +56,11 @@ def run_demo(
     settings: Sequence[str] = (),
     *,
     seed: int | None = None,
-    progress: Progress | None = None,
+    progress: StageProgress | None = None,
 ) -> dict[str, Any]:
     """Predict, build, simulate a walk and replay it by two filters, with the pictures of each.
+
+    A page shows both replays side by side.
 
     Parameters
     ----------
@@ -47,14 +71,15 @@ def run_demo(
     seed : int, optional
         Another walk with other noise.
     progress : callable, optional
-        Called with stages done and stages in all.
+        Called with stages done, stages in all, and what the next one does.
 
     Returns
     -------
     dict
         Points and cells of the database, length of the walk, whether, where and how accurately the
         Bayes filter switched to tracking, its errors from then on (as in ``Accuracy``), the same
-        figures of the candidate filter, wall time of each stage, and all files written.
+        figures of the candidate filter, wall time of each stage, all files written, and the
+        address of the page.
     """
     ensure_writable_folder(out)
     seeds = [] if seed is None else [f"journeys.seed={seed}"]
@@ -64,24 +89,29 @@ def run_demo(
     seconds: dict[str, float] = {}
 
     @contextmanager
-    def stage(name: str) -> Iterator[None]:
+    def stage(name: str, counted: str = "") -> Iterator[None]:
+        if progress is not None:
+            progress(list(_STAGES).index(name), len(_STAGES), _STAGES[name])
         began_s = time.perf_counter()
         yield
-        seconds[name] = round(time.perf_counter() - began_s, 3)
-        if progress is not None:
-            progress(len(seconds), len(_STAGES))
+        taken_s = seconds.get(counted or name, 0.0) + time.perf_counter() - began_s
+        seconds[counted or name] = round(taken_s, 3)
 
-    with stage("predict"):
-        predicted = run_predict(config)
-    with stage("build"):
-        built = run_build(config)
-    with stage("simulate"):
-        simulated = run_simulate(config)
+    with compiled_beside():
+        with stage("predict"):
+            predicted = run_predict(config)
+        with stage("build"):
+            built = run_build(config)
+        with stage("simulate"):
+            simulated = run_simulate(config)
     with stage("replay"):
-        walk = run_replay(config, out / "replay").logs[0]
+        walk = run_replay(config, out / "replay", html=True).logs[0]
+    with stage("candidate", "replay"):
         old_filter = config.filter.model_copy(update={"name": _OLD_FILTER})
         old_config = config.model_copy(update={"filter": old_filter})
-        old = run_replay(old_config, out / _OLD_FILTER).logs[0]
+        old = run_replay(old_config, out / _OLD_FILTER, html=True).logs[0]
+    with stage("view", "replay"):
+        view = run_view([out / "replay", out / _OLD_FILTER], out / VIEW_HTML)
     files = [predicted.rasters, predicted.ground_truth, predicted.plan, built.database]
     pictures = (simulated.path, *built.pictures, *walk.outputs, *old.outputs)
     return {
@@ -91,7 +121,8 @@ def run_demo(
         **_figures(walk),
         "candidate": _figures(old),
         "seconds": seconds,
-        "outputs": (*(file for file in files if file is not None), *pictures),
+        "outputs": (*(file for file in files if file is not None), *pictures, view["html"]),
+        "open": view["open"],
     }
 
 

@@ -40,14 +40,16 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.satellites import NlosModel, ReceptionModel
+from mapfilter.workflows.evaluate_recorded import ALL
+from mapfilter.workflows.evaluate_recorded import NAMES as RECORDED
 from mapfilter.workflows.evaluate_runs import run_cases, street_base
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import World, filter_choice, option_sections
 
-NAMES = ("global-positioning", "audit", "ottawa", "single-reports")
-OF_DATA = ("ottawa", "single-reports")
+OF_DATA = (ALL, *RECORDED, "single-reports")
 """Benchmarks on published data."""
+NAMES = ("global-positioning", "audit", *OF_DATA)
 RUNS = 20
 TABLE = "table.json"
 _MISSING = 0.1

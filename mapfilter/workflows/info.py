@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pyogrio
-from pyogrio.errors import DataSourceError
 from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
 from mapfilter._inputs import open_input
-from mapfilter._ogr import vector_source
+from mapfilter._ogr import VectorSource, sealed_gdal, vector_source
 from mapfilter.config.load import load_config
 from mapfilter.database.export import BANDS, CELLS_TAG
 from mapfilter.database.manifest import MANIFEST
@@ -138,24 +137,24 @@ def _layers_info(path: Path) -> dict[str, Any]:
     """Describe the layers of a vector file."""
     place = vector_source(path)
     try:
-        layers = [
-            {
-                "layer": str(layer),
-                "geometry": str(kind or "none"),
-                "features": int(about["features"]),
-                "crs": str(about["crs"] or ""),
-                "columns": ", ".join(map(str, about["fields"])),
-            }
-            for layer, kind in pyogrio.list_layers(place.path)
-            for about in [
-                pyogrio.read_info(
-                    place.path, layer=layer, force_feature_count=True, **place.options
-                )
+        with sealed_gdal():
+            layers = [
+                _layer_info(place, layer, kind) for layer, kind in pyogrio.list_layers(place.path)
             ]
-        ]
-    except (DataSourceError, OSError, ValueError) as error:
+    except (RuntimeError, OSError, ValueError, UnboundLocalError) as error:
         raise fail(InputError, str(path), "a layer that GDAL can read", str(error)) from error
     return {"kind": "layers", "layers": layers, "use": "roads.layer, or QGIS and geopandas"}
+
+
+def _layer_info(place: VectorSource, layer: str, kind: str | None) -> dict[str, Any]:
+    about = pyogrio.read_info(place.path, layer=layer, force_feature_count=True, **place.options)
+    return {
+        "layer": str(layer),
+        "geometry": str(kind or "none"),
+        "features": int(about["features"]),
+        "crs": str(about["crs"] or ""),
+        "columns": ", ".join(map(str, about["fields"])),
+    }
 
 
 def _table_info(path: Path) -> dict[str, Any]:

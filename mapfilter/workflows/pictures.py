@@ -46,6 +46,7 @@ from mapfilter.workflows.served import (
 
 ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")
 FIGURES = "figures.json"
+REPLAY_HTML = "replay.html"
 SUMMARY = "summary.json"
 
 PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
@@ -58,7 +59,7 @@ NETWORK_PICTURES = (
     "land-use.png",
 )
 
-_OF_ONE_LOG = {*ESTIMATES, FIGURES, *PICTURES}
+_OF_ONE_LOG = {*ESTIMATES, FIGURES, REPLAY_HTML, *PICTURES}
 _NEARLY_ALL = (1.0, 99.0)
 _IF_NONE_DBM = (-110.0, -50.0)
 _SQUARE_M = 5.0

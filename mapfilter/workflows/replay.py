@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -24,6 +25,7 @@ from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import Lattice
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import PositionedTrack
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
@@ -38,12 +40,25 @@ from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
 from mapfilter.tracks.store import is_log
+from mapfilter.viewing.bundle import replay_bundle
+from mapfilter.viewing.page import write_page
+from mapfilter.viewing.runs import ViewedRun
+from mapfilter.viewing.trace import TraceRecorder
 from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.logs import journeys_of, open_journey
-from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, draw_track, older_results
+from mapfilter.workflows.pictures import (
+    ESTIMATES,
+    FIGURES,
+    REPLAY_HTML,
+    SUMMARY,
+    draw_track,
+    older_results,
+)
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports, together
 from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
 from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.views import run_figures
 from mapfilter.workflows.world import filter_choice, plan_antennas, planned_cells
 
 
@@ -259,7 +274,9 @@ def _shared_notes(logs: Sequence[ReplayedLog]) -> list[str]:
     return [f"{note} (in {_named(names)})" for note, names in owners.items()]
 
 
-def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -> ReplayResult:
+def run_replay(
+    config: Config, out: Path, *, html: bool = False, progress: Progress | None = None
+) -> ReplayResult:
     """Locate the log or logs of a configuration and write estimates, figures and pictures.
 
     Parameters
@@ -269,6 +286,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         sections count.
     out : Path
         Folder of the results; one log writes straight into it, several into a folder each.
+    html : bool
+        Whether a page is written that shows each log's replay (``replay.html``).
     progress : callable, optional
         Called with logs done and logs in all.
 
@@ -279,8 +298,9 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         cannot be written.
     """
     options = filter_choice(config.filter)
-    database = _database(config, options)
-    journeys = _Logs(config, database)
+    with compiled_beside() if isinstance(options, BayesFilter) else nullcontext():
+        database = _database(config, options)
+        journeys = _Logs(config, database)
 
     @cache
     def sites(crs: str) -> CellPlan:
@@ -319,7 +339,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
-        track = locate(log, filter_, rng, snapshots=drawn, risk=risk)
+        recorder = TraceRecorder(filter_) if html else None
+        track = locate(log, filter_, rng, snapshots=drawn, risk=risk, recorder=recorder)
         into = new if count == 1 else new / name
         baseline = baselines.of(log)
         if database is None:
@@ -331,6 +352,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)
+        if recorder is not None:
+            written = _with_view(written, log, track, recorder, database, into)
         files = tuple(out / file.relative_to(new) for file in written.outputs)
         return replace(written, outputs=files)
 
@@ -345,6 +368,30 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         if count > 1:
             write_json(new / SUMMARY, to_jsonable(summary_figures(result)))
     return result
+
+
+def _with_view(
+    replayed: ReplayedLog,
+    log: TrackLog,
+    track: PositionedTrack,
+    recorder: TraceRecorder,
+    database: RadioRouteDatabase | None,
+    into: Path,
+) -> ReplayedLog:
+    """Write the page of one log."""
+    name, estimate = replayed.name, track.estimate
+    figures = run_figures(replayed.figures)
+    view = ViewedRun(
+        f"{name}, {estimate.filter}",
+        estimate,
+        log,
+        log_name=name,
+        trace=recorder,
+        figures=figures,
+        smoothed=recorder.filter.smoother() is not None,
+    )
+    write_page(replay_bundle(f"Replay of {name}", [view], database), into / REPLAY_HTML)
+    return replace(replayed, outputs=(*replayed.outputs, into / REPLAY_HTML))
 
 
 def _database(config: Config, options: FilterOptions) -> RadioRouteDatabase | None:

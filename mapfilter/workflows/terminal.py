@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mapfilter._printing import printable, printable_json, write
+from mapfilter._printing import printable, printable_json, quiet_callbacks, write
 from mapfilter.errors import MapfilterError, Stopped
 
 if TYPE_CHECKING:
@@ -70,6 +70,24 @@ def progress_bar(label: str) -> Iterator[Progress | None]:
     with Bar(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextlib.contextmanager
+def stage_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Show a bar on stderr with the name of each stage, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda done, total, what: None  # noqa: ARG005
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label)
+
+        def show(done: int, total: int, what: str) -> None:
+            bar.update(task, completed=done, total=total, description=f"{done + 1}/{total} {what}")
+
+        yield show
 
 
 def rate_text(per_s: float, unit: str) -> str:
@@ -165,7 +183,7 @@ def guarded(run: Callable[[], int | None]) -> int:
     When a signal stops it, stderr gets what is kept, and the code is 128 and the signal's number.
     """
     try:
-        with stop_signals():
+        with quiet_callbacks(), stop_signals():
             return run() or 0
     except Stopped as error:
         print_message(stopped_text(error))

@@ -1,8 +1,10 @@
 """The doors of files: pipes, devices, other drivers' files, and what leads to other places."""
 
 import ast
+import contextlib
 import os
 import socketserver
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -14,6 +16,7 @@ import geopandas
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
+import pyogrio
 import pytest
 import rasterio
 import shapely
@@ -33,6 +36,7 @@ from mapfilter.tracks.log import make_log
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.tracks.store import write_log
 from mapfilter.tracks.table_files import read_table as read_log_table
+from mapfilter.workflows.info import run_info
 
 CRS = "EPSG:32635"
 BOX = (385000.0, 6671000.0, 386000.0, 6672000.0)
@@ -267,6 +271,39 @@ def test_every_reader_refuses_a_pipe(tmp_path):
     said = done.stdout.splitlines()
     assert not [line for line in said if line.startswith("READ")]
     assert sum(line.startswith("refused") for line in said) == len(calls)
+
+
+def with_table_of(path, target, form):
+    """Write a database of which one table is what SQLite calls virtual: a file elsewhere."""
+    roads(path, driver=form, layer="roads")
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA writable_schema = ON")
+        made = f"CREATE VIRTUAL TABLE other USING VirtualOGR('{target}')"
+        row = "INSERT INTO sqlite_master VALUES ('table', 'other', 'other', 0, ?)"
+        database.execute(row, (made,))
+        if form == "GPKG":
+            listed = "INSERT INTO gpkg_contents (table_name, data_type, identifier, srs_id) "
+            database.execute(f"{listed} VALUES ('other', 'attributes', 'other', 0)")
+        database.commit()
+    return path
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize(("form", "suffix"), [("SQLite", "sqlite"), ("GPKG", "gpkg")])
+def test_a_table_of_another_file_or_address_is_not_opened(tmp_path, server, form, suffix, packed):
+    address, asked = server
+    path = with_table_of(tmp_path / f"a.{suffix}", f"/vsicurl/{address}/x.geojson", form)
+    if packed:
+        with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+            archive.write(path, path.name)
+        path = tmp_path / "a.zip"
+    assert read_layer(path, CRS, BOX, "roads").number.size == 1
+    with pytest.raises(InputError):
+        read_layer(path, CRS, BOX, "other")
+    with contextlib.suppress(InputError):
+        run_info(path)
+    assert not asked
+    assert pyogrio.get_gdal_config_option("OGR_SQLITE_STATIC_VIRTUAL_OGR") is None
 
 
 def swapped_after_check(path, monkeypatch):

@@ -190,8 +190,10 @@ def test_quickstart_shows_only_commands_that_exist():
         "bench",
         "bound",
         "evaluate",
+        "film",
         "sweep",
         "reproduce",
+        "view",
     }
 
 

@@ -60,6 +60,7 @@ def test_the_usual_options():
         "fault_m": 300.0,
         "absent_db": 3.0,
         "weight": 0.35,
+        "tracking_share": 0.3,
     }
     assert asdict(MotionErrors()) == {
         "step_sd_m": 0.3,

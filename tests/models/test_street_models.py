@@ -23,6 +23,7 @@ from mapfilter.models.street_motion import (
     interpolate,
     map_log_likelihood,
     move,
+    moved_back,
     weigh_by_map,
 )
 
@@ -66,6 +67,22 @@ def test_a_step_without_noise_is_that_of_the_oracle():
         for one, place in zip(before.T, after.T, strict=True):
             expected = oracle.moved(*(float(x) for x in one[:4]), step_m, heading_rad)
             assert place[:2] == pytest.approx(expected, abs=2e-4)
+
+
+def test_going_back_undoes_the_steps_with_their_errors():
+    """In complex numbers: each hypothesis turned and scaled the displacement by its own errors."""
+    rng = np.random.default_rng(7)
+    start = states(40)
+    start[BIAS], start[TURN] = rng.uniform(-3, 3, 40), rng.uniform(-1, 1, 40)
+    start[LOG_SCALE], start[STRETCH] = rng.normal(0, 0.2, 40), rng.normal(0, 0.2, 40)
+    way = 60.0 - 25.0j
+    errors = np.exp(start[LOG_SCALE] + start[STRETCH] + 1j * (start[BIAS] + start[TURN]))
+    there = start.copy()
+    there[EAST] += (way * errors).real
+    there[NORTH] += (way * errors).imag
+    given = there.copy()
+    np.testing.assert_allclose(moved_back(there, way.real, way.imag), start, atol=1e-4)
+    np.testing.assert_array_equal(there, given)
 
 
 # Correlations of 1e5 draws are good to 1/sqrt(1e5); five standard errors are allowed.

@@ -24,6 +24,8 @@ import pytest
 BROKEN = 70
 """Exit status of a run that pytest never began."""
 _POLL_S = 0.02
+_WAITING = 10.0
+"""A test that waits, or has others work, may take so many times its processor time by the clock."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class Outcome:
     @property
     def timed_out(self) -> bool:
         """Whether it ran too long."""
-        return self.code in (-signal.SIGALRM, -signal.SIGKILL)
+        return self.code in (-signal.SIGPROF, -signal.SIGALRM, -signal.SIGKILL)
 
 
 class Watch:
@@ -86,8 +88,10 @@ class Watch:
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         limit_s = self._request.limits_s.get(nodeid.partition("::")[0], self._request.limit_s)
-        # Its default action ends the process even within a compiled kernel.
-        signal.setitimer(signal.ITIMER_REAL, limit_s)
+        # Their default actions end the process even within a compiled kernel. Processor time is
+        # what a mutant uses up; the clock alone says how busy the machine is.
+        signal.setitimer(signal.ITIMER_PROF, limit_s)
+        signal.setitimer(signal.ITIMER_REAL, _WAITING * limit_s)
         self._write(nodeid)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -98,6 +102,7 @@ class Watch:
         self._fail(report)
 
     def pytest_sessionfinish(self) -> None:
+        signal.setitimer(signal.ITIMER_PROF, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)
         self._write(self._failed)
 
@@ -119,7 +124,7 @@ def run(request: Request) -> Outcome:
     owner = os.getppid()
     try:
         while (ended := os.waitpid(child, os.WNOHANG))[0] == 0:
-            if time.monotonic() - began_s > request.limit_s:
+            if time.monotonic() - began_s > _WAITING * request.limit_s:
                 os.kill(child, signal.SIGKILL)
                 ended = os.waitpid(child, 0)
                 break

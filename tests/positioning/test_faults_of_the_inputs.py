@@ -135,8 +135,8 @@ FAULTS = {
     "ways-missing": [
         of_cells(s, without_streets((1, 3, 5), (1, 3, 5)), NOBODY_LEAVES_THE_WAYS) for s in (0, 4)
     ],
-    "district-6db": [
-        of_cells(3, other(district=(300, 300, 250, 6)), LEVELS_ARE_AS_PREDICTED),
+    "district-10db": [
+        of_cells(3, other(district=(300, 300, 250, 10)), LEVELS_ARE_AS_PREDICTED),
     ],
     "indoors-start": [of_logs(s, LEVELS_ARE_AS_PREDICTED, indoors) for s in (3, 4)],
     "off-ways": [

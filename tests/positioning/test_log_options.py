@@ -1,5 +1,7 @@
 """Filters take the step of timing advance, and of levels, from the log that states them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -229,3 +231,16 @@ def test_whose_motion_it_is_can_be_stated():
     assert fitted_to_log(BayesFilter(vehicle=True), turning(1.4))[0].vehicle is True
     assert BayesFilter().resolved == BayesFilter()
     assert fitted_to_log(CandidateFilter(), turning(9.0)) == (CandidateFilter(), ())
+
+
+@pytest.mark.parametrize("options", [BayesFilter(), GridFilter()])
+def test_what_a_log_states_of_its_vehicle_counts_more_than_signs(options):
+    walked, driven = turning(1.0), turning(9.0)
+    fitted, notes = fitted_to_log(options, replace(walked, vehicle=True))
+    assert fitted.vehicle is True
+    assert notes == ("motion: a vehicle's, as the log states it (filter.bayes.vehicle)",)
+    fitted, notes = fitted_to_log(options, replace(driven, vehicle=False))
+    assert fitted.vehicle is False
+    assert notes == ("motion: no vehicle's, as the log states it (filter.bayes.vehicle)",)
+    own = replace(options, vehicle=False)
+    assert fitted_to_log(own, replace(walked, vehicle=True)) == (own, ())

@@ -328,18 +328,18 @@ def test_without_motion_a_position_is_not_claimed_for_long(fault, reason):
 
 
 def test_a_phone_that_is_turned_in_its_pocket_is_found_again():
-    """Headings are off by half a circle from the middle on; without the remedy it stays lost."""
+    """Headings are off by half a circle from the middle on; without the remedy all stay lost."""
     share = {}
     for remounts_per_m in (1e-3, 0.0):
         motion = replace(AREA.model.motion, remounts_per_m=remounts_per_m)
         positioner = replace(AREA, model=replace(AREA.model, motion=motion))
         logs = [
-            (seed, faulty(walk_log(TOWN, seed, error_db=3.0), "reversed")) for seed in (1, 2, 3)
+            (seed, faulty(walk_log(TOWN, seed, error_db=3.0), "reversed")) for seed in range(1, 7)
         ]
         ends = [tracked(log, seed, positioner)[0][-60:] for seed, log in logs]
         share[remounts_per_m] = np.mean([(end[:, 1] < 30).mean() for end in ends])
-    assert share[1e-3] > 0.6
-    assert share[0.0] < 0.3
+    assert share[1e-3] > 0.35
+    assert share[0.0] < 0.1
 
 
 def test_radio_that_stands_still_leaves_dead_reckoning_alone():

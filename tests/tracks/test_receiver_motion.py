@@ -62,3 +62,39 @@ def test_errors_of_speed_and_course_are_how_they_differ_from_positions():
     assert errors.sigma_trans_m == pytest.approx(0.6 / np.sqrt(2), rel=0.25)
     still = np.zeros(len(time_s))
     assert course_errors(motion, still, still) is None
+
+
+@pytest.mark.parametrize("every_s", [2, 9, 12.5])
+def test_ways_of_several_seconds_are_parted_into_steps_of_one(every_s):
+    """Positions every 9 s, one way of 100 s among them."""
+    time_s = np.r_[0:90:every_s, 190:280:every_s]
+    rng = np.random.default_rng(3)
+    east_m, north_m = np.cumsum(rng.uniform(60, 140, (2, len(time_s))), axis=1)
+    motion, errors = motion_from_positions(time_s, east_m, north_m)
+    lasted_s = np.diff(motion["time_s"])
+    assert lasted_s.max() > 90
+    assert np.sort(lasted_s)[-2] <= 1
+    assert np.sum(lasted_s > 1) == 1
+    assert set(time_s) <= set(motion["time_s"])
+    # At each position the steps have come where it lies.
+    along = motion[["step_m", "step_m"]].to_numpy() * np.column_stack(
+        [np.cos(motion["heading_rad"]), np.sin(motion["heading_rad"])]
+    )
+    at = np.cumsum(np.nan_to_num(along), axis=0)[np.isin(motion["time_s"], time_s)]
+    np.testing.assert_allclose(at[:, 0], east_m - east_m[0], atol=1e-6)
+    np.testing.assert_allclose(at[:, 1], north_m - north_m[0], atol=1e-6)
+    assert errors.scale == 0.1
+    assert errors.period_s == pytest.approx(every_s / np.ceil(every_s))
+
+
+def test_the_errors_of_parts_add_up_to_those_of_their_way():
+    """A random walk whose steps of a second scatter by 2 m, seen every 9 s."""
+    rng = np.random.default_rng(4)
+    seen = np.r_[0:18000:9]
+    east_m = np.cumsum(12.0 + rng.normal(0, 2.0, 18000))[seen]
+    north_m = np.cumsum(rng.normal(0, 2.0, 18000))[seen]
+    _, errors = motion_from_positions(seen.astype(np.float64), east_m, north_m)
+    # About the line over two ways of n steps the middle scatters by 2 √(n / 2), as positions with
+    # white errors of 2 √(n / 3) do: their ways have errors of √2 times that, each step of 2 √(2/3).
+    assert errors.sigma_trans_m == pytest.approx(2.0 * np.sqrt(2 / 3), rel=0.1)
+    assert errors.sigma_orient_deg == pytest.approx(np.degrees(errors.sigma_trans_m / 12), rel=0.1)

@@ -260,6 +260,17 @@ def test_a_quote_that_is_never_closed_ends_with_its_line(read):
     assert len(recording.tables["radio"]) == 2 * COUNT
 
 
+def test_a_quoted_separator_does_not_stand_for_a_field_that_is_missing(read):
+    """Counted with it, the line has all its fields, each but the first ones of its neighbour."""
+    lines = MADE["opencellid"][1].splitlines()
+    fields = lines[5].split(",")
+    lines[5] = ",".join([*fields[:2], f'"{fields[2]},{fields[3]}"', *fields[4:]])
+    assert lines[5].count(",") == lines[4].count(",")
+    recording = read("opencellid", "\n".join(lines).encode())
+    assert len(recording.tables["radio"]) == COUNT - 1
+    assert "fewer fields" in recording.unusable[0].reason
+
+
 def test_a_long_line_is_refused_alone(read):
     lines = MADE["opencellid"][1].splitlines()
     lines[5] += "x" * 100_000

@@ -304,6 +304,18 @@ def test_a_log_without_errors_of_motion_states_none(log, tmp_path):
     assert read_log(tmp_path / "log").imu is None
 
 
+def test_whose_motion_it_is_travels_with_the_log(log, tmp_path):
+    write_log(log, tmp_path / "unknown")
+    assert "vehicle" not in json.loads((tmp_path / "unknown" / "log.json").read_text())
+    assert read_log(tmp_path / "unknown").vehicle is None
+    for vehicle in (True, False):
+        write_log(replace(log, vehicle=vehicle), tmp_path / "log")
+        assert leave_out(read_log(tmp_path / "log"), ["radio"]).vehicle is vehicle
+    (tmp_path / "log.json").write_text(json.dumps({"crs": CRS, "vehicle": "yes"}))
+    with pytest.raises(InputError, match="vehicle: expected true, false or null, found 'yes'"):
+        read_log(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("imu", "named"),
     [

@@ -1,5 +1,7 @@
 """Recordings become one log: clocks, frames, motion, sensors, and the command."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -185,8 +187,9 @@ def test_positions_make_motion_where_there_is_no_course(made, tmp_path):
     assert any("motion comes from GNSS: its positions" in note for note in result.notes)
     moved = log.motion.iloc[1:]
     east, north = (np.diff(log.gnss[name]) for name in ("east_m", "north_m"))
-    assert moved["step_m"].to_numpy() == pytest.approx(np.hypot(east, north))
-    assert moved["heading_rad"].to_numpy() == pytest.approx(np.arctan2(north, east))
+    # Positions every 2 s, steps of 1 s.
+    assert moved["step_m"].to_numpy() == pytest.approx(np.repeat(np.hypot(east, north) / 2, 2))
+    assert moved["heading_rad"].to_numpy() == pytest.approx(np.repeat(np.arctan2(north, east), 2))
     assert log.imu.sigma_trans_m < 0.5
 
 
@@ -197,6 +200,7 @@ def test_poses_make_steps_and_turns(name, made, tmp_path):
     assert motion["step_m"].iloc[1:].to_numpy() == pytest.approx(2.202, abs=0.05)
     expected = -0.02 if name == "kitti" else 0.02
     assert motion["turn_rad"].iloc[1:].to_numpy() == pytest.approx(expected, abs=1e-5)
+    assert read_log(tmp_path / "log").vehicle is None
 
 
 def test_odometry_makes_steps_and_turns(made, tmp_path):
@@ -317,9 +321,10 @@ def test_a_speed_and_a_yaw_rate_are_odometry(speed, rate, tmp_path):
     rows = "".join(f"{k},{told},{turned}\n" for k in range(11))
     (tmp_path / "drive.csv").write_text(f"time,{speed},{rate}\n{rows}")
     run_convert([tmp_path / "drive.csv"], tmp_path / "log")
-    motion = read_log(tmp_path / "log").motion
-    assert motion["step_m"].sum() == pytest.approx(90.0)
-    assert motion["turn_rad"].sum() == pytest.approx(1.0)
+    log = read_log(tmp_path / "log")
+    assert log.motion["step_m"].sum() == pytest.approx(90.0)
+    assert log.motion["turn_rad"].sum() == pytest.approx(1.0)
+    assert log.vehicle is True
     # Beside positions it is the speed of their receiver, and no motion unless asked for.
     rows = "".join(f"{k},{told},{turned},60.1{k},24.9\n" for k in range(11))
     (tmp_path / "drive.csv").write_text(f"time,{speed},{rate},lat,lon\n{rows}")
@@ -368,3 +373,44 @@ def test_dates_of_a_plain_table(tmp_path):
         with pytest.raises(InputError, match="ISO 8601 such as 2026-05-01T10:00:00") as caught:
             converted_of(given, given)
         assert hint in str(caught.value)
+
+
+def test_files_of_other_sensors_in_an_export_are_left_out(tmp_path):
+    """As phyphox writes them: light, and sound, beside the accelerometer."""
+    folder = tmp_path / "export"
+    folder.mkdir()
+    (folder / "Accelerometer.csv").write_text(MADE["phyphox"][1])
+    (folder / "Light.csv").write_text('"Time (s)","Illuminance (lx)"\n0.1,30\n0.2,31\n')
+    result = run_convert([folder], tmp_path / "log")
+    assert [Path(file.file).name for file in result.files] == ["Accelerometer.csv"]
+    assert "export: Light.csv left out, no recordings" in result.notes
+    with pytest.raises(InputError, match="a recording in a known format"):
+        run_convert([folder / "Light.csv"], tmp_path / "log")
+
+
+@pytest.mark.parametrize(
+    ("speed", "rate", "shown_mps", "shown_radps"),
+    [
+        ("Vehicle speed (km/h)", "Yaw rate (deg/s)", 3.6, 57.29578),
+        ("vehicle_speed_mps", "yaw_rate_rad_s", 1.0, 1.0),
+        ("wheel speed (m/s)", "yaw_rate_dps", 1.0, 57.29578),
+    ],
+)
+def test_names_with_units_are_known(speed, rate, shown_mps, shown_radps, tmp_path):
+    rows = "".join(f"{k},{9 * shown_mps},{0.1 * shown_radps}\n" for k in range(11))
+    (tmp_path / "can.csv").write_text(f"Time,{speed},{rate}\n{rows}")
+    run_convert([tmp_path / "can.csv"], tmp_path / "log")
+    motion = read_log(tmp_path / "log").motion
+    assert motion["step_m"].sum() == pytest.approx(90.0)
+    assert motion["turn_rad"].sum() == pytest.approx(1.0)
+
+
+def test_sentences_of_apps_for_android_are_nmea(made, tmp_path):
+    """Each in a line of its own, with what wrote it before and the time after it."""
+    lines = MADE["nmea"][1].splitlines()
+    text = "".join(f"NMEA,{line.strip()},1777618800{k:03d}\n" for k, line in enumerate(lines))
+    (tmp_path / "app.txt").write_text(text)
+    plain = run_convert(made("nmea"), tmp_path / "a")
+    result = run_convert([tmp_path / "app.txt"], tmp_path / "b")
+    assert result.files[0].format == "nmea"
+    assert result.rows["gnss"] == plain.rows["gnss"] > 0

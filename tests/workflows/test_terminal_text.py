@@ -6,8 +6,11 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+import rasterio
 
+from mapfilter._printing import quiet_callbacks
 from mapfilter.errors import InputError, fail
 from mapfilter.workflows import terminal
 
@@ -42,6 +45,43 @@ def test_long_messages_are_cut(capsys):
     said = capsys.readouterr().err
     assert len(said) < 3000
     assert "more characters" in said
+
+
+def test_messages_of_gdal_that_cannot_be_decoded_print_no_traceback(tmp_path):
+    path = tmp_path / "x.tif"
+    profile = {"driver": "GTiff", "width": 64, "height": 64, "count": 1, "dtype": "uint8"}
+    place = rasterio.Affine(5, 0, 385000, 0, -5, 6672000)
+    with rasterio.open(path, "w", crs="EPSG:32635", transform=place, **profile) as target:
+        target.write(np.full((1, 64, 64), 5, "uint8"))
+        target.update_tags(NOTE="abcdefgh")
+    # No XML, and no UTF-8: GDAL's warning cites it.
+    path.write_bytes(path.read_bytes().replace(b"abcdefgh", b"\x80\x80<a\x80>xx"))
+    done = subprocess.run(
+        [sys.executable, "-m", "mapfilter", "info", str(path)],
+        capture_output=True, check=False,
+    )  # fmt: skip
+    assert b"Traceback" not in done.stderr
+    assert b"UnicodeDecodeError" not in done.stderr
+    assert done.returncode in (0, 2)
+
+
+def test_other_errors_of_callbacks_are_printed(capsys):
+    """And Python's own hooks are there again afterwards."""
+    before = sys.excepthook, sys.unraisablehook
+    said = []
+
+    class Lost:
+        exc_value = ValueError("lost")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "unraisablehook", lambda lost: said.append(lost.exc_value))
+        with quiet_callbacks():
+            sys.unraisablehook(Lost)
+            sys.excepthook(ValueError, ValueError("shown"), None)
+            sys.excepthook(UnicodeDecodeError, UnicodeDecodeError("a", b"", 0, 1, "b"), None)
+    assert said == [Lost.exc_value]
+    assert capsys.readouterr().err == "ValueError: shown\n"
+    assert (sys.excepthook, sys.unraisablehook) == before
 
 
 @pytest.mark.parametrize("options", [["--json"], []])

@@ -42,6 +42,8 @@ class PartRow:
         Share of the scored fixes within the 95 % radius.
     baseline_m : float
         Median error of the centroids of the same sessions.
+    published_m : float
+        NaN: no figures of others are known.
     """
 
     part: str
@@ -56,6 +58,7 @@ class PartRow:
     success_high: float
     coverage_95: float
     baseline_m: float
+    published_m: float = nan
 
 
 @dataclass(frozen=True)

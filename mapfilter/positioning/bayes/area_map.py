@@ -17,7 +17,8 @@ from mapfilter.models.level_errors import roughness
 from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.radio.cells import CellPlan
 
-_BELOW_FLOOR_DB = 6.0
+BELOW_FLOOR_DB = 6.0
+"""How far below the floor a level is assumed to be that the database does not hold."""
 _EDGE_M, _EDGE_SHARE = 60.0, 0.05
 
 
@@ -68,7 +69,7 @@ class AreaMap:
         """
         rows, cols, count = field.level_dbm.shape
         level = np.empty((rows, cols, count + 2), dtype=np.float32)
-        quiet_dbm = np.float32(floor_dbm - _BELOW_FLOOR_DB)
+        quiet_dbm = np.float32(floor_dbm - BELOW_FLOOR_DB)
         np.copyto(level[..., :count], field.level_dbm)
         received = level[..., :count]
         received[np.isnan(received)] = quiet_dbm

@@ -71,6 +71,8 @@ class RadioReading:
         Log-likelihood of the terms under the null hypothesis.
     doubted : bool
         Whether the null hypothesis, or an alternative, is too probable for a belief to converge.
+    tracked : bool
+        Whether the belief has been found and goes on by motion that is measured.
     length_m : float
         Distance since the last report that was used; 0 for the first.
     timing_advance : float
@@ -86,6 +88,7 @@ class RadioReading:
     length_m: float = 0.0
     timing_advance: float = nan
     doubted: bool = False
+    tracked: bool = False
 
     def radio_under_null(self, other_log_likelihood: float) -> float:
         """Return the log-likelihood of the report under the null hypothesis.

@@ -180,17 +180,31 @@ class BayesPositioner(Filter[BayesState]):
                 belief, sources = started
                 state = replace(state, belief=belief, sources={**state.sources, **sources})
         else:
-            state, why = self._weighed(state, state.belief, updates, epoch, rng)
+            measured = motion is Reason.USED
+            state, why = self._weighed(state, state.belief, updates, epoch, rng, measured=measured)
             reason = reason if why is Reason.USED else why
             if state.belief is not None:
                 belief, status = report(before, state.belief, state.status)
                 state = replace(state, belief=belief, status=status)
-                measured = motion is Reason.USED
                 state = self._in_one_place(state, measured=measured, was_unclear=unclear)
         if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
         return step_output(self.area, state, epoch.time_s, reason, tuple(unused))
+
+    def evidence_at(
+        self, state: BayesState, epoch: Epoch, rng: np.random.Generator
+    ) -> tuple[BayesState, list[EvidenceUpdate]]:
+        """Return the state moved to an epoch, and the evidence that :meth:`step` weighs it with.
+
+        With the generator as before the step these are the step's own: for explanations of it.
+        """
+        if epoch.fix and not (isfinite(epoch.fix.east_m) and isfinite(epoch.fix.north_m)):
+            epoch = replace(epoch, fix=None)
+        spacing_m = state.particle_spacing_m
+        watch, epoch, _ = watched(state.watch, epoch)
+        moved, _ = self._moved(replace(state, watch=watch), epoch, rng)
+        return self._collected(moved, epoch, spacing_m)
 
     def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
         """Load the compiled kernels, and prepare the area."""
@@ -316,6 +330,8 @@ class BayesPositioner(Filter[BayesState]):
         updates: list[EvidenceUpdate],
         epoch: Epoch,
         rng: np.random.Generator,
+        *,
+        measured: bool,
     ) -> tuple[BayesState, Reason]:
         """Weigh the belief and its alternative; start, prefer or drop the alternative."""
         reading = joined(updates)
@@ -324,7 +340,9 @@ class BayesPositioner(Filter[BayesState]):
         update, rules = self.filters[state.compass].update, self.rules
         plain = self._by_map_alone and not state.path.is_distinctive
         doubt = plain or doubted(rules, before, state.null, state.alternative)
-        reading = replace(reading, doubted=doubt or self.area.at_edge(before.summary.mean))
+        doubt = doubt or self.area.at_edge(before.summary.mean)
+        tracked = measured and before.status is Status.TRACKING
+        reading = replace(reading, doubted=doubt, tracked=tracked)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
@@ -333,7 +351,8 @@ class BayesPositioner(Filter[BayesState]):
         if alternative is not None:
             terms = joined(updates, alternative=True) or RadioReading()
             doubt = plain or alternative.null.log_odds > rules.converge_log_odds
-            terms = replace(terms, doubted=doubt)
+            tracked = measured and alternative.belief.status is Status.TRACKING
+            terms = replace(terms, doubted=doubt, tracked=tracked)
             other, _ = update(alternative.belief, terms, rng)
             own = _challenged(rules, alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)

@@ -265,7 +265,11 @@ class BayesModel:
             if reading.serving >= 0 and reading.serving_weight > 0:
                 self._weigh_serving(cloud, pixel, log_weight, reading)
             if reading.levels is not None:
+                start = log_weight.copy()
                 cloud = self._weigh_levels(cloud, pixel, log_weight, reading)
+                if reading.tracked and self.remember:
+                    share = self.evidence.levels.tracking_share
+                    cloud = cloud._replace(withheld=_withhold(start, log_weight, share))
             flat, bands, table = self.area.flat_level_dbm, self._bands, self._bound_table
             for bound in reading.bounds:
                 fingerprint.weigh_by_bound(pixel, flat, bands, bound, table, log_weight)
@@ -368,6 +372,14 @@ class BayesModel:
 def _sample(pixel: Ints32) -> Ints32:
     """Return the pixels of some hypotheses, which stand for all of them."""
     return pixel[:: max(pixel.size // _SAMPLE, 1)]
+
+
+def _withhold(start: Floats, log_weight: Floats, share: float) -> float:
+    """Leave a share of what log weights have gained, in place; return the evidence of the rest."""
+    counted = np.isfinite(log_weight)
+    before, after = start[counted], log_weight[counted]
+    log_weight[counted] = before + share * (after - before)
+    return float(np.logaddexp.reduce(after) - np.logaddexp.reduce(log_weight[counted]))
 
 
 def _new(state: Floats32) -> Cloud:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import imufusion
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from mapfilter._types import Floats, Ints
@@ -93,6 +92,9 @@ def _fused(signals: Signals, rate_radps: Floats) -> Rotation:
 
 def _compass(signals: Signals) -> Rotation:
     """Return the attitude by low-passed gravity and field, its y axis to the magnetic north."""
+    # Slow to import (it imports scipy.stats), and few commands need it.
+    from scipy.signal import butter, sosfiltfilt
+
     assert signals.field_ut is not None
     sos = butter(2, _LOWPASS_HZ, fs=RATE_HZ, output="sos")
     up = sosfiltfilt(sos, signals.force_mps2, axis=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import butter, hilbert, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from mapfilter._types import Bools, Floats
@@ -39,6 +38,9 @@ def direction_by_acceleration(level_mps2: Floats, yaw_rad: Floats, walking: Bool
     float
         Counter-clockwise from the x axis of the level frame; NaN with less than 5 s of walk.
     """
+    # Slow to import (it imports scipy.stats), and few commands need it.
+    from scipy.signal import butter, hilbert, sosfiltfilt
+
     if walking.sum() < _LEAST_S * RATE_HZ:
         return float("nan")
     cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)

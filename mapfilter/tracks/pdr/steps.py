@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.pdr.options import STEP_FACTOR
@@ -40,6 +39,9 @@ class Steps:
 
 def vertical_swing(force_up_mps2: Floats) -> Floats:
     """Return vertical accelerations in the band of human steps, 0.5 to 2.6 Hz."""
+    # Slow to import (it imports scipy.stats), and few commands need it.
+    from scipy.signal import butter, sosfiltfilt
+
     sos = butter(2, BAND_HZ, btype="band", fs=RATE_HZ, output="sos")
     swing: Floats = sosfiltfilt(sos, force_up_mps2)
     return swing
@@ -57,6 +59,9 @@ def find_steps(force_up_mps2: Floats) -> Steps:
     force_up_mps2 : (N,) array
         At :data:`mapfilter.tracks.pdr.signals.RATE_HZ`; the device's axes do not matter.
     """
+    # Slow to import (it imports scipy.stats), and few commands need it.
+    from scipy.signal import find_peaks
+
     swing = vertical_swing(force_up_mps2)
     peaks, found = find_peaks(
         swing,

@@ -168,7 +168,10 @@ def _unknown(path: Path, text: Text) -> MapfilterError:
     fields = {name for some in plain_csv.FIELDS.values() for name in some}
     hint = _NOT_READ.get(path.suffix.lower(), "")
     if not hint and len(names) > 1 and names & fields:
-        hint = "a CSV without a column of times, or with other names: --column FIELD=COLUMN"
+        hint = (
+            "a CSV without a column of times, or with other names: --column FIELD=COLUMN, such as "
+            "acc_x=AX or wheel_speed_mps=SPEED"
+        )
     if not hint:
         hint = _other_separators(path, text)
     expected = f"a recording in a known format ({', '.join(f.name for f in FORMATS)})"

@@ -22,7 +22,7 @@ LONGEST_LINE = 1 << 16
 """Characters of a line; a longer one is refused."""
 
 _BLOCK_BYTES = 1 << 21
-_LINE_FEED = 10
+_LINE_FEED, _QUOTE = 10, 34
 
 
 def blocks(data: memoryview, first_line: int, size_bytes: int = 0) -> Iterator[tuple[bytes, int]]:
@@ -70,6 +70,8 @@ def good_lines(
     fields = np.searchsorted(places, ends) - np.searchsorted(places, starts) + 1
     length = ends - starts
     right = (fields == count) & (length <= LONGEST_LINE) & (length > 0)
+    if b'"' in block:
+        right &= ~_quoted_separators(code, starts, ends, places)
     if right.all():
         reading.rows += len(starts)
         return block.replace(b'"', b""), first_line + np.arange(len(starts))
@@ -88,6 +90,17 @@ def good_lines(
                 rows.append(first_line + at)
     reading.rows += int(right.sum())
     return b"\n".join(good), np.array(rows, dtype=np.int64)
+
+
+def _quoted_separators(code: NDArray[np.uint8], starts: Ints, ends: Ints, places: Ints) -> Bools:
+    """Return which lines have a separator within quotes; none where a quote is never closed."""
+    quotes = np.flatnonzero(code == _QUOTE)
+    before, after = np.searchsorted(quotes, starts), np.searchsorted(quotes, ends)
+    of = np.searchsorted(starts, places, side="right") - 1
+    within = (np.searchsorted(quotes, places) - before[of]) % 2 == 1
+    found: Bools = np.zeros(len(starts), dtype=bool)
+    found[of[within]] = (after - before)[of[within]] % 2 == 0
+    return found
 
 
 def _padded(block: bytes, count: int, separator: str, least: int) -> bytes:

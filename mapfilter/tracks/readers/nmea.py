@@ -17,7 +17,8 @@ from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 
-_SENTENCE = re.compile(rb"[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")
+_SENTENCE = re.compile(rb"(?:NMEA,)?[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")
+"""Apps for Android write ``NMEA,$GNGGA,…*hh,TIME``."""
 _KINDS = {
     b"GGA": ("time", "lat", "ns", "lon", "ew", "quality", "used", "hdop", "altitude"),
     b"RMC": ("time", "status", "lat", "ns", "lon", "ew", "knots", "course", "date"),

@@ -30,6 +30,8 @@ _UNITS = {
     "magnetometer": "ut",
 }
 _UNIT = re.compile(r"\(([^()]*)\)\s*$")
+_PHYPHOX_WORDS = ("m/s", "rad/s", "t)", "hpa", "latitude")
+"""Units and names of the sensors that are read, in the headers of their files."""
 _EARTH_MPS2, _EARTH_UT = (8.5, 11.5), (15.0, 90.0)
 _KILOPASCAL = (30.0, 110.0)
 _SENSOR_LOGGER = {
@@ -50,7 +52,10 @@ def _names(text: Text) -> tuple[str, ...]:
 
 def _is_phyphox(text: Text) -> bool:
     names = _names(text)
-    return len(names) >= 2 and names[0] == "time (s)" and all("(" in name for name in names[1:])
+    if len(names) < 2 or names[0] != "time (s)" or not all("(" in name for name in names[1:]):
+        return False
+    # An export also has files of light, sound and other sensors that are not read.
+    return any(word in name for name in names[1:] for word in _PHYPHOX_WORDS)
 
 
 def _read_phyphox(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001

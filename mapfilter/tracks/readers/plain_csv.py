@@ -46,10 +46,16 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "turn_rad": ("turn_rad",),
     "compass_deg": ("compass_deg", "heading_deg", "azimuth_deg"),
     "turn_deg": ("turn_deg",),
-    "yaw_rate_radps": ("yaw_rate_radps", "yaw_rate"),
-    "yaw_rate_degps": ("yaw_rate_degps",),
-    "wheel_speed_mps": ("wheel_speed_mps", "wheel_speed"),
-    "wheel_speed_kmh": ("wheel_speed_kmh",),
+    "yaw_rate_radps": ("yaw_rate_radps", "yaw_rate", "yaw_rate_rad_s", "yaw rate (rad/s)"),
+    "yaw_rate_degps": ("yaw_rate_degps", "yaw_rate_deg_s", "yaw_rate_dps", "yaw rate (deg/s)"),
+    "wheel_speed_mps": (
+        *("wheel_speed_mps", "wheel_speed", "vehicle_speed_mps"),
+        *("wheel speed (m/s)", "vehicle speed (m/s)"),
+    ),
+    "wheel_speed_kmh": (
+        *("wheel_speed_kmh", "vehicle_speed_kmh"),
+        *("wheel speed (km/h)", "vehicle speed (km/h)"),
+    ),
     "role": ("role",),
     "technology": ("technology", "radio", "rat", "network_type"),
     "cell": ("cell",),
@@ -73,8 +79,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
             for name in (f"{word}_{axis}", f"{word}{axis}", f"{word}_{axis}_{unit}")
         )
         for sensor, unit, others in (
-            ("acc", "mps2", ("accel", "accelerometer")),
-            ("gyr", "radps", ("gyro", "gyroscope")),
+            ("acc", "mps2", ("accel", "accelerometer", "acceleration")),
+            ("gyr", "radps", ("gyro", "gyroscope", "angular_velocity")),
             ("mag", "ut", ("magnetometer", "magnetic")),
         )
         for axis in "xyz"

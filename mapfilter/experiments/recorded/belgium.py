@@ -1,0 +1,224 @@
+"""Walks in Belgium whose radio freezes within a minute, while the positions go on.
+
+It is a test of honesty. ``live`` gives the filter what the phone logged, row by row: after its last
+change the last report is repeated, as in the file. The run succeeds where the filter says that the
+radio is stale within 60 s of its last change, and never reports CONVERGED at a wrong place. The map
+is the corridor of the other walks of the place, with levels predicted from the table of towers.
+``locate`` takes each report that was really measured by itself, anywhere in the box around the
+towers.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._inputs import read_input
+from mapfilter.database.store import open_database
+from mapfilter.errors import InputError, fail
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
+from mapfilter.experiments.recorded.ground import (
+    corridor_routes,
+    lattice_about,
+    open_ground,
+    positions_of,
+    predicted,
+)
+from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.rows import Found
+from mapfilter.experiments.recorded.scoring import score_journey
+from mapfilter.filters.contract import Reason
+from mapfilter.geodesy import project
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
+from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
+from mapfilter.propagation.shadowing import named_rng
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.roads.corridors import Positions
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.open_log import OpenOptions, open_log
+
+ZONE = "Europe/Brussels"
+LEAST_S = 60.0
+HEIGHT_M, EIRP_DBM = 30.0, 58.0
+"""Usual values: the table of towers has neither."""
+_TOWERS = "tower_data/towers.json"
+_MARGIN_M, _BOX_MARGIN_M, _BOX_RESOLUTION_M = 300.0, 1500.0, 25.0
+_LARGEST_BYTES = 10_000_000
+_PUBLISHED_RMSE_M = {
+    ("ixelle", "locate"): 166.0,
+    ("lln", "locate"): 537.0,
+    ("waha", "locate"): 691.0,
+}
+
+
+def units(folder: Path) -> list[tuple[str, str, int]]:
+    """Return each walk; the part is its place."""
+    return [(_place(file), file.stem, 1) for file in _walks(folder)]
+
+
+def judge(task: Task) -> Judged:
+    """Judge a walk: what the filter claims while the radio stands still, and each fresh report."""
+    logs = {file: read_walk(file) for file in _walks(task.data) if _place(file) == task.part}
+    own = next(log for file, log in logs.items() if file.stem == task.unit)
+    others = [positions_of(log.truth) for log in logs.values() if log is not own]
+    plan = read_towers(task.data / _TOWERS, own.crs)
+    near = _near(plan, [positions_of(own.truth), *others])
+    folder = task.work / task.unit
+    lattice = lattice_about(own.crs, others, _MARGIN_M)
+    predicted(near, lattice, corridor_routes(lattice, others), folder / "corridor")
+    rng = named_rng(task.seed, "belgium", task.unit)
+    named = name_by_plan(own, near)
+    located = locate_log(repeated(named), folder / "corridor", rng)
+    truth = Truth.of_table(own.truth)
+    assert truth is not None, "walks have more than one position"
+    delay_s = stale_after_s(located.estimate, named)
+    live = score_journey(task.part, "live", task.unit, located.estimate, truth)
+    named_in_time = bool(delay_s <= LEAST_S) and not live.wrong
+    note = f"stale radio named after {delay_s:.0f} s. {live.note}"
+    live = replace(live, success=named_in_time, seconds=located.filter_s, note=note)
+    alone = _fresh_reports(task, named, near, folder)
+    return Judged((live, alone), {"live": Journey(located.estimate, truth, folder / "corridor")})
+
+
+def read_walk(file: Path) -> TrackLog:
+    """Read a walk: radio that was renewed, positions as truth, and motion made from them."""
+    combine = CombineOptions(truth=(file,), course_motion=True)
+    log = open_log(file, options=OpenOptions(zone=ZONE, combine=combine)).log
+    if log.truth.empty and len(log.gnss):
+        rows = log.gnss[["time_s", "east_m", "north_m"]].drop_duplicates("time_s")
+        log = replace(log, truth=rows)
+    return replace(log, gnss=log.gnss.iloc[:0])
+
+
+def read_towers(file: Path, crs: str) -> CellPlan:
+    """Read the table of towers; heights and powers, which it lacks, are usual ones."""
+    try:
+        table: dict[str, Any] = json.loads(read_input(file, _LARGEST_BYTES, "a table of towers"))
+        cells = [_cell(name, row, crs) for name, row in table.items()]
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        expected = "cells with latitude, longitude, pci, earfcn and azimuth"
+        raise fail(InputError, str(file), expected, repr(error)) from error
+    return CellPlan(crs, tuple(cells))
+
+
+def repeated(log: TrackLog) -> TrackLog:
+    """Return a log in which the last report is repeated at each later position, as logged."""
+    radio, rows = log.radio, [log.radio]
+    if not len(radio):
+        return log
+    last_s = float(radio["time_s"].max())
+    last = radio[radio["time_s"] == last_s]
+    later = log.truth["time_s"].to_numpy()
+    rows += [last.assign(time_s=float(at)) for at in later[later > last_s]]
+    return replace(log, radio=pd.concat(rows, ignore_index=True))
+
+
+def stale_after_s(estimate: TrackEstimate, fresh: TrackLog) -> float:
+    """Return the time from the radio's last change until the filter names it; NaN if never."""
+    if not len(fresh.radio):
+        return nan
+    last_s = float(fresh.radio["time_s"].max())
+    named = [
+        float(at)
+        for at, why in zip(estimate.time_s, estimate.reason, strict=True)
+        if why is Reason.STALE_RADIO and at > last_s
+    ]
+    return min(named) - last_s if named else nan
+
+
+def _fresh_reports(task: Task, log: TrackLog, plan: CellPlan, folder: Path) -> Found:
+    """Locate each report that was measured by itself, anywhere around the towers."""
+    at = np.array([(cell.east_m, cell.north_m) for cell in plan.cells])
+    box = lattice_about(log.crs, [Positions(at[:, 0], at[:, 1])], _BOX_MARGIN_M, _BOX_RESOLUTION_M)
+    database = predicted(plan, box, open_ground(box), folder / "box")
+    # Without a position by GNSS at its time a report is not scored.
+    reports = reports_of_logs([log], plan)
+    fitted = fit_locator(reports_of_database(open_database(folder / "box")), "probabilistic")
+    located = locate_by(fitted, reports)
+    known = np.isfinite(located.error_m)
+    sites = _site_errors_m(log, database.plan)
+    held = (located.error_m <= located.radii_m[:, 2])[known]
+    return Found(
+        task.part,
+        "locate",
+        task.unit,
+        None,
+        None,
+        None,
+        located.error_m[known],
+        held,
+        sites,
+        note=f"{int(known.sum())} reports were measured",
+    )
+
+
+def _site_errors_m(log: TrackLog, plan: CellPlan) -> np.ndarray:
+    """Return how far the serving cell's site is from each fresh report."""
+    serving = log.radio[log.radio["role"] == "serving"]
+    site = {cell.id: (cell.east_m, cell.north_m) for cell in plan.cells}
+    truth = Truth.of_table(log.truth)
+    assert truth is not None, "walks have more than one position"
+    east, north = truth.at(serving["time_s"].to_numpy())
+    errors = [
+        np.hypot(e - site[cell][0], n - site[cell][1])
+        for e, n, cell in zip(east, north, serving["cell"], strict=True)
+        if cell in site
+    ]
+    return np.array([error for error in errors if np.isfinite(error)], dtype=np.float64)
+
+
+def _cell(name: str, row: dict[str, Any], crs: str) -> Cell:
+    east, north = project(crs, [float(row["longitude"])], [float(row["latitude"])])
+    frequency = float(str(row["downlink_frequency"]).split()[0])
+    return Cell(
+        name,
+        str(row["enb_id"]),
+        float(east[0]),
+        float(north[0]),
+        HEIGHT_M,
+        None if row["azimuth"] is None else float(row["azimuth"]),
+        EIRP_DBM,
+        frequency,
+        antenna="omni" if row["azimuth"] is None else "sector",
+        ci=int(name),
+        arfcn=int(row["earfcn"]),
+        bsic=int(row["pci"]),
+        technology="LTE",
+    )
+
+
+def _near(plan: CellPlan, tracks: Sequence[Positions]) -> CellPlan:
+    """Return the cells within 5 km of the tracks' middle."""
+    east = float(np.mean(np.concatenate([track.east_m for track in tracks])))
+    north = float(np.mean(np.concatenate([track.north_m for track in tracks])))
+    near = [c for c in plan.cells if np.hypot(c.east_m - east, c.north_m - north) < 5000.0]
+    return CellPlan(plan.crs, tuple(near))
+
+
+def _walks(folder: Path) -> list[Path]:
+    return sorted((folder / "walks").glob("*.txt"))
+
+
+def _place(file: Path) -> str:
+    return file.stem.rpartition("_")[0]
+
+
+BENCHMARK = Benchmark(
+    "belgium",
+    "cell-belgium-lte",
+    ("walks/*.txt", _TOWERS),
+    units,
+    judge,
+    published_m=_PUBLISHED_RMSE_M,
+)

@@ -1,0 +1,127 @@
+"""What a benchmark on recordings is: its folder, its units, and how each of them is located."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.experiments.recorded.rows import Found
+from mapfilter.positioning.estimate import TrackEstimate
+
+
+@dataclass(frozen=True)
+class Task:
+    """One unit to be located.
+
+    Parameters
+    ----------
+    part, unit : str
+        As in the table.
+    run : int
+        Which of the unit's runs: start, or draw of the noise.
+    data : Path
+        Folder of the data set.
+    work : Path
+        Holds what :attr:`Benchmark.prepare` made.
+    seed : int
+    """
+
+    part: str
+    unit: str
+    run: int
+    data: Path
+    work: Path
+    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """Name of the task's files."""
+        return f"{self.part}-{self.unit}-{self.run}".replace("/", "-")
+
+
+@dataclass(frozen=True, eq=False)
+class Journey:
+    """A located journey and its truth, for pictures; and the database it was located over."""
+
+    estimate: TrackEstimate
+    truth: Truth
+    database: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Results of one task by all methods, and the journeys of some of them, by method."""
+
+    found: tuple[Found, ...]
+    journeys: Mapping[str, Journey] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A data set and how it is judged.
+
+    Parameters
+    ----------
+    name : str
+        Of the command.
+    folder : str
+        Of the data, in the folder of all data sets.
+    needs : tuple of str
+        Files or folders in it that have to be there.
+    units : callable
+        From the folder of the data to part and unit of each task and its number of runs.
+    judge : callable
+        Locates a task.
+    prepare : callable, optional
+        From the folder of the data and a folder to write to: makes what all tasks share.
+    published_m : mapping
+        Published figures by part and method ("" for all methods).
+    baseline : {"median", "mean"}
+        Statistic of the baseline's errors.
+    """
+
+    name: str
+    folder: str
+    needs: tuple[str, ...]
+    units: Callable[[Path], Sequence[tuple[str, str, int]]]
+    judge: Callable[[Task], Judged]
+    prepare: Callable[[Path, Path], None] | None = None
+    published_m: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    baseline: str = "median"
+
+    def tasks(self, data: Path, work: Path, seed: int, runs: int | None = None) -> list[Task]:
+        """Return all tasks, at most ``runs`` of each unit.
+
+        Raises
+        ------
+        InputError
+            Files are missing, or there is nothing to judge.
+        """
+        folder = data / self.folder
+        check_there(folder, self.needs)
+        found = self.units(folder)
+        if not found:
+            faults = Faults()
+            faults.add(str(folder), "recordings to be judged", "none", "see its README")
+            faults.raise_if_any(InputError)
+        return [
+            Task(part, unit, run, folder, work, seed)
+            for part, unit, usual in found
+            for run in range(min(usual, runs or usual))
+        ]
+
+
+def check_there(folder: Path, needs: Sequence[str]) -> None:
+    """Check that files of a data set are there; InputError with all that are missing."""
+    faults = Faults()
+    if not folder.is_dir():
+        hint = f"--data is the folder that holds {folder.name}"
+        faults.add(str(folder), "the folder of the data set", "none", hint)
+    else:
+        for name in needs:
+            if not any(folder.glob(name)):
+                faults.add(str(folder / name), "a file of the data set", "none", "not unpacked")
+    faults.raise_if_any(InputError)

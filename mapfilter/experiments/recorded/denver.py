@@ -1,0 +1,161 @@
+"""Traces of cars in Denver, matched to a street graph, beside a hidden Markov model.
+
+The data have neither times nor a list of the streets that were driven. So a point counts as matched
+rightly where the street runs within 25 m of it, and is the same street as that of the point before,
+or one that begins where that ends. Points come one a second.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import shapely
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.database.sources import LayerRoutes
+from mapfilter.errors import InputError, fail
+from mapfilter.experiments.recorded.benchmark import Benchmark, Judged, Task
+from mapfilter.experiments.recorded.ground import roads_alone
+from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.rows import Found
+from mapfilter.experiments.recorded.street_graph import StreetGraph, match_points, read_graph
+from mapfilter.geodesy import Lattice, project, utm_crs
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.propagation.shadowing import named_rng
+from mapfilter.roads.index import RouteSource
+from mapfilter.roads.ways import half_width_of
+from mapfilter.tracks.deadreckoning import steps_between
+from mapfilter.tracks.log import TrackLog, make_log
+
+RIGHT_M, JOINED_M = 25.0, 1.0
+LEAST_POINTS = 20
+_GRAPH, _TRACES = "*graph*.graphml.gz", "*trace*.csv"
+_RESOLUTION_M, _MARGIN_M = 4.0, 50.0
+_CLASS = "residential"
+_MAP = "streets"
+
+
+def units(folder: Path) -> list[tuple[str, str, int]]:
+    """Return the traces."""
+    return [(file.stem, "trace", 1) for file in sorted(folder.glob(_TRACES))]
+
+
+def prepare(folder: Path, work: Path) -> None:
+    """Build a database of the graph's streets."""
+    graph = _graph(folder)
+    west, south, east, north = shapely.total_bounds(graph.line)
+    bounds = (west - _MARGIN_M, south - _MARGIN_M, east + _MARGIN_M, north + _MARGIN_M)
+    lattice = Lattice.covering(graph.crs, bounds, _RESOLUTION_M)
+    source = RouteSource.of(graph.ways(), None, None, half_width_of(_CLASS))
+    roads_alone(LayerRoutes(source, lattice), work / _MAP)
+
+
+def judge(task: Task) -> Judged:
+    """Match the part of a trace that lies in the box of the graph by both methods."""
+    graph = _graph(task.data)
+    places = clipped(read_trace(task.data / f"{task.part}.csv", graph.crs), graph)
+    if len(places) < LEAST_POINTS:
+        expected = f"{LEAST_POINTS} points or more within the box of the graph"
+        raise fail(InputError, str(task.data / task.part), expected, len(places))
+    edge = match_points(graph, places)
+    hmm = np.where(edge >= 0, graph.street[edge], 0)
+    rng = named_rng(task.seed, "denver", task.part)
+    options = BayesFilter(vehicle=True)
+    located = locate_log(trace_log(places, graph.crs), task.work / _MAP, rng, options)
+    at = np.searchsorted(located.estimate.time_s, np.arange(len(places), dtype=np.float64))
+    ours = located.estimate.way_id[np.minimum(at, len(located.estimate) - 1)]
+    found = []
+    apart_hmm, _ = judged_streets(graph, places, hmm)
+    for method, street in (("bayes", ours), ("hmm", hmm)):
+        apart_m, right = judged_streets(graph, places, street)
+        same = float(np.mean(street == hmm))
+        found += [
+            Found(
+                task.part,
+                method,
+                "trace",
+                bool(right[i]),
+                None,
+                None,
+                apart_m[i : i + 1][np.isfinite(apart_m[i : i + 1])],
+                np.empty(0, dtype=np.bool_),
+                apart_hmm[i : i + 1][np.isfinite(apart_hmm[i : i + 1])],
+                note=f"{100 * same:.0f} % of the points on the street of the other method",
+            )
+            for i in range(len(places))
+        ]
+    return Judged(tuple(found))
+
+
+def read_trace(file: Path, crs: str) -> Floats:
+    """Read the places of a trace, shape (N, 2); the same place again and again once."""
+    try:
+        table = pd.read_csv(file)
+        lon, lat = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
+    except (OSError, KeyError, ValueError) as error:
+        expected = "a CSV of latitude and longitude"
+        raise fail(InputError, str(file), expected, repr(error)) from error
+    places = np.column_stack(project(crs, lon, lat))
+    moved = np.append(True, np.any(np.diff(places, axis=0) != 0, axis=1))
+    return np.asarray(places[moved & np.isfinite(places).all(axis=1)])
+
+
+def clipped(places: Floats, graph: StreetGraph) -> Floats:
+    """Return the places in the graph's box: the longest stretch of them that follow each other."""
+    west, south, east, north = shapely.total_bounds(graph.line)
+    x, y = places.T
+    inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
+    spans = edges.reshape(-1, 2)
+    if not len(spans):
+        return places[:0]
+    first, end = spans[np.argmax(spans[:, 1] - spans[:, 0])]
+    return places[first:end]
+
+
+def trace_log(places: Floats, crs: str) -> TrackLog:
+    """Return a trace as fixes, a second apart, with the steps between them as motion."""
+    time_s = np.arange(len(places), dtype=np.float64)
+    step, heading = steps_between(places[:, 0], places[:, 1])
+    motion = pd.DataFrame(
+        {
+            "time_s": time_s,
+            "step_m": np.append(0.0, step),
+            "heading_rad": np.append(heading[:1], heading),
+        }
+    )
+    gnss = pd.DataFrame({"time_s": time_s, "east_m": places[:, 0], "north_m": places[:, 1]})
+    return make_log(crs, motion=motion, gnss=gnss)
+
+
+def judged_streets(graph: StreetGraph, places: Floats, street: Ints) -> tuple[Floats, Bools]:
+    """Return how far each point is from its street, and whether that counts as right."""
+    first = {int(number): i for i, number in reversed(list(enumerate(graph.street)))}
+    lines = [graph.line[first[int(s)]] if int(s) in first else None for s in street]
+    apart = np.array(
+        [
+            shapely.distance(line, shapely.Point(place)) if line is not None else np.inf
+            for line, place in zip(lines, places, strict=True)
+        ]
+    )
+    follows = np.ones(len(lines), dtype=np.bool_)
+    for i in range(1, len(lines)):
+        a, b = lines[i - 1], lines[i]
+        follows[i] = a is not None and b is not None and shapely.distance(a, b) <= JOINED_M
+    return apart, (apart <= RIGHT_M) & follows
+
+
+@lru_cache(maxsize=1)
+def _graph(folder: Path) -> StreetGraph:
+    files = sorted(folder.glob(_GRAPH))[:1]
+    if not files:
+        raise fail(InputError, str(folder), _GRAPH, "none")
+    trace = pd.read_csv(sorted(folder.glob(_TRACES))[0], nrows=1)
+    crs = utm_crs(float(trace["longitude"].iloc[0]), float(trace["latitude"].iloc[0]))
+    return read_graph(files[0], crs)
+
+
+BENCHMARK = Benchmark("denver", "mapmatch-denver", (_GRAPH, _TRACES), units, judge, prepare)

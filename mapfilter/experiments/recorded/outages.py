@@ -1,0 +1,96 @@
+"""Outages of satellites in a journey, and the errors at their ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Bools, Floats
+from mapfilter.evaluation.accuracy import Truth, position_errors_m
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.tracks.deadreckoning import dead_reckon
+from mapfilter.tracks.log import TrackLog
+
+_DIRECTION_M = 30.0
+
+
+@dataclass(frozen=True)
+class Outages:
+    """Equal outages one after another.
+
+    Parameters
+    ----------
+    first_s : float
+        Begin of the first one.
+    length_s, pause_s : float
+        Of each, and between two of them.
+    """
+
+    first_s: float
+    length_s: float
+    pause_s: float
+
+    def within(self, until_s: float) -> list[tuple[float, float]]:
+        """Return begin and end of all outages that end in time."""
+        found, begin_s = [], self.first_s
+        while begin_s + self.length_s <= until_s:
+            found.append((begin_s, begin_s + self.length_s))
+            begin_s += self.length_s + self.pause_s
+        return found
+
+
+def without(table: pd.DataFrame, spans: Sequence[tuple[float, float]]) -> pd.DataFrame:
+    """Return a table without the rows of some spans of time."""
+    time_s = table["time_s"].to_numpy()
+    inside = np.zeros(len(table), dtype=np.bool_)
+    for begin_s, end_s in spans:
+        inside |= (time_s > begin_s) & (time_s <= end_s)
+    return table[~inside].reset_index(drop=True)
+
+
+def log_without(log: TrackLog, spans: Sequence[tuple[float, float]]) -> TrackLog:
+    """Return a log without satellites in some spans of time."""
+    return replace(
+        log, gnss=without(log.gnss, spans), pseudoranges=without(log.pseudoranges, spans)
+    )
+
+
+def errors_at(
+    estimate: TrackEstimate, truth: Truth, times_s: Sequence[float]
+) -> tuple[Floats, Bools]:
+    """Return the error at the last epoch up to each time, and whether the 95 % radius held it.
+
+    Without a position the error is infinite.
+    """
+    errors_m = position_errors_m(estimate, truth)
+    at = np.searchsorted(estimate.time_s, np.asarray(times_s) + 1e-6) - 1
+    found = np.where(np.isfinite(errors_m[at]), errors_m[at], np.inf)
+    return found, np.isfinite(errors_m[at]) & (errors_m[at] <= estimate.radii_m[at, 2])
+
+
+def coasted_errors_m(
+    motion: pd.DataFrame, truth: Truth, spans: Sequence[tuple[float, float]]
+) -> Floats:
+    """Return the errors at the ends of spans of dead reckoning alone.
+
+    It is given the true position at their beginnings, and the true direction of the last 30 m.
+    """
+    time_s = motion["time_s"].to_numpy()
+    turn = motion["turn_rad"].fillna(0.0).to_numpy()
+    heading = np.cumsum(turn) - turn / 2
+    found = np.stack(dead_reckon(0.0, 0.0, motion["step_m"].fillna(0.0), heading))
+    true = np.stack(truth.at(time_s))
+    length = truth.distance_at(time_s)
+    errors = []
+    for begin_s, end_s in spans:
+        i, k = np.searchsorted(time_s, [begin_s, end_s], side="right") - 1
+        j = int(np.searchsorted(length, length[i] - _DIRECTION_M))
+        known, seen = (part[:, i] - part[:, j] for part in (true, found))
+        turned = np.arctan2(known[1], known[0]) - np.arctan2(seen[1], seen[0])
+        rotation = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+        apart = rotation @ (found[:, k] - found[:, i]) - (true[:, k] - true[:, i])
+        errors.append(float(np.hypot(*apart)))
+    return np.array(errors, dtype=np.float64)

@@ -1,0 +1,177 @@
+"""A drive through a street canyon in Berlin: odometry and pseudoranges, without a street map.
+
+The other drives of the data set are in other streets, so the map is open ground about the
+receiver's least-squares positions of the first minute. All satellites are used for the first
+minute; afterwards none, one, two or three of the highest ones, or all. ``outages`` takes all of
+them away for 60 s, again and again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Floats
+from mapfilter.errors import InputError, fail
+from mapfilter.evaluation.accuracy import Truth, position_errors_m
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
+from mapfilter.experiments.recorded.ground import lattice_about, open_ground, roads_alone
+from mapfilter.experiments.recorded.least_squares import least_squares_positions
+from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.outages import (
+    Outages,
+    coasted_errors_m,
+    errors_at,
+    log_without,
+)
+from mapfilter.experiments.recorded.scoring import score_journey
+from mapfilter.geodesy import unproject
+from mapfilter.propagation.shadowing import named_rng
+from mapfilter.roads.corridors import Positions
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.open_log import OpenOptions, open_log
+
+SATELLITES = {"satellites-0": 0, "satellites-1": 1, "satellites-2": 2, "satellites-3": 3}
+ALL, OUTAGES = "satellites-all", "outages-60s"
+FIRST_S, OUTAGE_S, PAUSE_S = 60.0, 60.0, 15.0
+RIGHT_M = {ALL: 12.0, OUTAGES: 25.0}
+"""What is asked for: the median error, and that at the ends of outages."""
+RUNS = 3
+_MARGIN_M = 600.0
+_MAP = "open"
+
+
+def units(folder: Path) -> list[tuple[str, str, int]]:
+    """Return the drives that have sensors, each with every number of satellites."""
+    parts = (*SATELLITES, ALL, OUTAGES)
+    # Without outages nothing differs between runs but the filter's random numbers.
+    return [
+        (part, _name(file), RUNS if part == OUTAGES else 1)
+        for file in _inputs(folder)
+        for part in parts
+    ]
+
+
+def prepare(folder: Path, work: Path) -> None:
+    """Build open ground about the first positions of each drive."""
+    for file in _inputs(folder):
+        log = _drive(file)
+        first = log.pseudoranges[log.pseudoranges["time_s"] <= FIRST_S]
+        east, north = least_squares_positions(first, log.crs)[1:]
+        middle = Positions(np.array([np.median(east)]), np.array([np.median(north)]))
+        lattice = lattice_about(log.crs, [middle], _MARGIN_M)
+        roads_alone(open_ground(lattice), work / _name(file) / _MAP)
+
+
+def judge(task: Task) -> Judged:
+    """Locate a drive with some of its satellites."""
+    log = _drive(next(file for file in _inputs(task.data) if _name(file) == task.unit))
+    truth = Truth.of_table(log.truth)
+    assert truth is not None, "the ground truth has more than one position"
+    rng = named_rng(task.seed, "smartloc", task.part, str(task.run))
+    end_s = float(truth.time_s[-1])
+    spans: list[tuple[float, float]] = []
+    if task.part == OUTAGES:
+        first_s = FIRST_S + task.run * (OUTAGE_S + PAUSE_S) / RUNS
+        spans = Outages(first_s, OUTAGE_S, PAUSE_S).within(end_s)
+        given = log_without(log, spans)
+    else:
+        most = SATELLITES.get(task.part)
+        kept = log.pseudoranges if most is None else highest(log, most, FIRST_S)
+        given = replace(log, pseudoranges=kept)
+    database = task.work / task.unit / _MAP
+    located = locate_log(given, database, rng)
+    found = score_journey(
+        task.part, "bayes", task.unit, located.estimate, truth, seconds=located.filter_s
+    )
+    if task.part == OUTAGES:
+        ends = [end for _, end in spans]
+        errors_m, held = errors_at(located.estimate, truth, ends)
+        baseline_m = coasted_errors_m(log.motion, truth, spans)
+    else:
+        since = (located.estimate.time_s > FIRST_S) & (located.estimate.time_s <= end_s)
+        every_m = position_errors_m(located.estimate, truth)
+        known = since & np.isfinite(every_m)
+        errors_m, held = every_m[known], (every_m <= located.estimate.radii_m[:, 2])[known]
+        if task.part == ALL:
+            baseline_m = _least_squares_errors_m(log, truth)
+        else:
+            baseline_m = _reckoned_errors_m(log, truth)
+    there = np.isfinite(errors_m)
+    right_m = RIGHT_M.get(task.part, inf)
+    found = replace(
+        found,
+        error_m=errors_m[there],
+        covered=held[there],
+        baseline_m=baseline_m,
+        success=bool(np.median(errors_m) <= right_m) if np.isfinite(right_m) else found.success,
+    )
+    return Judged((found,), {"bayes": Journey(located.estimate, truth, database)})
+
+
+def highest(log: TrackLog, most: int, after_s: float) -> pd.DataFrame:
+    """Return pseudoranges of which so many, of the highest satellites, are left after a time."""
+    rows = log.pseudoranges
+    east, north = log.truth["east_m"].iloc[0], log.truth["north_m"].iloc[0]
+    up = _up_of(log.crs, float(east), float(north))
+    place = rows[["x_m", "y_m", "z_m"]].to_numpy()
+    # Far above the earth the direction from its centre orders satellites as their elevation does.
+    height = (place @ up) / np.linalg.norm(place, axis=1)
+    rank = pd.Series(-height).groupby(rows["time_s"].to_numpy()).rank(method="first").to_numpy()
+    kept = (rows["time_s"].to_numpy() <= after_s) | (rank <= most)
+    return rows[kept].reset_index(drop=True)
+
+
+def _up_of(crs: str, east_m: float, north_m: float) -> Floats:
+    lon, lat = (np.radians(part[0]) for part in unproject(crs, [east_m], [north_m]))
+    return np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+
+
+def _least_squares_errors_m(log: TrackLog, truth: Truth) -> Floats:
+    time_s, east, north = least_squares_positions(log.pseudoranges, log.crs)
+    true_east, true_north = truth.at(time_s)
+    errors = np.hypot(east - true_east, north - true_north)
+    return np.asarray(errors[np.isfinite(errors) & (time_s > FIRST_S)])
+
+
+def _reckoned_errors_m(log: TrackLog, truth: Truth) -> Floats:
+    """Return the errors of dead reckoning alone from the end of the first minute on."""
+    times = log.motion["time_s"].to_numpy()
+    after = times[(times > FIRST_S) & (times <= truth.time_s[-1])]
+    return coasted_errors_m(log.motion, truth, [(FIRST_S, float(end)) for end in after])
+
+
+@lru_cache(maxsize=2)
+def _drive(file: Path) -> TrackLog:
+    """Read a drive: odometry and pseudoranges, and its ground truth."""
+    truth = file.with_name(file.name.replace("_Input", "_GT"))
+    if not truth.is_file():
+        raise fail(InputError, str(truth), "the ground truth of the drive", "none")
+    combine = CombineOptions(truth=(truth,))
+    return open_log([file, truth], options=OpenOptions(combine=combine)).log
+
+
+def _inputs(folder: Path) -> list[Path]:
+    """Return the drives with sensors; those of RTKLIB are the same drives, solved otherwise."""
+    files = sorted(folder.glob("*_Input.txt.gz"))
+    return [file for file in files if not file.name.startswith("RTKLIB")]
+
+
+def _name(file: Path) -> str:
+    return file.name.removesuffix("_Input.txt.gz")
+
+
+BENCHMARK = Benchmark(
+    "smartloc",
+    "gnss-odometry-smartloc",
+    ("*_Input.txt.gz", "*_GT.txt.gz"),
+    units,
+    judge,
+    prepare,
+)

@@ -1,0 +1,59 @@
+"""Wi-Fi fingerprints of four buildings or campuses, each test report located by itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter.experiments.benchmarks.single_reports import (
+    BASELINE,
+    WIFI,
+    WIFI_FOLDER,
+    locate_wifi,
+    read_wifi,
+)
+from mapfilter.experiments.recorded.benchmark import Benchmark, Judged, Task
+from mapfilter.experiments.recorded.rows import Found
+from mapfilter.positioning.fingerprints.options import AUTO
+
+
+def units(_: Path) -> list[tuple[str, str, int]]:
+    """Return one unit for each set."""
+    return [(name, "test", 1) for name in WIFI]
+
+
+def judge(task: Task) -> Judged:
+    """Locate the test reports of a set by all methods, beside three nearest neighbours."""
+    training, test = read_wifi(task.data, task.part)
+    names = (AUTO, "probabilistic", BASELINE)
+    located = {name: locate_wifi(training, test, name)[0] for name in names}
+    baseline_m = located[BASELINE].error_m
+    found = []
+    for name, result in located.items():
+        known = np.isfinite(result.error_m)
+        found.append(
+            Found(
+                task.part,
+                "locate" if name == AUTO else name,
+                task.unit,
+                None,
+                None,
+                None,
+                result.error_m[known],
+                (result.error_m <= result.radii_m[:, 2])[known],
+                baseline_m[np.isfinite(baseline_m)],
+                count=len(result.error_m),
+            )
+        )
+    return Judged(tuple(found))
+
+
+BENCHMARK = Benchmark(
+    "fingerprints",
+    WIFI_FOLDER,
+    tuple(f"{name}.mat" for name in WIFI),
+    units,
+    judge,
+    baseline="mean",
+)

@@ -1,0 +1,203 @@
+"""The bundle: everything that a view shows, as one JSON object.
+
+Format and meaning of its fields are in the documentation ("See a replay"); arrays are packed by
+:mod:`mapfilter.viewing.arrays`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+import numpy as np
+
+from mapfilter._io import VERSION as PROGRAM
+from mapfilter._types import Floats
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import InputError
+from mapfilter.geodesy import unproject
+from mapfilter.models.fingerprint import pixels
+from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.radio.cells import CellPlan
+from mapfilter.viewing.ground import (
+    Bounds,
+    ViewFrame,
+    background,
+    cells_of,
+    empty_background,
+    level_fields,
+)
+from mapfilter.viewing.here import constants
+from mapfilter.viewing.runs import (
+    REASONS,
+    STATUSES,
+    LevelAt,
+    ViewedRun,
+    run_of,
+    tracks_bounds,
+)
+from mapfilter.viewing.words import REASONS as WORDS
+
+FORMAT, VERSION = "mapfilter-view", 1
+
+_AROUND_M = 400.0
+_ALIGNED_M = 100.0
+
+
+def replay_bundle(
+    title: str, runs: Sequence[ViewedRun], database: RadioRouteDatabase | None
+) -> dict[str, Any]:
+    """Return the bundle of one or more runs over one database.
+
+    Parameters
+    ----------
+    runs : sequence of ViewedRun
+        Their positions are in the CRS of the database.
+    database : RadioRouteDatabase or None
+        None for filters without a map.
+    """
+    crs = runs[0].estimate.crs if runs else ""
+    tracks = tracks_bounds(runs, _AROUND_M)
+    if database is not None:
+        bounds: Bounds = database.lattice.bounds_m
+        crs, plan = database.lattice.crs, database.plan
+    else:
+        bounds, plan = tracks or (0.0, 0.0, 1.0, 1.0), CellPlan(crs, ())
+    frame = _frame(crs, bounds)
+    found = _head("replay", title, frame, bounds, plan)
+    measured = _measured(runs)
+    ways: dict[str, int] = {}
+    if database is not None:
+        found |= {
+            "attribution": database.attribution,
+            "database": database.generation,
+            "background": background(database, frame),
+        }
+        ways = {one["id"]: at for at, one in enumerate(found["background"]["ways"])}
+        if database.cell_ids and tracks is not None:
+            fields = _fields(database, frame, tracks, measured)
+            if fields is not None:
+                found["levels"], bands = fields
+                found["why"] = _why(runs, tuple(bands))
+    found["runs"] = [run_of(run, frame, plan, ways, _level_at(run)) for run in runs]
+    return found
+
+
+def database_bundle(title: str, database: RadioRouteDatabase) -> dict[str, Any]:
+    """Return the bundle of a database: streets, cells, best servers, levels of every cell."""
+    bounds = database.lattice.bounds_m
+    frame = _frame(database.lattice.crs, bounds)
+    found = _head("database", title, frame, bounds, database.plan)
+    found |= {
+        "attribution": database.attribution,
+        "database": database.generation,
+        "background": background(database, frame),
+    }
+    if database.cell_ids:
+        found["levels"], _ = level_fields(database, frame, None)
+    return found
+
+
+def _head(
+    kind: str, title: str, frame: ViewFrame, bounds: Bounds, plan: CellPlan
+) -> dict[str, Any]:
+    _, _, east_m, north_m = bounds
+    size = east_m - frame.west_m, north_m - frame.south_m
+    corners_m = [(0.0, 0.0), (size[0], 0.0), size, (0.0, size[1])]
+    east, north = np.array(corners_m).T
+    lon, lat = unproject(frame.crs, east + frame.west_m, north + frame.south_m)
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "kind": kind,
+        "title": title,
+        "mapfilter": PROGRAM,
+        "database": "",
+        "frame": {
+            "crs": frame.crs,
+            "origin": [frame.west_m, frame.south_m],
+            "size": [round(side, 1) for side in size],
+            "corners": [[round(x, 7), round(y, 7)] for x, y in zip(lon, lat, strict=True)],
+        },
+        "attribution": "",
+        "notes": [],
+        "statuses": [str(one) for one in STATUSES],
+        "reasons": [str(one) for one in REASONS],
+        "words": {str(reason): text for reason, text in WORDS.items()},
+        "cells": cells_of(plan, frame),
+        "background": empty_background(),
+        "levels": None,
+        "why": None,
+        "runs": [],
+    }
+
+
+def _frame(crs: str, bounds: Bounds) -> ViewFrame:
+    west_m, south_m = (_ALIGNED_M * float(np.floor(at / _ALIGNED_M)) for at in bounds[:2])
+    return ViewFrame(crs, west_m, south_m)
+
+
+def _measured(runs: Sequence[ViewedRun]) -> set[str]:
+    found: set[str] = set()
+    for run in runs:
+        if run.log is not None and len(run.log.radio):
+            found.update(str(cell) for cell in run.log.radio["cell"].dropna().unique())
+    return found
+
+
+def _fields(
+    database: RadioRouteDatabase, frame: ViewFrame, tracks: Bounds, measured: Collection[str]
+) -> tuple[dict[str, Any], Any] | None:
+    west, south, east, north = database.lattice.bounds_m
+    inside = (
+        max(tracks[0], west),
+        max(tracks[1], south),
+        min(tracks[2], east),
+        min(tracks[3], north),
+    )
+    if inside[0] >= inside[2] or inside[1] >= inside[3]:
+        return None
+    try:
+        return level_fields(database, frame, inside, measured)
+    except InputError:
+        # The tracks lie where the database has no point.
+        return None
+
+
+def _model(run: ViewedRun) -> BayesModel | None:
+    filter_ = run.trace.filter if run.trace is not None else None
+    return filter_.model if isinstance(filter_, BayesPositioner) else None
+
+
+def _why(runs: Sequence[ViewedRun], cells: Sequence[str]) -> dict[str, Any] | None:
+    """Return the constants of the first map filter's model."""
+    model = next((found for run in runs if (found := _model(run)) is not None), None)
+    if type(model) is not BayesModel:
+        # Over measured maps serving cells count where they were measured, which is not in the page.
+        return None
+    site = dict(zip(model.area.cell_ids, model.area.site_of.tolist(), strict=True))
+    return {**constants(model), "site": [site.get(cell, -1) for cell in cells]}
+
+
+def _level_at(run: ViewedRun) -> LevelAt:
+    """Return a function that looks levels up on the filter's own map."""
+    model = _model(run)
+
+    def nothing(east_m: Floats, north_m: Floats, cells: Sequence[str | None]) -> Floats:  # noqa: ARG001
+        return np.full(len(cells), np.nan)
+
+    if model is None or not model.area.cell_ids:
+        return nothing
+    area = model.area
+    (west, south), band_of = area.origin_m, area.band_of
+
+    def look_up(east_m: Floats, north_m: Floats, cells: Sequence[str | None]) -> Floats:
+        place = np.stack([east_m - west, north_m - south])
+        known = np.isfinite(place).all(axis=0)
+        at = pixels(np.where(known, place, 0.0).astype(np.float32), area.frame)
+        band = np.array([band_of.get(cell or "", -1) for cell in cells], dtype=np.int64)
+        level = area.level_dbm.reshape(-1, len(area.cell_ids) + 2)[at, band].astype(np.float64)
+        return np.where(known & (band >= 0), level, np.nan)
+
+    return look_up

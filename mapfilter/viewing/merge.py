@@ -1,0 +1,60 @@
+"""Several views over one database as one, with their runs side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mapfilter.errors import Faults, InputError
+
+_SAME = ("database", "frame")
+
+
+def side_by_side(views: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
+    """Return a view with the runs of all.
+
+    Levels are those of the first view that has them; names that occur twice get the number of their
+    view.
+
+    Parameters
+    ----------
+    views : sequence of (str, bundle)
+        Each with its file's name, for messages.
+
+    Raises
+    ------
+    InputError
+        They are of different databases, or a view holds no run.
+    """
+    faults = Faults()
+    first = views[0][1]
+    for name, view in views:
+        if view.get("kind") != "replay" or not view.get("runs"):
+            faults.add(name, "a view of a replay", f"a view of a {view.get('kind')}")
+        elif any(view.get(part) != first.get(part) for part in _SAME):
+            hint = "replay all logs with the same --db"
+            faults.add(name, f"runs over the database of {views[0][0]}", "another database", hint)
+    faults.raise_if_any(InputError)
+    found = dict(first)
+    having = [view for _, view in views if view.get("levels")]
+    best = max(having, key=_reach, default=first)
+    found["levels"], found["why"] = best.get("levels"), best.get("why")
+    names: set[str] = set()
+    runs: list[dict[str, Any]] = []
+    for number, (_, view) in enumerate(views, start=1):
+        for run in view["runs"]:
+            name = str(run["name"])
+            if name in names:
+                name = f"{name} ({number})"
+            names.add(name)
+            runs.append({**run, "name": name})
+    found["runs"] = runs
+    found["title"] = " | ".join(dict.fromkeys(str(view["title"]) for _, view in views))
+    found["notes"] = list(dict.fromkeys(note for _, view in views for note in view["notes"]))
+    return found
+
+
+def _reach(view: Mapping[str, Any]) -> tuple[bool, float]:
+    """Return whether the filter's constants are in a view, and over how much its levels reach."""
+    grid = view["levels"]["grid"]
+    return view.get("why") is not None, grid["rows"] * grid["cols"] * grid["step"] ** 2

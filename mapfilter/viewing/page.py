@@ -1,0 +1,121 @@
+"""One self-contained HTML file: the page's template, styles, scripts and the bundle in it."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import math
+import re
+from base64 import b64decode, b64encode
+from collections.abc import Mapping
+from html import escape
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+from mapfilter._inputs import read_input
+from mapfilter._io import atomic_file
+from mapfilter.errors import StoreError, fail
+from mapfilter.viewing.bundle import FORMAT, VERSION
+
+OPENING = '<script id="mapfilter-bundle" type="text/plain">'
+"""Tag before the bundle, which base64 of gzip of JSON follows up to the next tag."""
+
+_MOST_BYTES = 512 << 20
+_LEVEL = 6
+
+
+def encoded(bundle: Mapping[str, Any]) -> str:
+    """Return a bundle as text without any character that HTML gives a meaning to."""
+    text = json.dumps(_plain(bundle), ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    # Equal bundles give equal bytes: no time of writing.
+    return b64encode(gzip.compress(text.encode("ascii"), _LEVEL, mtime=0)).decode("ascii")
+
+
+def page_html(bundle: Mapping[str, Any]) -> str:
+    """Return the page with a bundle in it."""
+    folder = resources.files("mapfilter.viewing") / "page"
+    style = "\n".join([*_texts(folder / "vendor", ".css"), *_texts(folder, ".css")])
+    scripts = [*_texts(folder / "vendor", ".js"), *_texts(folder, ".js")]
+    # A script ends at this text wherever it stands; in a string of JavaScript both are the same.
+    script = "\n".join(scripts).replace("</script", "<\\/script")
+    html = (folder / "page.html").read_text(encoding="utf-8")
+    parts = {
+        "{{TITLE}}": escape(str(bundle.get("title", ""))),
+        "/*{{STYLE}}*/": style,
+        "/*{{SCRIPT}}*/": script,
+        "{{BUNDLE}}": encoded(bundle),
+    }
+    # Cut at all markers at once, so that one in a title is none.
+    pieces = re.split("|".join(f"({re.escape(marker)})" for marker in parts), html)
+    return "".join(parts.get(piece, piece) for piece in pieces if piece is not None)
+
+
+def write_page(bundle: Mapping[str, Any], path: Path) -> None:
+    """Write the page with a bundle in it.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with atomic_file(path) as temporary:
+        temporary.write_text(page_html(bundle), encoding="utf-8")
+
+
+def read_page(path: Path) -> dict[str, Any]:
+    """Return the bundle of a page.
+
+    Raises
+    ------
+    StoreError
+        The file is missing, too large, damaged, of a newer version, or no such page.
+    """
+    where, what = str(path), "a page that mapfilter wrote"
+    text = read_input(path, _MOST_BYTES, what, StoreError).decode("utf-8", errors="replace")
+    _, opening, rest = text.partition(OPENING)
+    if not opening:
+        raise fail(StoreError, where, what, "no bundle in it")
+    try:
+        packed = b64decode(rest.partition("<")[0].strip(), validate=True)
+        bundle = json.loads(_unzipped(packed))
+    except (ValueError, OSError, EOFError) as error:
+        raise fail(StoreError, where, what, f"{error}", "cut off") from error
+    if not isinstance(bundle, dict) or bundle.get("format") != FORMAT:
+        raise fail(StoreError, where, what, "another format")
+    if bundle.get("version") != VERSION:
+        hint = "made by another version of mapfilter; make it again"
+        raise fail(StoreError, where, f"version {VERSION}", bundle.get("version"), hint)
+    return bundle
+
+
+def _unzipped(packed: bytes) -> bytes:
+    with gzip.GzipFile(fileobj=io.BytesIO(packed)) as stream:
+        text = stream.read(_MOST_BYTES + 1)
+    if len(text) > _MOST_BYTES:
+        raise ValueError("more than 512 MB of it")
+    return text
+
+
+def _texts(folder: Traversable, ending: str) -> list[str]:
+    if not folder.is_dir():
+        return []
+    files = sorted((one for one in folder.iterdir() if one.name.endswith(ending)), key=_name)
+    return [one.read_text(encoding="utf-8") for one in files]
+
+
+def _name(file: Traversable) -> str:
+    return file.name
+
+
+def _plain(value: Any) -> Any:
+    """Return JSON types, with None for numbers that JSON has not."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,70 @@
+"use strict";
+// The area: streets, buildings, best server, predicted levels, and what they are at a place.
+(() => {
+  const pixel = (grid, east, north) => {
+    const col = Math.floor((east - grid.west) / grid.step);
+    const row = Math.floor((grid.north - north) / grid.step);
+    return col < 0 || row < 0 || col >= grid.cols || row >= grid.rows ? -1 : row * grid.cols + col;
+  };
+
+  const lines = (object) => {
+    if (!object || !object.first) return null;
+    const first = MF.array(object.first).raw;
+    if (first.length < 2) return null;
+    return { first, east: MF.numbers(object.east), north: MF.numbers(object.north), path: null };
+  };
+
+  MF.makeGround = (bundle) => {
+    const background = bundle.background ?? {};
+    const ground = { frame: bundle.frame, cells: bundle.cells, streets: lines(background.streets),
+      buildings: lines(background.buildings), points: null, best: null, bound: null, levels: null };
+    if (background.points) ground.points = { grid: background.points.grid, bits: MF.array(background.points.bits).raw };
+    if (background.best) {
+      const { grid, server, level, margin } = background.best;
+      ground.best = { grid, server: MF.array(server), level: MF.array(level), margin: MF.array(margin) };
+    }
+    if (background.bound) {
+      const { grid, value, name, unit } = background.bound;
+      ground.bound = { grid, value: MF.array(value), name, unit };
+    }
+    if (bundle.levels) {
+      const { grid, level, rough, best, second, distance } = bundle.levels;
+      ground.levels = { ...bundle.levels, level: MF.array(level), rough: MF.array(rough), best: MF.array(best),
+        second: MF.array(second), distance: MF.array(distance), size: grid.rows * grid.cols,
+        band: new Map(bundle.levels.cells.map((cell, band) => [cell, band])) };
+    }
+    ground.pixel = pixel;
+
+    // Predicted levels at a place, strongest first; empty where the database has none.
+    ground.levelsAt = (east, north) => {
+      const all = ground.levels;
+      if (!all) return [];
+      const at = pixel(all.grid, east, north);
+      if (at < 0) return [];
+      return all.cells.map((cell, band) => ({ cell, level: all.level.at(band * all.size + at) }))
+        .filter((one) => Number.isFinite(one.level)).sort((a, b) => b.level - a.level);
+    };
+    ground.bestAt = (east, north) => {
+      const one = ground.best;
+      if (!one) return null;
+      const at = pixel(one.grid, east, north);
+      if (at < 0 || one.server.raw[at] < 0) return null;
+      return { cell: one.server.raw[at], level: one.level.at(at), margin: one.margin.at(at) };
+    };
+    ground.boundAt = (east, north) => {
+      if (!ground.bound) return NaN;
+      return ground.bound.value.at(pixel(ground.bound.grid, east, north));
+    };
+    // Longitude and latitude by the frame's corners (bilinear: for labels).
+    ground.lonLat = (east, north) => {
+      const { corners, size } = bundle.frame;
+      if (!corners || !(size[0] > 0 && size[1] > 0)) return null;
+      const [u, v] = [east / size[0], north / size[1]];
+      const mix = (k) => (1 - v) * ((1 - u) * corners[0][k] + u * corners[1][k])
+        + v * ((1 - u) * corners[3][k] + u * corners[2][k]);
+      return { lon: mix(0), lat: mix(1) };
+    };
+    ground.cellName = (cell) => ground.cells[cell]?.label || ground.cells[cell]?.id || "unknown cell";
+    return ground;
+  };
+})();

@@ -1,0 +1,57 @@
+"use strict";
+// Where the maps look: a center in metres and a scale in pixels per metre, shared by all maps.
+(() => {
+  MF.makeCamera = (changed) => {
+    const camera = { east: 0, north: 0, scale: 1, least: 0.001, most: 40 };
+    camera.x = (east, view) => (east - camera.east) * camera.scale + view.width / 2;
+    camera.y = (north, view) => view.height / 2 - (north - camera.north) * camera.scale;
+    camera.eastOf = (x, view) => (x - view.width / 2) / camera.scale + camera.east;
+    camera.northOf = (y, view) => (view.height / 2 - y) / camera.scale + camera.north;
+    camera.fit = (box, view) => {
+      const width = Math.max(box.east1 - box.east0, 40);
+      const height = Math.max(box.north1 - box.north0, 40);
+      camera.east = (box.east0 + box.east1) / 2;
+      camera.north = (box.north0 + box.north1) / 2;
+      camera.scale = MF.clamp(Math.min(view.width / width, view.height / height) * 0.9, camera.least, camera.most);
+      changed();
+    };
+    camera.pan = (dx, dy) => {
+      camera.east -= dx / camera.scale;
+      camera.north += dy / camera.scale;
+      changed();
+    };
+    // Zoom with the place under (x, y) kept where it is.
+    camera.zoom = (factor, x, y, view) => {
+      const east = camera.eastOf(x, view);
+      const north = camera.northOf(y, view);
+      camera.scale = MF.clamp(camera.scale * factor, camera.least, camera.most);
+      camera.east = east - (x - view.width / 2) / camera.scale;
+      camera.north = north + (y - view.height / 2) / camera.scale;
+      changed();
+    };
+    camera.goTo = (east, north) => {
+      camera.east = east;
+      camera.north = north;
+      changed();
+    };
+    return camera;
+  };
+
+  // What a run covers: its truth and its estimates, else the area.
+  MF.boxOfRuns = (runs, frame) => {
+    const box = { east0: Infinity, east1: -Infinity, north0: Infinity, north1: -Infinity };
+    const add = (east, north) => {
+      if (!Number.isFinite(east) || !Number.isFinite(north)) return;
+      box.east0 = Math.min(box.east0, east);
+      box.east1 = Math.max(box.east1, east);
+      box.north0 = Math.min(box.north0, north);
+      box.north1 = Math.max(box.north1, north);
+    };
+    for (const run of runs) {
+      for (let i = 0; i < run.count; i += 1) add(run.epochs.east[i], run.epochs.north[i]);
+      if (run.hasTruth) run.truth.east.forEach((east, i) => add(east, run.truth.north[i]));
+    }
+    if (!Number.isFinite(box.east0)) return { east0: 0, north0: 0, east1: frame.size[0], north1: frame.size[1] };
+    return box;
+  };
+})();

@@ -1,0 +1,33 @@
+"""Reasons for unused readings, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from mapfilter.filters.contract import Reason
+
+REASONS: Mapping[Reason, str] = {
+    Reason.USED: "used",
+    Reason.NOT_MOVED_ENOUGH: "too near to the last report that was used",
+    Reason.NO_SERVING_CELL: "the report has no serving cell",
+    Reason.SECOND_SERVING_CELL: "a second serving cell in one report; the first counts",
+    Reason.UNKNOWN_CELL: "the database does not have this cell",
+    Reason.NO_CELL: "neither cell nor carrier is reported",
+    Reason.NO_POINTS_IN_CELL: "the database has the cell, but no point where it is received",
+    Reason.NO_CANDIDATES_LEFT: "no hypothesis agrees with it",
+    Reason.NO_HEADING: "the step has no heading",
+    Reason.NO_STEP: "the length of the step is unknown",
+    Reason.NO_READING: "nothing was measured",
+    Reason.MOTION_MISSING: "motion is missing for a while",
+    Reason.MOTION_STUCK: "the motion sensor repeats itself",
+    Reason.STALE_RADIO: "the modem repeats an old report",
+    Reason.NOT_STARTED: "there is no belief yet",
+    Reason.NOT_USED_BY_FILTER: "this filter does not use readings of this kind",
+    Reason.AMBIGUOUS_CELL: "several cells of the database fit",
+    Reason.UPDATE_FAILED: "the filter's update failed",
+    Reason.UNKNOWN_SATELLITE: "the satellite's place is unknown",
+    Reason.BELOW_HORIZON: "the satellite is below the horizon",
+    Reason.SECOND_READING: "a second reading of the same satellite",
+    Reason.REJECTED_BY_EVIDENCE: "contradicts the map and the other readings",
+    Reason.ON_PROBATION: "was wrong before, and has to agree for a while first",
+}

@@ -1,0 +1,299 @@
+"""``mapfilter evaluate NAME --data DIR``: benchmarks on public recordings, in one table."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter._io import ensure_writable_folder, sha256_file, write_json
+from mapfilter._parallel import Progress, local_executor, ordered_results, part_of
+from mapfilter._resume import kept_when_stopped, start_or_resume
+from mapfilter.database.store import open_database
+from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.experiments.benchmarks.worst_run import explain
+from mapfilter.experiments.recorded import (
+    belgium,
+    denver,
+    kitti,
+    mall,
+    mountain_view,
+    smartloc,
+    wifi,
+)
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Task
+from mapfilter.experiments.recorded.kept import (
+    read_journey,
+    read_scores,
+    scores_file,
+    write_judged,
+)
+from mapfilter.experiments.recorded.rows import (
+    Found,
+    Row,
+    UnitRow,
+    table_rows,
+    unit_rows,
+    worst_of,
+)
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.canvas import save
+from mapfilter.report.integrity import plot_worst_run
+from mapfilter.workflows.evaluate_ottawa import run_ottawa
+from mapfilter.workflows.served import served_points, street_map
+from mapfilter.workflows.terminal import to_jsonable
+
+OTTAWA = "ottawa"
+ALL = "all"
+BENCHMARKS: Mapping[str, Benchmark] = {
+    one.BENCHMARK.name: one.BENCHMARK
+    for one in (kitti, mall, smartloc, belgium, wifi, mountain_view, denver)
+}
+"""All but ottawa, which has a workflow of its own, by name."""
+NAMES = (OTTAWA, *BENCHMARKS)
+HEAD, TABLE, PICTURES, WORK, UNITS = "benchmark.json", "table.json", "pictures", "work", "units"
+_VERSION = 1
+_AROUND_M = 100.0
+
+
+@dataclass(frozen=True)
+class RecordedResult:
+    """Results of one benchmark: seed of what is drawn, tables, pictures, wall time."""
+
+    name: str
+    seed: int
+    rows: tuple[Row, ...]
+    units: tuple[UnitRow, ...]
+    pictures: tuple[Path, ...]
+    seconds: float
+    out: Path
+
+
+@dataclass(frozen=True)
+class AllResult:
+    """Results of all benchmarks in one table; ``part`` begins with the benchmark's name.
+
+    Parameters
+    ----------
+    missing : tuple of str
+        What was not run, and why.
+    """
+
+    seed: int
+    rows: tuple[Row, ...]
+    missing: tuple[str, ...]
+    seconds: Mapping[str, float]
+    out: Path
+
+
+def run_recorded(
+    name: str,
+    data: Path,
+    out: Path,
+    *,
+    parts: Sequence[str] = (),
+    runs: int | None = None,
+    seed: int = 0,
+    workers: int = 1,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> RecordedResult:
+    """Run one benchmark on recordings.
+
+    Parameters
+    ----------
+    name : str
+        Of :data:`BENCHMARKS`.
+    data : Path
+        Holds the folders of the data sets.
+    out : Path
+        Gets the finished units, ``table.json`` and ``pictures``.
+    parts : sequence of str
+        All when left out.
+    runs : int, optional
+        At most so many runs of each unit.
+    workers : int
+        Local processes.
+    resume : bool
+        Keep the units that the same benchmark has finished.
+    progress : callable, optional
+        Called with runs done and runs in all.
+
+    Raises
+    ------
+    MapfilterError
+        The data set is missing or damaged, there is something else to resume, or the output cannot
+        be written.
+    """
+    began_s = time.perf_counter()
+    benchmark = BENCHMARKS[name]
+    work, finished = out / WORK, out / UNITS
+    tasks = _chosen(benchmark.tasks(data, work, seed, runs), parts)
+    ensure_writable_folder(out)
+    head = {
+        "version": _VERSION,
+        "name": name,
+        "seed": seed,
+        "parts": list(parts),
+        "runs": runs,
+        "data": _digests(data / benchmark.folder),
+    }
+    files = [scores_file(finished, task) for task in tasks]
+    kept = start_or_resume(out / HEAD, head, files, resume=resume)
+    if benchmark.prepare is not None and not (kept and work.is_dir()):
+        benchmark.prepare(data / benchmark.folder, work)
+    todo = [task for task in tasks if not (resume and read_scores(finished, task) is not None)]
+    before = len(tasks) - len(todo)
+
+    def report(done: int, _: int) -> None:
+        if progress is not None:
+            progress(before + done, len(tasks))
+
+    report(0, 0)
+    with local_executor(workers) as executor, kept_when_stopped("runs"):
+        jobs = [(name, task, finished) for task in todo]
+        for _ in ordered_results(executor, _judge, jobs, in_flight=2 * workers, progress=report):
+            pass
+    by_task = {task: read_scores(finished, task) or () for task in tasks}
+    found = [one for each in by_task.values() for one in each]
+    rows = table_rows(found, benchmark.published_m, baseline=benchmark.baseline)
+    pictures = _draw(by_task, finished, out / PICTURES)
+    result = RecordedResult(
+        name,
+        seed,
+        tuple(rows),
+        tuple(unit_rows(found)),
+        tuple(pictures),
+        time.perf_counter() - began_s,
+        out,
+    )
+    write_json(out / TABLE, to_jsonable(result))
+    return result
+
+
+def run_all(
+    data: Path,
+    out: Path,
+    *,
+    names: Sequence[str] = NAMES,
+    seed: int = 0,
+    workers: int = 1,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> AllResult:
+    """Run every benchmark whose data set is there, and put their rows together.
+
+    Parameters are those of :func:`run_recorded`.
+
+    Raises
+    ------
+    InputError
+        None of the data sets is there.
+    """
+    rows: list[Row] = []
+    missing: list[str] = []
+    seconds: dict[str, float] = {}
+    ensure_writable_folder(out)
+    for number, name in enumerate(names):
+        part = part_of(progress, number, len(names))
+        try:
+            found, seconds[name] = _rows_of(
+                name, data, out / name, seed=seed, workers=workers, resume=resume, progress=part
+            )
+        except InputError as error:
+            missing.append(f"{name}: {error}")
+            continue
+        rows += [replace(row, part=f"{name}/{row.part}") for row in found]
+        result = AllResult(seed, tuple(rows), tuple(missing), seconds, out)
+        write_json(out / TABLE, to_jsonable(result))
+    if not rows:
+        raise fail(InputError, str(data), "folders of the data sets", "; ".join(missing))
+    return AllResult(seed, tuple(rows), tuple(missing), seconds, out)
+
+
+def _rows_of(
+    name: str,
+    data: Path,
+    out: Path,
+    *,
+    seed: int,
+    workers: int,
+    resume: bool,
+    progress: Progress | None,
+) -> tuple[Sequence[Row], float]:
+    if name != OTTAWA:
+        found = run_recorded(
+            name, data, out, seed=seed, workers=workers, resume=resume, progress=progress
+        )
+        return found.rows, found.seconds
+    ottawa = run_ottawa(data, out, seed=seed, workers=workers, resume=resume, progress=progress)
+    return [Row(**vars(row)) for row in ottawa.rows], ottawa.seconds
+
+
+def _judge(job: tuple[str, Task, Path]) -> None:
+    """Locate one task and keep the results."""
+    name, task, folder = job
+    write_judged(BENCHMARKS[name].judge(task), folder, task)
+
+
+def _chosen(tasks: Sequence[Task], parts: Sequence[str]) -> list[Task]:
+    known = list(dict.fromkeys(task.part for task in tasks))
+    for part in parts:
+        if part not in known:
+            raise fail(ConfigError, "--case", ", ".join(known), repr(part))
+    return [task for task in tasks if not parts or task.part in parts]
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files}
+
+
+def _draw(by_task: Mapping[Task, Sequence[Found]], finished: Path, folder: Path) -> list[Path]:
+    """Draw the worst run of each part and method of which a journey was kept."""
+    made = []
+    every = [one for found in by_task.values() for one in found]
+    task_of = {id(one): task for task, found in by_task.items() for one in found}
+    for part, method in dict.fromkeys((one.part, one.method) for one in every):
+        worst = worst_of([one for one in every if (one.part, one.method) == (part, method)])
+        if worst is None:
+            continue
+        task = task_of[id(worst)]
+        journey = read_journey(finished, task, method)
+        story = explain(journey.estimate, journey.truth) if journey is not None else None
+        if journey is None or story is None:
+            continue
+        drawn = plot_worst_run(
+            journey.estimate,
+            journey.truth,
+            _ground(journey),
+            (story.index, story.first, story.last),
+            SUCCESS_RADIUS_M,
+            title=f"{part}, {method}, {task.unit} run {task.run}: {story.what}",
+            reason=story.reason,
+        )
+        made.append(folder / f"{part}-{method}-worst.png".replace("/", "-"))
+        save(drawn, made[-1])
+    return made
+
+
+def _ground(journey: Journey) -> BaseMap:
+    """Return the streets of a journey's database, or an empty map about its truth."""
+    if journey.database is not None:
+        try:
+            database = open_database(journey.database)
+            return street_map(database, served_points(database))
+        except MapfilterError:
+            pass
+    truth = journey.truth
+    bounds = (
+        float(np.min(truth.east_m)) - _AROUND_M,
+        float(np.min(truth.north_m)) - _AROUND_M,
+        float(np.max(truth.east_m)) + _AROUND_M,
+        float(np.max(truth.north_m)) + _AROUND_M,
+    )
+    return BaseMap(bounds)

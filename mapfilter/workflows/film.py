@@ -1,0 +1,107 @@
+"""``mapfilter film``: a replay's page as GIF or MP4."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.film import FilmMoment, write_film
+from mapfilter.viewing.arrays import unpacked
+from mapfilter.viewing.page import read_page
+from mapfilter.workflows.views import pages_of
+
+MOST_PICTURES = 240
+_AROUND_M = 80.0
+
+
+def run_film(result: Path, out: Path, *, run: int = 0, pictures: int = 150) -> dict[str, Any]:
+    """Write a film of one run of a replay.
+
+    Parameters
+    ----------
+    result : Path
+        A result of ``replay --html``, or a page.
+    out : Path
+        The film: .gif, or .mp4 where ffmpeg is found.
+    run : int
+        Of several side by side, counted from 0.
+    pictures : int
+        How many, evenly chosen in time.
+
+    Raises
+    ------
+    MapfilterError
+        There is no such run, it has no belief, or the film cannot be written.
+    """
+    if not 1 <= pictures <= MOST_PICTURES:
+        raise fail(ConfigError, "--pictures", f"1 to {MOST_PICTURES}", pictures)
+    page = pages_of([result])[0]
+    bundle = read_page(page)
+    try:
+        if not 0 <= run < len(bundle["runs"]):
+            raise fail(ConfigError, "--run", f"a run of {len(bundle['runs'])}", run)
+        chosen = bundle["runs"][run]
+        if chosen["belief"] is None:
+            raise fail(InputError, str(page), "a run with its belief", "none recorded")
+        moments = _moments(bundle, chosen, pictures)
+        base = _base(bundle, moments)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise fail(InputError, str(page), "a whole page", repr(error), "damaged") from error
+    write_film(moments, base, out, title=str(chosen["name"]))
+    return {"film": out, "pictures": len(moments), "megabytes": round(out.stat().st_size / 1e6, 2)}
+
+
+def _moments(bundle: Mapping[str, Any], run: Mapping[str, Any], pictures: int) -> list[FilmMoment]:
+    west, south = bundle["frame"]["origin"]
+    found, belief = run["epochs"], run["belief"]
+    column = {
+        name: unpacked(found[name])
+        for name in ("time", "east", "north", "r95", "truth_east", "truth_north", "status")
+    }
+    frame = {name: unpacked(belief[name]) for name in ("epoch", "first", "step", "col", "row")}
+    shade = unpacked(belief["mass"]) / 255.0
+    count = int(found["count"])
+    at = np.unique(np.linspace(0, count - 1, min(pictures, count)).astype(np.int64))
+    moments = []
+    for epoch in at.tolist():
+        number = int(np.searchsorted(frame["epoch"], epoch, side="right")) - 1
+        some = slice(0, 0)
+        step = 1.0
+        if number >= 0:
+            some = slice(int(frame["first"][number]), int(frame["first"][number + 1]))
+            step = float(frame["step"][number])
+        corner = np.column_stack([frame["col"][some], frame["row"][some]]) * step + (west, south)
+        moments.append(
+            FilmMoment(
+                f"{column['time'][epoch]:.0f} s",
+                corner,
+                step,
+                shade[some],
+                (column["east"][epoch] + west, column["north"][epoch] + south),
+                float(column["r95"][epoch]),
+                (column["truth_east"][epoch] + west, column["truth_north"][epoch] + south),
+                str(bundle["statuses"][int(column["status"][epoch])]),
+            )
+        )
+    return moments
+
+
+def _base(bundle: Mapping[str, Any], moments: list[FilmMoment]) -> BaseMap:
+    """Return the streets about the tracks."""
+    west, south = bundle["frame"]["origin"]
+    width, height = bundle["frame"]["size"]
+    streets = bundle["background"]["streets"]
+    corner = np.column_stack([unpacked(streets["east"]) + west, unpacked(streets["north"]) + south])
+    lines = np.split(corner, unpacked(streets["first"])[1:-1].astype(np.int64))
+    places = [one for m in moments for one in (m.estimate_m, m.truth_m) if isfinite(one[0])]
+    bounds = west, south, west + max(width, 1.0), south + max(height, 1.0)
+    if places:
+        low, high = np.min(places, axis=0) - _AROUND_M, np.max(places, axis=0) + _AROUND_M
+        bounds = float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    return BaseMap(bounds, tuple(line for line in lines if len(line) > 1))

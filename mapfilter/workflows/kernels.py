@@ -1,0 +1,117 @@
+"""Compile the kernels of a replay in other processes, where this machine has not done so yet.
+
+Numba keeps compiled kernels on disk, for each version of their source and each processor. What is
+not compiled here is compiled when it is first called: only the time of a first run depends on this.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from concurrent.futures import wait
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mapfilter._kernels import draw_key
+from mapfilter._parallel import local_executor
+from mapfilter._types import Floats, Floats32
+from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.hypotheses import flattened, summarise
+from mapfilter.filters.particle import Cloud
+from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+from mapfilter.geodesy import Lattice
+from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
+from mapfilter.models.level_errors import LevelReport
+from mapfilter.models.street_motion import STATES, weigh_by_map
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.integrity import sample_tail
+
+_WORKERS = 2
+_PARTICLES, _PIXELS, _PIXEL_M = 64, 4, 5.0
+
+
+@contextmanager
+def compiled_beside() -> Iterator[None]:
+    """Compile what the Bayes filter needs, in two processes, while the block runs.
+
+    At its end all is compiled. Nothing is done where it is already, or on a single processor.
+    """
+    if all(map(_is_kept, _LAST)) or (os.cpu_count() or 1) < _WORKERS:
+        yield
+        return
+    with local_executor(_WORKERS) as workers:
+        tasks = [workers.submit(task) for task in _TASKS]
+        yield
+        # A process that fails costs time only.
+        wait(tasks)
+
+
+def compile_evidence() -> None:
+    """Compile the weighing by reports."""
+    model, cloud, log_weight = _made()
+    one, none = np.full(1, -60, dtype=np.float32), np.zeros(1, dtype=np.int32)
+    levels = LevelReport(none, one, none, -100.0, 1.0)
+    plain = RadioReading(0, 1.0, levels)
+    # What is kept of a first report decays until the second.
+    cloud, _ = model.weigh(cloud, log_weight, plain)
+    bounds = (BoundReading(none, -60.0, 1, 8.0, 1.0),)
+    model.weigh(cloud, log_weight, RadioReading(0, 1.0, levels, bounds))
+
+
+def compile_motion() -> None:
+    """Compile steps, and the weighing by the map."""
+    model, cloud, log_weight = _made()
+    model.move(cloud.state, log_weight, MotionStep(1.0, 0.0), draw_key(np.random.default_rng(0)))
+
+
+def compile_summaries() -> None:
+    """Compile the summary of a belief."""
+    model, cloud, _ = _made()
+    weight = np.full(_PARTICLES, 1 / _PARTICLES, dtype=np.float32)
+    summarise(cloud.state, weight, model.bins)
+    flattened(cloud.state, weight, model.bins, 0.5)
+
+
+def compile_resampling() -> None:
+    """Compile resampling, the protection level, and the way that a belief lies on."""
+    model, cloud, log_weight = _made()
+    weight, chosen = np.empty(_PARTICLES, dtype=np.float32), np.empty(_PARTICLES, dtype=np.int32)
+    normalise(log_weight, weight)
+    model.area.matched_way(cloud.state[0], cloud.state[1], weight)
+    sample_tail(cloud.state[0], cloud.state[1], weight, np.zeros(STATES), 0.0).protection_m(1e-3)
+    systematic(weight, 0.5, chosen)
+    jitter, copies = np.ones(STATES, dtype=np.float32), np.empty_like(cloud.state)
+    copy_with_jitter(cloud.state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
+
+
+# The longest first; what each compiles last shows that it has ended.
+_TASKS = (compile_motion, compile_evidence, compile_summaries, compile_resampling)
+_LAST: tuple[Any, ...] = (weigh_by_map, weigh_by_bound, flattened, copy_with_jitter)
+
+
+def _is_kept(kernel: Any) -> bool:
+    """Return whether a kernel's present source lies compiled on this machine."""
+    code, version = kernel.py_func.__code__, f"py{sys.version_info[0]}{sys.version_info[1]}"
+    name = f"*.{code.co_name}-{code.co_firstlineno}.{version}*.nbi"
+    return any(Path(kernel.stats.cache_path).glob(name))
+
+
+def _made() -> tuple[BayesModel, Cloud, Floats]:
+    """Return a made area with one cell, and hypotheses at its corner."""
+    lattice = Lattice("EPSG:32635", 0.0, _PIXELS * _PIXEL_M, _PIXEL_M, _PIXELS, _PIXELS)
+    flat: Floats32 = np.zeros((_PIXELS, _PIXELS), dtype=np.float32)
+    level = np.full((_PIXELS, _PIXELS, 3), -60.0, dtype=np.float32)
+    way = np.ones((_PIXELS, _PIXELS), dtype=np.int64)
+    area = AreaMap(
+        lattice, ("A",), frozenset({"A"}), level, flat, way, way > 0, {}, -110.0,
+        {"A": (0.0, 0.0, 20.0)},
+    )  # fmt: skip
+    state = np.ones((STATES, _PARTICLES), dtype=np.float32)
+    log_weight = np.full(_PARTICLES, -np.log(_PARTICLES))
+    return BayesModel(area), Cloud(state, np.empty((0, _PARTICLES), dtype=np.float32)), log_weight

@@ -1,0 +1,166 @@
+"""``mapfilter evaluate`` on recordings: units are kept, faults are named, rows are put together."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from command_line import mapfilter
+from scipy.io import savemat
+
+from mapfilter.errors import ConfigError, InputError, Stopped
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.experiments.recorded import wifi
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged
+from mapfilter.experiments.recorded.rows import Found
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.workflows import evaluate_recorded
+from mapfilter.workflows.evaluate_recorded import run_all, run_recorded
+
+
+def _estimate(off_m):
+    def fix(k):
+        radii, covariance = np.array([1.0, 2.0, 3.0]), np.eye(2)
+        place = (500.0 + 10 * k, 500.0 + off_m)
+        status = Status.CONVERGED if k == 3 else Status.TRACKING if k > 3 else Status.SEARCHING
+        return Fix(float(k), *place, covariance, radii, status, 9, 1.0, 0, 0.0, Reason.USED)
+
+    return TrackEstimate.of_fixes("EPSG:32632", "bayes", [fix(k) for k in range(9)])
+
+
+class _Fake:
+    """A benchmark of two parts that counts what it located."""
+
+    def __init__(self):
+        self.done, self.stop_at = [], None
+
+    def units(self, folder):
+        names = sorted(path.stem for path in folder.glob("*.txt"))
+        return [(name, "unit", 2) for name in names]
+
+    def judge(self, task):
+        if len(self.done) == self.stop_at:
+            raise Stopped(15)
+        self.done.append(task.name)
+        error = np.array([float(task.run + 1)])
+        found = Found(task.part, "bayes", task.unit, True, True, False, error, error <= 1.0)
+        times = np.arange(9.0)
+        truth = Truth(times, 500.0 + 10 * times, np.full(9, 500.0))
+        return Judged((found,), {"bayes": Journey(_estimate(float(task.run)), truth)})
+
+    def benchmark(self):
+        return Benchmark("fake", "fake-data", ("*.txt",), self.units, self.judge)
+
+
+@pytest.fixture
+def fake(tmp_path, monkeypatch):
+    made = _Fake()
+    (tmp_path / "fake-data").mkdir()
+    for name in ("one", "two"):
+        (tmp_path / "fake-data" / f"{name}.txt").write_text("data\n")
+    monkeypatch.setattr(evaluate_recorded, "BENCHMARKS", {"fake": made.benchmark()})
+    return made
+
+
+@pytest.mark.usefixtures("fake")
+def test_rows_table_and_pictures(tmp_path):
+    result = run_recorded("fake", tmp_path, tmp_path / "out")
+    assert [(row.part, row.n, row.mean_m, row.coverage_95) for row in result.rows] == [
+        ("one", 2, 1.5, 0.5),
+        ("two", 2, 1.5, 0.5),
+    ]
+    table = json.loads((tmp_path / "out" / "table.json").read_text())
+    assert table["rows"][0]["published_m"] is None
+    assert [path.name for path in result.pictures] == [
+        "one-bayes-worst.png",
+        "two-bayes-worst.png",
+    ]
+    assert all(path.stat().st_size > 10_000 for path in result.pictures)
+
+
+def test_finished_runs_are_kept_and_damaged_ones_done_again(fake, tmp_path):
+    fake.stop_at = 3
+    with pytest.raises(Stopped) as stopped:
+        run_recorded("fake", tmp_path, tmp_path / "out")
+    assert "--resume" in stopped.value.__notes__[0]
+    first, fake.done, fake.stop_at = fake.done, [], None
+    done = []
+    run_recorded(
+        "fake", tmp_path, tmp_path / "out", resume=True, progress=lambda *a: done.append(a)
+    )
+    assert first == ["one-unit-0", "one-unit-1", "two-unit-0"]
+    assert fake.done == ["two-unit-1"]
+    assert done == [(3, 4), (4, 4)]
+    file = tmp_path / "out" / "units" / "one-unit-1.json"
+    file.write_text(file.read_text()[:50])
+    fake.done = []
+    run_recorded("fake", tmp_path, tmp_path / "out", resume=True)
+    assert fake.done == ["one-unit-1"]
+
+
+@pytest.mark.usefixtures("fake")
+def test_other_data_are_not_resumed(tmp_path):
+    run_recorded("fake", tmp_path, tmp_path / "out")
+    (tmp_path / "fake-data" / "one.txt").write_text("other\n")
+    with pytest.raises(ConfigError, match="another data"):
+        run_recorded("fake", tmp_path, tmp_path / "out", resume=True)
+
+
+def test_parts_and_runs_are_chosen(fake, tmp_path):
+    run_recorded("fake", tmp_path, tmp_path / "out", parts=["two"], runs=1)
+    assert fake.done == ["two-unit-0"]
+    with pytest.raises(ConfigError, match="one, two"):
+        run_recorded("fake", tmp_path, tmp_path / "out", parts=["three"])
+
+
+def test_all_names_what_is_missing_and_keeps_the_rest(fake, tmp_path, monkeypatch):
+    absent = replace(fake.benchmark(), name="absent", folder="absent-data")
+    monkeypatch.setattr(
+        evaluate_recorded, "BENCHMARKS", {"fake": fake.benchmark(), "absent": absent}
+    )
+    result = run_all(tmp_path, tmp_path / "out", names=("fake", "absent"))
+    assert [row.part for row in result.rows] == ["fake/one", "fake/two"]
+    assert len(result.missing) == 1
+    assert "absent-data" in result.missing[0]
+    with pytest.raises(InputError, match="absent-data"):
+        run_all(tmp_path, tmp_path / "out", names=("absent",))
+
+
+def test_an_empty_folder_is_named(tmp_path):
+    (tmp_path / "fingerprint-wifi").mkdir()
+    with pytest.raises(InputError, match=r"UJI1\.mat"):
+        run_recorded("fingerprints", tmp_path, tmp_path / "out")
+
+
+def _wifi_set(rng, count):
+    beacons = rng.uniform(0, 60, (8, 2))
+    places = rng.uniform(0, 60, (count, 2))
+    away = 1 + np.hypot(*(places[:, None] - beacons).transpose(2, 0, 1))
+    levels = np.round(-40 - 25 * np.log10(away) + rng.normal(0, 2, away.shape))
+    labels = np.column_stack([places, np.zeros((count, 3))])
+    return levels, labels
+
+
+def test_wifi_sets_by_the_command(tmp_path):
+    folder = tmp_path / "fingerprint-wifi"
+    folder.mkdir()
+    for seed, name in enumerate(wifi.WIFI):
+        levels, labels = _wifi_set(np.random.default_rng(seed), 160)
+        database = {
+            "trainingMacs": levels[:120],
+            "trainingLabels": labels[:120],
+            "testMacs": levels[120:],
+            "testLabels": labels[120:],
+        }
+        savemat(folder / f"{name}.mat", {"database": database})
+    out = tmp_path / "out"
+    where = ("--data", tmp_path, "--out", out, "--workers", 1)
+    done = mapfilter("evaluate", "fingerprints", *where, "--json")
+    assert done.code == 0, done.err
+    rows = done.json["rows"]
+    assert [row["part"] for row in rows if row["method"] == "locate"] == list(wifi.WIFI)
+    assert all(row["unit_count"] == row["n"] == 40 for row in rows)
+    assert all(row["mean_m"] < 15 and row["success"] is None for row in rows)
+    by = {(row["part"], row["method"]): row for row in rows}
+    assert by["TUT1", "locate"]["baseline_m"] == by["TUT1", "3-nn"]["mean_m"]

@@ -1,0 +1,68 @@
+"""Kernels that are compiled beside the first stages are those that a replay then calls."""
+
+import subprocess
+import sys
+
+from mapfilter.workflows import kernels
+
+# In a process of its own: in this one other tests have called the kernels already.
+_CHECK = """
+import numpy as np
+from mapfilter.filters import hypotheses, particle, resampling
+from mapfilter.filters.contract import MotionStep
+from mapfilter.models import fingerprint, level_kernels, street_motion
+from mapfilter.positioning import integrity
+from mapfilter.positioning.bayes import area_map, evidence, model
+from mapfilter.workflows import kernels
+
+compiled = {
+    f"{module.__name__}.{name}": found
+    for module in (
+        area_map, fingerprint, hypotheses, integrity, level_kernels, resampling, street_motion
+    )
+    for name, found in vars(module).items()
+    if hasattr(found, "signatures") and found.py_func.__module__ == module.__name__
+}
+called = lambda: {name: tuple(found.signatures) for name, found in compiled.items()}
+for task in kernels._TASKS:
+    task()
+before = called()
+made, cloud, log_weight = kernels._made()
+rng = np.random.default_rng(0)
+filter_ = particle.ParticleFilter(made, particle.ParticleOptions(500, 400, 300))
+belief = filter_.init(model.Start(None, True, 10.0, 10.0, 2.0), rng)
+none = np.zeros(1, np.int32)
+levels = kernels.LevelReport(none, np.full(1, -60, np.float32), none, -100.0, 1.0)
+bound = fingerprint.BoundReading(none, -60.0, 1, 8.0, 1.0)
+for _ in range(3):
+    belief, _ = filter_.predict(belief, MotionStep(1.0, 0.3), rng)
+    reading = evidence.RadioReading(0, 1.0, levels, (bound,), length_m=1.0)
+    belief, _ = filter_.update(belief, reading, rng)
+    belief.summary, made.area.matched_way(*belief.state[:2], belief.weight)
+    tail = integrity.sample_tail(*belief.state[:2], belief.weight, belief.summary.mean, 0.0)
+    tail.protection_m(1e-3)
+assert called() == before, set(called().items()) - set(before.items())
+assert sum(map(len, before.values())) >= 14, before
+"""
+
+
+def test_a_filter_calls_what_was_compiled():
+    done = subprocess.run([sys.executable, "-c", _CHECK], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_nothing_is_started_where_all_is_kept(monkeypatch):
+    monkeypatch.setattr(kernels, "local_executor", None)
+    monkeypatch.setattr(kernels, "_is_kept", lambda _: True)
+    with kernels.compiled_beside():
+        pass
+
+
+def test_a_kernel_is_kept_by_its_line():
+    class Elsewhere:
+        py_func = test_nothing_is_started_where_all_is_kept
+        stats = kernels.weigh_by_map.stats
+
+    kernels.compile_motion()
+    assert kernels._is_kept(kernels.weigh_by_map)
+    assert not kernels._is_kept(Elsewhere)
