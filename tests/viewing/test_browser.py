@@ -149,6 +149,8 @@ def test_two_filters_share_their_time(browser, replay):
         view.press("2")
         assert view.state("run") == 1
         assert maps.nth(1).get_attribute("data-active") == "true"
+        # The second run explains nothing, and has no reports to step through.
+        assert view.page.get_by_role("button", name="Next report used").is_disabled()
         view.page.select_option("#second", "-1")
         view.settle()
         assert maps.count() == 1
