@@ -30,7 +30,7 @@ from mapfilter.roads.ways import half_width_of
 from mapfilter.tracks.deadreckoning import steps_between
 from mapfilter.tracks.log import TrackLog, make_log
 
-RIGHT_M, JOINED_M = 25.0, 1.0
+RIGHT_M, JOINED_M, ON_GRAPH_M = 25.0, 1.0, 50.0
 LEAST_POINTS = 20
 _GRAPH, _TRACES = "*graph*.graphml.gz", "*trace*.csv"
 _RESOLUTION_M, _MARGIN_M = 4.0, 50.0
@@ -54,11 +54,11 @@ def prepare(folder: Path, work: Path) -> None:
 
 
 def judge(task: Task) -> Judged:
-    """Match the part of a trace that lies in the box of the graph by both methods."""
+    """Match the part of a trace that lies on the graph by both methods."""
     graph = _graph(task.data)
     places = clipped(read_trace(task.data / f"{task.part}.csv", graph.crs), graph)
     if len(places) < LEAST_POINTS:
-        expected = f"{LEAST_POINTS} points or more within the box of the graph"
+        expected = f"{LEAST_POINTS} points or more on the graph"
         raise fail(InputError, str(task.data / task.part), expected, len(places))
     edge = match_points(graph, places)
     hmm = np.where(edge >= 0, graph.street[edge], 0)
@@ -104,10 +104,11 @@ def read_trace(file: Path, crs: str) -> Floats:
 
 
 def clipped(places: Floats, graph: StreetGraph) -> Floats:
-    """Return the places in the graph's box: the longest stretch of them that follow each other."""
-    west, south, east, north = shapely.total_bounds(graph.line)
-    x, y = places.T
-    inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+    """Return the longest stretch of places that follow each other within 50 m of a street."""
+    tree = shapely.STRtree(graph.line)
+    near, _ = tree.query(shapely.points(places), "dwithin", ON_GRAPH_M)
+    inside = np.zeros(len(places), dtype=np.bool_)
+    inside[near] = True
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
     spans = edges.reshape(-1, 2)
     if not len(spans):
