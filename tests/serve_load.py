@@ -186,28 +186,52 @@ def city(folder: Path) -> tuple[Path, list[dict]]:
     return folder / "database", sent
 
 
+def body_of(sent: list[dict], first: int, last: int) -> bytes:
+    """Return the body of a request with some epochs."""
+    return json.dumps({"epochs": sent[first:last]}).encode()
+
+
 async def measure(count: int, folder: Path, database: Path, sent: list[dict]) -> dict:
     """Run all parts, and return the figures."""
-
-    def body(first: int, last: int) -> bytes:
-        return json.dumps({"epochs": sent[first:last]}).encode()
-
     served = Served(database, folder, "--save-every", "5")
+    try:
+        found, states, tracked = await loaded(served, count, sent)
+    finally:
+        served.end(signal.SIGKILL)
+    again = Served(database, folder)
+    try:
+        found["restart_s"] = again.seconds
+        _, data = await Client(again.port).ask("GET", "/sessions")
+        restored = {one["id"]: one for one in json.loads(data)["sessions"]}
+        found["lost_by_kill"] = sum(
+            restored.get(key, {}).get("epochs") != one["epochs"] for key, one in states.items()
+        )
+        found["after_restart"] = await round_of(again.port, tracked, body_of(sent, 235, 236), {})
+    finally:
+        code, said = again.end(signal.SIGTERM)
+    found["end"] = {"code": code, "said": said.splitlines()[-1]}
+    return found
+
+
+async def loaded(
+    served: Served, count: int, sent: list[dict]
+) -> tuple[dict, dict[str, dict], list[str]]:
+    """Begin sessions and post to them; return figures, all that is saved, and who has tracked."""
     found: dict[str, object] = {"start_s": served.seconds, "empty_mib": served.memory_mib()}
     began_s = time.monotonic()
     ids = await begin(served.port, count)
     found["begin_s"] = time.monotonic() - began_s
     held: dict[str, Client] = {}
     for name, first, last in (("first", 0, 1), ("searching", 1, 5)):
-        found[name] = await round_of(served.port, ids, body(first, last), held)
+        found[name] = await round_of(served.port, ids, body_of(sent, first, last), held)
         found[f"{name}_mib"] = served.memory_mib()
     tracked = ids[: max(1, count // 10)]
     before_s = served.cpu_s()
-    found["walk"] = await round_of(served.port, tracked, body(5, 205), held)
+    found["walk"] = await round_of(served.port, tracked, body_of(sent, 5, 205), held)
     found["walk_epochs_per_cpu_s"] = 200 * len(tracked) / (served.cpu_s() - before_s)
     found["walk_mib"] = served.memory_mib()
     before_s = served.cpu_s()
-    found["tracking"] = await round_of(served.port, tracked, body(205, 235), held)
+    found["tracking"] = await round_of(served.port, tracked, body_of(sent, 205, 235), held)
     found["tracking_epochs_per_cpu_s"] = 30 * len(tracked) / (served.cpu_s() - before_s)
     found["faults"] = await faults(served.port, ids)
     await asyncio.sleep(1)
@@ -220,18 +244,7 @@ async def measure(count: int, folder: Path, database: Path, sent: list[dict]) ->
             break
         await asyncio.sleep(1)
     found["all_saved_after_s"] = time.monotonic() - began_s
-    served.end(signal.SIGKILL)
-    again = Served(database, folder)
-    found["restart_s"] = again.seconds
-    _, data = await Client(again.port).ask("GET", "/sessions")
-    restored = {one["id"]: one for one in json.loads(data)["sessions"]}
-    found["lost_by_kill"] = sum(
-        restored.get(key, {}).get("epochs") != one["epochs"] for key, one in states.items()
-    )
-    found["after_restart"] = await round_of(again.port, tracked, body(235, 236), {})
-    code, said = again.end(signal.SIGTERM)
-    found["end"] = {"code": code, "said": said.splitlines()[-1]}
-    return found
+    return found, states, tracked
 
 
 def main() -> int:

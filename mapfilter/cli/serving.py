@@ -53,7 +53,7 @@ def serve(
     ] = 60.0,
     memory_mib: Annotated[
         int, typer.Option("--memory", metavar="MIB", help="Memory for states of sessions.")
-    ] = 1200,
+    ] = 1000,
     body_kib: Annotated[
         int, typer.Option("--body", metavar="KIB", help="Largest body of a request.")
     ] = 1024,

@@ -41,7 +41,7 @@ class ServiceLimits:
 
     sessions: int = 1000
     idle_s: float = 3600.0
-    state_bytes: int = 1200 << 20
+    state_bytes: int = 1000 << 20
     body_bytes: int = 1 << 20
     rate_per_s: float = 200.0
     burst_s: float = 5.0
