@@ -98,9 +98,9 @@ def _quoted_separators(code: NDArray[np.uint8], starts: Ints, ends: Ints, places
     before, after = np.searchsorted(quotes, starts), np.searchsorted(quotes, ends)
     of = np.searchsorted(starts, places, side="right") - 1
     within = (np.searchsorted(quotes, places) - before[of]) % 2 == 1
-    found = np.zeros(len(starts), dtype=bool)
-    found[of[within]] = True
-    return found & ((after - before) % 2 == 0)
+    found: Bools = np.zeros(len(starts), dtype=bool)
+    found[of[within]] = (after - before)[of[within]] % 2 == 0
+    return found
 
 
 def _padded(block: bytes, count: int, separator: str, least: int) -> bytes:
