@@ -7,6 +7,7 @@ or one that begins where that ends. Points come one a second.
 
 from __future__ import annotations
 
+import io
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 import pandas as pd
 import shapely
 
+from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.errors import InputError, fail
@@ -35,6 +37,7 @@ LEAST_POINTS = 20
 _GRAPH, _TRACES = "*graph*.graphml.gz", "*trace*.csv"
 _RESOLUTION_M, _MARGIN_M = 4.0, 50.0
 _CLASS = "residential"
+_LARGEST_BYTES = 100_000_000
 _MAP = "streets"
 
 
@@ -92,12 +95,7 @@ def judge(task: Task) -> Judged:
 
 def read_trace(file: Path, crs: str) -> Floats:
     """Read the places of a trace, shape (N, 2); the same place again and again once."""
-    try:
-        table = pd.read_csv(file)
-        lon, lat = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
-    except (OSError, KeyError, ValueError) as error:
-        expected = "a CSV of latitude and longitude"
-        raise fail(InputError, str(file), expected, repr(error)) from error
+    lon, lat = _degrees(file)
     places = np.column_stack(project(crs, lon, lat))
     moved = np.append(True, np.any(np.diff(places, axis=0) != 0, axis=1))
     return np.asarray(places[moved & np.isfinite(places).all(axis=1)])
@@ -154,9 +152,21 @@ def _graph(folder: Path) -> StreetGraph:
     files = sorted(folder.glob(_GRAPH))[:1]
     if not files:
         raise fail(InputError, str(folder), _GRAPH, "none")
-    trace = pd.read_csv(sorted(folder.glob(_TRACES))[0], nrows=1)
-    crs = utm_crs(float(trace["longitude"].iloc[0]), float(trace["latitude"].iloc[0]))
-    return read_graph(files[0], crs)
+    lon, lat = _degrees(sorted(folder.glob(_TRACES))[0])
+    return read_graph(files[0], utm_crs(float(lon[0]), float(lat[0])))
+
+
+def _degrees(file: Path) -> tuple[Floats, Floats]:
+    """Return longitude and latitude of a trace's rows."""
+    try:
+        table = pd.read_csv(io.BytesIO(read_input(file, _LARGEST_BYTES, "a trace")))
+        found = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
+    except (KeyError, ValueError) as error:
+        expected = "a CSV of latitude and longitude"
+        raise fail(InputError, str(file), expected, repr(error)) from error
+    if not len(table):
+        raise fail(InputError, str(file), "rows", "none")
+    return found
 
 
 BENCHMARK = Benchmark("denver", "mapmatch-denver", (_GRAPH, _TRACES), units, judge, prepare)
