@@ -26,6 +26,11 @@ run_path(str(Path(__file__).with_name("diagrams.py")))["draw"](
     Path(__file__).parent / "_static" / "drawn"
 )
 
+# The notebooks, as files to download and run.
+run_path(str(Path(__file__).with_name("notebook_files.py")))["write_all"](
+    Path(__file__).parent / "notebooks", Path(__file__).parent / "_static" / "notebooks"
+)
+
 # Pages of modules that are gone would stay and fail the next build.
 rmtree(Path(__file__).parent / "api", ignore_errors=True)
 autosummary_generate = True
@@ -41,6 +46,8 @@ napoleon_use_rtype = False
 # Examples in docstrings are run by pytest, with the names of their modules.
 doctest_test_doctest_blocks = ""
 
+html_static_path = ["_static"]
+html_css_files = ["house.css"]
 html_theme = "furo" if find_spec("furo") is not None else "alabaster"
 html_title = f"mapfilter {release}"
 html_show_sphinx = False

@@ -77,6 +77,20 @@ class Readings:
         """Return some of the rows."""
         return Readings(self.cell_ids, *(getattr(self, name)[kept] for name in _READINGS))
 
+    def of_cells(self, cell_ids: Sequence[str]) -> Readings:
+        """Return the rows of some cells.
+
+        A survey has no raster of a cell that was measured too rarely, and its database no such
+        cell.
+        """
+        names = tuple(name for name in self.cell_ids if name in set(cell_ids))
+        if names == self.cell_ids:
+            return self
+        numbers = {name: number for number, name in enumerate(names)}
+        own = np.array([numbers.get(name, -1) for name in self.cell_ids], dtype=np.int32)
+        cell = own[self.cell]
+        return replace(self, cell_ids=names, cell=cell).some(cell >= 0)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviations:
@@ -280,8 +294,10 @@ def read_measured(
         raise fail(StoreError, str(deviations), expected, "others", "parts mixed up")
     deviation_db = table["deviation_db"].to_numpy().astype(np.float32)
     read = read_readings(readings)
-    for source, some in ((readings, read.cell_ids), (deviations, names)):
-        if not set(some) <= {*cell_ids, ""}:
+    # Cells that were received too rarely for a map are in the readings: at times they serve.
+    strange = len(read) > 0 and set(read.cell_ids).isdisjoint(cell_ids)
+    for source, wrong in ((readings, strange), (deviations, not set(names) <= {*cell_ids, ""})):
+        if wrong:
             raise fail(StoreError, str(source), "cells of the database", "others", "parts mixed up")
     return MeasuredParts(read, Deviations(names, cell, row, col, deviation_db))
 

@@ -9,6 +9,7 @@ state that outlives a call. Equal data give equal bytes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,13 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 """Versions and dates are left out of files: they would change the bytes from one to the next."""
 
+_WRITER: dict[str, dict[str, Any]] = {
+    # A third of the time of the default level, and files a tenth larger.
+    "png": {"pil_kwargs": {"compress_level": 3}},
+    "svg": {},
+    "pdf": {},
+}
+
 styled = matplotlib.rc_context(_STYLE)
 """Decorator of all functions that draw: fonts, sizes and colours of the package."""
 
@@ -128,9 +136,26 @@ def save(drawn: Drawn, path: Path) -> Path:
     if kind not in _METADATA:
         raise fail(OutputError, str(path), "a name that ends in .png, .svg or .pdf", path.name)
     figure = drawn if isinstance(drawn, Figure) else figure_of(drawn)
-    with atomic_file(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=DPI, metadata=_METADATA[kind])
+    with atomic_file(path) as temporary, _laid_out(figure):
+        figure.savefig(temporary, format=kind, dpi=DPI, metadata=_METADATA[kind], **_WRITER[kind])
     return path
+
+
+@contextmanager
+def _laid_out(figure: Figure) -> Iterator[None]:
+    """Lay a figure out now, and not while it is saved: matplotlib would draw it twice to do so."""
+    engine, dpi = figure.get_layout_engine(), figure.dpi
+    if engine is None:
+        yield
+        return
+    figure.set_dpi(DPI)
+    engine.execute(figure)
+    figure.set_layout_engine(None)
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
+        figure.set_dpi(dpi)
 
 
 def tidy(axes: Axes, *, grid: bool = True) -> None:
@@ -171,17 +196,22 @@ def stretches(where: Bools) -> Iterator[tuple[int, int]]:
 
 
 def bottom_legend(
-    figure: Figure, most_columns: int, handles: Sequence[Artist] | None = None
+    figure: Figure,
+    most_columns: int,
+    handles: Sequence[Artist] | None = None,
+    title: str | None = None,
 ) -> None:
     """Put a legend under the axes, in as many columns as there is room for.
 
-    It shows the handles, or without any all that is labelled, if anything is.
+    It shows the handles, or without any all that is labelled, if anything is; the title is a line
+    above them.
     """
     if handles is None and not any(ax.get_legend_handles_labels()[0] for ax in figure.axes):
         return
     given: dict[str, Any] = {} if handles is None else {"handles": handles, "handletextpad": 0.4}
+    given |= {"title": title, "title_fontsize": 9, "frameon": False}
     for columns in range(most_columns, 0, -1):
-        legend = figure.legend(loc="outside lower center", ncols=columns, frameon=False, **given)
+        legend = figure.legend(loc="outside lower center", ncols=columns, **given)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()

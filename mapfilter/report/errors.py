@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
@@ -38,6 +39,8 @@ _SHADES = {Status.SEARCHING: "#eeeeee", Status.LOST: "#f7d9c9"}
 _SPANS = (*_SHADES.values(), "#dce9f5")
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, GREY)
 _WIDE, _LEAST_M = 12.0, 0.3
+_SQUARE_M, _SQUARE_S = 25.0, 20.0
+_PANEL_IN, _PANELS_WIDE = (4.4, 2.3), 2
 
 
 @styled
@@ -145,11 +148,60 @@ def plot_errors_over_time(
 
 
 @styled
+def plot_errors_apart(
+    estimates: Mapping[str, TrackEstimate],
+    truth: Truth,
+    *,
+    spans: Sequence[tuple[str, float, float]] = (),
+) -> Figure:
+    """Draw the position errors of several estimates over time, each in a panel of its own.
+
+    The others stand behind it in grey, so that six lines can be told apart. ``spans`` are as of
+    :func:`plot_errors_over_time`.
+
+    Raises
+    ------
+    InputError
+        There is no estimate.
+    """
+    if not estimates:
+        raise fail(InputError, "estimates", "one or more, by their names", "none")
+    errors_m = {n: position_errors_m(one, truth).clip(_LEAST_M) for n, one in estimates.items()}
+    rows = -(-len(estimates) // _PANELS_WIDE)
+    figure = new_figure(_PANELS_WIDE * _PANEL_IN[0], rows * _PANEL_IN[1] + 0.5)
+    panels = figure.subplots(rows, _PANELS_WIDE, sharex=True, sharey=True, squeeze=False).ravel()
+    for index, (axes, name) in enumerate(zip(panels, estimates, strict=False)):
+        for (span, begin_s, end_s), shade in zip(spans, _SPANS, strict=False):
+            axes.axvspan(begin_s, end_s, color=shade, linewidth=0, zorder=0, label=span)
+        for other in estimates:
+            behind = Look(color="#c8c8c8", linewidth=0.7, zorder=1.5)
+            look = Look(color=BLUE, linewidth=1.5, zorder=3) if other == name else behind
+            axes.plot(estimates[other].time_s, errors_m[other], **look)
+        axes.set_title(name, fontsize=10.5)
+        tidy(axes, grid=False)
+        if index + _PANELS_WIDE >= len(estimates):
+            axes.set_xlabel("time / s")
+            axes.tick_params(labelbottom=True)
+    panels[0].set(yscale="log", xlim=(float(truth.time_s[0]), float(truth.time_s[-1])))
+    panels[0].set_ylim(bottom=_LEAST_M)
+    panels[0].yaxis.set_major_formatter("{x:g}")
+    for axes in panels[len(estimates) :]:
+        axes.set_visible(False)
+    figure.supylabel("position error / m", fontsize=10)
+    shaded = panels[0].get_legend_handles_labels()[0]
+    others = Line2D([], [], color="#c8c8c8", linewidth=0.9, label="the others")
+    bottom_legend(figure, 6, [Line2D([], [], color=BLUE, label="error"), others, *shaded])
+    return figure
+
+
+@styled
 def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = "") -> Figure:
     """Draw entropy, the leading hypothesis's and the runner-up's shares, and the status.
 
-    Over the true distance travelled; over seconds where the truth is not known. Without a title it
-    is the filter's name.
+    Over the true distance travelled; over seconds where the truth is not known. The entropy is
+    counted over squares of 25 m and rises by up to a bit wherever the belief lies across two of
+    them, so its mean over as long a way (over 20 s without truth) is drawn. Without a title it is
+    the filter's name.
 
     Raises
     ------
@@ -159,12 +211,14 @@ def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = 
     evidence = estimate.evidence
     if evidence is None or not len(estimate):
         raise fail(InputError, "estimate, evidence", "epochs with probabilities", "none")
-    along, across = estimate.time_s, "time / s"
+    along, across, window, mean = estimate.time_s, "time / s", _SQUARE_S, f"{_SQUARE_S:g} s"
     if truth is not None and truth.time_s.size:
         along, across = truth.distance_at(estimate.time_s), "distance travelled / m"
+        window, mean = _SQUARE_M, f"{_SQUARE_M:g} m"
     figure = new_figure(*_EVIDENCE_IN)
     above, below = figure.subplots(2, 1, sharex=True)
-    above.plot(along, evidence.entropy_bits, color=BLUE, linewidth=1.5, label="entropy")
+    entropy_bits = running_mean(along, evidence.entropy_bits, window)
+    above.plot(along, entropy_bits, color=BLUE, linewidth=1.5, label=f"entropy, mean over {mean}")
     above.set_ylabel("entropy over 25 m squares / bit")
     above.set_ylim(bottom=0.0)
     within = f"within {SUCCESS_RADIUS_M:.0f} m of the leading hypothesis"
@@ -179,6 +233,27 @@ def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = 
     above.set_title(title or f"Filter: {estimate.filter}")
     bottom_legend(figure, 5)
     return figure
+
+
+def running_mean(along: Floats, values: Floats, width: float) -> Floats:
+    """Return the mean of the values within half a width to both sides of each place.
+
+    ``along`` does not decrease. Values that are not finite count nowhere, and their places and
+    those without any other are NaN.
+
+    Examples
+    --------
+    >>> running_mean(np.arange(5.0), np.array([0.0, 3.0, 0.0, 3.0, 0.0]), 2.0).tolist()
+    [1.5, 1.0, 2.0, 1.0, 1.5]
+    """
+    finite = np.isfinite(values)
+    sums = np.concatenate([[0.0], np.cumsum(np.where(finite, values, 0.0))])
+    counts = np.concatenate([[0], np.cumsum(finite)])
+    low = np.searchsorted(along, along - width / 2, side="left")
+    high = np.searchsorted(along, along + width / 2, side="right")
+    with np.errstate(invalid="ignore"):
+        means = (sums[high] - sums[low]) / (counts[high] - counts[low])
+    return np.where(finite, means, np.nan)
 
 
 def shade_statuses(

@@ -28,7 +28,8 @@ from mapfilter.report.network import (
     plot_margin,
     plot_points_per_cell,
 )
-from mapfilter.report.track import MAX_PANELS, plot_belief, plot_candidates, plot_track
+from mapfilter.report.snapshots import MAX_PANELS, plot_belief, plot_candidates
+from mapfilter.report.track import plot_track
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.ways import Buildings

@@ -14,7 +14,7 @@ from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate, TrackEv
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLUE, save
 from mapfilter.report.errors import plot_error_over_distance, plot_evidence
-from mapfilter.report.track import plot_belief
+from mapfilter.report.snapshots import plot_belief, story_bounds_m
 from mapfilter.workflows.pictures import choose_snapshots
 
 STREET = np.array([[0.0, 100.0], [400.0, 100.0]])
@@ -65,6 +65,28 @@ def test_the_same_belief_gives_the_same_bytes(tmp_path):
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
+def test_a_belief_is_shown_where_the_story_happens():
+    whole_m = (-2000.0, -2000.0, 3000.0, 3000.0)
+    west, south, east, north = story_bounds_m([snapshot(150.0), snapshot(5.0)], None, whole_m)
+    # 95 % of the first belief lies within 142.5 m of 200 m, and there is a margin of 30 m.
+    assert (west, east) == pytest.approx((27.5, 372.5), abs=1.5)
+    assert south < 100.0 < north
+    assert north - south < 0.75 * (east - west)
+    figure = plot_belief([snapshot(150.0)], None, BASE.zoomed(whole_m))
+    assert figure.axes[0].get_xlim()[1] < 500.0
+    assert plot_belief([snapshot(9.0)], None, BASE, zoom=False).axes[0].get_xlim() == (0.0, 400.0)
+
+
+def test_the_story_stays_on_the_map_and_keeps_the_truth_in_sight():
+    whole_m = (0.0, 0.0, 250.0, 150.0)
+    west, south, east, north = story_bounds_m([snapshot(180.0)], None, whole_m)
+    assert 0.0 <= west < east <= 250.0
+    assert 0.0 <= south < north <= 150.0
+    far = Truth(np.array([0.0, 1.0]), np.array([900.0, 901.0]), np.array([100.0, 100.0]))
+    assert story_bounds_m([snapshot(10.0)], far, (0.0, -900.0, 2000.0, 900.0))[2] > 900.0
+    assert story_bounds_m([], None, whole_m) == whole_m
+
+
 @pytest.mark.parametrize("count", [0, 7])
 def test_one_to_six_moments(tmp_path, count):
     with pytest.raises(InputError, match="1 to 6"):
@@ -75,6 +97,17 @@ def test_one_to_six_moments(tmp_path, count):
 def test_evidence_with_and_without_truth(tmp_path, truth):
     save(plot_evidence(estimate(), truth), tmp_path / "evidence.png")
     assert blue_pixels(tmp_path / "evidence.png") > 300
+
+
+def test_entropy_does_not_rise_where_a_belief_crosses_squares():
+    """A narrow belief on the way lies in one square of 25 m, in two, in one again."""
+    found = estimate()
+    entropy_bits = (TRUTH.east_m % 25.0 < 8.0).astype(float)
+    crossing = replace(found, evidence=replace(found.evidence, entropy_bits=entropy_bits))
+    (line,) = plot_evidence(crossing, TRUTH).axes[0].get_lines()
+    middle = line.get_ydata()[30:-30]
+    assert np.ptp(entropy_bits) == 1.0
+    assert np.ptp(middle) < 0.1
 
 
 def test_no_evidence_no_picture(tmp_path):

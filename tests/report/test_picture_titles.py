@@ -9,7 +9,8 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
-from mapfilter.report.track import plot_candidates, plot_track
+from mapfilter.report.snapshots import plot_candidates
+from mapfilter.report.track import plot_track
 
 CRS = "EPSG:32635"
 EAST_M, NORTH_M = 385_000.0, 6_672_000.0

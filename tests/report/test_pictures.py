@@ -20,7 +20,8 @@ from mapfilter.report.basemap import BaseMap, draw_base
 from mapfilter.report.canvas import BLUE, DPI, ORANGE, VERMILLION, save
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.network import draw_cells, plot_best_server, plot_level, plot_points_per_cell
-from mapfilter.report.track import plot_candidates, plot_track
+from mapfilter.report.snapshots import plot_candidates
+from mapfilter.report.track import plot_track
 
 CRS = "EPSG:32635"
 WEST_M, NORTH_M = 385_000.0, 6_672_000.0

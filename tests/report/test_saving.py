@@ -5,14 +5,18 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from mapfilter.errors import OutputError
+from mapfilter.errors import InputError, OutputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLACK, BLUE, distinct_colours, save
 from mapfilter.report.curves import Distribution, plot_cumulative
-from mapfilter.report.errors import plot_error_over_distance, plot_errors_over_time
+from mapfilter.report.errors import (
+    plot_error_over_distance,
+    plot_errors_apart,
+    plot_errors_over_time,
+)
 from mapfilter.report.table import latex_table, write_table
 from mapfilter.report.track import plot_track
 
@@ -70,6 +74,37 @@ def test_given_axes_are_drawn_on(draw):
     assert right.get_legend() is not None
     assert not left.lines
     assert not figure.legends
+
+
+def test_saving_lays_out_once_and_leaves_the_figure_as_it_was(tmp_path, monkeypatch):
+    axes = plot_error_over_distance(estimate(), TRUTH)
+    figure = axes.figure
+    engine, dpi = figure.get_layout_engine(), figure.dpi
+    runs = []
+    execute = type(engine).execute
+    monkeypatch.setattr(
+        type(engine), "execute", lambda self, fig: (runs.append(fig), execute(self, fig))
+    )
+    save(axes, tmp_path / "a.png")
+    assert runs == [figure]
+    assert figure.get_layout_engine() is engine
+    assert figure.dpi == dpi
+    # Labels have room: the layout was made.
+    assert axes.get_position().x0 > 0.05
+
+
+def test_each_of_five_estimates_has_a_panel_with_the_others_in_grey():
+    names = ["everything", "no satellites", "no cells", "no map", "satellites alone"]
+    figure = plot_errors_apart(dict.fromkeys(names, estimate()), TRUTH, spans=[("jammed", 2, 4)])
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert [axes.get_title() for axes in shown] == names
+    for axes in shown:
+        assert [line.get_color() for line in axes.lines].count(BLUE) == 1
+        assert len(axes.lines) == 5
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["error", "the others", "jammed"]
+    with pytest.raises(InputError, match="one or more"):
+        plot_errors_apart({}, TRUTH)
 
 
 def test_truth_is_wider_than_the_estimate_over_it():
