@@ -86,7 +86,7 @@ def animate(demo: Path, target: Path) -> Path:
         snapshots[i] for i in np.unique(np.linspace(0, len(snapshots) - 1, _FRAMES, dtype=int))
     ]
     base = whole.zoomed(story_bounds_m(chosen, truth, whole.bounds_m))
-    frames = [_frame(one, truth, base) for one in chosen]
+    frames = _of_one_size([_frame(one, truth, base) for one in chosen])
     times_ms = [*[_FRAME_MS] * (len(frames) - 1), _LAST_MS]
     look = {"quality": 60, "method": 4, "loop": 0, "duration": times_ms}
     frames[0].save(target, save_all=True, append_images=frames[1:], **look)
@@ -105,9 +105,23 @@ def _located(
 def _frame(snapshot: Snapshot, truth: Truth | None, base: BaseMap) -> Image.Image:
     drawn = plot_belief([snapshot], truth, base, zoom=False)
     assert isinstance(drawn, Figure)
+    # The caption of the page is the legend.
+    for legend in drawn.legends:
+        legend.remove()
     stream = BytesIO()
-    drawn.savefig(stream, format="png", dpi=_FRAME_DPI)
+    drawn.savefig(stream, format="png", dpi=_FRAME_DPI, bbox_inches="tight", pad_inches=0.08)
     return Image.open(stream).convert("RGB")
+
+
+def _of_one_size(frames: Sequence[Image.Image]) -> list[Image.Image]:
+    """Return pictures on white of the largest width and height, held at the lower left."""
+    width, height = max(one.width for one in frames), max(one.height for one in frames)
+    found = []
+    for one in frames:
+        whole = Image.new("RGB", (width, height), "white")
+        whole.paste(one, (0, height - one.height))
+        found.append(whole)
+    return found
 
 
 def main(demo: Path) -> None:

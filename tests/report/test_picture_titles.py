@@ -80,9 +80,9 @@ def test_a_track_says_what_came_of_it(estimate, truth, title, titles, tmp_path):
 @pytest.mark.parametrize(
     ("truth", "title"),
     [
-        (TRUTH, "(a) 140 m travelled, 2 candidates"),
-        (None, "(a) 153 m by dead reckoning, 2 candidates"),
-        (NOTHING, "(a) 153 m by dead reckoning, 2 candidates"),
+        (TRUTH, "140 m travelled, 2 candidates"),
+        (None, "153 m by dead reckoning, 2 candidates"),
+        (NOTHING, "153 m by dead reckoning, 2 candidates"),
     ],
 )
 def test_panels_say_true_metres_where_they_are_known(truth, title, titles, tmp_path):
