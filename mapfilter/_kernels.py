@@ -7,7 +7,10 @@ the order of the work changes nothing. Functions are polynomials in single preci
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from math import pi
+from typing import Any
 
 import numpy as np
 from numba import boolean, float64, int64, njit, void
@@ -43,6 +46,26 @@ _EXPONENT_OF_ONE = np.int32(0x3F800000)
 _S3, _S5, _S7, _S9 = (_F(v) for v in (-1 / 6, 1 / 120, -1 / 5040, 1 / 362880))
 _C2, _C4, _C6, _C8, _C10 = (_F(v) for v in (-1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800))
 _E2, _E3, _E4, _E5 = (_F(v) for v in (0.5, 1 / 6, 1 / 24, 1 / 120))
+
+
+def on_demand(
+    signature: Any, function: Callable[..., Any], *, contract: bool = False
+) -> Callable[[], Callable[..., Any]]:
+    """Return a function that returns a kernel of one signature, compiled at the first call of it.
+
+    With its signature in a decorator a kernel is compiled on import, for seconds, by every command
+    that imports its module. ``contract`` allows fused products and sums.
+    """
+
+    @cache
+    def kernel() -> Callable[..., Any]:
+        fast = {"contract"} if contract else False
+        compiled: Callable[..., Any] = njit(
+            [signature], cache=True, nogil=True, error_model="numpy", fastmath=fast
+        )(function)
+        return compiled
+
+    return kernel
 
 
 def draw_key(rng: np.random.Generator) -> np.uint64:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 ABANDONED_S = 7 * 86400.0
 """So long after its last change, the folder of a process of another host is taken for left."""
-_NAME = re.compile(r"(?:(?P<host>h[0-9a-f]{8})-)?(?P<pid>\d+)-[^-]*")
+_NAME = re.compile(r"(?:(?P<host>h[0-9a-f]{8})-)?(?P<pid>[0-9]{1,20})-[^-]{0,64}")
 
 
 def new_partial(path: Path) -> Path:

@@ -11,7 +11,7 @@ settings.register_profile("mapfilter", deadline=None)
 settings.load_profile("mapfilter")
 
 # Commands, with imports from several rooms: python -m tests.fuzz, python -m tests.faults.
-collect_ignore = ["faults.py", "fuzz_command.py", "fuzz_readers.py"]
+collect_ignore = ["faults.py", "serve_load.py", "fuzz_command.py", "fuzz_readers.py"]
 
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
 

@@ -27,6 +27,7 @@ from mapfilter.cli.convert import convert
 from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
 from mapfilter.cli.learning import learn
 from mapfilter.cli.options import DONE
+from mapfilter.cli.serving import serve
 from mapfilter.cli.views import film, view
 from mapfilter.workflows.terminal import guarded
 
@@ -58,6 +59,7 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
         "--db area/database --log walk --filter bayes --out located",
         "howto/which-filter.rst",
     ),
+    (serve, "--db area/database --state sessions", "howto/serve.rst"),
     (view, "located/replay other/replay --out both.html", "howto/see-a-replay.rst"),
     (film, "located/replay --out walk.gif", "howto/see-a-replay.rst"),
     (learn, "area/database --logs walks --out learned", "tutorial/learn.rst"),

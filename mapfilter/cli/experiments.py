@@ -223,7 +223,9 @@ def evaluate(
                 result = run_recorded(
                     name, data, folder, parts=cases or (), runs=runs, progress=progress, **common
                 )
-        print_result(result, as_json)
+        # Units may be hundreds: they are in the JSON and in table.json.
+        shown = {key: value for key, value in vars(result).items() if key != "units"}
+        print_result(result if as_json else shown, as_json)
         if name == ALL and result.missing:
             raise typer.Exit(PARTIAL)
         return

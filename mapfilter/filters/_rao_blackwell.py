@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numba import float64, int64, njit, types
 
-from mapfilter._kernels import MEASURE_SIGNATURE, hashed, normals
+from mapfilter._kernels import MEASURE_SIGNATURE, hashed, normals, on_demand
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 
 _LANES = 256
@@ -182,7 +182,6 @@ _WEIGHING = _TYPES.NamedTuple(
 _SIGNATURE = float64(types.FunctionType(MEASURE_SIGNATURE), _WEIGHING, _MATRIX, _VECTOR)
 
 
-@njit([_SIGNATURE], cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def weigh(measure: Any, given: Weighing, state: Floats, log_weight: Floats) -> float:
     """Add the log density of a reading to each weight, and correct the means; both in place.
 
@@ -230,6 +229,10 @@ def weigh(measure: Any, given: Weighing, state: Floats, log_weight: Floats) -> f
             log_weight[begin + k] -= 0.5 * square[k]
             least = min(least, square[k])
     return least
+
+
+weigh_kernel = on_demand(_SIGNATURE, weigh, contract=True)
+"""Return :func:`weigh`, compiled."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

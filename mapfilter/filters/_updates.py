@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import boolean, float64, int64, njit, types, void
 
-from mapfilter._kernels import MEASURE_SIGNATURE
+from mapfilter._kernels import MEASURE_SIGNATURE, on_demand
 from mapfilter._types import Bools, Floats
 from mapfilter.filters._square_root import (
     Lanes,
@@ -253,7 +253,6 @@ def advance(
                     factor[i, j, w] = lower[i, j, w] if j <= i else 0.0
 
 
-@njit([_FOUND(*RUN, BLOCK, MATRIX, BLOCK, boolean)], cache=True, nogil=True, error_model="numpy")
 def run_lanes(
     update: Any,
     measure: Any,
@@ -280,3 +279,7 @@ def run_lanes(
         if keep:
             covariance_lanes(factor, covariances[k])
     return means, covariances, evidence, nis
+
+
+run_lanes_kernel = on_demand(_FOUND(*RUN, BLOCK, MATRIX, BLOCK, boolean), run_lanes)
+"""Return :func:`run_lanes`, compiled."""

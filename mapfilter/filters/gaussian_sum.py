@@ -14,9 +14,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numba import float64, njit
+from numba import float64
 from numpy.typing import ArrayLike
 
+from mapfilter._kernels import on_demand
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters._square_root import Problem, kernel
@@ -157,12 +158,6 @@ def _moments(
             covariance[j, i] = covariance[i, j]
 
 
-@njit(
-    [_FOUND(*RUN, MATRIX, MATRIX, BLOCK, VECTOR, float64)],
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
 def _run_mixture(
     update: Any,
     measure: Any,
@@ -201,6 +196,9 @@ def _run_mixture(
             mean, factor = mean[:, left], factor[:, :, left]
             weight = weight[left] / total
     return means, covariances, evidence, counts
+
+
+_run_mixture_kernel = on_demand(_FOUND(*RUN, MATRIX, MATRIX, BLOCK, VECTOR, float64), _run_mixture)
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +260,7 @@ def run_mixtures(
     means, covariances = np.empty((trials, steps, n)), np.empty((trials, steps, n, n))
     evidence, counts = np.empty((trials, steps)), np.empty((trials, steps), dtype=np.int64)
     for trial in range(trials):
-        means[trial], covariances[trial], evidence[trial], counts[trial] = _run_mixture(
+        means[trial], covariances[trial], evidence[trial], counts[trial] = _run_mixture_kernel()(
             kernel_of(method),
             measurement.measure,
             problem,

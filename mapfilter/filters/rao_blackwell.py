@@ -33,7 +33,7 @@ from mapfilter.filters._rao_blackwell import (
     move,
     propagate,
     sums,
-    weigh,
+    weigh_kernel,
 )
 from mapfilter.filters.gaussian import Gaussian, factor_of
 from mapfilter.filters.kalman import Taken
@@ -224,7 +224,7 @@ def update(
         Entries.of(np.zeros((0, 0)) if loading is None else loading),
     )
     log_weight, state = belief.log_weight.copy(), belief.state.copy()
-    least = weigh(measurement.measure, weighing, state, log_weight)
+    least = weigh_kernel()(measurement.measure, weighing, state, log_weight)
     weight = np.empty(log_weight.size, dtype=np.float32)
     total, effective = normalise(log_weight, weight)
     if not isfinite(total):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters._square_root import Problem
-from mapfilter.filters._updates import kernel_of, run_lanes
+from mapfilter.filters._updates import kernel_of, run_lanes_kernel
 from mapfilter.filters.gaussian import Method, factor_of
 
 LANES = 64
@@ -116,7 +116,7 @@ def run_trials(
     evidence, nis = np.empty((trials, steps)), np.empty((trials, steps))
     for first in range(0, trials, LANES):
         block = slice(first, min(first + LANES, trials))
-        run = run_lanes(
+        run = run_lanes_kernel()(
             kernel_of(method),
             measurement.measure,
             problem,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.models.state import StateLayout
-from mapfilter.models.terms import COLUMNS, measure
+from mapfilter.models.terms import COLUMNS, measure_kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +96,7 @@ class GaussianTerms:
         lanes = points.shape[1]
         mean = np.empty((m, lanes))
         slope = np.zeros((m, self.uses.size, lanes if derive else 1))
+        measure = measure_kernel()
         measure(points, self.slots, self.rows, self.patterns, mean, slope, derive)
         means = np.ascontiguousarray(mean.T).reshape(*given.shape[:-1], m)
         if not derive:

@@ -1,7 +1,7 @@
 """The one place where measurement equations and their derivatives are computed.
 
 Every Gaussian measurement of this room is a table of terms, one row for each component of the
-reading; the kernel :func:`measure` goes over it for a block of lanes (states). What the columns
+reading; :func:`measure`, compiled, goes over it for a block of lanes (states). What the columns
 mean depends on the kind of term:
 
 =============== ===== ============= =========================================================
@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mapfilter._kernels import MEASURE_SIGNATURE
+from mapfilter._kernels import MEASURE_SIGNATURE, on_demand
 from mapfilter._types import Floats, Ints
 
 COLUMNS = 13
@@ -228,7 +228,6 @@ def _add_level(
         _add_gain(row, slots, patterns, work, mean, slope, derive)
 
 
-@njit([MEASURE_SIGNATURE], cache=True, nogil=True, error_model="numpy")
 def measure(
     points: Floats,
     slots: Ints,
@@ -278,3 +277,7 @@ def measure(
                     mean[i, w] += points[clock, w]
                 if derive:
                     slope[i, clock, :] = 1.0
+
+
+measure_kernel = on_demand(MEASURE_SIGNATURE, measure)
+"""Return :func:`measure`, compiled."""

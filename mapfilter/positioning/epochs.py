@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from math import isfinite, isnan, nan
 from typing import Any, NamedTuple
@@ -144,6 +144,28 @@ def epochs(log: TrackLog) -> list[Epoch]:
         )
         for time_s in sorted(times)
     ]
+
+
+def make_epoch(time_s: float, rows: Mapping[str, Sequence[Sequence[Any]]]) -> Epoch:
+    """Make one epoch of rows as they arrive.
+
+    Parameters
+    ----------
+    rows : mapping of str to sequences
+        By table of :data:`mapfilter.tracks.schema.TABLES`; the values of a row are those of the
+        table's columns after ``time_s`` that are not optional, in their order. Missing numbers are
+        NaN, missing integers and texts None.
+
+    Examples
+    --------
+    >>> make_epoch(1.0, {"motion": [(1.4, 0.5, nan)]}).motion
+    (MotionStep(step_m=1.4, heading_rad=0.5, turn_rad=nan, spread_m=nan),)
+    """
+    made = {name: [_FIELDS[name].row(*values) for values in rows[name]] for name in rows}
+    return Epoch(
+        time_s,
+        **{_FIELDS[name].name: _FIELDS[name].of_rows(one) for name, one in made.items() if one},
+    )
 
 
 def _by_time(log: TrackLog, table: str, row: Callable[..., Any]) -> dict[float, list[Any]]:

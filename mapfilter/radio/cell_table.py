@@ -86,7 +86,8 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
     for name in header:
         if name not in _ALLOWED:
             near = difflib.get_close_matches(name.lower(), sorted(_ALLOWED), n=1, cutoff=0.5)
-            faults.add(where, "known columns only", repr(name), f"{near[0]} meant" if near else "")
+            hint = f"{near[0]} meant" if near else "name what it holds in [cells.columns]"
+            faults.add(where, "known columns only", repr(name), hint)
     for name in sorted({name for name in header if header.count(name) > 1}):
         faults.add(where, "each column once", f"{name} {header.count(name)} times")
     if {"lat", "lon"} & set(header) and {"east", "north"} & set(header):

@@ -7,7 +7,7 @@ located from the levels. Maps are validated where sessions were left out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Literal
@@ -152,6 +152,7 @@ def fit_survey(
     *,
     plan: CellPlan | None = None,
     predicted: Mapping[str, Covariate] | None = None,
+    only: Collection[str] | None = None,
 ) -> Survey:
     """Make the maps of all cells that were received often enough.
 
@@ -163,6 +164,8 @@ def fit_survey(
         Calibrate predictions: for each cell a function from east and north (m) to the predicted
         level (dBm, NaN where there is none). Offset, slope and residuals are fitted about it.
         Cells that were not predicted are left out.
+    only : collection of str, optional
+        Make the maps of these cells alone. The shadowing is that of all.
 
     Raises
     ------
@@ -214,6 +217,8 @@ def fit_survey(
         for _ in range(_ROUNDS):
             shadowing = learn_shadowing(telling, [trend_of(some) for some in telling], shadowing)
         for some in points:
+            if only is not None and some.cell_id not in only:
+                continue
             trend = trend_of(some)
             antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
             made: ResidualField = TrendField(trend, shadowing)
@@ -355,13 +360,16 @@ def leave_out(
     found = [np.empty((0, 5))]
     for number in range(count):
         out = fold == number
+        # Maps of cells that were not received here predict nothing.
+        only = {measurements.cell_ids[index] for index in np.unique(measurements.cell[out])}
+        others = measurements.where(~out)
         try:
-            others = fit_survey(measurements.where(~out), options, plan=plan, predicted=predicted)
+            survey = fit_survey(others, options, plan=plan, predicted=predicted, only=only)
         except InputError:
             # The other sessions alone are too little for any cell.
             pass
         else:
-            found.extend(_predictions(others, measurements.where(out)))
+            found.extend(_predictions(survey, measurements.where(out)))
         if progress is not None:
             progress(number + 1, count)
     table = np.concatenate(found)

@@ -23,7 +23,7 @@ _SHORT_CI = 1 << 16
 
 
 @dataclass(frozen=True, slots=True)
-class _Reported:
+class ReportedCell:
     """One combination of a cell's id, identity, carrier and code, as reports give it."""
 
     role: str
@@ -62,12 +62,12 @@ def name_by_plan(log: TrackLog, plan: CellPlan) -> TrackLog:
     keys = keys.astype(object).where(keys.notna(), None)
     numbers = pd.MultiIndex.from_frame(keys.fillna("")).factorize()[0]
     _, first = np.unique(numbers, return_index=True)
-    table = _Table(plan)
+    table = PlanNames(plan)
     named: list[str | None] = []
     found = _Counts()
     for at, count in zip(first.tolist(), np.bincount(numbers).tolist(), strict=True):
         values = {k: _plain(v) for k, v in keys.iloc[at].items()}
-        reported = _Reported(**values)
+        reported = ReportedCell(**values)
         named.append(table.name(reported))
         found.add(reported, named[-1], plan, count)
     if not any(found.named.values()) and not found.hidden:
@@ -89,7 +89,7 @@ class _Counts:
         self.lost: dict[str, int] = {}
         self.hidden = False
 
-    def add(self, reported: _Reported, name: str | None, plan: CellPlan, rows: int) -> None:
+    def add(self, reported: ReportedCell, name: str | None, plan: CellPlan, rows: int) -> None:
         if name is not None and name in plan and name != reported.cell:
             self.named[name] = self.named.get(name, 0) + rows
         elif name is not None and name not in plan:
@@ -106,8 +106,8 @@ class _Counts:
             yield f"radio: {rows} rows of {len(self.lost)} cells that the plan lacks ({some})"
 
 
-class _Table:
-    """The identities, carriers and codes of a plan."""
+class PlanNames:
+    """The identities, carriers and codes of a plan, by which reported cells get its ids."""
 
     def __init__(self, plan: CellPlan) -> None:
         self.plan = plan
@@ -119,7 +119,7 @@ class _Table:
             if cell.ci is not None:
                 self.by_ci.setdefault(cell.ci, []).append(cell)
 
-    def name(self, reported: _Reported) -> str | None:
+    def name(self, reported: ReportedCell) -> str | None:
         """Return the plan's id of a reported cell, or what was reported."""
         if reported.cell is not None and reported.cell in self.plan:
             return reported.cell
@@ -131,7 +131,7 @@ class _Table:
             return reported.cell
         return self._by_carrier(reported.arfcn, reported.bsic, reported)
 
-    def _by_identity(self, reported: _Reported) -> str | None:
+    def _by_identity(self, reported: ReportedCell) -> str | None:
         assert reported.ci is not None
         found = [c for c in self.by_ci.get(reported.ci, ()) if _fits(c, reported)]
         if not found and reported.ci >= _SHORT_CI and reported.technology in ("UMTS", None):
@@ -141,7 +141,7 @@ class _Table:
             found = [c for c in found if _fits(c, reported)]
         return found[0].id if len(found) == 1 else None
 
-    def _by_carrier(self, arfcn: int, bsic: int, reported: _Reported) -> str | None:
+    def _by_carrier(self, arfcn: int, bsic: int, reported: ReportedCell) -> str | None:
         ids = self.plan.ids_by_carrier.get((arfcn, bsic), ())
         cells = [self.plan[one] for one in ids]
         same = [c.id for c in cells if _same_technology(c.technology, reported.technology)]
@@ -154,7 +154,7 @@ class _Table:
         return same[0] if len(same) == 1 else unknown if not same else None
 
 
-def _with_identity(reported: _Reported) -> _Reported:
+def _with_identity(reported: ReportedCell) -> ReportedCell:
     """Return a reported cell with the identity that its id states, if any."""
     found = parse_cgi(reported.cell or "")
     if found is None:
@@ -167,7 +167,7 @@ def _same_technology(one: str | None, other: str | None) -> bool:
     return one is None or other is None or one == other
 
 
-def _fits(cell: Cell, reported: _Reported) -> bool:
+def _fits(cell: Cell, reported: ReportedCell) -> bool:
     """Return whether no part of an identity that both sides state differs."""
     if not _same_technology(cell.technology, reported.technology):
         return False
@@ -179,6 +179,6 @@ def _fits(cell: Cell, reported: _Reported) -> bool:
     return all(one is None or other is None or one == other for one, other in pairs)
 
 
-def _shown(reported: _Reported) -> str:
+def _shown(reported: ReportedCell) -> str:
     parts = (reported.mcc, reported.mnc, reported.lac, reported.ci)
     return "-".join(str(part) for part in parts if part is not None)

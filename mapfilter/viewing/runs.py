@@ -13,7 +13,7 @@ from mapfilter._types import Floats, Ints
 from mapfilter.evaluation.accuracy import Truth, position_errors_m
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.epochs import ReportRow, epochs
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import TrackLog
@@ -194,7 +194,8 @@ class _Readings:
         self.count = np.zeros(kept.size, dtype=np.int64)
         self.serving = np.full(kept.size, -1, dtype=np.int64)
         self.cell: list[int] = []
-        self.names: list[str | None] = []
+        self.names: list[str] = []
+        self.known: list[str | None] = []
         self.role: list[int] = []
         self.level: list[float] = []
         self.use: list[int] = []
@@ -216,7 +217,9 @@ class _Readings:
             self.count[number] = len(epoch.radio)
             for row in epoch.radio:
                 name = _named(row.cell, row.arfcn, row.bsic)
-                cell = index.get(row.cell, -1) if row.cell is not None else -1
+                serving = plan.ids[self.serving[number]] if self.serving[number] >= 0 else None
+                known = _cell_of(row, plan, serving)
+                cell = index.get(known, -1) if known is not None else -1
                 reason = why.get((epoch.time_s, row.role, name), Reason.USED)
                 if row.role in never:
                     reason = Reason.NOT_USED_BY_FILTER
@@ -226,6 +229,7 @@ class _Readings:
                     self.serving[number] = cell
                 self.cell.append(cell)
                 self.names.append(name)
+                self.known.append(known)
                 self.role.append(ROLES.index(row.role))
                 self.level.append(row.level_dbm)
                 self.use.append(REASONS.index(reason))
@@ -235,16 +239,25 @@ class _Readings:
     def packed(self, whats: _Numbers, level_at: LevelAt) -> dict[str, Any]:
         """Return the rows as the page reads them."""
         east_m, north_m = np.array(self.east_m), np.array(self.north_m)
-        predicted = level_at(east_m, north_m, self.names) if self.names else np.empty(0)
+        predicted = level_at(east_m, north_m, self.known) if self.known else np.empty(0)
         return {
             "first": starts(self.count),
             "cell": packed(np.array(self.cell, dtype=np.int64), "i2"),
-            "what": packed(np.array([whats[one or ""] for one in self.names], np.int64), "u4"),
+            "what": packed(np.array([whats[one] for one in self.names], np.int64), "u4"),
             "role": packed(np.array(self.role, dtype=np.int64), "u1"),
             "level": _dbm(np.array(self.level, dtype=np.float64)),
             "predicted": _dbm(predicted),
             "use": packed(np.array(self.use, dtype=np.int64), "u1"),
         }
+
+
+def _cell_of(row: ReportRow, plan: CellPlan, serving: str | None) -> str | None:
+    """Return the cell of a row: as it is named, or the only one of its carrier and code."""
+    if row.cell is not None or row.arfcn is None:
+        return row.cell
+    alike = plan.ids_by_carrier.get((row.arfcn, -1 if row.bsic is None else row.bsic), ())
+    others = [cell for cell in alike if cell != serving]
+    return others[0] if len(others) == 1 else None
 
 
 def _named(cell: str | None, arfcn: int | None, bsic: int | None) -> str:

@@ -21,9 +21,9 @@ def test_every_dependency_has_its_version_and_licence_in_the_docs():
     table = (ROOT / "docs" / "dependencies.rst").read_text()
     rows = re.findall(r"\* - ([a-z][^\n]*)\n     - ([^\n]+)\n     - ([^\n]+)\n", table)
     listed = {name: version for names, version, _ in rows for name in names.split(", ")}
-    wanted = names_of(project["dependencies"]) | names_of(
-        project["optional-dependencies"]["cluster"]
-    )
+    wanted = names_of(project["dependencies"])
+    for extra in ("cluster", "serve"):
+        wanted |= names_of(project["optional-dependencies"][extra])
     assert wanted <= listed.keys()
     assert {name: constraints()[name] for name in listed} == listed
 

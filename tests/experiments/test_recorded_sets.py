@@ -1,5 +1,6 @@
 """What the benchmarks read of each data set, in made files of the same layout."""
 
+import dataclasses
 import gzip
 import io
 import json
@@ -11,7 +12,9 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
+from mapfilter.experiments.benchmarks.ottawa_table import PartRow
 from mapfilter.experiments.recorded import belgium, denver, mall, mountain_view, smartloc
+from mapfilter.experiments.recorded.rows import Row
 from mapfilter.experiments.recorded.street_graph import match_points, read_graph
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
@@ -235,3 +238,15 @@ def test_the_highest_satellites_are_left():
     kept = smartloc.highest(log, 2, 60.0)
     assert kept["satellite"].tolist() == ["G01", "G02", "G03", "G01", "G03"]
     assert len(smartloc.highest(replace(log), 0, 60.0)) == 3
+
+
+@pytest.mark.parametrize("data", [b"", b"a,b\n1,2\n", b"longitude,latitude\n", b"\xff\x00"])
+def test_what_is_no_trace_is_named(tmp_path, data):
+    (tmp_path / "x_trace.csv").write_bytes(data)
+    with pytest.raises(InputError, match=r"x_trace\.csv"):
+        denver.read_trace(tmp_path / "x_trace.csv", CRS)
+
+
+def test_rows_of_ottawa_are_those_of_all():
+    own = {one.name for one in dataclasses.fields(PartRow)}
+    assert own == {one.name for one in dataclasses.fields(Row)}

@@ -164,6 +164,26 @@ def test_one_part_of_a_survey_without_the_other(surveyed, change, why):
         open_database(database.path)
 
 
+def test_cells_received_too_rarely_for_a_map_stay_in_the_readings(tmp_path):
+    """The first cell, which serves in the west, has no map; the third one's serving stays rare."""
+    levels, deviation = rasters(tmp_path, filled=True)
+    mapped = CELLS[1:]
+    some = []
+    for name, raster in (("level", levels), ("sd", deviation)):
+        bands = zip(mapped, raster.read(cells=mapped), strict=True)
+        path = tmp_path / f"{name}-some.tif"
+        quantity = "level" if name == "level" else "deviation"
+        write_rasters(path, LATTICE, bands, mapped, {}, quantity=quantity)
+        some.append(open_rasters(path))
+    plan = CellPlan(CRS, tuple(map(cell, mapped)))
+    made = build(some[0], plan, routes(), tmp_path / "db", measured=(served(), some[1]))
+    parts = open_database(made.path, verify="full").measured()
+    assert len(parts.readings) == len(served())
+    read = parts.readings
+    assert {read.cell_ids[n] for n in np.unique(read.cell)} == {CELLS[0], CELLS[2]}
+    assert BayesFilter().over(made).model is not None
+
+
 def test_readings_of_cells_of_another_database(surveyed, tmp_path):
     database, _, _ = surveyed
     others = tuple(f"1-1-8-{number}" for number in range(3))

@@ -189,6 +189,24 @@ def test_left_out_sessions_leave_no_trace():
     assert found.deviation_factor == 1.0
 
 
+def test_maps_of_some_cells_are_those_of_the_whole_survey():
+    rows, _ = shadowed(per_drive=60)
+    cell = np.arange(len(rows)) % 3
+    east_m, north_m = somewhere(20, seed=5)
+    ids = ("A", "B", "C")
+    rows = measured(rows.east_m, rows.north_m, rows.level_dbm - 5.0 * cell, rows.session, cell, ids)
+    whole = fit_survey(rows, SurveyOptions())
+    some = fit_survey(rows, SurveyOptions(), only={"B", "D"})
+    assert (list(whole.cells), list(some.cells)) == (["A", "B", "C"], ["B"])
+    assert some.shadowing == whole.shadowing
+    for one, other in zip(
+        some.cells["B"].predict(east_m, north_m), whole.cells["B"].predict(east_m, north_m),
+        strict=True,
+    ):  # fmt: skip
+        np.testing.assert_array_equal(one, other)
+    assert fit_survey(rows, SurveyOptions(), only=()).cells == {}
+
+
 def test_one_session_is_left_out_part_by_part():
     rows, _ = shadowed(drives=1, per_drive=200)
     found = leave_out(rows, SurveyOptions()).validation

@@ -1,6 +1,7 @@
 """Debian's Chromium by Playwright, with the network cut; a plain reason where it is missing."""
 
 import shutil
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -59,6 +60,13 @@ class Watched:
         self.page.evaluate(
             "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
         )
+
+    def until(self, expression, timeout_s=30.0):
+        """Wait until an expression of the page is true; its policy forbids Playwright's own way."""
+        end = time.monotonic() + timeout_s
+        while not self.page.evaluate(expression):
+            assert time.monotonic() < end, expression
+            self.settle()
 
     def press(self, key):
         self.page.keyboard.press(key)

@@ -57,7 +57,7 @@ def place_at(level, east_m, north_m):
 def test_plays_pauses_steps_and_seeks(browser, replay):
     with page(browser, replay) as view:
         view.press("Space")
-        view.page.wait_for_function("MF.page.store.state.time > 1")
+        view.until("MF.page.store.state.time > 1")
         view.press("Space")
         assert view.state("playing") is False
         view.press("Home")
@@ -135,7 +135,7 @@ def test_a_click_on_the_map_asks_why_not_there(browser, replay):
         view.page.locator(".sheet").first.focus()
         view.press("Enter")
         assert view.state("place") is not None
-        view.page.mouse.move(box["x"] + 200, box["y"] + 150)
+        view.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         assert "dBm" in view.page.inner_text(".tip >> visible=true")
 
 
@@ -149,9 +149,20 @@ def test_two_filters_share_their_time(browser, replay):
         view.press("2")
         assert view.state("run") == 1
         assert maps.nth(1).get_attribute("data-active") == "true"
+        # The second run explains nothing, and has no reports to step through.
+        assert view.page.get_by_role("button", name="Next report used").is_disabled()
         view.page.select_option("#second", "-1")
         view.settle()
         assert maps.count() == 1
+
+
+def test_what_the_map_shows_can_be_switched_off(browser, replay):
+    with page(browser, replay, at="#t=70") as view:
+        pictures = "(MF.frameSvg(MF.page).match(/<image/g) || []).length"
+        with_belief = view.page.evaluate(pictures)
+        view.page.locator(".legend").first.evaluate("(one) => { one.open = true; }")
+        view.page.get_by_label("belief", exact=True).first.uncheck()
+        assert view.page.evaluate(pictures) == with_belief - 1
 
 
 def test_names_of_others_are_text(browser, replay):

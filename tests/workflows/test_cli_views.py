@@ -68,7 +68,12 @@ def test_readings_have_cells_levels_and_reasons(bundle, world):
     found = run["readings"]
     assert unpacked(found["first"])[-1] == len(radio)
     cells = [bundle["cells"][at]["id"] for at in unpacked(found["cell"])]
-    assert sorted(cells) == sorted(radio["cell"])
+    plan = mf.open_database(world.database).plan
+    by_carrier = {(cell.arfcn, cell.bsic): cell.id for cell in plan.cells}
+    carriers = zip(radio["arfcn"], radio["bsic"], radio["cell"], strict=True)
+    assert sorted(cells) == sorted(
+        cell if cell is not None else by_carrier[arfcn, bsic] for arfcn, bsic, cell in carriers
+    )
     used = {bundle["reasons"][code] for code in unpacked(found["use"])}
     assert used <= {"used", "not_moved_enough"}
     assert set(bundle["words"]) == set(bundle["reasons"])

@@ -7,6 +7,7 @@ or one that begins where that ends. Points come one a second.
 
 from __future__ import annotations
 
+import io
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 import pandas as pd
 import shapely
 
+from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.errors import InputError, fail
@@ -30,11 +32,12 @@ from mapfilter.roads.ways import half_width_of
 from mapfilter.tracks.deadreckoning import steps_between
 from mapfilter.tracks.log import TrackLog, make_log
 
-RIGHT_M, JOINED_M = 25.0, 1.0
+RIGHT_M, JOINED_M, ON_GRAPH_M = 25.0, 1.0, 50.0
 LEAST_POINTS = 20
 _GRAPH, _TRACES = "*graph*.graphml.gz", "*trace*.csv"
 _RESOLUTION_M, _MARGIN_M = 4.0, 50.0
 _CLASS = "residential"
+_LARGEST_BYTES = 100_000_000
 _MAP = "streets"
 
 
@@ -54,11 +57,11 @@ def prepare(folder: Path, work: Path) -> None:
 
 
 def judge(task: Task) -> Judged:
-    """Match the part of a trace that lies in the box of the graph by both methods."""
+    """Match the part of a trace that lies on the graph by both methods."""
     graph = _graph(task.data)
     places = clipped(read_trace(task.data / f"{task.part}.csv", graph.crs), graph)
     if len(places) < LEAST_POINTS:
-        expected = f"{LEAST_POINTS} points or more within the box of the graph"
+        expected = f"{LEAST_POINTS} points or more on the graph"
         raise fail(InputError, str(task.data / task.part), expected, len(places))
     edge = match_points(graph, places)
     hmm = np.where(edge >= 0, graph.street[edge], 0)
@@ -92,22 +95,18 @@ def judge(task: Task) -> Judged:
 
 def read_trace(file: Path, crs: str) -> Floats:
     """Read the places of a trace, shape (N, 2); the same place again and again once."""
-    try:
-        table = pd.read_csv(file)
-        lon, lat = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
-    except (OSError, KeyError, ValueError) as error:
-        expected = "a CSV of latitude and longitude"
-        raise fail(InputError, str(file), expected, repr(error)) from error
+    lon, lat = _degrees(file)
     places = np.column_stack(project(crs, lon, lat))
     moved = np.append(True, np.any(np.diff(places, axis=0) != 0, axis=1))
     return np.asarray(places[moved & np.isfinite(places).all(axis=1)])
 
 
 def clipped(places: Floats, graph: StreetGraph) -> Floats:
-    """Return the places in the graph's box: the longest stretch of them that follow each other."""
-    west, south, east, north = shapely.total_bounds(graph.line)
-    x, y = places.T
-    inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+    """Return the longest stretch of places that follow each other within 50 m of a street."""
+    tree = shapely.STRtree(graph.line)
+    near, _ = tree.query(shapely.points(places), "dwithin", ON_GRAPH_M)
+    inside = np.zeros(len(places), dtype=np.bool_)
+    inside[near] = True
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
     spans = edges.reshape(-1, 2)
     if not len(spans):
@@ -153,9 +152,21 @@ def _graph(folder: Path) -> StreetGraph:
     files = sorted(folder.glob(_GRAPH))[:1]
     if not files:
         raise fail(InputError, str(folder), _GRAPH, "none")
-    trace = pd.read_csv(sorted(folder.glob(_TRACES))[0], nrows=1)
-    crs = utm_crs(float(trace["longitude"].iloc[0]), float(trace["latitude"].iloc[0]))
-    return read_graph(files[0], crs)
+    lon, lat = _degrees(sorted(folder.glob(_TRACES))[0])
+    return read_graph(files[0], utm_crs(float(lon[0]), float(lat[0])))
+
+
+def _degrees(file: Path) -> tuple[Floats, Floats]:
+    """Return longitude and latitude of a trace's rows."""
+    try:
+        table = pd.read_csv(io.BytesIO(read_input(file, _LARGEST_BYTES, "a trace")))
+        found = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
+    except (KeyError, ValueError) as error:
+        expected = "a CSV of latitude and longitude"
+        raise fail(InputError, str(file), expected, repr(error)) from error
+    if not len(table):
+        raise fail(InputError, str(file), "rows", "none")
+    return found
 
 
 BENCHMARK = Benchmark("denver", "mapmatch-denver", (_GRAPH, _TRACES), units, judge, prepare)

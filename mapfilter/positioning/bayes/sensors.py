@@ -287,19 +287,23 @@ def _repeated(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, bool]:
     levels = min(len(_levels(epoch.radio)), _MOST_ROWS)
     nats = 0.0
     # Rows without a level compare as NaN, which equals nothing: their cells are compared.
-    if levels and _keys(epoch.radio) == _keys(watch.report):
+    if levels and _equal(epoch.radio, watch.report):
         each = min(_NATS_PER_M * watch.moved_m, _NATS_PER_REPEAT)
         nats = watch.repeated_nats + levels * each
     watch = replace(watch, report=epoch.radio, moved_m=0.0, repeated_nats=nats)
     return watch, nats >= _STALE_NATS
 
 
-def _keys(rows: tuple[ReportRow, ...]) -> list[tuple[object, ...]]:
-    found: list[tuple[object, ...]] = []
-    for row in rows:
-        measured = [x if isfinite(x) else None for x in (row.level_dbm, row.timing_advance)]
-        found.append((row.role, row.cell, row.arfcn, row.bsic, row.censored, *measured))
-    return found
+def _equal(report: tuple[ReportRow, ...], before: tuple[ReportRow, ...]) -> bool:
+    # Nearly all pairs differ in their first rows.
+    return len(report) == len(before) and all(
+        _key(row) == _key(other) for row, other in zip(report, before, strict=True)
+    )
+
+
+def _key(row: ReportRow) -> tuple[object, ...]:
+    measured = [x if isfinite(x) else None for x in (row.level_dbm, row.timing_advance)]
+    return row.role, row.cell, row.arfcn, row.bsic, row.censored, *measured
 
 
 def _levels(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:

@@ -18,7 +18,7 @@ from mapfilter.models.gaussian import GaussianTerms, stack
 from mapfilter.models.ranging import GSM_STEP_M, timing_advances
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import StateLayout
-from mapfilter.models.terms import measure
+from mapfilter.models.terms import measure_kernel
 from mapfilter.options import Options, Positive
 from mapfilter.propagation.empirical import cost231_hata_db
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -188,7 +188,7 @@ class SiteModels:
 def compiled(measurement: GaussianTerms) -> CompiledMeasurement:
     """Return a measurement as the compiled filters take it."""
     return CompiledMeasurement(
-        measure,
+        measure_kernel(),
         measurement.slots,
         measurement.uses,
         measurement.rows,

@@ -172,7 +172,9 @@ def _add_neighbours(rows: Columns, reading: Reading, time_s: Floats, good: Bools
 
 
 def _codes(texts: np.ndarray) -> Floats:
-    known = {word: float(word) if word.isdigit() else np.nan for word in set(texts.tolist())}
+    words = set(texts.tolist())
+    # Of other scripts, and raised ones, are digits, too.
+    known = {w: float(w) if w.isascii() and w.isdigit() else np.nan for w in words}
     return np.array([known[word] for word in texts], dtype=np.float64)
 
 

@@ -53,8 +53,8 @@ from mapfilter.tracks.readers.times import utc_from_local_s
 
 _BEGIN = re.compile(r"#(?:PRODUCT|FF|ID|START)[,;\t]")
 _EVENT = re.compile(r"(?:GPS|CELLMEAS|CHI|SEI|RRCSM|L3SM)([,;\t])\d{1,2}:\d\d:\d\d[.,]\d{1,3}\1")
-_START = re.compile(r'#START([,;\t])[^;\t\n]*?\1\d*\1"?(\d{1,2})\.(\d{1,2})\.(\d{4})')
-_AHEAD_MIN = re.compile(r'#UT([,;\t])[^;\t\n]*?\1\d*\1"?([-+]?\d{1,3})(?!\d)')
+_START = re.compile(r'#START([,;\t])[^;\t\n]*?\1\d*\1"?(\d{1,2})\.(\d{1,2})\.(\d{4})', re.ASCII)
+_AHEAD_MIN = re.compile(r'#UT([,;\t])[^;\t\n]*?\1\d*\1"?([-+]?\d{1,3})(?!\d)', re.ASCII)
 _PRODUCT = re.compile(r'#PRODUCT[,;\t]+"?([^",;\t]*)"?[,;\t]"?([\d.]*)')
 _KINDS = ("GPS", "CELLMEAS", "CHI", "SEI")
 _SCANNERS = ("OFDMSCAN", "PILOTSCAN", "FREQSCAN")

@@ -173,7 +173,7 @@ def _dates(tables: dict[bytes, Columns]) -> pd.DataFrame:
 
 
 def _year(word: str) -> float:
-    if not (len(word) == 6 and word.isdigit()):
+    if not (len(word) == 6 and word.isascii() and word.isdigit()):
         return float("nan")
     year = int(word[4:])
     return 2000.0 + year if year < 80 else 1900.0 + year

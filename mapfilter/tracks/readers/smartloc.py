@@ -19,6 +19,7 @@ _RANGES = ("pseudorange3", "range3")
 _KNOWN = frozenset({*_RANGES, "odom3", "point3"})
 _LETTERS = {1: "G", 2: "S", 4: "R", 8: "E", 16: "J", 32: "C"}
 _SYSTEMS = {"GPS": "G", "SBAS": "S", "GLONASS": "R", "GALILEO": "E", "QZSS": "J", "BEIDOU": "C"}
+_MOST_NUMBER = 1000
 _EARTH_M = (6.2e6, 6.5e6)
 
 
@@ -85,12 +86,13 @@ def _geodetic(place_m: Floats) -> tuple[Floats, Floats, Floats]:
 def _satellites(system: Floats, number: Floats) -> np.ndarray:
     """Return names as in RINEX; slots of GLONASS count from 1, 65 or 301."""
     names = np.full(len(number), None, dtype=object)
-    for kind, index in {*zip(system.tolist(), number.tolist(), strict=True)}:
-        letter = _LETTERS.get(int(kind)) if 0 < kind < 100 else None
+    whole = np.isin(system, list(_LETTERS)) & (np.floor(number) == number) & (number < _MOST_NUMBER)
+    for kind, index in {*zip(system[whole].tolist(), number[whole].tolist(), strict=True)}:
+        letter = _LETTERS[int(kind)]
         slot = index - (300 if index > 300 else 64 if letter == "R" and index > 64 else 0)
         if letter == "S" and index > 100:
             slot = index - 100
-        if letter and 1 <= slot <= 99:
+        if 1 <= slot <= 99:
             names[(system == kind) & (number == index)] = f"{letter}{int(slot):02d}"
     return names
 

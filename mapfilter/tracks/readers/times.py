@@ -19,11 +19,13 @@ from mapfilter.gnss.orbits import LEAPS_UTC_S, WEEK_S
 GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
 DAY_S = 86_400.0
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
-_DOTTED = re.compile(r"^\s*(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)(?!\d)")
+_FAR_QUARTERS = 6e7
+"""Quarters of an hour, 1700 years from 1970; datetime ends soon after."""
+_DOTTED = re.compile(r"^\s*(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)(?!\d)", re.ASCII)
 """Day, month and year with dots, which no one writes in another order."""
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
-_TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?")
-_OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?")
+_TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
+_OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?", re.ASCII)
 
 
 def utc_from_gps_s(gps_s: ArrayLike) -> Floats:
@@ -123,14 +125,15 @@ def utc_from_local_s(local_s: ArrayLike, zone: str) -> Floats:
     """
     rules = parse_zone(zone)
     local = np.asarray(local_s, dtype=np.float64)
-    shift = np.zeros(local.shape)
     # The shift is constant within an hour's quarter in every zone.
     quarter = np.floor(np.where(np.isfinite(local), local, 0.0) / 900.0)
-    for value in np.unique(quarter):
-        moment = datetime(1970, 1, 1) + timedelta(seconds=float(value) * 900.0)
+    values, of = np.unique(np.clip(quarter, -_FAR_QUARTERS, _FAR_QUARTERS), return_inverse=True)
+    shift = np.empty(len(values))
+    for i, value in enumerate(values.tolist()):
+        moment = datetime(1970, 1, 1) + timedelta(seconds=value * 900.0)
         offset = moment.replace(tzinfo=rules).utcoffset() or timedelta(0)
-        shift[quarter == value] = offset.total_seconds()
-    return np.asarray(local - shift)
+        shift[i] = offset.total_seconds()
+    return np.asarray(local - shift[of].reshape(local.shape))
 
 
 def parse_zone(zone: str) -> tzinfo:

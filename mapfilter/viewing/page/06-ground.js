@@ -33,7 +33,25 @@
         second: MF.array(second), distance: MF.array(distance), size: grid.rows * grid.cols,
         band: new Map(bundle.levels.cells.map((cell, band) => [cell, band])) };
     }
-    ground.pixel = pixel;
+    // The pieces of one way, kept for the last one asked for: it changes seldom.
+    const owners = background.streets?.way ? MF.array(background.streets.way).raw : null;
+    let wayKept = { index: -1, set: null };
+    ground.wayLines = (index) => {
+      if (!owners || !ground.streets) return null;
+      if (wayKept.index === index) return wayKept.set;
+      const { first, east, north } = ground.streets;
+      const [firsts, easts, norths] = [[0], [], []];
+      for (let l = 0; l + 1 < first.length; l += 1) {
+        if (owners[l] !== index) continue;
+        for (let i = first[l]; i < first[l + 1]; i += 1) {
+          easts.push(east[i]);
+          norths.push(north[i]);
+        }
+        firsts.push(easts.length);
+      }
+      wayKept = { index, set: easts.length ? { first: firsts, east: easts, north: norths, path: null } : null };
+      return wayKept.set;
+    };
 
     // Predicted levels at a place, strongest first; empty where the database has none.
     ground.levelsAt = (east, north) => {

@@ -1,6 +1,8 @@
 "use strict";
 // Where the maps look: a center in metres and a scale in pixels per metre, shared by all maps.
 (() => {
+  const BUTTONS = 56;
+
   MF.makeCamera = (changed) => {
     const camera = { east: 0, north: 0, scale: 1, least: 0.001, most: 40 };
     camera.x = (east, view) => (east - camera.east) * camera.scale + view.width / 2;
@@ -10,9 +12,11 @@
     camera.fit = (box, view) => {
       const width = Math.max(box.east1 - box.east0, 40);
       const height = Math.max(box.north1 - box.north0, 40);
+      // Room for the buttons at the right, twice, so that the middle stays the middle.
+      const across = Math.max(view.width - 2 * BUTTONS, 0.6 * view.width);
       camera.east = (box.east0 + box.east1) / 2;
       camera.north = (box.north0 + box.north1) / 2;
-      camera.scale = MF.clamp(Math.min(view.width / width, view.height / height) * 0.9, camera.least, camera.most);
+      camera.scale = MF.clamp(Math.min(across / width, (0.88 * view.height) / height), camera.least, camera.most);
       changed();
     };
     camera.pan = (dx, dy) => {

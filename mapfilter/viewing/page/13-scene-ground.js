@@ -1,7 +1,7 @@
 "use strict";
 // What stays while time runs: streets, buildings, a layer, sites with their sectors, the whole track, the scale bar.
 (() => {
-  // Streets are rows of lattice points 5 m apart: a little wider, and they close.
+  // Width of streets on the map: centre lines are what the database has.
   const STREET_M = 6;
 
   const picture = (pen, one, alpha = 1) => {
@@ -115,8 +115,8 @@
     if (points) picture(pen, points, layer && !layer.plain ? 0.35 : 1);
     if (ground.streets) {
       const plain = !layer || layer.plain;
-      pen.lines(ground.streets, { stroke: plain ? MF.color.street : MF.color.card, alpha: plain ? 1 : 0.4,
-        width: MF.clamp(STREET_M * camera.scale, 0.6, 24) });
+      pen.lines(ground.streets, { stroke: plain ? MF.color.street : MF.color.card, alpha: plain ? 1 : 0.3,
+        width: MF.clamp((plain ? STREET_M : 1.2) * camera.scale, 0.6, 24) });
     }
     if (run) {
       MF.drawTruth(pen, run);

@@ -32,6 +32,8 @@
     const at = (one) => [camera.x(one.east, view), camera.y(one.north, view)];
     const e = run.epochs;
     const here = run.place(i);
+    const way = e.way?.[i] > 0 && show.hypotheses ? ground.wayLines(e.way[i] - 1) : null;
+    if (way) pen.lines(way, { stroke: color.accent, alpha: 0.3, width: MF.clamp(5 * camera.scale, 2, 20) });
     if (show.belief && density) MF.drawPicture(pen, density);
     MF.drawTrack(pen, run, Math.max(0, i - TRAIL), i, { width: 4, alpha: 1 });
 
@@ -39,6 +41,12 @@
     const marks = show.radio ? links(pen, ground, readings, known(here) ? here : null) : new Map();
     MF.drawSites(pen, ground, marks);
 
+    const truth = run.truthAt(i);
+    if (known(truth)) {
+      const [tx, ty] = at(truth);
+      if (known(here)) pen.path([at(here), [tx, ty]], { stroke: color.truth, width: 1, dash: [2, 2] });
+      pen.path([[tx, ty - 8], [tx + 8, ty], [tx, ty + 8], [tx - 8, ty]], { fill: color.card, stroke: color.truth, width: 2.4 }, true);
+    }
     if (known(here)) {
       const [x, y] = at(here);
       const status = MF.statusColor(run.status(i));
@@ -49,12 +57,6 @@
           pen.circle(x, y, e.r50[i] * camera.scale, { fill: status, alpha: 0.16 });
           pen.circle(x, y, e.r50[i] * camera.scale, { stroke: status, width: 1.2, dash: [5, 3] });
         }
-      }
-      const truth = run.truthAt(i);
-      if (known(truth)) {
-        const [tx, ty] = at(truth);
-        pen.path([[x, y], [tx, ty]], { stroke: color.truth, width: 1, dash: [2, 2] });
-        pen.path([[tx, ty - 8], [tx + 8, ty], [tx, ty + 8], [tx - 8, ty]], { fill: color.card, stroke: color.truth, width: 2.4 }, true);
       }
       const runner = { east: e.runner_east?.[i], north: e.runner_north?.[i] };
       if (show.hypotheses && known(runner) && e.runner_mass[i] > 0) {
@@ -76,13 +78,13 @@
   };
 
   // The place that somebody pointed at.
-  MF.drawPlace = (pen, place) => {
+  MF.drawPlace = (pen, place, words = "there") => {
     const x = pen.camera.x(place.east, pen.view);
     const y = pen.camera.y(place.north, pen.view);
     for (const [stroke, width] of [[MF.color.halo, 6], [MF.color.there, 3]]) {
       pen.path([[x - 8, y - 8], [x + 8, y + 8]], { stroke, width });
       pen.path([[x - 8, y + 8], [x + 8, y - 8]], { stroke, width });
     }
-    pen.text("there", x + 13, y, { fill: MF.color.there, halo: MF.color.halo, size: 12, weight: 650 });
+    pen.text(words, x + 13, y, { fill: MF.color.there, halo: MF.color.halo, size: 12, weight: 650 });
   };
 })();

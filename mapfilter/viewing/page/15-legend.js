@@ -36,12 +36,21 @@
     if (run.epochs.alt_lead?.some(Number.isFinite)) {
       list.push([sign((pen) => pen.path([[17, 2], [24, 14], [10, 14]], { fill: color.card, stroke: color.alternative, width: 2.2 }, true)), "alternative hypothesis"]);
     }
+    if (run.epochs.way?.some((one) => one > 0)) list.push([line({ stroke: color.accent, width: 7, alpha: 0.3 }), "matched way"]);
     list.push([line({ stroke: color.accent, width: 2 }), "serving cell"]);
     list.push([line({ stroke: color.soft, width: 1.2, dash: [3, 4] }), "neighbour cells of the report"]);
     return list;
   };
 
-  MF.fillLegend = (legend, { bundle, run, layer }) => {
+  const SHOWN = [["belief", "belief"], ["regions", "regions"], ["hypotheses", "hypotheses"], ["radio", "cells heard"]];
+  const switches = (store) => MF.h("p", { class: "switches" }, SHOWN.map(([key, words]) => {
+    const box = MF.h("input", { type: "checkbox" });
+    box.checked = store.state.show[key];
+    box.addEventListener("change", () => store.set({ show: { ...store.state.show, [key]: box.checked } }));
+    return MF.h("label", {}, box, words);
+  }));
+
+  MF.fillLegend = (legend, { bundle, run, layer, store }) => {
     const items = run ? signs(bundle, run) : [];
     items.push([sign((pen) => pen.path([[17, 14], [11, 3], [17, 1], [23, 3]], { fill: MF.color.card, stroke: MF.color.soft, width: 1.4 }, true)), "site and sector"]);
     const parts = [MF.h("summary", {}, "Legend")];
@@ -57,7 +66,7 @@
           MF.h("span", {}, MF.h("i", { style: { background: color } }), name))));
       }
     }
-    parts.push(MF.h("ul", {}, items.map(([canvas, words]) => MF.h("li", {}, canvas, words))));
+    parts.push(MF.h("ul", {}, items.map(([canvas, words]) => MF.h("li", {}, canvas, words))), run ? switches(store) : "");
     legend.replaceChildren(...parts);
   };
 })();

@@ -84,7 +84,7 @@
       if (run && run.count) {
         const i = run.at(time);
         MF.drawMoment(pen, { ground, run, i, density: show.belief ? density(run, run.frameAt(i)) : null, place, show });
-      } else if (place) MF.drawPlace(pen, place);
+      } else if (place) MF.drawPlace(pen, place, "");
       MF.drawScaleBar(pen);
     };
     map.draw = () => {
@@ -102,7 +102,7 @@
       }
     };
     map.paintAll = (pen) => { paintStill(pen); paintMoving(pen); };
-    map.refreshLegend = () => MF.fillLegend(legend, { bundle, run, layer: layerNow() });
+    map.refreshLegend = () => MF.fillLegend(legend, { bundle, run, layer: layerNow(), store });
 
     MF.listenToPointer(page, map, (event) => {
       if (!event) { tip.hidden = true; return; }

@@ -1,8 +1,8 @@
 "use strict";
 // "Why here?" as rows: what each reading says for the estimate against another place.
 (() => {
-  const TERMS = { streets: "Streets and motion", serving: "Serving cell", level: "Level", absent: "Expected cells that are missing",
-    bound: "Levels known as bounds", timing: "Timing advance", fix: "Position fix", gnss: "Satellites", map: "Map", other: "Other readings" };
+  const TERMS = { streets: "Streets, motion", serving: "Serving cell", level: "Level", absent: "Cells not reported",
+    bound: "Levels as bounds", timing: "Timing advance", fix: "Position fix", gnss: "Satellites", map: "Map", other: "Other readings" };
   const nameOf = (ground, term, cell) => {
     const words = TERMS[term] ?? term;
     return cell >= 0 && (term === "serving" || term === "level" || term === "timing") ? `${words} ${ground.cellName(cell)}` : words;
@@ -18,7 +18,7 @@
     const own = Boolean(page.ground.levels && page.bundle.why);
     const at = x >= 0 ? run.explained.epoch.raw[x] : i;
     const truth = run.truthAt(at);
-    if (own && Number.isFinite(truth.east ?? NaN)) list.push("truth");
+    if (own && Number.isFinite(truth.east ?? NaN) && Number.isFinite(run.place(at).east)) list.push("truth");
     if (own) list.push("place");
     return list;
   };
@@ -44,6 +44,7 @@
   const fromPlace = (page, run, i, place) => {
     const { levels, cells } = { levels: page.ground.levels, cells: page.ground.levels.cells };
     const from = run.place(i);
+    if (!Number.isFinite(from.east)) return { rows: [], sum: NaN, problem: "There is no estimate at this moment to compare the place with." };
     const here = MF.mapAt(levels, from.east, from.north);
     const there = MF.mapAt(levels, place.east, place.north);
     if (!here || !there) return { rows: [], sum: NaN, problem: there ? "The estimate lies outside the database." : "This place lies outside the database. Choose one on the map's streets." };

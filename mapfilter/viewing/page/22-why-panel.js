@@ -37,10 +37,11 @@
     const when = MF.h("span", { class: "quiet" });
     const segments = MF.h("div", { class: "segments", role: "group", "aria-label": "Compare the estimate with" });
     const step = (words, label, by) => MF.h("button", { type: "button", "aria-label": label, title: label, onclick: () => page.stepReport(by) }, words);
+    const steps = [step("‹ report", "Previous report used", -1), step("report ›", "Next report used", 1)];
     const clear = MF.h("button", { type: "button", onclick: () => page.store.set({ place: null, against: "runner" }) }, "Clear the place");
     const element = MF.h("section", { class: "card why", "aria-labelledby": "why-title" },
       MF.h("header", {}, MF.h("h2", { id: "why-title" }, "Why here?"), when), segments, body,
-      MF.h("div", { class: "steps" }, step("‹ report", "Previous report used", -1), step("report ›", "Next report used", 1), clear));
+      MF.h("div", { class: "steps" }, ...steps, clear));
 
     const empty = (result, run) => {
       if (result.problem) return result.problem;
@@ -60,6 +61,7 @@
       segments.replaceChildren(...result.choices.map((name) => MF.h("button", { type: "button",
         "aria-pressed": String(result.kind === name), onclick: () => page.ask(name) }, AGAINST[name])));
       clear.hidden = !place;
+      for (const one of steps) one.disabled = !run.reports.length;
       if (!result.rows.length) {
         body.replaceChildren(MF.h("p", { class: "empty" }, empty(result, run)));
         return;

@@ -52,7 +52,7 @@
     try {
       await navigator.clipboard.writeText(address);
     } catch {
-      words = "In the address bar";
+      words = window.top === window ? "In the address bar" : "Not in a frame";
     }
     const before = button.textContent;
     button.textContent = words;

@@ -101,6 +101,13 @@
       MF.byId("charts").hidden = true;
       database.refresh();
     }
+    // The maps fill what the bar and the transport leave of the window.
+    const measure = () => {
+      const chrome = document.querySelector(".bar").offsetHeight + MF.byId("transport").offsetHeight;
+      document.documentElement.style.setProperty("--chrome", `${chrome}px`);
+    };
+
+    measure();
     buildMaps(page);
     markActive(page);
     page.fit();
@@ -139,6 +146,7 @@
     });
     window.addEventListener("hashchange", () => page.store.set(MF.readAddress(page)));
     window.addEventListener("resize", () => {
+      measure();
       page.maps.forEach((map) => map.resize());
       charts?.resize();
       player?.strip();

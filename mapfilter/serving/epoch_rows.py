@@ -1,0 +1,174 @@
+"""Epochs as they arrive: rows in the names of the track log's tables, checked by its schema."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite, nan
+from typing import Any
+
+from mapfilter._inputs import shown
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import wrap_rad
+from mapfilter.positioning.epochs import Epoch, make_epoch
+from mapfilter.radio.identities import LIMITS
+from mapfilter.serving.documents import (
+    RequestError,
+    check_keys,
+    number,
+    one_fault,
+    rows_of,
+    text,
+    whole,
+)
+from mapfilter.tracks.identify import PlanNames, ReportedCell
+from mapfilter.tracks.schema import (
+    MISSING_SIGNS,
+    NEIGHBOUR,
+    PLACE,
+    SCHEMA,
+    SERVING,
+    TABLES,
+    Column,
+)
+
+MOST_EPOCHS = 300
+"""Epochs in one request; more are sent one request after another."""
+
+_MOST_ROWS = 200
+_TIME = SCHEMA["motion"][0]
+_TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
+_USUAL = {name: [c for c in SCHEMA[name][1:] if not c.optional] for name in _TABLES}
+_COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
+_LEAST_PLACE_M, _MOST_PLACE_M = 2.0e7, 5.5e7
+_IDENTITY = ("mcc", "mnc", "lac", "ci")
+
+
+def read_epochs(document: Mapping[str, Any], names: PlanNames, after_s: float) -> list[Epoch]:
+    """Return the epochs of a request, in the order of their times.
+
+    Parameters
+    ----------
+    document : mapping
+        ``epochs``: a list of objects with ``time_s`` and, by the names of the log's tables, lists
+        of rows without ``time_s``. What is missing is left out, or null.
+    names : PlanNames
+        Gives cells the ids of the database.
+    after_s : float
+        Time of the last epoch before; NaN for none.
+
+    Raises
+    ------
+    RequestError
+        With all faults together; or the first epoch is not later than the last one (409).
+    """
+    faults = Faults()
+    check_keys(document, ("epochs",), "body", faults)
+    given = rows_of(document.get("epochs"), "epochs", faults, MOST_EPOCHS)
+    if not given and not faults.found:
+        raise one_fault("epochs", "a list of at least one epoch", "none")
+    found: list[Epoch] = []
+    for index, one in enumerate(given):
+        where = f"epochs[{index}]"
+        check_keys(one, ("time_s", *_TABLES), where, faults)
+        low, high = _TIME.low, _TIME.high
+        time_s = number(one.get("time_s"), f"{where}.time_s", _TIME.expected, faults, low, high)
+        rows = {
+            name: _rows(name, one.get(name), f"{where}.{name}", names, faults) for name in _TABLES
+        }
+        if time_s is not None:
+            if found and time_s <= found[-1].time_s:
+                expected = f"later than {found[-1].time_s:g}, the epoch before"
+                faults.add(f"{where}.time_s", expected, f"{time_s:g}", "epochs out of order")
+            found.append(make_epoch(time_s, rows))
+    if faults.found:
+        raise RequestError.of(InputError(tuple(faults.found)))
+    if found[0].time_s <= after_s:
+        expected = f"later than {after_s!r}, the last epoch of the session"
+        error = one_fault("epochs[0].time_s", expected, f"{found[0].time_s!r}", "sent before")
+        raise RequestError(409, "outOfOrder", error.message, error.faults)
+    return found
+
+
+def _rows(
+    table: str, given: object, where: str, names: PlanNames, faults: Faults
+) -> list[tuple[Any, ...]]:
+    found: dict[tuple[Any, ...], None] = {}
+    for index, row in enumerate(rows_of(given, where, faults, _MOST_ROWS)):
+        place = f"{where}[{index}]"
+        before = len(faults.found)
+        check_keys(row, tuple(_COLUMNS[table]), place, faults)
+        values = {
+            name: _value(column, row.get(name), f"{place}.{name}", faults)
+            for name, column in _COLUMNS[table].items()
+        }
+        _CHECKS.get(table, _nothing)(values, place, faults)
+        if len(faults.found) > before:
+            continue
+        if table == "radio":
+            values["cell"] = names.name(_reported(values))
+        if table == "motion" and isfinite(values["heading_rad"]):
+            values["heading_rad"] = float(wrap_rad(values["heading_rad"]))
+        # Rows that repeat another one exactly count once, as in a log.
+        found[tuple(values[column.name] for column in _USUAL[table])] = None
+    return list(found)
+
+
+def _value(column: Column, value: object, where: str, faults: Faults) -> Any:
+    """Return a field's value: NaN or None where it is missing or faulty."""
+    missing = nan if column.kind == "number" else None
+    if value is None:
+        if column.required:
+            faults.add(where, column.expected, "nothing")
+        return missing
+    if column.kind == "text":
+        return text(value, where, column.expected, faults)
+    if column.kind == "integer":
+        low, high = int(column.low), int(column.high)
+        found = whole(value, where, column.expected, faults, low, high)
+        return missing if found is None else found
+    if value in MISSING_SIGNS:
+        hint = "a sign for a missing value; leave the field out"
+        faults.add(where, column.expected, shown(value), hint)
+        return missing
+    found_number = number(value, where, column.expected, faults, column.low, column.high)
+    return missing if found_number is None else found_number
+
+
+def _reported(values: Mapping[str, Any]) -> ReportedCell:
+    keys = ("role", "cell", "technology", *_IDENTITY, "arfcn", "bsic")
+    return ReportedCell(**{name: values[name] for name in keys})
+
+
+def _nothing(values: Mapping[str, Any], where: str, faults: Faults) -> None:
+    """Check nothing: columns are all that such a row has to keep."""
+
+
+def _check_radio(values: Mapping[str, Any], where: str, faults: Faults) -> None:
+    if values["role"] not in (SERVING, NEIGHBOUR, None):
+        faults.add(f"{where}.role", "serving or neighbour", shown(values["role"]))
+    family = values["technology"]
+    for name, most in LIMITS.get(family or "", {}).items():
+        if values[name] is not None and values[name] > most:
+            faults.add(f"{where}.{name}", f"0..{most} in {family}", values[name])
+
+
+def _check_gnss(values: Mapping[str, Any], where: str, faults: Faults) -> None:
+    product = values["var_east_m2"] * values["var_north_m2"]
+    if values["cov_east_north_m2"] ** 2 > product * (1 + 1e-9):
+        expected = "a covariance of at most √(var_east·var_north)"
+        faults.add(f"{where}.cov_east_north_m2", expected, values["cov_east_north_m2"])
+
+
+def _check_pseudorange(values: Mapping[str, Any], where: str, faults: Faults) -> None:
+    place = [values[name] for name in PLACE]
+    known = [isfinite(one) for one in place]
+    if any(known) and not all(known):
+        faults.add(f"{where}, {', '.join(PLACE)}", "all three, or none", "some of them")
+    elif all(known):
+        away_m = sum(one * one for one in place) ** 0.5
+        if not _LEAST_PLACE_M <= away_m <= _MOST_PLACE_M:
+            expected = "20 000 to 55 000 km from the earth's centre"
+            faults.add(f"{where}, {', '.join(PLACE)}", expected, f"{away_m / 1000:.0f} km")
+
+
+_CHECKS = {"radio": _check_radio, "gnss": _check_gnss, "pseudoranges": _check_pseudorange}

@@ -1,0 +1,140 @@
+"""The folder of saved sessions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mapfilter._io import ensure_writable_folder
+from mapfilter.errors import ConfigError, StoreError, fail
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.models.level_memory import LevelMemory
+from mapfilter.models.street_motion import STATES
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.serving.state_file import read_session, write_session
+
+SUFFIX = ".session"
+_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_")
+_ID_LENGTH = 22
+_TYPES: Mapping[str, type | tuple[type, ...]] = {
+    "name": str,
+    "seed": int,
+    "began_utc_s": float,
+    "state": BayesState,
+    "rng": dict,
+    "epochs": int,
+    "time_s": float,
+    "last": str,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SessionStore:
+    """Saved sessions, a file each.
+
+    Parameters
+    ----------
+    folder : Path
+        Of sessions of one database and filter only.
+    binding : str
+        Of which database and filter; states mean nothing over another.
+    """
+
+    folder: Path
+    binding: str
+
+    @classmethod
+    def in_folder(cls, folder: Path, binding: str) -> SessionStore:
+        """Make the folder where there is none; raise OutputError where it cannot be written."""
+        ensure_writable_folder(folder)
+        return cls(folder, binding)
+
+    def path(self, session_id: str) -> Path:
+        """Return the file of a session; ids are those that the service made, never paths."""
+        if len(session_id) != _ID_LENGTH or not _LETTERS.issuperset(session_id):
+            raise ValueError("no id of a session")
+        return self.folder / f"{session_id}{SUFFIX}"
+
+    def write(self, session_id: str, value: Mapping[str, Any]) -> None:
+        """Save a session; it is there whole, or as it was saved before."""
+        write_session(self.path(session_id), {**value, "binding": self.binding})
+
+    def read(self, session_id: str) -> dict[str, Any]:
+        """Read a session.
+
+        Raises
+        ------
+        StoreError
+            It is missing, damaged, or of another version.
+        ConfigError
+            It is of another database or filter.
+        """
+        path = self.path(session_id)
+        value = read_session(path)
+        if value.get("binding") != self.binding:
+            expected = "sessions of this database and these options of the filter"
+            hint = "the database was built again; choose another folder, or remove the sessions"
+            raise fail(ConfigError, f"--state, {path}", expected, "one of others", hint)
+        _check(value, str(path))
+        return value
+
+    def read_all(self) -> tuple[dict[str, dict[str, Any]], list[str]]:
+        """Return all saved sessions without their states, and why others cannot be read.
+
+        Raises
+        ------
+        ConfigError
+            The folder is that of another database or filter.
+        """
+        found: dict[str, dict[str, Any]] = {}
+        lost: list[str] = []
+        for path in sorted(self.folder.glob(f"*{SUFFIX}")):
+            name = path.name.removesuffix(SUFFIX)
+            try:
+                value = self.read(name)
+            except ValueError:
+                lost.append(f"{path}: no name of a session")
+            except StoreError as error:
+                lost.append(str(error))
+            else:
+                del value["state"]
+                found[name] = value
+        return found, lost
+
+    def remove(self, session_id: str) -> None:
+        """Remove a session; nothing happens where there is none."""
+        self.path(session_id).unlink(missing_ok=True)
+
+
+def _check(value: Mapping[str, Any], where: str) -> None:
+    """Raise StoreError where values do not fit together, before compiled code gets them."""
+    for name, kind in _TYPES.items():
+        if not isinstance(value.get(name), kind):
+            raise fail(StoreError, where, f"{name}, as it was saved", "something else", "edited")
+    state = value["state"]
+    beliefs = [state.belief]
+    if state.alternative is not None:
+        beliefs.append(state.alternative.belief)
+    for belief in beliefs:
+        if belief is not None and not _is_whole(belief):
+            raise fail(StoreError, where, "arrays of one length", "others", "edited")
+    try:
+        np.random.default_rng().bit_generator.state = value["rng"]
+    except (ValueError, TypeError, KeyError) as error:
+        raise fail(StoreError, where, "a random generator", "something else", "edited") from error
+
+
+def _is_whole(belief: object) -> bool:
+    if not isinstance(belief, ParticleBelief):
+        return False
+    shared, count = belief.shared, belief.log_weight.size
+    width = shared.width if isinstance(shared, LevelMemory) else belief.kept.shape[0]
+    return (
+        belief.state.shape == (STATES, count)
+        and belief.log_weight.shape == (count,)
+        and belief.kept.shape == (width, count)
+    )

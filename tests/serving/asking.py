@@ -1,0 +1,135 @@
+"""Asking a service in this process, without a socket; and a small service over a made cross."""
+
+import asyncio
+import contextlib
+import json
+from dataclasses import dataclass
+
+from positioning.cross_world import walk_log
+
+from mapfilter.positioning.epochs import epochs
+from mapfilter.serving.app import Service
+from mapfilter.serving.limits import ServiceLimits
+from mapfilter.serving.sessions import Sessions
+from mapfilter.serving.store import SessionStore
+from mapfilter.tracks.identify import PlanNames
+
+JSON = {"content-type": "application/json", "host": "localhost"}
+SERVING = {"role": "serving", "cell": "W", "level_dbm": -70.0}
+
+
+@dataclass
+class Answer:
+    code: int
+    headers: dict
+    body: bytes
+
+    @property
+    def json(self):
+        return json.loads(self.body)
+
+    @property
+    def reason(self):
+        return self.json["error"]["errors"][0]["reason"]
+
+
+def request(method, path, body=b"", headers=None, query=b""):
+    """The scope of a request, and its client's messages; after a part None nothing more comes."""
+    body = body if isinstance(body, bytes | list) else json.dumps(body).encode()
+    parts = body if isinstance(body, list) else [body]
+    held = JSON if headers is None else headers
+    scope = {
+        "type": "http",
+        "method": method,
+        "path": path,
+        "raw_path": path.encode(),
+        "query_string": query,
+        "headers": [(k.lower().encode(), v.encode()) for k, v in held.items()],
+        "client": ("127.0.0.1", 1),
+        "server": ("127.0.0.1", 80),
+        "scheme": "http",
+        "http_version": "1.1",
+        "root_path": "",
+    }
+    ends = [False] * (len(parts) - 1) + [True]
+    both = [(part, end) for part, end in zip(parts, ends, strict=True) if part is not None]
+    more = [{"type": "http.request", "body": part, "more_body": not end} for part, end in both]
+    return scope, more
+
+
+async def ask(app, method, path, body=b"", headers=None, query=b""):
+    """Return the answer to one request."""
+    scope, messages = request(method, path, body, headers, query)
+    sent = []
+
+    async def receive():
+        if not messages:
+            await asyncio.sleep(3600)
+        return messages.pop(0)
+
+    async def send(message):
+        sent.append(message)
+
+    await app(scope, receive, send)
+    start = sent[0]
+    named = {k.decode(): v.decode() for k, v in start["headers"]}
+    return Answer(start["status"], named, b"".join(m.get("body", b"") for m in sent[1:]))
+
+
+class Streamed:
+    """A client of a stream of events; it takes a part when it is asked to."""
+
+    def __init__(self, app, path, headers=None):
+        self.gone, self.parts = asyncio.Event(), asyncio.Queue(maxsize=1)
+        scope, messages = request("GET", path, headers={**JSON, **(headers or {})})
+
+        async def receive():
+            if messages:
+                return messages.pop(0)
+            await self.gone.wait()
+            return {"type": "http.disconnect"}
+
+        self.task = asyncio.ensure_future(app(scope, receive, self.parts.put))
+
+    async def take(self, count):
+        """Return the next events with data, as (name, number, document)."""
+        found = []
+        while len(found) < count:
+            part = await asyncio.wait_for(self.parts.get(), 20)
+            lines = part.get("body", b"").decode().splitlines()
+            held = dict(line.split(": ", 1) for line in lines if line and line[0] != ":")
+            if "data" in held:
+                found.append((held["event"], held.get("id"), json.loads(held["data"])))
+        return found
+
+
+@contextlib.contextmanager
+def service(positioner, plan, folder=None, locate=None, token="", names=(), **limits):
+    """A service, with its sessions saved in a folder or nowhere."""
+    held = ServiceLimits(**({"rate_per_s": 1e5} | limits))
+    store = SessionStore.in_folder(folder, "made") if folder is not None else None
+    sessions = Sessions(positioner, PlanNames(plan), held, store)
+    if store is not None:
+        found, lost = store.read_all()
+        assert not lost
+        sessions.restore(found)
+    try:
+        yield Service(sessions, locate, held, token, frozenset(names))
+    finally:
+        sessions.close()
+
+
+def documents(count=None):
+    """The epochs of the walk on the cross, as a client sends them; the log, and its epochs."""
+    log = walk_log()
+    radio = log.radio.iloc[1:].assign(level_dbm=-70.0)
+    log = walk_log(radio=radio)
+    sent = []
+    for epoch in epochs(log)[:count]:
+        one = {"time_s": epoch.time_s}
+        one["motion"] = [{"step_m": m.step_m, "heading_rad": m.heading_rad} for m in epoch.motion]
+        one["radio"] = [
+            {"role": r.role, "cell": r.cell, "level_dbm": r.level_dbm} for r in epoch.radio
+        ]
+        sent.append(one)
+    return sent, log

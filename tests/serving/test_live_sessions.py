@@ -1,0 +1,263 @@
+"""Sessions give what a replay gives, also after a restart, a crash, or a while on disk."""
+
+import asyncio
+import json
+
+import numpy as np
+import pytest
+from asking import SERVING, Streamed, ask, documents, service
+
+from mapfilter.errors import ConfigError
+from mapfilter.positioning.filter import locate as replay
+from mapfilter.serving.store import SessionStore
+
+COUNT = 60
+
+
+async def begin(app, **body):
+    answer = await ask(app, "POST", "/sessions", {"seed": 0, **body})
+    assert answer.code == 201, answer.body
+    assert answer.headers["location"] == f"/sessions/{answer.json['id']}"
+    return answer.json["id"]
+
+
+async def post(app, session, sent):
+    answer = await ask(app, "POST", f"/sessions/{session}/epochs", {"epochs": sent})
+    assert answer.code == 200, answer.body
+    return answer.json["fixes"]
+
+
+@pytest.fixture(scope="module")
+def whole(positioner, cross):
+    """The fixes of one session without any interruption."""
+
+    async def run(app):
+        return await post(app, await begin(app), documents(COUNT)[0])
+
+    with service(positioner, cross.plan) as made:
+        return asyncio.run(run(made.app()))
+
+
+def test_a_session_gives_what_a_replay_gives(positioner, whole):
+    track = replay(documents()[1], positioner, np.random.default_rng(0)).estimate
+    assert [one["status"] for one in whole] == list(track.status)[:COUNT]
+    for name in ("time_s", "east_m", "north_m", "mass_50m", "protection_m"):
+        found = np.array([one[name] for one in whole], dtype=np.float64)
+        expected = getattr(track, name)[:COUNT]
+        expected = np.where(np.isfinite(expected), expected, np.nan)
+        np.testing.assert_array_equal(found, expected)
+    assert whole[-1]["number"] == COUNT
+    assert {"lat_deg", "lon_deg", "radius_95_m", "unused"} <= whole[-1].keys()
+    assert whole[-1]["lat_deg"] == pytest.approx(41.15, abs=0.1)
+
+
+@pytest.mark.parametrize("cuts", [(1, 2, 40), (30,)])
+def test_requests_may_be_cut_anywhere_and_the_service_started_again(
+    positioner, cross, whole, tmp_path, cuts
+):
+    sent, fixes, session = documents(COUNT)[0], [], None
+    for first, last in zip((0, *cuts), (*cuts, COUNT), strict=True):
+        with service(positioner, cross.plan, tmp_path) as made:
+
+            async def run(app, made, part):
+                nonlocal session
+                session = session or await begin(app)
+                fixes.extend(await post(app, session, part))
+                shown = (await ask(app, "GET", f"/sessions/{session}")).json
+                assert shown["last"] == fixes[-1]
+                assert await made.sessions.save_all() == 1
+                assert await made.sessions.save_all() == 0
+
+            asyncio.run(run(made.app(), made, sent[first:last]))
+    assert fixes == whole
+    assert [path.stat().st_mode & 0o077 for path in tmp_path.iterdir()] == [0]
+
+
+def test_after_a_crash_a_client_goes_on_from_the_last_saved_epoch(
+    positioner, cross, whole, tmp_path
+):
+    sent = documents(COUNT)[0]
+    with service(positioner, cross.plan, tmp_path) as made:
+
+        async def before():
+            app = made.app()
+            session = await begin(app)
+            await post(app, session, sent[:20])
+            await made.sessions.save_all()
+            await post(app, session, sent[20:40])
+            return session
+
+        session = asyncio.run(before())
+    with service(positioner, cross.plan, tmp_path) as made:
+
+        async def after():
+            app = made.app()
+            shown = (await ask(app, "GET", f"/sessions/{session}")).json
+            assert (shown["epochs"], shown["time_s"]) == (20, sent[19]["time_s"])
+            assert shown["saved_time_s"] == shown["time_s"]
+            return await post(app, session, [e for e in sent if e["time_s"] > shown["time_s"]])
+
+        assert asyncio.run(after()) == whole[20:]
+
+
+def test_states_without_room_are_kept_on_disk(positioner, cross, whole, tmp_path):
+    sent = documents(COUNT)[0]
+    with service(positioner, cross.plan, tmp_path, state_bytes=1) as made:
+
+        async def run():
+            app = made.app()
+            session, other = await begin(app), await begin(app)
+            fixes = []
+            for at in range(0, COUNT, 15):
+                fixes += await post(app, session, sent[at : at + 15])
+                assert made.sessions.held_bytes > 0
+                await made.sessions.make_room()
+                assert made.sessions.held_bytes == 0
+            assert await post(app, other, sent[:5]) == whole[:5]
+            return fixes
+
+        assert asyncio.run(run()) == whole
+
+
+def test_without_a_folder_no_session_begins_when_memory_is_used_up(positioner, cross):
+    with service(positioner, cross.plan, state_bytes=1) as made:
+
+        async def run():
+            app = made.app()
+            await begin(app)
+            return await ask(app, "POST", "/sessions", {})
+
+        answer = asyncio.run(run())
+    assert (answer.code, answer.reason) == (503, "outOfMemory")
+
+
+def test_requests_of_one_session_follow_each_other_and_are_whole_or_not_at_all(
+    positioner, cross, whole
+):
+    sent = documents(COUNT)[0]
+    with service(positioner, cross.plan, waiting=2) as made:
+
+        async def run():
+            app = made.app()
+            session = await begin(app)
+            path = f"/sessions/{session}/epochs"
+            parts = [sent[:20], sent[20:40], sent[40:]]
+            asked = [ask(app, "POST", path, {"epochs": part}) for part in parts]
+            first, second, third = await asyncio.gather(*asked)
+            assert first.json["fixes"] + second.json["fixes"] == whole[:40]
+            assert (third.code, third.reason) == (429, "tooManyRequests")
+            wrong = [*sent[40:], {"time_s": 1e6, "radio": [{"role": "x"}]}]
+            assert (await ask(app, "POST", path, {"epochs": wrong})).code == 400
+            again = await ask(app, "POST", path, {"epochs": sent[30:50]})
+            assert (again.code, again.reason) == (409, "outOfOrder")
+            assert await post(app, session, sent[40:]) == whole[40:]
+
+        asyncio.run(run())
+
+
+def test_a_known_start_is_tracked_from_there(positioner, cross, whole):
+    place = {name: whole[-1][name] for name in ("lat_deg", "lon_deg")}
+    with service(positioner, cross.plan) as made:
+
+        async def run():
+            app = made.app()
+            session = await begin(app, start={**place, "sd_m": 3.0}, name="a phone")
+            return await post(app, session, [{"time_s": 0.0, "radio": [SERVING]}])
+
+        (fix,) = asyncio.run(run())
+    assert fix["status"] == "TRACKING"
+    off_m = np.hypot(fix["east_m"] - whole[-1]["east_m"], fix["north_m"] - whole[-1]["north_m"])
+    assert off_m < 10
+
+
+def test_sessions_end_when_deleted_or_idle_and_leave_nothing(positioner, cross, tmp_path):
+    with service(positioner, cross.plan, tmp_path, sessions=2, idle_s=0.05) as made:
+
+        async def run():
+            app = made.app()
+            one, other = await begin(app), await begin(app)
+            full = await ask(app, "POST", "/sessions", {})
+            assert (full.code, full.reason) == (503, "tooManySessions")
+            stream = Streamed(app, f"/sessions/{one}/events")
+            await asyncio.sleep(0)
+            assert (await ask(app, "DELETE", f"/sessions/{one}")).code == 204
+            assert await stream.take(1) == [("end", None, {"reason": "deleted"})]
+            await stream.parts.get()
+            await stream.task
+            listed = (await ask(app, "GET", "/sessions")).json["sessions"]
+            assert [found["id"] for found in listed] == [other]
+            await asyncio.sleep(0.1)
+            assert await made.sessions.end_idle() == 1
+            for session in (one, other):
+                assert (await ask(app, "GET", f"/sessions/{session}")).code == 404
+
+        asyncio.run(run())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_sessions_of_another_database_are_refused(positioner, cross, tmp_path):
+    with service(positioner, cross.plan, tmp_path) as made:
+        asyncio.run(begin(made.app()))
+    with pytest.raises(ConfigError, match="sessions of this database"):
+        SessionStore.in_folder(tmp_path, "another").read_all()
+
+
+def test_damaged_sessions_are_named_and_the_others_restored(positioner, cross, tmp_path):
+    with service(positioner, cross.plan, tmp_path) as made:
+
+        async def run():
+            app = made.app()
+            return [await begin(app) for _ in range(3)]
+
+        ids = asyncio.run(run())
+    cut, changed = (tmp_path / f"{one}.session" for one in ids[:2])
+    cut.write_bytes(cut.read_bytes()[:-7])
+    changed.write_bytes(changed.read_bytes().replace(b'"seed":0', b'"seed":1'))
+    (tmp_path / "..session").write_bytes(b"")
+    found, lost = SessionStore.in_folder(tmp_path, "made").read_all()
+    assert list(found) == [ids[2]]
+    assert len(lost) == 3
+    assert sum("cut off or changed" in line for line in lost) == 2
+
+
+def test_listeners_get_fixes_and_what_they_missed(positioner, cross, whole):
+    sent = documents(COUNT)[0]
+    with service(positioner, cross.plan, listeners=2) as made:
+
+        async def run():
+            app = made.app()
+            session = await begin(app)
+            path = f"/sessions/{session}/events"
+            one = Streamed(app, path)
+            await asyncio.sleep(0.01)
+            await post(app, session, sent[:10])
+            events = await one.take(10)
+            assert [json.loads(number) for _, number, _ in events] == list(range(1, 11))
+            assert [fix for *_, fix in events] == whole[:10]
+            late = Streamed(app, path, {"last-event-id": "7"})
+            assert [fix for *_, fix in await late.take(3)] == whole[7:10]
+            third = await ask(app, "GET", path)
+            assert (third.code, third.reason) == (429, "tooManyRequests")
+            for stream in (one, late):
+                stream.gone.set()
+                stream.parts = asyncio.Queue()
+            await asyncio.sleep(0.05)
+            assert made.sessions.all[session].channel.listeners == set()
+
+        asyncio.run(run())
+
+
+def test_a_listener_that_takes_nothing_is_cut_off_and_holds_nobody_up(positioner, cross, whole):
+    sent = documents(COUNT)[0]
+    with service(positioner, cross.plan, send_s=0.2) as made:
+
+        async def run():
+            app = made.app()
+            session = await begin(app)
+            slow = Streamed(app, f"/sessions/{session}/events")
+            await asyncio.sleep(0.01)
+            assert await post(app, session, sent) == whole
+            await asyncio.wait_for(slow.task, 20)
+            assert made.sessions.all[session].channel.listeners == set()
+
+        asyncio.run(run())

@@ -1,0 +1,321 @@
+"""What comes over the network is checked at the door, and all that is wrong is said at once."""
+
+import asyncio
+import gzip
+import json
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pandas as pd
+import pytest
+from asking import JSON, SERVING, ask, documents, service
+from positioning.cross_world import CRS
+
+from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.fingerprints.locating import locate_by
+from mapfilter.positioning.fingerprints.reports import reports_of_log
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.serving.documents import RequestError
+from mapfilter.serving.epoch_rows import read_epochs
+from mapfilter.serving.geolocate import geolocator
+from mapfilter.tracks.identify import PlanNames, name_by_plan
+from mapfilter.tracks.log import make_log
+
+TOKEN = "0123456789abcdef"
+
+
+@pytest.fixture(scope="module")
+def made(positioner, cross, locate):
+    with service(positioner, cross.plan, locate=locate, body_bytes=20_000, receive_s=0.2) as one:
+        yield one
+
+
+def answer_of(made, *args, **kwargs):
+    return asyncio.run(ask(made.app(), *args, **kwargs))
+
+
+def epoch(**fields):
+    return {"epochs": [{"time_s": 1.0, **fields}]}
+
+
+HOSTILE = {
+    "cut off": b'{"epochs": [',
+    "no JSON": b"epochs",
+    "not UTF-8": b'{"epochs": "\xff"}',
+    "NaN": b'{"epochs": [{"time_s": NaN}]}',
+    "infinity": b'{"epochs": [{"time_s": -Infinity}]}',
+    "deep": b'{"a":' * 3000 + b"1" + b"}" * 3000,
+    "deep list": b"[" * 15_000,
+    "digits": b'{"a":' + b"9" * 10_000 + b"}",
+    "surrogate": b'{"epochs": "\\ud800"}',
+    "surrogate key": b'{"\\udc00": 1}',
+    "key twice": b'{"epochs": [], "epochs": []}',
+    "list": b"[]",
+    "number": b"1",
+    "compressed": gzip.compress(b'{"epochs": []}'),
+}
+
+
+@pytest.mark.parametrize("body", HOSTILE.values(), ids=HOSTILE.keys())
+@pytest.mark.parametrize("path", ["/sessions", "/v1/geolocate"])
+def test_what_is_no_strict_json_is_refused(made, body, path):
+    answer = answer_of(made, "POST", path, body)
+    assert (answer.code, answer.reason) == (400, "parseError")
+    assert answer.json["error"]["code"] == 400
+    assert len(answer.body) < 1000
+    assert not made.sessions.all
+
+
+WRONG = {
+    "epochs": {"epochs": 1},
+    "no epoch": {"epochs": []},
+    "nothing": {},
+    "too many": {"epochs": [{"time_s": i} for i in range(301)]},
+    "an epoch that is none": {"epochs": [1]},
+    "an unknown key": {"epoch": []},
+    "no time": {"epochs": [{}]},
+    "a time as text": {"epochs": [{"time_s": "1"}]},
+    "a time that overflows": {"epochs": [{"time_s": 10**400}]},
+    "true": {"epochs": [{"time_s": True}]},
+    "order": {"epochs": [{"time_s": 2}, {"time_s": 1}]},
+    "equal times": {"epochs": [{"time_s": 1}, {"time_s": 1}]},
+    "a table": epoch(motoin=[]),
+    "truth": epoch(truth=[{"east_m": 1, "north_m": 1}]),
+    "rows": epoch(radio={"role": "serving"}),
+    "degrees": epoch(motion=[{"step_m": 1, "heading_rad": 90}]),
+    "missing sign": epoch(motion=[{"step_m": -9999}]),
+    "column": epoch(motion=[{"step": 1}]),
+    "role": epoch(radio=[{**SERVING, "role": "best"}]),
+    "no role": epoch(radio=[{"cell": "W"}]),
+    "level": epoch(radio=[{**SERVING, "level_dbm": 40}]),
+    "cell": epoch(radio=[{**SERVING, "cell": 7}]),
+    "long cell": epoch(radio=[{**SERVING, "cell": "x" * 129}]),
+    "escape": epoch(radio=[{**SERVING, "cell": "\x1b[2J"}]),
+    "fraction": epoch(radio=[{**SERVING, "arfcn": 1.5}]),
+    "carrier": epoch(radio=[{**SERVING, "technology": "GSM", "arfcn": 5000}]),
+    "covariance": epoch(
+        gnss=[{"east_m": 0, "north_m": 0, "var_east_m2": 1, "var_north_m2": 1,
+               "cov_east_north_m2": 2}]
+    ),
+    "satellite": epoch(pseudoranges=[{"satellite": "G01", "x_m": 1.0, "y_m": 2.0, "z_m": 3.0}]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("body", WRONG.values(), ids=WRONG.keys())
+def test_epochs_with_a_fault_are_refused_with_its_place(cross, body):
+    with pytest.raises(RequestError) as caught:
+        read_epochs(body, PlanNames(cross.plan), nan)
+    error = caught.value
+    assert error.code == 400
+    assert error.faults
+    assert all(fault.where and fault.expected for fault in error.faults)
+
+
+def test_all_faults_of_a_request_are_named_together(cross):
+    body = epoch(
+        motion=[{"step_m": "1"}], radio=[{"role": "x"}, SERVING, {"role": "neighbour", "cell": ""}]
+    )
+    with pytest.raises(RequestError) as caught:
+        read_epochs(body, PlanNames(cross.plan), nan)
+    assert [fault.where for fault in caught.value.faults] == [
+        "epochs[0].motion[0].step_m",
+        "epochs[0].radio[0].role",
+        "epochs[0].radio[2].cell",
+    ]
+    assert [one["location"] for one in caught.value.document["error"]["errors"]] == [
+        fault.where for fault in caught.value.faults
+    ]
+
+
+def test_epochs_are_those_of_a_log_with_the_same_rows():
+    cells = [("a", 262, 1, 5, 77), ("b", None, None, None, None)]
+    plan = CellPlan(
+        CRS,
+        tuple(
+            Cell(name, name, 531_000.0, 4_556_000.0, 30.0, None, 50.0, 1800.0, "omni",
+                 mcc=mcc, mnc=mnc, lac=lac, ci=ci, arfcn=7, bsic=index)
+            for index, (name, mcc, mnc, lac, ci) in enumerate(cells)
+        ),
+    )  # fmt: skip
+    tables = {
+        "motion": [{"step_m": 1.5, "heading_rad": 6.0}, {"turn_rad": 0.1}],
+        "radio": [
+            {"role": "serving", "mcc": 262, "mnc": 1, "lac": 5, "ci": 77, "timing_advance": 2},
+            {"role": "neighbour", "cell": "b", "level_dbm": -80.5, "censored": -1},
+            {"role": "neighbour", "cell": "b", "level_dbm": -80.5, "censored": -1},
+            {"role": "neighbour", "arfcn": 7, "bsic": 1},
+            {"role": "neighbour", "cell": "262-1-5-77", "technology": "GSM"},
+        ],
+        "gnss": [{"east_m": 531_000.0, "north_m": 4_556_000.0, "var_east_m2": 4.0}],
+        "pseudoranges": [
+            {"satellite": "G01", "pseudorange_m": 2e7, "x_m": 2e7, "y_m": 1e7, "z_m": 0.0}
+        ],
+        "tdoa": [{"cell": "a", "reference": "b", "difference_m": 5.0}],
+    }
+    frames = {name: pd.DataFrame(rows).assign(time_s=3.0) for name, rows in tables.items()}
+    expected = epochs(name_by_plan(make_log(CRS, **frames), plan))
+    found = read_epochs({"epochs": [{"time_s": 3, **tables}]}, PlanNames(plan), nan)
+    assert repr(found) == repr(expected)
+
+
+def test_bodies_are_limited_in_size_type_and_time(made):
+    large = b" " * 20_001
+    answer = answer_of(made, "POST", "/sessions", large)
+    assert (answer.code, answer.headers["connection"]) == (413, "close")
+    announced = {**JSON, "content-length": "9" * 30}
+    assert answer_of(made, "POST", "/sessions", b"{}", announced).code == 413
+    parts = [b" " * 7000, b" " * 7000, b" " * 7000]
+    assert answer_of(made, "POST", "/sessions", parts).code == 413
+    packed = {**JSON, "content-encoding": "gzip"}
+    bomb = gzip.compress(b" " * 10_000_000)
+    assert answer_of(made, "POST", "/sessions", bomb, packed).reason == "unsupportedEncoding"
+    plain = {**JSON, "content-type": "text/plain"}
+    assert answer_of(made, "POST", "/sessions", b"{}", plain).code == 415
+    never = answer_of(made, "POST", "/sessions", [b"{", b" ", None])
+    assert (never.code, never.reason) == (408, "timeout")
+
+
+def test_tokens_are_asked_for(positioner, cross, locate):
+    with service(positioner, cross.plan, locate=locate, token=TOKEN) as made:
+        for given in (
+            {},
+            {"authorization": f"Bearer {TOKEN}x"},
+            {"authorization": f"Basic {TOKEN}"},
+        ):
+            answer = answer_of(made, "GET", "/sessions", headers={**JSON, **given})
+            assert (answer.code, answer.reason) == (401, "keyInvalid")
+            assert TOKEN not in answer.body.decode()
+        held = {**JSON, "authorization": f"Bearer {TOKEN}"}
+        assert answer_of(made, "GET", "/sessions", headers=held).code == 200
+        query = f"key={TOKEN}".encode()
+        assert answer_of(made, "GET", "/sessions", query=query).code == 401
+        body = {"cellTowers": [{"cellId": 1}]}
+        assert answer_of(made, "POST", "/v1/geolocate", body, query=query).code == 404
+        assert answer_of(made, "POST", "/v1/geolocate", body).code == 401
+
+
+@pytest.mark.parametrize(
+    ("host", "code"),
+    [("localhost:8765", 200), ("127.0.0.1", 200), ("[::1]:1", 200), ("box.lan", 200),
+     ("evil.example", 421), ("", 421), ("127.0.0.1.evil.example", 421)],
+)  # fmt: skip
+def test_pages_of_strangers_cannot_ask_by_a_name_of_theirs(positioner, cross, host, code):
+    with service(positioner, cross.plan, names=["box.lan"]) as made:
+        assert answer_of(made, "GET", "/", headers={"host": host}).code == code
+
+
+def test_requests_and_epochs_are_limited_by_rate(positioner, cross):
+    with service(positioner, cross.plan, rate_per_s=0.5, burst_s=20.0) as made:
+
+        async def run():
+            app = made.app()
+            session = (await ask(app, "POST", "/sessions", {})).json["id"]
+            path = f"/sessions/{session}/epochs"
+            many = [{"time_s": i} for i in range(9)]
+            assert (await ask(app, "POST", path, {"epochs": many[:5]})).code == 200
+            answer = await ask(app, "POST", path, {"epochs": many[5:]})
+            assert answer.code == 200
+            answer = await ask(app, "GET", "/")
+            assert (answer.code, answer.reason) == (429, "rateLimitExceeded")
+            assert int(answer.headers["retry-after"]) >= 1
+
+        asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "code"),
+    [("GET", "/nothing", 404), ("PUT", "/sessions", 405),
+     ("GET", "/sessions/../../etc/passwd", 404), ("GET", "/sessions/%2e%2e", 404),
+     ("DELETE", "/sessions/\x00", 404)],
+)  # fmt: skip
+def test_other_paths_lead_nowhere(made, method, path, code):
+    answer = answer_of(made, method, path)
+    assert answer.code == code
+    assert answer.json["error"]["code"] == code
+
+
+def test_a_report_is_located_as_locate_does_it(made, fitted, cross):
+    body = {"cellTowers": [{"cellId": 1}]}
+    unknown = answer_of(made, "POST", "/v1/geolocate", body)
+    assert (unknown.code, unknown.reason) == (404, "notFound")
+    cells = [replace_identity(cell, 100 + index) for index, cell in enumerate(cross.plan.cells)]
+    named = geolocator(fitted, CellPlan(CRS, tuple(cells)))
+    tower = {"mobileCountryCode": 262, "mobileNetworkCode": 1, "locationAreaCode": 9}
+    towers = [
+        {**tower, "cellId": 100 + index, "signalStrength": -60 - 9 * index} for index in (1, 0)
+    ]
+    found = named.answer({"cellTowers": towers, "radioType": "gsm", "considerIp": False})
+    ids = [cells[1].id, cells[0].id]
+    radio = pd.DataFrame(
+        {"time_s": 0.0, "role": ["serving", "neighbour"], "cell": ids, "level_dbm": [-69.0, -60.0]}
+    )
+    expected = locate_by(fitted, reports_of_log(make_log(CRS, radio=radio)))
+    table = expected.to_dataframe().iloc[0]
+    assert found["accuracy"] == table["radius_95_m"] > 0
+    assert found["location"] == {
+        "lat": pytest.approx(table["lat_deg"], abs=1e-9),
+        "lng": pytest.approx(table["lon_deg"], abs=1e-9),
+    }
+
+
+def replace_identity(cell, ci):
+    values = {name: getattr(cell, name) for name in cell.__dataclass_fields__}
+    return Cell(**{**values, "mcc": 262, "mnc": 1, "lac": 9, "ci": ci})
+
+
+def test_access_points_are_cells_by_their_addresses(fitted, cross):
+    ids = ("01:23:45:67:89:AB", *fitted.database.cell_ids[1:])
+    database = replace(fitted.database, cell_ids=ids)
+    made = geolocator(replace(fitted, database=database), cross.plan)
+    point = {"macAddress": "01-23-45-67-89-ab", "signalStrength": -60}
+    assert made.answer({"wifiAccessPoints": [point]})["accuracy"] > 0
+
+
+def test_faults_of_a_report_are_named_together(made):
+    body = {
+        "cellTowers": [{"cellId": -1, "signalStrength": 5}, {"mobileCountryCode": 1000}],
+        "wifiAccessPoints": [{"macAddress": "x"}],
+        "radioType": "7g",
+    }
+    answer = answer_of(made, "POST", "/v1/geolocate", body)
+    assert answer.code == 400
+    places = {one["location"] for one in answer.json["error"]["errors"]}
+    assert places == {
+        "radioType",
+        "cellTowers[0].cellId",
+        "cellTowers[0].signalStrength",
+        "cellTowers[1].mobileCountryCode",
+        "cellTowers[1].cellId",
+        "wifiAccessPoints[0].macAddress",
+    }
+    assert answer_of(made, "POST", "/v1/geolocate", {}).code == 400
+
+
+def test_a_fault_of_the_service_shows_nothing_of_it(positioner, cross, capsys):
+    class Broken:
+        def answer(self, _):
+            raise RuntimeError("inner words")
+
+    with service(positioner, cross.plan, locate=Broken()) as made:
+        answer = answer_of(made, "POST", "/v1/geolocate", {"cellTowers": []})
+    assert (answer.code, answer.reason) == (500, "backendError")
+    assert b"inner words" not in answer.body
+    assert "inner words" in capsys.readouterr().err
+
+
+def test_what_is_sent_is_strict_json(made):
+    sent = documents(3)[0]
+
+    async def run():
+        app = made.app()
+        session = (await ask(app, "POST", "/sessions", {"name": "ä"})).json["id"]
+        answer = await ask(app, "POST", f"/sessions/{session}/epochs", {"epochs": sent})
+        await ask(app, "DELETE", f"/sessions/{session}")
+        return answer
+
+    def refuse(name):
+        raise ValueError(name)
+
+    json.loads(asyncio.run(run()).body, parse_constant=refuse)
+    assert np.isfinite(sent[0]["time_s"])

@@ -1,0 +1,59 @@
+"""What is wrong with the command is said before anything is served."""
+
+import sys
+
+import pytest
+from workflows.command_line import assert_refused, mapfilter
+
+from mapfilter.serving.server import listen
+
+
+@pytest.fixture(scope="module")
+def database(cross):
+    return cross.path
+
+
+@pytest.fixture(autouse=True)
+def _no_token(monkeypatch):
+    monkeypatch.delenv("MAPFILTER_TOKEN", raising=False)
+
+
+def test_without_the_extra_there_is_one_plain_message(database, monkeypatch):
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    for name in ("mapfilter.workflows.serve", "mapfilter.serving.server"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    outcome = mapfilter("serve", "--db", database)
+    assert_refused(outcome, "pip install 'mapfilter[serve]'")
+
+
+def test_other_machines_are_not_served_without_a_token(database):
+    outcome = mapfilter("serve", "--db", database, "--host", "0.0.0.0", "--port", 0)
+    assert_refused(outcome, "--host", "a token for other hosts")
+
+
+def test_limits_are_checked_together(database):
+    outcome = mapfilter(
+        "serve", "--db", database, "--port", 70_000, "--sessions", 0, "--rate", "nan",
+        "--idle", -1, "--body", 0,
+    )  # fmt: skip
+    assert_refused(outcome, "--port", "--sessions", "--rate", "--idle", "--body")
+
+
+@pytest.mark.parametrize("token", ["short", "", "two words and more", "ümlaut" * 4, "a" * 5000])
+def test_tokens_are_long_and_plain(database, tmp_path, token):
+    (tmp_path / "token").write_text(token, encoding="utf-8")
+    outcome = mapfilter("serve", "--db", database, "--token-file", tmp_path / "token")
+    assert_refused(outcome, "token")
+    if token not in ("",):
+        assert token not in outcome.err
+
+
+def test_only_states_that_can_be_saved_are_served(database):
+    outcome = mapfilter("serve", "--db", database, "--port", 0, "--set", "filter.name=grid")
+    assert_refused(outcome, "filter", "bayes")
+
+
+def test_a_port_that_is_taken_is_named(database):
+    with listen("127.0.0.1", 0, "") as taken:
+        port = taken.getsockname()[1]
+        assert_refused(mapfilter("serve", "--db", database, "--port", port), f"127.0.0.1:{port}")
