@@ -159,8 +159,7 @@ def build(
         if measured is not None:
             readings, deviation = measured
             deviation = replace(deviation, lattice=rasters.lattice)
-            deviations = deviations_at_points(folder, deviation, ids)
-            parts = MeasuredParts(readings.of_cells(ids), deviations)
+            parts = MeasuredParts(readings, deviations_at_points(folder, deviation, ids))
         head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts, parts)
         head.write(folder, written.parts)
     return open_database(out)

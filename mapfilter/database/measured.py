@@ -77,20 +77,6 @@ class Readings:
         """Return some of the rows."""
         return Readings(self.cell_ids, *(getattr(self, name)[kept] for name in _READINGS))
 
-    def of_cells(self, cell_ids: Sequence[str]) -> Readings:
-        """Return the rows of some cells.
-
-        A survey has no raster of a cell that was measured too rarely, and its database no such
-        cell.
-        """
-        names = tuple(name for name in self.cell_ids if name in set(cell_ids))
-        if names == self.cell_ids:
-            return self
-        numbers = {name: number for number, name in enumerate(names)}
-        own = np.array([numbers.get(name, -1) for name in self.cell_ids], dtype=np.int32)
-        cell = own[self.cell]
-        return replace(self, cell_ids=names, cell=cell).some(cell >= 0)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviations:

@@ -83,18 +83,23 @@ def test_without_resume_a_build_starts_anew(world, whole, tmp_path):
     assert anew.tasks == everything.tasks
 
 
-def test_tiles_of_other_inputs_or_damaged_ones_are_made_again(world, whole, tmp_path):
+def test_tiles_of_other_inputs_are_not_used_and_go_with_the_finished_build(world, tmp_path):
+    out = tmp_path / "db"
+    interrupted(world, out, 4)
+    other = build(
+        world.rasters, world.plan, world.routes, out, tile_px=8, floor_dbm=-95, resume=True
+    )
+    assert other.floor_dbm == -95
+    assert not list(tmp_path.glob(".db.tiles-*"))
+
+
+def test_damaged_tiles_are_made_again(world, whole, tmp_path):
     out = tmp_path / "db"
     interrupted(world, out, 4)
     (tiles,) = tmp_path.glob(".db.tiles-*")
     cut, changed, *_ = sorted(tiles.iterdir())
     cut.write_bytes(cut.read_bytes()[:50])
     changed.write_bytes(changed.read_bytes()[:-1] + b"x")
-    other = build(
-        world.rasters, world.plan, world.routes, out, tile_px=8, floor_dbm=-95, resume=True
-    )
-    assert other.floor_dbm == -95
-    assert tiles.is_dir()
     assert contents(again(world, out, resume=True).path) == whole
     assert not tiles.exists()
 

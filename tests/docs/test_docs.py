@@ -191,6 +191,7 @@ def test_quickstart_shows_only_commands_that_exist():
         "bound",
         "evaluate",
         "film",
+        "serve",
         "sweep",
         "reproduce",
         "view",

@@ -72,7 +72,7 @@ def test_a_part_that_is_cut_off_is_none(tmp_path):
 
 def test_another_table_is_refused(tmp_path):
     other = tmp_path / "other.parquet"
-    with pytest.raises(StoreError, match="table of a sweep"):
+    with pytest.raises(StoreError, match="expected a readable file"):
         read_runs(other)
     pq.write_table(rows(0, 5).drop_columns(["draw", "route"]), other)
     with pytest.raises(StoreError, match="columns of a sweep"):

@@ -67,16 +67,6 @@ def served(count=40):
     )  # fmt: skip
 
 
-def test_readings_of_cells_that_a_database_lacks_are_left_out():
-    """A survey makes no raster of a cell that was measured too rarely."""
-    every = served()
-    assert every.of_cells(CELLS) is every
-    some = every.of_cells(CELLS[1:])
-    assert some.cell_ids == CELLS[1:]
-    assert [some.cell_ids[n] for n in some.cell] == [CELLS[2]] * 20
-    np.testing.assert_array_equal(some.east_m, every.east_m[20:])
-
-
 def rasters(folder, *, filled):
     """Cells 0 and 2 are measured in one half of the area each, cell 1 nowhere."""
     col = np.arange(SIZE)[None, :] + np.zeros((SIZE, 1))

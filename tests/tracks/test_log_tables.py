@@ -96,6 +96,7 @@ def test_every_kind_and_part_of_a_log_belongs_to_one_table():
         "start_utc_s",
         "notes",
         "imu",
+        "vehicle",
     }
 
 
