@@ -24,8 +24,8 @@ from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import pixels
 from mapfilter.positioning.bayes.alternative import MapBelief
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, RadioReading, joined
-from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.evidence import EvidenceUpdate, RadioReading
+from mapfilter.positioning.bayes.filter import BayesPositioner, weighed_by
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 
@@ -65,10 +65,15 @@ class Explanation:
         Streets first, then readings in the order in which the filter takes them.
     prior : float
         Log odds of the leading hypothesis against the runner-up before the epoch.
+    withheld, alternative_withheld : float
+        Log evidence of levels that the belief, and the alternative, are not weighed by: it is a
+        part of the evidence of a belief that is tracked, but of no hypothesis.
     """
 
     rows: tuple[Contribution, ...]
     prior: float
+    withheld: float = 0.0
+    alternative_withheld: float = 0.0
 
 
 class _Prefix(NamedTuple):
@@ -107,7 +112,7 @@ def explain(
     start = before.belief
     if start is None or isinstance(start, GridBelief):
         return None
-    state, updates = filter_.evidence_at(before, epoch, rng)
+    state, updates, measured = filter_.evidence_at(before, epoch, rng)
     belief = state.belief
     if not isinstance(belief, ParticleBelief):
         return None
@@ -115,8 +120,10 @@ def explain(
     model = filter_.model
     sets = [_near(belief.state, lead_m), _near(belief.state, runner_m)]
     moved = _streets(start, belief, sets)
-    main = list(_prefixes(joined(updates), updates, names, alternative=False))
-    own = [*moved, *_chain(model, belief, main, sets)]
+    reading = weighed_by(belief, updates, measured=measured)
+    main = list(_prefixes(reading, updates, names, alternative=False))
+    chain, withheld = _chain(model, belief, main, sets)
+    own, withheld_beside = [*moved, *chain], 0.0
     other = state.alternative
     beside: list[tuple[float, ...]]
     if other is None or not isinstance(other.belief, ParticleBelief):
@@ -124,11 +131,10 @@ def explain(
     else:
         everywhere = [np.ones(other.belief.log_weight.size, dtype=np.bool_)]
         previous = before.alternative.belief if before.alternative is not None else other.belief
-        terms = list(_prefixes(joined(updates, alternative=True), updates, names, alternative=True))
-        beside = [
-            *_streets(previous, other.belief, everywhere),
-            *_chain(model, other.belief, terms, everywhere),
-        ]
+        against = weighed_by(other.belief, updates, measured=measured, alternative=True)
+        terms = list(_prefixes(against, updates, names, alternative=True))
+        chain, withheld_beside = _chain(model, other.belief, terms, everywhere)
+        beside = [*_streets(previous, other.belief, everywhere), *chain]
     heads = [("streets", -1, nan), *((one.what, one.cell, one.measured_dbm) for one in main)]
     rows = tuple(
         Contribution(
@@ -144,9 +150,8 @@ def explain(
         for (what, cell, measured_dbm), pair, third in zip(heads, own, beside, strict=True)
     )
     totals = [_log_sum(start.log_weight, one) for one in sets]
-    return Explanation(
-        rows, totals[0] - totals[1] if start.log_weight.size == sets[0].size else nan
-    )
+    prior = totals[0] - totals[1] if start.log_weight.size == sets[0].size else nan
+    return Explanation(rows, prior, withheld, withheld_beside)
 
 
 def level_at(model: BayesModel, place_m: tuple[float, float], cell: int) -> float:
@@ -182,15 +187,19 @@ def _streets(before: MapBelief, moved: MapBelief, sets: Sequence[Bools]) -> list
 
 def _chain(
     model: BayesModel, belief: ParticleBelief, prefixes: Sequence[_Prefix], sets: Sequence[Bools]
-) -> Iterator[tuple[float, ...]]:
-    """Yield the contribution of each reading, given those before it, to each set."""
+) -> tuple[list[tuple[float, ...]], float]:
+    """Return the contribution of each reading, given those before it, and what all withhold."""
+    rows: list[tuple[float, ...]] = []
+    withheld = 0.0
     last = [_log_sum(belief.log_weight, one) for one in sets]
     for prefix in prefixes:
         weighed = belief.log_weight.copy()
-        model.weigh(belief.cloud, weighed, prefix.reading)
+        cloud, _ = model.weigh(belief.cloud, weighed, prefix.reading)
+        withheld = cloud.withheld
         now = [_log_sum(weighed, one) for one in sets]
-        yield tuple(after - earlier for after, earlier in zip(now, last, strict=True))
+        rows.append(tuple(after - earlier for after, earlier in zip(now, last, strict=True)))
         last = now
+    return rows, withheld
 
 
 def _prefixes(

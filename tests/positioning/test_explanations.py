@@ -8,10 +8,13 @@ from math import isfinite, nan
 import numpy as np
 import pytest
 from made_town import NAMES, SOUTH_M, WEST_M, Town, walk_log
+from scipy.special import logsumexp
 
+from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import Cloud
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import Hypotheses, locate
@@ -64,7 +67,7 @@ def test_contributions_add_up_to_the_evidence_of_the_filter(town_filter, steps, 
         if found is None:
             continue
         # What the map says of steps between two reports waits for the next one.
-        total += sum(row.lead for row in found.rows)
+        total += sum(row.lead for row in found.rows) + found.withheld
         if after.takeovers > before.takeovers or not isfinite(output.fix.east_m):
             total = nan
         gained = after.belief.log_evidence - before.belief.log_evidence
@@ -94,7 +97,7 @@ def test_contributions_to_the_alternative_add_up_to_its_evidence(town_filter, st
             continue
         found = explained(town_filter, (state, epoch, drawn, after, output))
         gained = other.belief.log_evidence - belief.log_evidence
-        total = sum(row.alternative for row in found.rows)
+        total = sum(row.alternative for row in found.rows) + found.alternative_withheld
         assert total + waiting == pytest.approx(gained, abs=2e-6)
         compared += 1
     assert compared > 5
@@ -108,13 +111,14 @@ def test_differences_add_up_to_the_change_of_log_odds(town_filter, steps):
         found = explained(town_filter, step)
         if found is None or np.isnan([row.runner for row in found.rows]).any():
             continue
-        state, updates = town_filter.evidence_at(before, epoch, copy.deepcopy(drawn))
+        state, updates, measured = town_filter.evidence_at(before, epoch, copy.deepcopy(drawn))
         reading = next((update.radio for update in updates if update.radio is not None), None)
         if reading is None:
             continue
         belief = state.belief
         weighed = np.zeros(belief.log_weight.size)
-        town_filter.model.weigh(belief.cloud, weighed, reading)
+        tracked = measured and belief.status is Status.TRACKING
+        town_filter.model.weigh(belief.cloud, weighed, replace(reading, tracked=tracked))
         odds = []
         for east_m, north_m in (
             (output.fix.east_m, output.fix.north_m),
@@ -128,6 +132,45 @@ def test_differences_add_up_to_the_change_of_log_odds(town_filter, steps):
             after = np.exp((belief.log_weight + weighed)[near].astype(np.longdouble))
             odds.append(float(np.log(after.sum()) - np.log(prior.sum())))
         shown = sum(row.lead - row.runner for row in found.rows)
+        assert shown == pytest.approx(odds[0] - odds[1], abs=1e-6)
+        compared += 1
+    assert compared > 5
+
+
+def test_contributions_are_those_by_which_the_step_itself_weighs(town_filter, walk, monkeypatch):
+    """The weights are caught inside the step: of a belief that is tracked levels count less."""
+    caught, weigh = [], BayesModel.weigh
+
+    def catching(model, cloud, log_weight, reading):
+        before = log_weight.copy()
+        answer = weigh(model, cloud, log_weight, reading)
+        caught.append((cloud.state.copy(), before, log_weight.copy()))
+        return answer
+
+    monkeypatch.setattr(module, "NEAR_M", 8.0)
+    compared, rng, start = 0, np.random.default_rng(3), walk.truth.iloc[0]
+    after = town_filter.begin_at(start["east_m"], start["north_m"], 5.0, rng)
+    for epoch in epochs(walk):
+        before, drawn = after, copy.deepcopy(rng)
+        caught.clear()
+        with monkeypatch.context() as patch:
+            patch.setattr(BayesModel, "weigh", catching)
+            after, output = town_filter.step(before, epoch, rng)
+        if before.belief.status is not Status.TRACKING:
+            continue
+        lead_m = output.fix.east_m - WEST_M, output.fix.north_m - SOUTH_M
+        runner_m = lead_m[0] + 10.0, lead_m[1]
+        found = explain(town_filter, before, epoch, copy.deepcopy(drawn), lead_m, runner_m)
+        if not caught or len(found.rows) < 2:
+            continue
+        state, prior, posterior = caught[0]
+        odds = []
+        for east_m, north_m in (lead_m, runner_m):
+            near = np.hypot(state[0] - east_m, state[1] - north_m) <= 8.0
+            odds.append(logsumexp(posterior[near]) - logsumexp(prior[near]))
+        shown = sum(row.lead - row.runner for row in found.rows[1:])
+        if not isfinite(odds[0] - odds[1]):
+            continue
         assert shown == pytest.approx(odds[0] - odds[1], abs=1e-6)
         compared += 1
     assert compared > 5
@@ -172,7 +215,7 @@ def test_a_report_by_itself_is_as_the_model_has_it(town_filter, steps):
     """The page's arithmetic against the model's kernels, for a report without any before it."""
     model, area = town_filter.model, town_filter.area
     rng, why = np.random.default_rng(8), constants(town_filter.model)
-    _, updates = town_filter.evidence_at(steps[0][0], steps[0][1], np.random.default_rng(0))
+    _, updates, _ = town_filter.evidence_at(steps[0][0], steps[0][1], np.random.default_rng(0))
     reading = next(update.radio for update in updates if update.radio is not None)
     reading = replace(reading, levels=reading.levels._replace(absent=np.empty(0, dtype=np.int32)))
     # Pixels of even predictions, so that the share of roughness under a fault hardly matters.

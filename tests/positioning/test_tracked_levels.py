@@ -10,6 +10,7 @@ from small_area import BANDS, COLS, OPTIONS, PIXEL_M, ROWS, make_area
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import Cloud, ParticleBelief, ParticleFilter, ParticleOptions
 from mapfilter.models.street_motion import STATES
+from mapfilter.positioning.bayes.evidence import FixedTerm
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import DeadReckoning
@@ -62,8 +63,12 @@ def test_a_share_of_the_levels_is_in_the_weights_and_the_rest_in_the_evidence(re
 
 
 def test_the_log_evidence_of_a_tracked_belief_is_that_of_the_whole_report(reading):
+    """Also with other evidence, and with hypotheses beyond the area."""
     cloud, log_weight = particles()
+    cloud.state[0, :40] = -30.0
     log_weight -= logsumexp(log_weight)
+    fix = FixedTerm(np.random.default_rng(2).normal(0, 2, COUNT))
+    reading = replace(reading, terms=(fix,))
     options = ParticleOptions(max_particles=COUNT, min_search_particles=COUNT, min_particles=COUNT)
     positioner = ParticleFilter(MODEL, options)
     belief = ParticleBelief(cloud.state, log_weight, MODEL.bins, cloud.kept, status=Status.TRACKING)
@@ -73,6 +78,26 @@ def test_the_log_evidence_of_a_tracked_belief_is_that_of_the_whole_report(readin
     ]
     assert evidence[1] == pytest.approx(evidence[0], abs=1e-5)
     assert abs(evidence[0]) > 1.0
+
+
+def test_beyond_the_area_the_same_share_counts(reading):
+    """There a prediction holds or not: both sides of the mixture count alike."""
+    cloud, _ = particles()
+    cloud.state[0] = -30.0
+    found = {}
+    for tracked in (False, True):
+        weight = np.zeros(COUNT)
+        after, _ = MODEL.weigh(cloud, weight, replace(reading, tracked=tracked))
+        found[tracked] = weight
+    whole, share = after.shared.other_log_likelihood, OPTIONS.levels.tracking_share
+    unknown = reading.radio_under_null(whole), reading.radio_under_null(share * whole)
+    # What the prediction at the edge says, from the mixture of the whole report.
+    inside = np.log(2 * np.exp(found[False]) - np.exp(unknown[0]))
+    alone = np.zeros(COUNT)
+    MODEL.weigh(cloud, alone, replace(reading, levels=None))
+    serving = np.log(2 * np.exp(alone) - np.exp(reading.radio_under_null(0.0)))
+    expected = np.logaddexp(serving + share * (inside - serving), unknown[1]) - np.log(2)
+    np.testing.assert_allclose(found[True], expected, atol=1e-4)
 
 
 def test_a_hypothesis_without_weight_keeps_none(reading):

@@ -194,17 +194,18 @@ class BayesPositioner(Filter[BayesState]):
 
     def evidence_at(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
-    ) -> tuple[BayesState, list[EvidenceUpdate]]:
-        """Return the state moved to an epoch, and the evidence that :meth:`step` weighs it with.
+    ) -> tuple[BayesState, list[EvidenceUpdate], bool]:
+        """Return what :meth:`step` weighs at an epoch; for explanations of it.
 
-        With the generator as before the step these are the step's own: for explanations of it.
+        The state moved to the epoch, the evidence, and whether motion was measured; with the
+        generator as before the step these are its own.
         """
         if epoch.fix and not (isfinite(epoch.fix.east_m) and isfinite(epoch.fix.north_m)):
             epoch = replace(epoch, fix=None)
         spacing_m = state.particle_spacing_m
-        watch, epoch, _ = watched(state.watch, epoch)
+        watch, epoch, (motion, _) = watched(state.watch, epoch)
         moved, _ = self._moved(replace(state, watch=watch), epoch, rng)
-        return self._collected(moved, epoch, spacing_m)
+        return *self._collected(moved, epoch, spacing_m), motion is Reason.USED
 
     def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
         """Load the compiled kernels, and prepare the area."""
@@ -334,25 +335,26 @@ class BayesPositioner(Filter[BayesState]):
         measured: bool,
     ) -> tuple[BayesState, Reason]:
         """Weigh the belief and its alternative; start, prefer or drop the alternative."""
-        reading = joined(updates)
+        reading = weighed_by(before, updates, measured=measured)
         if reading is None:
             return state, Reason.USED
         update, rules = self.filters[state.compass].update, self.rules
         plain = self._by_map_alone and not state.path.is_distinctive
         doubt = plain or doubted(rules, before, state.null, state.alternative)
         doubt = doubt or self.area.at_edge(before.summary.mean)
-        tracked = measured and before.status is Status.TRACKING
-        reading = replace(reading, doubted=doubt, tracked=tracked)
+        reading = replace(reading, doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
         null = _challenged(rules, state.null, reading, before, belief)
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
-            terms = joined(updates, alternative=True) or RadioReading()
+            own_reading = weighed_by(
+                alternative.belief, updates, measured=measured, alternative=True
+            )
+            terms = own_reading or RadioReading()
             doubt = plain or alternative.null.log_odds > rules.converge_log_odds
-            tracked = measured and alternative.belief.status is Status.TRACKING
-            terms = replace(terms, doubted=doubt, tracked=tracked)
+            terms = replace(terms, doubted=doubt)
             other, _ = update(alternative.belief, terms, rng)
             own = _challenged(rules, alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)
@@ -446,6 +448,19 @@ class BayesPositioner(Filter[BayesState]):
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
         kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
         return replace(belief, state=state, log_weight=log_weight, kept=kept)
+
+
+def weighed_by(
+    belief: MapBelief,
+    updates: Sequence[EvidenceUpdate],
+    *,
+    measured: bool,
+    alternative: bool = False,
+) -> RadioReading | None:
+    """Return the evidence as a belief is weighed by it; None without any."""
+    reading = joined(updates, alternative=alternative)
+    tracked = measured and belief.status is Status.TRACKING
+    return reading if reading is None else replace(reading, tracked=tracked)
 
 
 def _challenged(

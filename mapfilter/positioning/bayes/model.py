@@ -255,34 +255,63 @@ class BayesModel:
     def weigh(
         self, cloud: Cloud, log_weight: Floats, reading: RadioReading
     ) -> tuple[Cloud, Reason]:
-        """Add the log-likelihood of a report, then of each further term, in place."""
+        """Add the log-likelihood of a report, then of each further term, in place.
+
+        Of a belief that is tracked a part of that of levels is left out, and returned as log
+        evidence that is withheld from the weights.
+        """
+        kept_back: Floats | None = None
+        counted: Floats | None = None
         # A serving cell that the map lacks weighs all hypotheses in the area alike.
         used = reading.serving_weight > 0
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
             pixel = self._pixels(cloud.state)
             used = True
             cloud, before = self._aged(cloud, reading), log_weight.copy()
+            other = 0.0
             if reading.serving >= 0 and reading.serving_weight > 0:
                 self._weigh_serving(cloud, pixel, log_weight, reading)
             if reading.levels is not None:
                 start = log_weight.copy()
                 cloud = self._weigh_levels(cloud, pixel, log_weight, reading)
+                other = cloud.shared.other_log_likelihood
                 if reading.tracked and self.remember:
-                    share = self.evidence.levels.tracking_share
-                    cloud = cloud._replace(withheld=_withhold(start, log_weight, share))
+                    kept_back = (1 - self.evidence.levels.tracking_share) * _gained(
+                        start, log_weight
+                    )
             flat, bands, table = self.area.flat_level_dbm, self._bands, self._bound_table
             for bound in reading.bounds:
                 fingerprint.weigh_by_bound(pixel, flat, bands, bound, table, log_weight)
-            beyond = self.area.beyond(cloud.state)
-            if beyond.any():
-                other = cloud.shared.other_log_likelihood if reading.levels is not None else 0.0
-                # Predictions at the edge may hold, or not.
-                unknown = before[beyond] + reading.radio_under_null(other)
-                log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
+            if kept_back is not None:
+                counted = log_weight - kept_back
+                share = self.evidence.levels.tracking_share
+                self._weigh_beyond(cloud.state, before, counted, reading, share * other)
+            self._weigh_beyond(cloud.state, before, log_weight, reading, other)
         for term in reading.terms:
-            log_weight += term.log_likelihood(cloud.state)
+            log_likelihood = term.log_likelihood(cloud.state)
+            log_weight += log_likelihood
+            if counted is not None:
+                counted += log_likelihood
             used = True
+        if counted is not None:
+            whole = float(np.logaddexp.reduce(log_weight))
+            cloud = cloud._replace(withheld=whole - float(np.logaddexp.reduce(counted)))
+            log_weight[:] = counted
         return cloud, Reason.USED if used else Reason.NO_READING
+
+    def _weigh_beyond(
+        self,
+        state: Floats32,
+        before: Floats,
+        log_weight: Floats,
+        reading: RadioReading,
+        other_log_likelihood: float,
+    ) -> None:
+        """Mix what a report says beyond the area: predictions at the edge may hold, or not."""
+        beyond = self.area.beyond(state)
+        if beyond.any():
+            unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
+            log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
 
     def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
         """Return whether the leading hypothesis is on the map, and nothing else is as probable."""
@@ -374,12 +403,12 @@ def _sample(pixel: Ints32) -> Ints32:
     return pixel[:: max(pixel.size // _SAMPLE, 1)]
 
 
-def _withhold(start: Floats, log_weight: Floats, share: float) -> float:
-    """Leave a share of what log weights have gained, in place; return the evidence of the rest."""
-    counted = np.isfinite(log_weight)
-    before, after = start[counted], log_weight[counted]
-    log_weight[counted] = before + share * (after - before)
-    return float(np.logaddexp.reduce(after) - np.logaddexp.reduce(log_weight[counted]))
+def _gained(before: Floats, after: Floats) -> Floats:
+    """Return by how much log weights have grown; 0 where there is no weight."""
+    counted = np.isfinite(after)
+    gained = np.zeros(after.size)
+    gained[counted] = after[counted] - before[counted]
+    return gained
 
 
 def _new(state: Floats32) -> Cloud:
