@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 WRONG = 2
 """Exit code: the input or the command is wrong, or the machine too small for it."""
 
+_AGAIN_S = 0.05
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MOST_COUNTS = 12
 _MAX_TABLE_WIDTH = 200
@@ -146,7 +147,8 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
 def stop_signals() -> Iterator[None]:
     """Raise Stopped within the block when a signal asks the process to end; a second one ends it.
 
-    So what is half-written is removed, and workers are ended.
+    So what is half-written is removed, and workers are ended. Where a signal arrives in a library's
+    callback, nobody can catch what is raised there: it is raised again a moment later.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -157,13 +159,26 @@ def stop_signals() -> Iterator[None]:
             signal.signal(one, signal.SIG_DFL)
         raise Stopped(number)
 
+    def unraisable(lost: sys.UnraisableHookArgs) -> None:
+        error = lost.exc_value
+        if not isinstance(error, Stopped):
+            hook(lost)
+            return
+        signal.signal(error.signal_number, stop)
+        again = threading.Timer(_AGAIN_S, signal.raise_signal, (error.signal_number,))
+        again.daemon = True
+        again.start()
+
+    hook = sys.unraisablehook
     before = {one: signal.getsignal(one) for one in _STOPS}
+    sys.unraisablehook = unraisable
     for one, handler in before.items():
         if handler is not signal.SIG_IGN:
             signal.signal(one, stop)
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         for one, handler in before.items():
             signal.signal(one, handler)
 

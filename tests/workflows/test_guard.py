@@ -1,6 +1,9 @@
 """Pipelines tell what a user can mend as the command line does."""
 
+import ctypes
 import errno
+import signal
+import time
 
 import pytest
 
@@ -37,3 +40,27 @@ def test_codes_pass_and_other_errors_are_raised():
     assert guarded(lambda: None) == 0
     with pytest.raises(PermissionError):
         guarded(raising(PermissionError(errno.EACCES, "no", "x")))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_a_signal_that_arrives_in_a_callback_of_a_library_still_ends_the_command(number, capsys):
+    """What a callback raises is lost to whoever called it."""
+    reached = []
+
+    @ctypes.CFUNCTYPE(None)
+    def called():
+        signal.raise_signal(number)
+
+    def run():
+        called()
+        reached.append("after the callback")
+        until_s = time.monotonic() + 20
+        while time.monotonic() < until_s:
+            time.sleep(0.01)
+        return 0
+
+    assert guarded(run) == 128 + number
+    assert reached == ["after the callback"]
+    err = capsys.readouterr().err
+    assert f"stopped by {number.name}" in err
+    assert "Traceback" not in err
