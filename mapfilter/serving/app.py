@@ -166,11 +166,12 @@ class _Door:
                 return _refused(error)
             except ClientDisconnect:
                 return Response(status_code=400)
-            except MapfilterError as error:
-                return _refused(RequestError(500, "backendError", str(error)))
-            except Exception:
+            except Exception as error:
                 # A fault of the service: what it is goes to its log, not to the client.
-                traceback.print_exc(file=sys.stderr)
+                if isinstance(error, MapfilterError):
+                    sys.stderr.write(f"mapfilter: {error}\n")
+                else:
+                    traceback.print_exc(file=sys.stderr)
                 return _refused(RequestError(500, "backendError", "the service failed"))
 
         return answered

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import time
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from asking import SERVING, Streamed, ask, documents, service
 
 from mapfilter.errors import ConfigError
 from mapfilter.positioning.filter import locate as replay
+from mapfilter.serving import sessions as sessions_module
+from mapfilter.serving.documents import RequestError
 from mapfilter.serving.store import SessionStore
 
 COUNT = 60
@@ -261,3 +264,80 @@ def test_a_listener_that_takes_nothing_is_cut_off_and_holds_nobody_up(positioner
             assert made.sessions.all[session].channel.listeners == set()
 
         asyncio.run(run())
+
+
+def test_a_session_that_could_not_begin_is_not_there(positioner, cross, monkeypatch, capsys):
+    def broken(*_):
+        raise RuntimeError("inner words")
+
+    monkeypatch.setattr(sessions_module, "_first", broken)
+    with service(positioner, cross.plan) as made:
+        answer = asyncio.run(ask(made.app(), "POST", "/sessions", {}))
+        assert (answer.code, made.sessions.all) == (500, {})
+    assert "inner words" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("slow", ["_first", "write"])
+def test_a_session_whose_client_went_while_it_began_is_not_there(
+    positioner, cross, tmp_path, monkeypatch, slow
+):
+    where = sessions_module if slow == "_first" else SessionStore
+    whole = getattr(where, slow)
+
+    def slowly(*given):
+        time.sleep(0.2)
+        return whole(*given)
+
+    monkeypatch.setattr(where, slow, slowly)
+    with service(positioner, cross.plan, tmp_path) as made:
+
+        async def run():
+            task = asyncio.ensure_future(made.sessions.create({}))
+            await asyncio.sleep(0.1)
+            assert len(made.sessions.all) == 1
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            assert made.sessions.all == {}
+
+        asyncio.run(run())
+    assert list(tmp_path.glob("*.session")) == []
+
+
+def test_a_request_that_waited_while_its_session_ended_finds_none(positioner, cross, tmp_path):
+    sent = documents(2)[0]
+    with service(positioner, cross.plan, tmp_path, state_bytes=1) as made:
+
+        async def run():
+            app = made.app()
+            path = f"/sessions/{(session := await begin(app))}"
+            await made.sessions.make_room()
+            held = made.sessions.all[session]
+            async with held.lock:
+                ended = asyncio.ensure_future(ask(app, "DELETE", path))
+                # Found before it ends, and gets the lock after that.
+                late = asyncio.ensure_future(made.sessions.post(held, {"epochs": sent}))
+                await asyncio.sleep(0.01)
+            assert (await ended).code == 204
+            with pytest.raises(RequestError) as caught:
+                await late
+            assert caught.value.code == 404
+
+        asyncio.run(run())
+
+
+def test_a_damaged_file_is_named_to_the_log_only(positioner, cross, tmp_path, capsys):
+    with service(positioner, cross.plan, tmp_path, state_bytes=1) as made:
+
+        async def run():
+            app = made.app()
+            session = await begin(app)
+            await made.sessions.make_room()
+            (tmp_path / f"{session}.session").write_bytes(b"x")
+            path = f"/sessions/{session}/epochs"
+            return await ask(app, "POST", path, {"epochs": documents(1)[0]})
+
+        answer = asyncio.run(run())
+    assert (answer.code, answer.reason) == (500, "backendError")
+    assert str(tmp_path) not in answer.body.decode()
+    assert str(tmp_path) in capsys.readouterr().err
