@@ -31,8 +31,6 @@ _KEY = "key"
 reader of events can send no header."""
 _KEYED = ("/v1/geolocate", "/events")
 _SAFE = {"cache-control": "no-store", "x-content-type-options": "nosniff"}
-_PAGE_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-_PAGE_POLICY += "img-src data: blob:; worker-src blob:; connect-src 'self'"
 
 Handler = Callable[[Request], Awaitable[Response | EventStream]]
 
@@ -53,8 +51,6 @@ class Service:
         Without it requests are refused; empty for none.
     host_names : frozenset of str
         Names of this machine by which it may be asked, besides addresses and localhost.
-    page : bytes
-        HTML that shows sessions live; empty for none.
     """
 
     sessions: Sessions
@@ -62,7 +58,6 @@ class Service:
     limits: ServiceLimits
     token: str = ""
     host_names: frozenset[str] = frozenset()
-    page: bytes = b""
 
     def app(self) -> Starlette:
         """Return the ASGI application."""
@@ -80,9 +75,7 @@ class Service:
         return Starlette(routes=routes, exception_handlers={HTTPException: _no_route})
 
     async def _index(self, request: Request) -> Response:
-        if self.page and "text/html" in request.headers.get("accept", ""):
-            policy = {"content-security-policy": _PAGE_POLICY}
-            return Response(self.page, media_type="text/html", headers=_SAFE | policy)
+        del request
         found = {
             "service": "mapfilter",
             "version": VERSION,
