@@ -3,6 +3,7 @@
 import asyncio
 import json
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.positioning.filter import locate as replay
 from mapfilter.serving import sessions as sessions_module
 from mapfilter.serving.documents import RequestError
-from mapfilter.serving.store import SessionStore
+from mapfilter.serving.store import LOCK, SessionStore
 
 COUNT = 60
 
@@ -73,7 +74,7 @@ def test_requests_may_be_cut_anywhere_and_the_service_started_again(
 
             asyncio.run(run(made.app(), made, sent[first:last]))
     assert fixes == whole
-    assert [path.stat().st_mode & 0o077 for path in tmp_path.iterdir()] == [0]
+    assert [path.stat().st_mode & 0o077 for path in tmp_path.iterdir()] == [0, 0]
 
 
 def test_after_a_crash_a_client_goes_on_from_the_last_saved_epoch(
@@ -195,14 +196,32 @@ def test_sessions_end_when_deleted_or_idle_and_leave_nothing(positioner, cross, 
                 assert (await ask(app, "GET", f"/sessions/{session}")).code == 404
 
         asyncio.run(run())
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == [LOCK]
 
 
 def test_sessions_of_another_database_are_refused(positioner, cross, tmp_path):
     with service(positioner, cross.plan, tmp_path) as made:
         asyncio.run(begin(made.app()))
-    with pytest.raises(ConfigError, match="sessions of this database"):
-        SessionStore.in_folder(tmp_path, "another").read_all()
+    with (
+        closing(SessionStore.in_folder(tmp_path, "another")) as store,
+        pytest.raises(ConfigError, match="sessions of this database"),
+    ):
+        store.read_all()
+
+
+def test_a_folder_belongs_to_one_service_at_a_time(positioner, cross, tmp_path):
+    with service(positioner, cross.plan, tmp_path) as made:
+        session = asyncio.run(begin(made.app()))
+        with pytest.raises(ConfigError, match="one in use"):
+            SessionStore.in_folder(tmp_path, "another")
+    with closing(SessionStore.in_folder(tmp_path, "made")) as store:
+        assert list(store.read_all()[0]) == [session]
+
+
+def test_a_folder_that_cannot_be_locked_is_refused(tmp_path):
+    (tmp_path / LOCK).mkdir()
+    with pytest.raises(ConfigError, match="directory"):
+        SessionStore.in_folder(tmp_path, "made")
 
 
 def test_damaged_sessions_are_named_and_the_others_restored(positioner, cross, tmp_path):
@@ -217,7 +236,8 @@ def test_damaged_sessions_are_named_and_the_others_restored(positioner, cross, t
     cut.write_bytes(cut.read_bytes()[:-7])
     changed.write_bytes(changed.read_bytes().replace(b'"seed":0', b'"seed":1'))
     (tmp_path / "..session").write_bytes(b"")
-    found, lost = SessionStore.in_folder(tmp_path, "made").read_all()
+    with closing(SessionStore.in_folder(tmp_path, "made")) as store:
+        found, lost = store.read_all()
     assert list(found) == [ids[2]]
     assert len(lost) == 3
     assert sum("cut off or changed" in line for line in lost) == 2
