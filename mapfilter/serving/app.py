@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import sys
 import time
 import traceback
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any
 
 from starlette.applications import Starlette
@@ -19,7 +19,8 @@ from starlette.routing import Route
 
 from mapfilter._io import VERSION
 from mapfilter.errors import MapfilterError
-from mapfilter.serving.documents import RequestError, read_object
+from mapfilter.serving.documents import RequestError, one_fault, read_object
+from mapfilter.serving.epoch_rows import MOST_EPOCHS
 from mapfilter.serving.events import EventStream, json_bytes
 from mapfilter.serving.geolocate import Geolocator
 from mapfilter.serving.limits import RateLimit, ServiceLimits, bearer, is_own_host, same_token
@@ -30,8 +31,6 @@ _KEY = "key"
 reader of events can send no header."""
 _KEYED = ("/v1/geolocate", "/events")
 _SAFE = {"cache-control": "no-store", "x-content-type-options": "nosniff"}
-_PAGE_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-_PAGE_POLICY += "img-src data: blob:; worker-src blob:; connect-src 'self'"
 
 Handler = Callable[[Request], Awaitable[Response | EventStream]]
 
@@ -52,8 +51,6 @@ class Service:
         Without it requests are refused; empty for none.
     host_names : frozenset of str
         Names of this machine by which it may be asked, besides addresses and localhost.
-    page : bytes
-        HTML that shows sessions live; empty for none.
     """
 
     sessions: Sessions
@@ -61,7 +58,6 @@ class Service:
     limits: ServiceLimits
     token: str = ""
     host_names: frozenset[str] = frozenset()
-    page: bytes = b""
 
     def app(self) -> Starlette:
         """Return the ASGI application."""
@@ -79,9 +75,7 @@ class Service:
         return Starlette(routes=routes, exception_handlers={HTTPException: _no_route})
 
     async def _index(self, request: Request) -> Response:
-        if self.page and "text/html" in request.headers.get("accept", ""):
-            policy = {"content-security-policy": _PAGE_POLICY}
-            return Response(self.page, media_type="text/html", headers=_SAFE | policy)
+        del request
         found = {
             "service": "mapfilter",
             "version": VERSION,
@@ -113,7 +107,11 @@ class Service:
         document = await self._document(request)
         epochs = document.get("epochs")
         if isinstance(epochs, list):
-            request.state.door.charge(request, len(epochs) - 1)
+            # Before they are charged: what is never done must not use up the client's rate.
+            if len(epochs) > MOST_EPOCHS:
+                most = f"at most {MOST_EPOCHS} entries"
+                raise one_fault("epochs", most, len(epochs), "several requests")
+            request.state.door.charge(request, len(epochs) - 1, again=1.0)
         fixes = await self.sessions.post(session, document)
         return _with_fixes(_shown(session), fixes, "fixes")
 
@@ -148,7 +146,8 @@ class _Door:
     def __init__(self, service: Service) -> None:
         limits = service.limits
         self.service = service
-        self.rate = RateLimit(limits.rate_per_s, limits.burst_s * limits.rate_per_s)
+        burst = max(2.0, limits.burst_s * limits.rate_per_s)
+        self.rate = RateLimit(limits.rate_per_s, burst, float(MOST_EPOCHS))
 
     def __call__(self, handler: Handler) -> Callable[[Request], Awaitable[Any]]:
         async def answered(request: Request) -> Any:
@@ -160,23 +159,27 @@ class _Door:
                 return _refused(error)
             except ClientDisconnect:
                 return Response(status_code=400)
-            except MapfilterError as error:
-                return _refused(RequestError(500, "backendError", str(error)))
-            except Exception:
+            except Exception as error:
                 # A fault of the service: what it is goes to its log, not to the client.
-                traceback.print_exc(file=sys.stderr)
+                if isinstance(error, MapfilterError):
+                    sys.stderr.write(f"mapfilter: {error}\n")
+                else:
+                    traceback.print_exc(file=sys.stderr)
                 return _refused(RequestError(500, "backendError", "the service failed"))
 
         return answered
 
-    def charge(self, request: Request, cost: float) -> None:
-        """Take from the client's rate; RequestError (429) where that is used up."""
+    def charge(self, request: Request, cost: float, again: float = 0.0) -> None:
+        """Take from the client's rate; RequestError (429) where that is used up.
+
+        ``again`` is what the same request takes before it comes here once more.
+        """
         client = request.client.host if request.client is not None else ""
         wait_s = self.rate.wait_s(client, cost, time.monotonic()) if cost > 0 else 0.0
         if wait_s:
             per_s = f"{self.service.limits.rate_per_s:g} a second"
             error = RequestError(429, "rateLimitExceeded", f"more requests than {per_s}")
-            error.retry_s = wait_s
+            error.retry_s = wait_s + again / self.service.limits.rate_per_s
             raise error
 
     def _check(self, request: Request) -> None:
@@ -230,8 +233,8 @@ def _shown(session: Session) -> dict[str, Any]:
         "name": session.name,
         "began_utc_s": session.began_utc_s,
         "epochs": session.epochs,
-        "time_s": session.time_s if isfinite(session.time_s) else None,
-        "saved_time_s": session.saved_time_s if isfinite(session.saved_time_s) else None,
+        "time_s": session.time_s if math.isfinite(session.time_s) else None,
+        "saved_time_s": session.saved_time_s if math.isfinite(session.saved_time_s) else None,
     }
 
 
@@ -257,7 +260,7 @@ def _refused(error: RequestError) -> Response:
         # The rest of the body is not read.
         headers["connection"] = "close"
     if error.retry_s:
-        headers["retry-after"] = str(max(1, round(error.retry_s)))
+        headers["retry-after"] = str(max(1, math.ceil(error.retry_s - 1e-6)))
     return _json(error.document, error.code, headers)
 
 

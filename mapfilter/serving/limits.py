@@ -55,6 +55,15 @@ class ServiceLimits:
 class RateLimit:
     """A token bucket for each client address; those not seen for longest are forgotten.
 
+    Parameters
+    ----------
+    per_s : float
+        Tokens a second.
+    burst : float
+        Tokens of a full bucket, at least 2.
+    most_debt : float
+        Tokens that a bucket may owe at most.
+
     Examples
     --------
     >>> limit = RateLimit(per_s=2.0, burst=2.0)
@@ -66,18 +75,20 @@ class RateLimit:
 
     per_s: float
     burst: float
+    most_debt: float = 0.0
     _level: OrderedDict[str, tuple[float, float]] = field(default_factory=OrderedDict)
 
     def wait_s(self, client: str, cost: float, now_s: float) -> float:
         """Take from a client's bucket; return 0, or the seconds to wait where nothing is taken.
 
-        A cost above the whole bucket is taken from a full one, which is in debt afterwards.
+        A cost above the bucket is taken from one that lacks at most one token, as the request took
+        one when it came; the bucket is in debt afterwards.
         """
         held, then_s = self._level.pop(client, (self.burst, now_s))
         held = min(held + (now_s - then_s) * self.per_s, self.burst)
-        short = min(cost, self.burst) - held
+        short = min(cost, self.burst - 1.0) - held
         enough = short <= 1e-9
-        self._level[client] = (held - cost if enough else held, now_s)
+        self._level[client] = (max(held - cost, -self.most_debt) if enough else held, now_s)
         while len(self._level) > _MOST_CLIENTS:
             self._level.popitem(last=False)
         return 0.0 if enough else short / self.per_s

@@ -174,11 +174,15 @@ class Sessions:
         # Counted before the first await, so that no two requests take the last place.
         self.all[session.id] = session
         async with session.lock:
-            session.take(await self._run(partial(_first, self.positioner, seed, start)))
             try:
+                session.take(await self._run(partial(_first, self.positioner, seed, start)))
                 await self._save(session)
             except BaseException:
-                del self.all[session.id]
+                session.ended = True
+                self.all.pop(session.id, None)
+                if self.store is not None:
+                    # After a write that was begun: it goes on where this was cancelled.
+                    self.saver.submit(self.store.remove, session.id)
                 raise
         return session
 
@@ -197,6 +201,7 @@ class Sessions:
         session.waiting += 1
         try:
             async with session.lock:
+                _refuse_ended(session)
                 session.used_s = time.monotonic()
                 before = await self._loaded(session)
                 if self.held_bytes > self.limits.state_bytes:
@@ -204,8 +209,7 @@ class Sessions:
                 step = partial(_stepped, self.positioner, self.names, before, document)
                 # Shielded: a client that hangs up does not leave a half-done session.
                 after, fixes = await asyncio.shield(self._run(step))
-                if session.ended:
-                    raise RequestError(404, "notFound", "the session has ended meanwhile")
+                _refuse_ended(session)
                 session.take(after)
                 session.used_s = time.monotonic()
                 session.channel.publish(enumerate(fixes, before.epochs + 1))
@@ -310,6 +314,11 @@ class Sessions:
         """End the threads, after what they are doing."""
         self.pool.shutdown()
         self.saver.shutdown()
+
+
+def _refuse_ended(session: Session) -> None:
+    if session.ended:
+        raise RequestError(404, "notFound", "the session has ended meanwhile")
 
 
 def _first(

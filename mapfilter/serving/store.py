@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +21,9 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.serving.state_file import read_session, write_session
 
 SUFFIX = ".session"
+LOCK = ".lock"
+"""Empty file of a folder, locked while a service uses it."""
+
 _LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_")
 _ID_LENGTH = 22
 _TYPES: Mapping[str, type | tuple[type, ...]] = {
@@ -34,7 +40,7 @@ _TYPES: Mapping[str, type | tuple[type, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class SessionStore:
-    """Saved sessions, a file each.
+    """Saved sessions, a file each, in a folder that one service uses at a time.
 
     Parameters
     ----------
@@ -42,16 +48,31 @@ class SessionStore:
         Of sessions of one database and filter only.
     binding : str
         Of which database and filter; states mean nothing over another.
+    lock : FileIO
+        A locked file of the folder; see :meth:`close`.
     """
 
     folder: Path
     binding: str
+    lock: FileIO = field(repr=False, compare=False)
 
     @classmethod
     def in_folder(cls, folder: Path, binding: str) -> SessionStore:
-        """Make the folder where there is none; raise OutputError where it cannot be written."""
+        """Take a folder, and make it where there is none.
+
+        Raises
+        ------
+        OutputError
+            It cannot be written.
+        ConfigError
+            Another service uses it, or it cannot be locked.
+        """
         ensure_writable_folder(folder)
-        return cls(folder, binding)
+        return cls(folder, binding, _locked(folder))
+
+    def close(self) -> None:
+        """Leave the folder to others."""
+        self.lock.close()
 
     def path(self, session_id: str) -> Path:
         """Return the file of a session; ids are those that the service made, never paths."""
@@ -108,6 +129,28 @@ class SessionStore:
     def remove(self, session_id: str) -> None:
         """Remove a session; nothing happens where there is none."""
         self.path(session_id).unlink(missing_ok=True)
+
+
+def _locked(folder: Path) -> FileIO:
+    """Return a locked file; the system unlocks it when the process ends, in whatever way."""
+    where, expected = f"--state, {folder}", "a folder that no other service uses"
+    try:
+        held = FileIO(folder / LOCK, "a", opener=_open_private)
+    except OSError as error:
+        raise fail(ConfigError, where, expected, f"{LOCK}: {error.strerror}") from error
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        held.close()
+        if isinstance(error, BlockingIOError):
+            hint = "end the other service, or choose another folder"
+            raise fail(ConfigError, where, expected, "one in use", hint) from error
+        raise fail(ConfigError, where, "a folder that can be locked", error.strerror) from error
+    return held
+
+
+def _open_private(path: str, flags: int) -> int:
+    return os.open(path, flags, 0o600)
 
 
 def _check(value: Mapping[str, Any], where: str) -> None:

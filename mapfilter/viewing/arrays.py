@@ -26,8 +26,13 @@ def packed(
 ) -> dict[str, Any]:
     """Return an array as the page reads it.
 
-    A value is the number stored times ``scale`` plus ``offset``; values out of range are those of
-    its ends. ``none`` stands for NaN and may lie at an end of the range only.
+    A value is the number stored times ``scale`` plus ``offset``; measured values out of range are
+    those of its ends. ``none`` stands for NaN and may lie at an end of the range only.
+
+    Raises
+    ------
+    ValueError
+        Whole numbers, which may be indices, do not fit into the type.
 
     Examples
     --------
@@ -39,6 +44,8 @@ def packed(
     kind = np.dtype(f"<{code}")
     if kind.kind == "f" or (given.dtype.kind in "iub" and scale == 1.0 and offset == 0.0):
         raw = given.astype(kind)
+        if kind.kind != "f" and not np.array_equal(raw, given):
+            raise ValueError(f"{given.min()}..{given.max()} does not fit into {code}")
     else:
         low, high = int(np.iinfo(kind).min), int(np.iinfo(kind).max)
         if none is not None:

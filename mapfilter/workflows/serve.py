@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -99,7 +100,7 @@ def run_serve(
     ------
     MapfilterError
         The database cannot be read, the filter is not "bayes", an option is out of its range, the
-        address cannot be taken, or ``state`` holds sessions of another database.
+        address cannot be taken, or ``state`` holds sessions of another database or is in use.
     """
     options.check()
     token = read_token(options.token_file)
@@ -107,9 +108,10 @@ def run_serve(
     positioner = _positioner(config, opened)
     store, found = None, dict[str, dict[str, object]]()
     made = listen(options.host, options.port, token)
-    with made:
+    with made, ExitStack() as held:
         if options.state is not None:
             store = SessionStore.in_folder(options.state, _binding(config, opened))
+            held.enter_context(closing(store))
             found, lost = store.read_all()
             for line in lost:
                 print_message(f"not restored: {line}")

@@ -109,14 +109,15 @@ def service(positioner, plan, folder=None, locate=None, token="", names=(), **li
     held = ServiceLimits(**({"rate_per_s": 1e5} | limits))
     store = SessionStore.in_folder(folder, "made") if folder is not None else None
     sessions = Sessions(positioner, PlanNames(plan), held, store)
-    if store is not None:
-        found, lost = store.read_all()
-        assert not lost
-        sessions.restore(found)
-    try:
+    with contextlib.ExitStack() as stack:
+        if store is not None:
+            stack.enter_context(contextlib.closing(store))
+        stack.enter_context(contextlib.closing(sessions))
+        if store is not None:
+            found, lost = store.read_all()
+            assert not lost
+            sessions.restore(found)
         yield Service(sessions, locate, held, token, frozenset(names))
-    finally:
-        sessions.close()
 
 
 def documents(count=None):

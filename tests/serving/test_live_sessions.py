@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -9,7 +11,9 @@ from asking import SERVING, Streamed, ask, documents, service
 
 from mapfilter.errors import ConfigError
 from mapfilter.positioning.filter import locate as replay
-from mapfilter.serving.store import SessionStore
+from mapfilter.serving import sessions as sessions_module
+from mapfilter.serving.documents import RequestError
+from mapfilter.serving.store import LOCK, SessionStore
 
 COUNT = 60
 
@@ -70,7 +74,7 @@ def test_requests_may_be_cut_anywhere_and_the_service_started_again(
 
             asyncio.run(run(made.app(), made, sent[first:last]))
     assert fixes == whole
-    assert [path.stat().st_mode & 0o077 for path in tmp_path.iterdir()] == [0]
+    assert [path.stat().st_mode & 0o077 for path in tmp_path.iterdir()] == [0, 0]
 
 
 def test_after_a_crash_a_client_goes_on_from_the_last_saved_epoch(
@@ -192,14 +196,32 @@ def test_sessions_end_when_deleted_or_idle_and_leave_nothing(positioner, cross, 
                 assert (await ask(app, "GET", f"/sessions/{session}")).code == 404
 
         asyncio.run(run())
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == [LOCK]
 
 
 def test_sessions_of_another_database_are_refused(positioner, cross, tmp_path):
     with service(positioner, cross.plan, tmp_path) as made:
         asyncio.run(begin(made.app()))
-    with pytest.raises(ConfigError, match="sessions of this database"):
-        SessionStore.in_folder(tmp_path, "another").read_all()
+    with (
+        closing(SessionStore.in_folder(tmp_path, "another")) as store,
+        pytest.raises(ConfigError, match="sessions of this database"),
+    ):
+        store.read_all()
+
+
+def test_a_folder_belongs_to_one_service_at_a_time(positioner, cross, tmp_path):
+    with service(positioner, cross.plan, tmp_path) as made:
+        session = asyncio.run(begin(made.app()))
+        with pytest.raises(ConfigError, match="one in use"):
+            SessionStore.in_folder(tmp_path, "another")
+    with closing(SessionStore.in_folder(tmp_path, "made")) as store:
+        assert list(store.read_all()[0]) == [session]
+
+
+def test_a_folder_that_cannot_be_locked_is_refused(tmp_path):
+    (tmp_path / LOCK).mkdir()
+    with pytest.raises(ConfigError, match="directory"):
+        SessionStore.in_folder(tmp_path, "made")
 
 
 def test_damaged_sessions_are_named_and_the_others_restored(positioner, cross, tmp_path):
@@ -214,7 +236,8 @@ def test_damaged_sessions_are_named_and_the_others_restored(positioner, cross, t
     cut.write_bytes(cut.read_bytes()[:-7])
     changed.write_bytes(changed.read_bytes().replace(b'"seed":0', b'"seed":1'))
     (tmp_path / "..session").write_bytes(b"")
-    found, lost = SessionStore.in_folder(tmp_path, "made").read_all()
+    with closing(SessionStore.in_folder(tmp_path, "made")) as store:
+        found, lost = store.read_all()
     assert list(found) == [ids[2]]
     assert len(lost) == 3
     assert sum("cut off or changed" in line for line in lost) == 2
@@ -261,3 +284,80 @@ def test_a_listener_that_takes_nothing_is_cut_off_and_holds_nobody_up(positioner
             assert made.sessions.all[session].channel.listeners == set()
 
         asyncio.run(run())
+
+
+def test_a_session_that_could_not_begin_is_not_there(positioner, cross, monkeypatch, capsys):
+    def broken(*_):
+        raise RuntimeError("inner words")
+
+    monkeypatch.setattr(sessions_module, "_first", broken)
+    with service(positioner, cross.plan) as made:
+        answer = asyncio.run(ask(made.app(), "POST", "/sessions", {}))
+        assert (answer.code, made.sessions.all) == (500, {})
+    assert "inner words" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("slow", ["_first", "write"])
+def test_a_session_whose_client_went_while_it_began_is_not_there(
+    positioner, cross, tmp_path, monkeypatch, slow
+):
+    where = sessions_module if slow == "_first" else SessionStore
+    whole = getattr(where, slow)
+
+    def slowly(*given):
+        time.sleep(0.2)
+        return whole(*given)
+
+    monkeypatch.setattr(where, slow, slowly)
+    with service(positioner, cross.plan, tmp_path) as made:
+
+        async def run():
+            task = asyncio.ensure_future(made.sessions.create({}))
+            await asyncio.sleep(0.1)
+            assert len(made.sessions.all) == 1
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            assert made.sessions.all == {}
+
+        asyncio.run(run())
+    assert list(tmp_path.glob("*.session")) == []
+
+
+def test_a_request_that_waited_while_its_session_ended_finds_none(positioner, cross, tmp_path):
+    sent = documents(2)[0]
+    with service(positioner, cross.plan, tmp_path, state_bytes=1) as made:
+
+        async def run():
+            app = made.app()
+            path = f"/sessions/{(session := await begin(app))}"
+            await made.sessions.make_room()
+            held = made.sessions.all[session]
+            async with held.lock:
+                ended = asyncio.ensure_future(ask(app, "DELETE", path))
+                # Found before it ends, and gets the lock after that.
+                late = asyncio.ensure_future(made.sessions.post(held, {"epochs": sent}))
+                await asyncio.sleep(0.01)
+            assert (await ended).code == 204
+            with pytest.raises(RequestError) as caught:
+                await late
+            assert caught.value.code == 404
+
+        asyncio.run(run())
+
+
+def test_a_damaged_file_is_named_to_the_log_only(positioner, cross, tmp_path, capsys):
+    with service(positioner, cross.plan, tmp_path, state_bytes=1) as made:
+
+        async def run():
+            app = made.app()
+            session = await begin(app)
+            await made.sessions.make_room()
+            (tmp_path / f"{session}.session").write_bytes(b"x")
+            path = f"/sessions/{session}/epochs"
+            return await ask(app, "POST", path, {"epochs": documents(1)[0]})
+
+        answer = asyncio.run(run())
+    assert (answer.code, answer.reason) == (500, "backendError")
+    assert str(tmp_path) not in answer.body.decode()
+    assert str(tmp_path) in capsys.readouterr().err

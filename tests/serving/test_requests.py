@@ -5,6 +5,7 @@ import gzip
 import json
 from dataclasses import replace
 from math import nan
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -16,9 +17,11 @@ from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.fingerprints.locating import locate_by
 from mapfilter.positioning.fingerprints.reports import reports_of_log
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.serving import app as app_module
 from mapfilter.serving.documents import RequestError
 from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.geolocate import geolocator
+from mapfilter.serving.limits import RateLimit
 from mapfilter.tracks.identify import PlanNames, name_by_plan
 from mapfilter.tracks.log import make_log
 
@@ -319,3 +322,65 @@ def test_what_is_sent_is_strict_json(made):
 
     json.loads(asyncio.run(run()).body, parse_constant=refuse)
     assert np.isfinite(sent[0]["time_s"])
+
+
+def clock_of(monkeypatch):
+    """The door's clock, as a list of one time in seconds."""
+    now_s = [0.0]
+    monkeypatch.setattr(app_module, "time", SimpleNamespace(monotonic=lambda: now_s[0]))
+    return now_s
+
+
+def test_the_largest_request_is_done_at_a_low_rate(positioner, cross, monkeypatch):
+    now_s = clock_of(monkeypatch)
+    with service(positioner, cross.plan, rate_per_s=50.0) as made:
+
+        async def run():
+            app = made.app()
+            path = f"/sessions/{(await ask(app, 'POST', '/sessions', {})).json['id']}/epochs"
+            now_s[0] += 100.0
+            many = [{"time_s": i} for i in range(300)]
+            answer = await ask(app, "POST", path, {"epochs": many})
+            assert answer.code == 200, answer.body
+            assert (await ask(app, "POST", path, {"epochs": many})).code == 429
+
+        asyncio.run(run())
+
+
+@pytest.mark.parametrize("rate_per_s", [0.1, 0.5])
+def test_who_waits_as_long_as_told_is_let_in(positioner, cross, monkeypatch, rate_per_s):
+    now_s = clock_of(monkeypatch)
+    with service(positioner, cross.plan, rate_per_s=rate_per_s, burst_s=20.0) as made:
+
+        async def run():
+            app = made.app()
+            path = f"/sessions/{(await ask(app, 'POST', '/sessions', {})).json['id']}/epochs"
+            codes = []
+            for _ in range(5):
+                # With a fault, so that only the limit is tried.
+                answer = await ask(app, "POST", path, {"epochs": [0] * 30})
+                codes.append(answer.code)
+                now_s[0] += float(answer.headers.get("retry-after", 0.0))
+            assert codes == [429, 400, 429, 429, 400]
+
+        asyncio.run(run())
+
+
+def test_a_request_of_too_many_epochs_locks_nobody_out(positioner, cross, monkeypatch):
+    clock_of(monkeypatch)
+    with service(positioner, cross.plan, rate_per_s=50.0) as made:
+
+        async def run():
+            app = made.app()
+            path = f"/sessions/{(await ask(app, 'POST', '/sessions', {})).json['id']}/epochs"
+            answer = await ask(app, "POST", path, {"epochs": [0] * 300_000})
+            assert (answer.code, answer.reason) == (400, "invalid")
+            assert (await ask(app, "GET", "/")).code == 200
+
+        asyncio.run(run())
+
+
+def test_no_debt_grows_beyond_its_bound():
+    limit = RateLimit(per_s=1.0, burst=10.0, most_debt=30.0)
+    assert limit.wait_s("a", 1e6, now_s=0.0) == 0.0
+    assert limit.wait_s("a", 1.0, now_s=0.0) == 31.0

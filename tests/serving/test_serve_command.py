@@ -1,11 +1,13 @@
 """What is wrong with the command is said before anything is served."""
 
 import sys
+from contextlib import closing
 
 import pytest
 from workflows.command_line import assert_refused, mapfilter
 
 from mapfilter.serving.server import listen
+from mapfilter.serving.store import SessionStore
 
 
 @pytest.fixture(scope="module")
@@ -57,3 +59,9 @@ def test_a_port_that_is_taken_is_named(database):
     with listen("127.0.0.1", 0, "") as taken:
         port = taken.getsockname()[1]
         assert_refused(mapfilter("serve", "--db", database, "--port", port), f"127.0.0.1:{port}")
+
+
+def test_a_folder_in_use_by_another_service_is_named(database, tmp_path):
+    with closing(SessionStore.in_folder(tmp_path, "another")):
+        outcome = mapfilter("serve", "--db", database, "--port", 0, "--state", tmp_path)
+    assert_refused(outcome, "--state", str(tmp_path), "in use")

@@ -1,6 +1,7 @@
 """Arrays as the page reads them."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mapfilter.viewing.arrays import PLACE_M, packed, places, starts, unpacked
+from mapfilter.viewing.runs import _belief
+from mapfilter.viewing.trace import Frame
 
 LEVELS = st.floats(-150.0, -25.0) | st.just(float("nan"))
 
@@ -48,3 +51,34 @@ def test_shapes_and_starts():
 def test_damaged_arrays_are_refused(damage, told):
     with pytest.raises(ValueError, match=told):
         unpacked({**packed([1, 2], "u1"), **damage})
+
+
+WHOLE = ("u1", "i1", "u2", "i2", "u4", "i4")
+
+
+@given(st.sampled_from(WHOLE), st.lists(st.integers(-(2**63), 2**63 - 1), min_size=1, max_size=4))
+def test_whole_numbers_come_back_or_are_refused(code, values):
+    given_, ends = np.array(values, np.int64), np.iinfo(code)
+    if min(values) >= ends.min and max(values) <= ends.max:
+        assert unpacked(packed(given_, code)).tolist() == values
+    else:
+        with pytest.raises(ValueError, match="does not fit"):
+            packed(given_, code)
+
+
+@pytest.mark.parametrize("code", WHOLE)
+def test_the_ends_of_a_type_fit_and_what_follows_does_not(code):
+    low, high = int(np.iinfo(code).min), int(np.iinfo(code).max)
+    assert unpacked(packed(np.array([low, high]), code)).tolist() == [low, high]
+    for beyond in (low - 1, high + 1):
+        with pytest.raises(ValueError, match="does not fit"):
+            packed(np.array([0, beyond]), code)
+
+
+def test_squares_of_a_belief_far_from_the_corner_stay_where_they_are():
+    col, row = (np.array(at, np.int32) for at in ([40_000, 7], [9, -50_000]))
+    frame = Frame(0, 1.0, col, row, np.array([255, 9], np.uint8), 0.5)
+    trace = SimpleNamespace(frames=SimpleNamespace(kept={0: frame}))
+    found = _belief(trace, 1, SimpleNamespace(west_m=0.0, south_m=0.0))
+    assert unpacked(found["col"]).tolist() == [40_000, 7]
+    assert unpacked(found["row"]).tolist() == [9, -50_000]
