@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, sha256_file, write_json
+from mapfilter._io import atomic_dir, ensure_writable_folder, sha256_file, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results, part_of
 from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.database.store import open_database
@@ -56,6 +56,8 @@ BENCHMARKS: Mapping[str, Benchmark] = {
 """All but ottawa, which has a workflow of its own, by name."""
 NAMES = (OTTAWA, *BENCHMARKS)
 HEAD, TABLE, PICTURES, WORK, UNITS = "benchmark.json", "table.json", "pictures", "work", "units"
+PREPARED = "prepared.json"
+"""In the folder of the work, written last: without it the work is not resumed."""
 _VERSION = 1
 _AROUND_M = 100.0
 
@@ -142,10 +144,11 @@ def run_recorded(
         "runs": runs,
         "data": _digests(data / benchmark.folder),
     }
-    files = [scores_file(finished, task) for task in tasks]
-    kept = start_or_resume(out / HEAD, head, files, resume=resume)
-    if benchmark.prepare is not None and not (kept and work.is_dir()):
-        benchmark.prepare(data / benchmark.folder, work)
+    # Without --resume the marker goes before the new head is written: older work, of other data
+    # perhaps, is never taken for that of the new head.
+    files = [work / PREPARED, *(scores_file(finished, task) for task in tasks)]
+    start_or_resume(out / HEAD, head, files, resume=resume)
+    _prepare(benchmark, data / benchmark.folder, work)
     todo = [task for task in tasks if not (resume and read_scores(finished, task) is not None)]
     before = len(tasks) - len(todo)
 
@@ -232,6 +235,15 @@ def _rows_of(
         return found.rows, found.seconds
     ottawa = run_ottawa(data, out, seed=seed, workers=workers, resume=resume, progress=progress)
     return [Row(**vars(row)) for row in ottawa.rows], ottawa.seconds
+
+
+def _prepare(benchmark: Benchmark, folder: Path, work: Path) -> None:
+    """Make what all tasks share anew, or leave it where it is complete."""
+    if benchmark.prepare is None or (work / PREPARED).is_file():
+        return
+    with atomic_dir(work) as new:
+        benchmark.prepare(folder, new)
+        write_json(new / PREPARED, {"name": benchmark.name})
 
 
 def _judge(job: tuple[str, Task, Path]) -> None:
