@@ -15,6 +15,8 @@ from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.experiments.benchmarks.ottawa import FOLDER as OTTAWA_FOLDER
+from mapfilter.experiments.benchmarks.ottawa import PARTS as OTTAWA_PARTS
 from mapfilter.experiments.benchmarks.worst_run import explain
 from mapfilter.experiments.recorded import (
     belgium,
@@ -25,7 +27,7 @@ from mapfilter.experiments.recorded import (
     smartloc,
     wifi,
 )
-from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Task
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Task, check_there
 from mapfilter.experiments.recorded.kept import (
     read_journey,
     read_scores,
@@ -82,12 +84,15 @@ class AllResult:
     Parameters
     ----------
     missing : tuple of str
-        What was not run, and why.
+        What was not run, because its data set is not there or lacks files.
+    failed : tuple of str
+        What was begun and could not be finished, and why: damaged data.
     """
 
     seed: int
     rows: tuple[Row, ...]
     missing: tuple[str, ...]
+    failed: tuple[str, ...]
     seconds: Mapping[str, float]
     out: Path
 
@@ -195,27 +200,42 @@ def run_all(
     Raises
     ------
     InputError
-        None of the data sets is there.
+        None of the data sets is there, or none can be judged; the table says so, too.
     """
     rows: list[Row] = []
     missing: list[str] = []
+    failed: list[str] = []
     seconds: dict[str, float] = {}
     ensure_writable_folder(out)
     for number, name in enumerate(names):
         part = part_of(progress, number, len(names))
         try:
+            _check_there(name, data)
+        except InputError as error:
+            missing.append(f"{name}: {error}")
+            continue
+        try:
             found, seconds[name] = _rows_of(
                 name, data, out / name, seed=seed, workers=workers, resume=resume, progress=part
             )
         except InputError as error:
-            missing.append(f"{name}: {error}")
+            failed.append(f"{name}: {error}")
             continue
         rows += [replace(row, part=f"{name}/{row.part}") for row in found]
-        result = AllResult(seed, tuple(rows), tuple(missing), seconds, out)
-        write_json(out / TABLE, to_jsonable(result))
+    result = AllResult(seed, tuple(rows), tuple(missing), tuple(failed), seconds, out)
+    write_json(out / TABLE, to_jsonable(result))
     if not rows:
-        raise fail(InputError, str(data), "folders of the data sets", "; ".join(missing))
-    return AllResult(seed, tuple(rows), tuple(missing), seconds, out)
+        expected = "folders of the data sets"
+        raise fail(InputError, str(data), expected, "; ".join([*missing, *failed]))
+    return result
+
+
+def _check_there(name: str, data: Path) -> None:
+    """Check that a data set is there; InputError otherwise."""
+    if name == OTTAWA:
+        check_there(data / OTTAWA_FOLDER, tuple(f"{part}/*.csv" for part in OTTAWA_PARTS))
+    else:
+        check_there(data / BENCHMARKS[name].folder, BENCHMARKS[name].needs)
 
 
 def _rows_of(

@@ -8,7 +8,7 @@ import pytest
 from command_line import mapfilter
 from scipy.io import savemat
 
-from mapfilter.errors import ConfigError, InputError, Stopped
+from mapfilter.errors import ConfigError, InputError, Stopped, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded import wifi
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged
@@ -163,17 +163,28 @@ def test_parts_and_runs_are_chosen(fake, tmp_path):
         run_recorded("fake", tmp_path, tmp_path / "out", parts=["three"])
 
 
-def test_all_names_what_is_missing_and_keeps_the_rest(fake, tmp_path, monkeypatch):
+def test_all_names_what_is_missing_or_failed_and_keeps_the_rest(fake, tmp_path, monkeypatch):
+    def damaged_walk(task):
+        raise fail(InputError, f"{task.part}.txt", "a walk", "half of one")
+
     absent = replace(fake.benchmark(), name="absent", folder="absent-data")
-    monkeypatch.setattr(
-        evaluate_recorded, "BENCHMARKS", {"fake": fake.benchmark(), "absent": absent}
-    )
-    result = run_all(tmp_path, tmp_path / "out", names=("fake", "absent"))
-    assert [row.part for row in result.rows] == ["fake/one", "fake/two"]
-    assert len(result.missing) == 1
-    assert "absent-data" in result.missing[0]
+    damaged = replace(fake.benchmark(), name="damaged", judge=damaged_walk)
+    known = {"fake": fake.benchmark(), "absent": absent, "damaged": damaged}
+    monkeypatch.setattr(evaluate_recorded, "BENCHMARKS", known)
+    result = run_all(tmp_path, tmp_path / "out", names=("fake", "absent", "damaged"))
+    # What comes last is in the file as well.
+    written = json.loads((tmp_path / "out" / "table.json").read_text())
+    assert [row["part"] for row in written["rows"]] == ["fake/one", "fake/two"]
+    (missing,), (failed,) = written["missing"], written["failed"]
+    assert missing.startswith("absent: ")
+    assert "absent-data" in missing
+    assert failed.startswith("damaged: ")
+    assert "one.txt: expected a walk, found half of one" in failed
+    assert (result.missing, result.failed) == ((missing,), (failed,))
     with pytest.raises(InputError, match="absent-data"):
         run_all(tmp_path, tmp_path / "out", names=("absent",))
+    written = json.loads((tmp_path / "out" / "table.json").read_text())
+    assert (written["rows"], len(written["missing"])) == ([], 1)
 
 
 def test_an_empty_folder_is_named(tmp_path):
