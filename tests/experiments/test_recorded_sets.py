@@ -247,6 +247,12 @@ def test_what_is_no_trace_is_named(tmp_path, data):
         denver.read_trace(tmp_path / "x_trace.csv", CRS)
 
 
+@pytest.mark.parametrize("one", [mall, belgium], ids=["mall", "belgium"])
+def test_no_figure_of_another_statistic_counts_as_published(one):
+    """A range, and root mean squares, are published: the table has medians and means."""
+    assert one.BENCHMARK.published_m == {}
+
+
 def test_rows_of_ottawa_are_those_of_all():
     own = {one.name for one in dataclasses.fields(PartRow)}
     assert own == {one.name for one in dataclasses.fields(Row)}

@@ -55,11 +55,6 @@ HEIGHT_M, EIRP_DBM = 30.0, 58.0
 _TOWERS = "tower_data/towers.json"
 _MARGIN_M, _BOX_MARGIN_M, _BOX_RESOLUTION_M = 300.0, 1500.0, 25.0
 _LARGEST_BYTES = 10_000_000
-_PUBLISHED_RMSE_M = {
-    ("ixelle", "locate"): 166.0,
-    ("lln", "locate"): 537.0,
-    ("waha", "locate"): 691.0,
-}
 
 
 def units(folder: Path) -> list[tuple[str, str, int]]:
@@ -220,5 +215,4 @@ BENCHMARK = Benchmark(
     ("walks/*.txt", _TOWERS),
     units,
     judge,
-    published_m=_PUBLISHED_RMSE_M,
 )

@@ -53,8 +53,6 @@ from mapfilter.tracks.pdr.options import WalkOptions
 PARTS = 2
 DECLINATION_DEG = -5.4
 """Of Hangzhou at the end of 2019."""
-PUBLISHED_MEAN_M = 6.5
-"""The middle of 5 to 8 m, by Wi-Fi alone."""
 _ARCHIVE, _PLAN, _INFO = "*_paths.tar.xz", "geojson_map.json", "floor_info.json"
 _RESOLUTION_M = 1.0
 _LARGEST_BYTES, _LARGEST_WALK_BYTES = 100_000_000, 100_000_000
@@ -226,6 +224,5 @@ BENCHMARK = Benchmark(
     units,
     judge,
     prepare,
-    published_m={("floor", "wifi"): PUBLISHED_MEAN_M},
     baseline="mean",
 )
