@@ -226,7 +226,7 @@ def evaluate(
         # Units may be hundreds: they are in the JSON and in table.json.
         shown = {key: value for key, value in vars(result).items() if key != "units"}
         print_result(result if as_json else shown, as_json)
-        if name == ALL and result.missing:
+        if name == ALL and (result.missing or result.failed):
             raise typer.Exit(PARTIAL)
         return
     if name == "single-reports" and data is not None:

@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, sha256_file, write_json
+from mapfilter._io import atomic_dir, ensure_writable_folder, sha256_file, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results, part_of
 from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.experiments.benchmarks.ottawa import FOLDER as OTTAWA_FOLDER
+from mapfilter.experiments.benchmarks.ottawa import PARTS as OTTAWA_PARTS
 from mapfilter.experiments.benchmarks.worst_run import explain
 from mapfilter.experiments.recorded import (
     belgium,
@@ -25,7 +27,7 @@ from mapfilter.experiments.recorded import (
     smartloc,
     wifi,
 )
-from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Task
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Task, check_there
 from mapfilter.experiments.recorded.kept import (
     read_journey,
     read_scores,
@@ -56,6 +58,8 @@ BENCHMARKS: Mapping[str, Benchmark] = {
 """All but ottawa, which has a workflow of its own, by name."""
 NAMES = (OTTAWA, *BENCHMARKS)
 HEAD, TABLE, PICTURES, WORK, UNITS = "benchmark.json", "table.json", "pictures", "work", "units"
+PREPARED = "prepared.json"
+"""In the folder of the work, written last: without it the work is not resumed."""
 _VERSION = 1
 _AROUND_M = 100.0
 
@@ -80,12 +84,15 @@ class AllResult:
     Parameters
     ----------
     missing : tuple of str
-        What was not run, and why.
+        What was not run, because its data set is not there or lacks files.
+    failed : tuple of str
+        What was begun and could not be finished, and why: damaged data.
     """
 
     seed: int
     rows: tuple[Row, ...]
     missing: tuple[str, ...]
+    failed: tuple[str, ...]
     seconds: Mapping[str, float]
     out: Path
 
@@ -142,10 +149,11 @@ def run_recorded(
         "runs": runs,
         "data": _digests(data / benchmark.folder),
     }
-    files = [scores_file(finished, task) for task in tasks]
-    kept = start_or_resume(out / HEAD, head, files, resume=resume)
-    if benchmark.prepare is not None and not (kept and work.is_dir()):
-        benchmark.prepare(data / benchmark.folder, work)
+    # Without --resume the marker goes before the new head is written: older work, of other data
+    # perhaps, is never taken for that of the new head.
+    files = [work / PREPARED, *(scores_file(finished, task) for task in tasks)]
+    start_or_resume(out / HEAD, head, files, resume=resume)
+    _prepare(benchmark, data / benchmark.folder, work)
     todo = [task for task in tasks if not (resume and read_scores(finished, task) is not None)]
     before = len(tasks) - len(todo)
 
@@ -192,27 +200,42 @@ def run_all(
     Raises
     ------
     InputError
-        None of the data sets is there.
+        None of the data sets is there, or none can be judged; the table says so, too.
     """
     rows: list[Row] = []
     missing: list[str] = []
+    failed: list[str] = []
     seconds: dict[str, float] = {}
     ensure_writable_folder(out)
     for number, name in enumerate(names):
         part = part_of(progress, number, len(names))
         try:
+            _check_there(name, data)
+        except InputError as error:
+            missing.append(f"{name}: {error}")
+            continue
+        try:
             found, seconds[name] = _rows_of(
                 name, data, out / name, seed=seed, workers=workers, resume=resume, progress=part
             )
         except InputError as error:
-            missing.append(f"{name}: {error}")
+            failed.append(f"{name}: {error}")
             continue
         rows += [replace(row, part=f"{name}/{row.part}") for row in found]
-        result = AllResult(seed, tuple(rows), tuple(missing), seconds, out)
-        write_json(out / TABLE, to_jsonable(result))
+    result = AllResult(seed, tuple(rows), tuple(missing), tuple(failed), seconds, out)
+    write_json(out / TABLE, to_jsonable(result))
     if not rows:
-        raise fail(InputError, str(data), "folders of the data sets", "; ".join(missing))
-    return AllResult(seed, tuple(rows), tuple(missing), seconds, out)
+        expected = "folders of the data sets"
+        raise fail(InputError, str(data), expected, "; ".join([*missing, *failed]))
+    return result
+
+
+def _check_there(name: str, data: Path) -> None:
+    """Check that a data set is there; InputError otherwise."""
+    if name == OTTAWA:
+        check_there(data / OTTAWA_FOLDER, tuple(f"{part}/*.csv" for part in OTTAWA_PARTS))
+    else:
+        check_there(data / BENCHMARKS[name].folder, BENCHMARKS[name].needs)
 
 
 def _rows_of(
@@ -232,6 +255,15 @@ def _rows_of(
         return found.rows, found.seconds
     ottawa = run_ottawa(data, out, seed=seed, workers=workers, resume=resume, progress=progress)
     return [Row(**vars(row)) for row in ottawa.rows], ottawa.seconds
+
+
+def _prepare(benchmark: Benchmark, folder: Path, work: Path) -> None:
+    """Make what all tasks share anew, or leave it where it is complete."""
+    if benchmark.prepare is None or (work / PREPARED).is_file():
+        return
+    with atomic_dir(work) as new:
+        benchmark.prepare(folder, new)
+        write_json(new / PREPARED, {"name": benchmark.name})
 
 
 def _judge(job: tuple[str, Task, Path]) -> None:

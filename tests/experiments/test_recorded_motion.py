@@ -15,6 +15,7 @@ from mapfilter.experiments.recorded.outages import (
     Outages,
     coasted_errors_m,
     errors_at,
+    errors_between,
     log_without,
     without,
 )
@@ -167,3 +168,25 @@ def test_errors_of_a_vehicle_take_the_headings_away():
     assert moved["step_m"].nunique() == 1
     assert abs(moved["step_m"].iloc[0] / 10 - 1) < 0.1
     assert np.abs(moved["turn_rad"].to_numpy() - [0.0, 0.0, 0.0832, 0.1]).max() < 0.02
+
+
+def _track(places):
+    """Epochs at 10 s, 11 s, …; NaN is no position."""
+    fixes = [_fix(10.0 + i, east_m, 0.0, 3.0) for i, east_m in enumerate(places)]
+    return TrackEstimate.of_fixes(CRS, "bayes", fixes)
+
+
+def test_missing_positions_are_errors_and_not_covered():
+    estimate = _track([1.0, np.nan, 9.0, 2.0, np.nan])
+    truth = Truth(np.array([0.0, 13.5]), np.zeros(2), np.zeros(2))
+    # The last epoch lies after the truth, so nobody knows; the first after 10 s is asked for.
+    errors_m, held = errors_between(estimate, truth, 10.0, 20.0)
+    assert errors_m.tolist() == [np.inf, 9.0, 2.0]
+    assert held.tolist() == [False, False, True]
+
+
+def test_before_the_first_epoch_there_is_no_position():
+    truth = Truth(np.array([0.0, 20.0]), np.zeros(2), np.zeros(2))
+    errors_m, held = errors_at(_track([1.0, 2.0]), truth, [5.0, 10.0, 12.0])
+    assert errors_m.tolist() == [np.inf, 1.0, 2.0]
+    assert held.tolist() == [False, True, True]

@@ -79,8 +79,27 @@ def test_reports_of_a_table_are_units():
     assert (row.unit_count, row.n) == (3, 2)
 
 
+def test_errors_without_a_position_count_in_quantiles_and_coverage():
+    errors = (1.0, 2.0, 6.0, np.inf, np.inf)
+    (row,) = table_rows([_found(errors=errors, covered=np.array([True, True, True, False, False]))])
+    assert (row.n, row.median_m, row.mean_m, row.p95_m) == (5, 6.0, 3.0, np.inf)
+    assert row.coverage_95 == pytest.approx(3 / 5)
+    # One of a hundred does not reach the 95 % quantile, one of ten does.
+    for count, finite in ((100, True), (10, False)):
+        (row,) = table_rows([_found(errors=(*range(1, count), np.inf))])
+        assert np.isfinite(row.p95_m) == finite
+
+
+def test_neighbouring_points_have_a_share_and_no_interval():
+    points = [_found("trace", success=i > 0, dependent=True) for i in range(4)]
+    (row,) = table_rows(points)
+    assert row.success == 3 / 4
+    assert isnan(row.success_low)
+    assert isnan(row.success_high)
+
+
 @given(
-    st.lists(st.lists(st.floats(0, 1e4), max_size=6), min_size=1, max_size=5),
+    st.lists(st.lists(st.floats(0, 1e4) | st.just(np.inf), max_size=6), min_size=1, max_size=5),
     st.floats(0.0, 1e4),
 )
 def test_found_is_read_back(tmp_path_factory, errors, after_m):

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
+from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.benchmarks.ottawa_table import PartRow
 from mapfilter.experiments.recorded import belgium, denver, mall, mountain_view, smartloc
 from mapfilter.experiments.recorded.rows import Row
@@ -145,6 +146,21 @@ def test_time_until_a_stale_radio_is_named(named_s, expected_s):
     assert found == pytest.approx(expected_s, nan_ok=True)
 
 
+@pytest.mark.parametrize(
+    ("second_m", "wrong"), [(40.0, False), (60.0, True)], ids=["near", "a second claim far off"]
+)
+def test_every_claim_in_belgium_is_checked(second_m, wrong):
+    claims = {0.0: (0.0, Status.CONVERGED), 1.0: (900.0, Status.LOST)}
+    claims |= {2.0: (second_m, Status.CONVERGED), 3.0: (5.0, Status.TRACKING)}
+    fixes = [
+        Fix(t, off, 0.0, np.eye(2), np.ones(3), status, 1, 1.0, 0, 0.0, Reason.USED)
+        for t, (off, status) in claims.items()
+    ]
+    truth = Truth(np.array([0.0, 3.0]), np.zeros(2), np.zeros(2))
+    found = belgium.claimed_wrongly(TrackEstimate.of_fixes(CRS, "bayes", fixes), truth)
+    assert found is wrong
+
+
 def test_towers_and_their_faults(tmp_path):
     row = {
         "enb_id": 7,
@@ -245,6 +261,12 @@ def test_what_is_no_trace_is_named(tmp_path, data):
     (tmp_path / "x_trace.csv").write_bytes(data)
     with pytest.raises(InputError, match=r"x_trace\.csv"):
         denver.read_trace(tmp_path / "x_trace.csv", CRS)
+
+
+@pytest.mark.parametrize("one", [mall, belgium], ids=["mall", "belgium"])
+def test_no_figure_of_another_statistic_counts_as_published(one):
+    """A range, and root mean squares, are published: the table has medians and means."""
+    assert one.BENCHMARK.published_m == {}
 
 
 def test_rows_of_ottawa_are_those_of_all():

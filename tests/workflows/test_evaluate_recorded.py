@@ -8,7 +8,7 @@ import pytest
 from command_line import mapfilter
 from scipy.io import savemat
 
-from mapfilter.errors import ConfigError, InputError, Stopped
+from mapfilter.errors import ConfigError, InputError, Stopped, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded import wifi
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged
@@ -99,6 +99,55 @@ def test_finished_runs_are_kept_and_damaged_ones_done_again(fake, tmp_path):
     assert fake.done == ["one-unit-1"]
 
 
+def _prepared(fake, monkeypatch):
+    """Let the benchmark prepare two files, between which it can be stopped."""
+    state = {"stop": False, "count": 0}
+
+    def prepare(folder, work):
+        state["count"] += 1
+        work.mkdir(parents=True, exist_ok=True)
+        for file in sorted(folder.glob("*.txt")):
+            (work / file.name).write_text(file.read_text())
+            if state["stop"]:
+                raise Stopped(15)
+
+    made = replace(fake.benchmark(), prepare=prepare)
+    monkeypatch.setattr(evaluate_recorded, "BENCHMARKS", {"fake": made})
+    return state
+
+
+def _work(tmp_path):
+    files = (tmp_path / "out" / "work").glob("*.txt")
+    return {file.name: file.read_text() for file in files}
+
+
+@pytest.mark.parametrize("resume", [True, False])
+def test_a_preparation_that_was_stopped_is_done_again(fake, tmp_path, monkeypatch, resume):
+    state = _prepared(fake, monkeypatch)
+    state["stop"] = True
+    with pytest.raises(Stopped):
+        run_recorded("fake", tmp_path, tmp_path / "out")
+    assert not _work(tmp_path)
+    state["stop"] = False
+    run_recorded("fake", tmp_path, tmp_path / "out", resume=resume)
+    assert _work(tmp_path) == {"one.txt": "data\n", "two.txt": "data\n"}
+    run_recorded("fake", tmp_path, tmp_path / "out", resume=True)
+    assert state["count"] == 2
+
+
+def test_work_of_other_data_is_not_mixed_in(fake, tmp_path, monkeypatch):
+    state = _prepared(fake, monkeypatch)
+    run_recorded("fake", tmp_path, tmp_path / "out")
+    (tmp_path / "fake-data" / "one.txt").rename(tmp_path / "fake-data" / "three.txt")
+    # Stopped with the head of the new data, and the work of the old ones, in place.
+    state["stop"] = True
+    with pytest.raises(Stopped):
+        run_recorded("fake", tmp_path, tmp_path / "out")
+    state["stop"] = False
+    run_recorded("fake", tmp_path, tmp_path / "out", resume=True)
+    assert set(_work(tmp_path)) == {"three.txt", "two.txt"}
+
+
 @pytest.mark.usefixtures("fake")
 def test_other_data_are_not_resumed(tmp_path):
     run_recorded("fake", tmp_path, tmp_path / "out")
@@ -114,17 +163,28 @@ def test_parts_and_runs_are_chosen(fake, tmp_path):
         run_recorded("fake", tmp_path, tmp_path / "out", parts=["three"])
 
 
-def test_all_names_what_is_missing_and_keeps_the_rest(fake, tmp_path, monkeypatch):
+def test_all_names_what_is_missing_or_failed_and_keeps_the_rest(fake, tmp_path, monkeypatch):
+    def damaged_walk(task):
+        raise fail(InputError, f"{task.part}.txt", "a walk", "half of one")
+
     absent = replace(fake.benchmark(), name="absent", folder="absent-data")
-    monkeypatch.setattr(
-        evaluate_recorded, "BENCHMARKS", {"fake": fake.benchmark(), "absent": absent}
-    )
-    result = run_all(tmp_path, tmp_path / "out", names=("fake", "absent"))
-    assert [row.part for row in result.rows] == ["fake/one", "fake/two"]
-    assert len(result.missing) == 1
-    assert "absent-data" in result.missing[0]
+    damaged = replace(fake.benchmark(), name="damaged", judge=damaged_walk)
+    known = {"fake": fake.benchmark(), "absent": absent, "damaged": damaged}
+    monkeypatch.setattr(evaluate_recorded, "BENCHMARKS", known)
+    result = run_all(tmp_path, tmp_path / "out", names=("fake", "absent", "damaged"))
+    # What comes last is in the file as well.
+    written = json.loads((tmp_path / "out" / "table.json").read_text())
+    assert [row["part"] for row in written["rows"]] == ["fake/one", "fake/two"]
+    (missing,), (failed,) = written["missing"], written["failed"]
+    assert missing.startswith("absent: ")
+    assert "absent-data" in missing
+    assert failed.startswith("damaged: ")
+    assert "one.txt: expected a walk, found half of one" in failed
+    assert (result.missing, result.failed) == ((missing,), (failed,))
     with pytest.raises(InputError, match="absent-data"):
         run_all(tmp_path, tmp_path / "out", names=("absent",))
+    written = json.loads((tmp_path / "out" / "table.json").read_text())
+    assert (written["rows"], len(written["missing"])) == ([], 1)
 
 
 def test_an_empty_folder_is_named(tmp_path):

@@ -76,7 +76,8 @@ class Benchmark:
     judge : callable
         Locates a task.
     prepare : callable, optional
-        From the folder of the data and a folder to write to: makes what all tasks share.
+        From the folder of the data and a new, empty folder to write to: makes what all tasks share.
+        The folder is moved to :attr:`Task.work` when all is made, so nothing in it may name it.
     published_m : mapping
         Published figures by part and method ("" for all methods).
     baseline : {"median", "mean"}

@@ -84,8 +84,8 @@ def judge(task: Task) -> Judged:
     coasted_m = coasted_errors_m(log.motion, truth, spans)
     found = replace(
         whole,
-        error_m=errors_m[there],
-        covered=held[there],
+        error_m=errors_m,
+        covered=held,
         baseline_m=coasted_m,
         success=bool(np.median(errors_m) <= RIGHT_M) if len(errors_m) else None,
         note=f"{len(spans)} outages, {int(there.sum())} ends with a position. {whole.note}",

@@ -63,12 +63,27 @@ def errors_at(
 ) -> tuple[Floats, Bools]:
     """Return the error at the last epoch up to each time, and whether the 95 % radius held it.
 
-    Without a position the error is infinite.
+    Without a position the error is infinite, as before the first epoch.
     """
     errors_m = position_errors_m(estimate, truth)
     at = np.searchsorted(estimate.time_s, np.asarray(times_s) + 1e-6) - 1
-    found = np.where(np.isfinite(errors_m[at]), errors_m[at], np.inf)
-    return found, np.isfinite(errors_m[at]) & (errors_m[at] <= estimate.radii_m[at, 2])
+    there = (at >= 0) & np.isfinite(errors_m[at])
+    held = there & (errors_m[at] <= estimate.radii_m[at, 2])
+    return np.where(there, errors_m[at], np.inf), held
+
+
+def errors_between(
+    estimate: TrackEstimate, truth: Truth, after_s: float, until_s: float
+) -> tuple[Floats, Bools]:
+    """Return the errors of all epochs in a span of time in which the true position is known.
+
+    Without a position the error is infinite. Second, whether the 95 % radius held it.
+    """
+    known = np.isfinite(truth.at(estimate.time_s)[0])
+    asked = known & (estimate.time_s > after_s) & (estimate.time_s <= until_s)
+    errors_m = position_errors_m(estimate, truth)[asked]
+    there = np.isfinite(errors_m)
+    return np.where(there, errors_m, np.inf), there & (errors_m <= estimate.radii_m[asked, 2])
 
 
 def coasted_errors_m(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +25,17 @@ class Row:
     unit_count : int
         Journeys, sessions or reports: what is independent of each other.
     n : int
-        Errors that were scored.
-    median_m, mean_m, p95_m : float
-        Of these errors; NaN without any.
+        Places or times that were scored.
+    median_m, p95_m : float
+        Of the errors there; NaN without any. An error without a position is infinite.
+    mean_m : float
+        Of the finite errors.
     success, success_low, success_high : float
         Share of the runs that did what the benchmark asks for, with its 95 % interval over units;
-        NaN where nothing is asked for but the errors.
+        NaN where nothing is asked for but the errors. Without an interval where the runs are
+        neighbouring points of one journey.
     coverage_95 : float
-        Share of the scored positions whose 95 % radius held the truth; NaN without radii.
+        Share of what was scored where the 95 % radius held the truth; NaN without radii.
     baseline_m : float
         Error of the benchmark's baseline by the same statistic as its target.
     published_m : float
@@ -66,7 +69,7 @@ class Found:
         Whether it did what is asked for; whether a position was ever claimed; whether the first
         claim was more than 50 m off. None where there is no such thing.
     error_m : ndarray, shape (N,)
-        Scored errors.
+        Scored errors; infinite where a position was asked for and there was none.
     covered : ndarray of bool, shape (N,)
         Whether the 95 % radius held the truth; empty without radii.
     baseline_m : ndarray, shape (M,)
@@ -81,6 +84,8 @@ class Found:
         What is worth saying about the run.
     count : int
         Units that this stands for: the reports of a table.
+    dependent : bool
+        It is one of many neighbouring points of its unit: no interval is computed of them.
     """
 
     part: str
@@ -98,6 +103,7 @@ class Found:
     real_s: float = nan
     note: str = ""
     count: int = 1
+    dependent: bool = False
 
 
 @dataclass(frozen=True)
@@ -219,7 +225,7 @@ def _row(part: str, method: str, own: Sequence[Found], published_m: float, basel
         count,
         errors.size,
         _median(errors),
-        _mean(errors),
+        _mean(errors[np.isfinite(errors)]),
         _quantile(errors, 0.95),
         *_success(own, units),
         _mean(_joined(one.covered for one in own)),
@@ -234,6 +240,8 @@ def _success(own: Sequence[Found], units: Sequence[str]) -> tuple[float, float, 
         return nan, nan, nan
     runs = [sum(one.unit == name for one in judged) for name in units]
     good = [sum(bool(one.success) for one in judged if one.unit == name) for name in units]
+    if any(one.dependent for one in judged):
+        return sum(good) / len(judged), nan, nan
     # One unit says nothing of others: the interval is that of its runs.
     single = len(units) == 1 or len(judged) == len(units)
     low, high = (
@@ -251,12 +259,16 @@ def _joined(parts: Iterable[Floats | Bools]) -> Floats:
 
 
 def _median(values: Floats) -> float:
-    known = values[np.isfinite(values)]
+    known = values[~np.isnan(values)]
     return float(np.median(known)) if known.size else nan
 
 
 def _quantile(values: Floats, share: float) -> float:
-    return float(np.quantile(values, share)) if values.size else nan
+    if not values.size:
+        return nan
+    above = float(np.quantile(values, share, method="higher"))
+    # Between a finite and an infinite error there is no interpolation.
+    return float(np.quantile(values, share)) if isfinite(above) else above
 
 
 def _mean(values: Floats) -> float:
@@ -265,7 +277,8 @@ def _mean(values: Floats) -> float:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
-        return value.tolist()
+        # JSON knows no infinity; numpy reads the word back.
+        return ["inf" if each == inf else each for each in value.tolist()]
     return None if isinstance(value, float) and not isfinite(value) else value
 
 

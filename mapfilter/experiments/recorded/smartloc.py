@@ -18,7 +18,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import Truth, position_errors_m
+from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import lattice_about, open_ground, roads_alone
 from mapfilter.experiments.recorded.least_squares import least_squares_positions
@@ -27,6 +27,7 @@ from mapfilter.experiments.recorded.outages import (
     Outages,
     coasted_errors_m,
     errors_at,
+    errors_between,
     log_without,
 )
 from mapfilter.experiments.recorded.scoring import score_journey
@@ -95,22 +96,20 @@ def judge(task: Task) -> Judged:
         errors_m, held = errors_at(located.estimate, truth, ends)
         baseline_m = coasted_errors_m(log.motion, truth, spans)
     else:
-        since = (located.estimate.time_s > FIRST_S) & (located.estimate.time_s <= end_s)
-        every_m = position_errors_m(located.estimate, truth)
-        known = since & np.isfinite(every_m)
-        errors_m, held = every_m[known], (every_m <= located.estimate.radii_m[:, 2])[known]
+        errors_m, held = errors_between(located.estimate, truth, FIRST_S, end_s)
         if task.part == ALL:
             baseline_m = _least_squares_errors_m(log, truth)
         else:
             baseline_m = _reckoned_errors_m(log, truth)
-    there = np.isfinite(errors_m)
+    missing = int(np.isinf(errors_m).sum())
     right_m = RIGHT_M.get(task.part, inf)
     found = replace(
         found,
-        error_m=errors_m[there],
-        covered=held[there],
+        error_m=errors_m,
+        covered=held,
         baseline_m=baseline_m,
         success=bool(np.median(errors_m) <= right_m) if np.isfinite(right_m) else found.success,
+        note=f"{missing} of {len(errors_m)} without a position. {found.note}",
     )
     return Judged((found,), {"bayes": Journey(located.estimate, truth, database)})
 
