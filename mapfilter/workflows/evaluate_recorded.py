@@ -7,17 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from mapfilter._io import atomic_dir, ensure_writable_folder, sha256_file, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results, part_of
 from mapfilter._resume import kept_when_stopped, start_or_resume
-from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.experiments.benchmarks.ottawa import FOLDER as OTTAWA_FOLDER
 from mapfilter.experiments.benchmarks.ottawa import PARTS as OTTAWA_PARTS
-from mapfilter.experiments.benchmarks.worst_run import explain
 from mapfilter.experiments.recorded import (
     belgium,
     denver,
@@ -27,26 +22,20 @@ from mapfilter.experiments.recorded import (
     smartloc,
     wifi,
 )
-from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Task, check_there
+from mapfilter.experiments.recorded.benchmark import Benchmark, Task, check_there
 from mapfilter.experiments.recorded.kept import (
-    read_journey,
     read_scores,
     scores_file,
     write_judged,
 )
 from mapfilter.experiments.recorded.rows import (
-    Found,
     Row,
     UnitRow,
     table_rows,
     unit_rows,
-    worst_of,
 )
-from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
-from mapfilter.report.integrity import plot_worst_run
 from mapfilter.workflows.evaluate_ottawa import run_ottawa
-from mapfilter.workflows.served import served_points, street_map
+from mapfilter.workflows.recorded_pictures import draw_worst
 from mapfilter.workflows.terminal import to_jsonable
 
 OTTAWA = "ottawa"
@@ -61,7 +50,6 @@ HEAD, TABLE, PICTURES, WORK, UNITS = "benchmark.json", "table.json", "pictures",
 PREPARED = "prepared.json"
 """In the folder of the work, written last: without it the work is not resumed."""
 _VERSION = 1
-_AROUND_M = 100.0
 
 
 @dataclass(frozen=True)
@@ -169,7 +157,7 @@ def run_recorded(
     by_task = {task: read_scores(finished, task) or () for task in tasks}
     found = [one for each in by_task.values() for one in each]
     rows = table_rows(found, benchmark.published_m, baseline=benchmark.baseline)
-    pictures = _draw(by_task, finished, out / PICTURES)
+    pictures = draw_worst(by_task, finished, out / PICTURES)
     result = RecordedResult(
         name,
         seed,
@@ -283,49 +271,3 @@ def _chosen(tasks: Sequence[Task], parts: Sequence[str]) -> list[Task]:
 def _digests(folder: Path) -> dict[str, str]:
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files}
-
-
-def _draw(by_task: Mapping[Task, Sequence[Found]], finished: Path, folder: Path) -> list[Path]:
-    """Draw the worst run of each part and method of which a journey was kept."""
-    made = []
-    every = [one for found in by_task.values() for one in found]
-    task_of = {id(one): task for task, found in by_task.items() for one in found}
-    for part, method in dict.fromkeys((one.part, one.method) for one in every):
-        worst = worst_of([one for one in every if (one.part, one.method) == (part, method)])
-        if worst is None:
-            continue
-        task = task_of[id(worst)]
-        journey = read_journey(finished, task, method)
-        story = explain(journey.estimate, journey.truth) if journey is not None else None
-        if journey is None or story is None:
-            continue
-        drawn = plot_worst_run(
-            journey.estimate,
-            journey.truth,
-            _ground(journey),
-            (story.index, story.first, story.last),
-            SUCCESS_RADIUS_M,
-            title=f"{part}, {method}, {task.unit} run {task.run}: {story.what}",
-            reason=story.reason,
-        )
-        made.append(folder / f"{part}-{method}-worst.png".replace("/", "-"))
-        save(drawn, made[-1])
-    return made
-
-
-def _ground(journey: Journey) -> BaseMap:
-    """Return the streets of a journey's database, or an empty map about its truth."""
-    if journey.database is not None:
-        try:
-            database = open_database(journey.database)
-            return street_map(database, served_points(database))
-        except MapfilterError:
-            pass
-    truth = journey.truth
-    bounds = (
-        float(np.min(truth.east_m)) - _AROUND_M,
-        float(np.min(truth.north_m)) - _AROUND_M,
-        float(np.max(truth.east_m)) + _AROUND_M,
-        float(np.max(truth.north_m)) + _AROUND_M,
-    )
-    return BaseMap(bounds)

@@ -15,7 +15,8 @@ from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.benchmarks.ottawa_table import PartRow
 from mapfilter.experiments.recorded import belgium, denver, mall, mountain_view, smartloc
-from mapfilter.experiments.recorded.rows import Row
+from mapfilter.experiments.recorded.benchmark import Task
+from mapfilter.experiments.recorded.rows import Row, table_rows
 from mapfilter.experiments.recorded.street_graph import match_points, read_graph
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
@@ -79,6 +80,15 @@ def test_a_hidden_markov_model_follows_the_streets(town):
     far = np.full(len(places), graph.street[edge[0]])
     assert denver.judged_streets(graph, places, far)[1].mean() < 0.5
     assert not denver.judged_streets(graph, places, np.zeros(len(places), int))[1].any()
+
+
+def test_a_matched_trace_has_a_share_of_points_and_no_interval(town, tmp_path):
+    denver.prepare(town, tmp_path)
+    judged = denver.judge(Task("made_trace_1", "trace", 0, town, tmp_path))
+    rows = table_rows(judged.found)
+    assert [(row.method, row.n) for row in rows] == [("bayes", 60), ("hmm", 60)]
+    assert all(row.success > 0.9 for row in rows)
+    assert all(np.isnan([row.success_low, row.success_high]).all() for row in rows)
 
 
 def test_points_beyond_the_streets_are_matched_to_none(town):
