@@ -77,7 +77,10 @@ def test_journeys_that_receive_nothing_are_done_in_part(own_world):
 
 
 SLOW = """
+import signal
 import time
+# Shells start commands in the background with this one ignored, and it would stay so.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from mapfilter._resume import FinishedParts
 from mapfilter.cli import main
 save = FinishedParts.save
