@@ -155,8 +155,7 @@ class BayesPositioner(Filter[BayesState]):
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[BayesState, StepOutput]:
         """Process one epoch."""
-        if epoch.fix and not (isfinite(epoch.fix.east_m) and isfinite(epoch.fix.north_m)):
-            epoch = replace(epoch, fix=None)
+        epoch = _with_a_known_fix(epoch)
         unclear, spacing_m = state.unclear, state.particle_spacing_m
         if unclear:
             state = replace(state, status=Status.TRACKING, unclear=False)
@@ -200,8 +199,7 @@ class BayesPositioner(Filter[BayesState]):
         The state moved to the epoch, the evidence, and whether motion was measured; with the
         generator as before the step these are its own.
         """
-        if epoch.fix and not (isfinite(epoch.fix.east_m) and isfinite(epoch.fix.north_m)):
-            epoch = replace(epoch, fix=None)
+        epoch = _with_a_known_fix(epoch)
         spacing_m = state.particle_spacing_m
         watch, epoch, (motion, _) = watched(state.watch, epoch)
         moved, _ = self._moved(replace(state, watch=watch), epoch, rng)
@@ -448,6 +446,13 @@ class BayesPositioner(Filter[BayesState]):
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
         kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
         return replace(belief, state=state, log_weight=log_weight, kept=kept)
+
+
+def _with_a_known_fix(epoch: Epoch) -> Epoch:
+    """Return the epoch without a fix whose position is not known."""
+    fix = epoch.fix
+    known = fix is None or (isfinite(fix.east_m) and isfinite(fix.north_m))
+    return epoch if known else replace(epoch, fix=None)
 
 
 def weighed_by(
