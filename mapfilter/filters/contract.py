@@ -51,6 +51,8 @@ class Reason(StrEnum):
     NO_READING = "no_reading"
     MOTION_MISSING = "motion_missing"
     MOTION_STUCK = "motion_stuck"
+    HEADING_STUCK = "heading_stuck"
+    DELIVERED_TWICE = "delivered_twice"
     STALE_RADIO = "stale_radio"
     NOT_STARTED = "not_started"
     NOT_USED_BY_FILTER = "not_used_by_filter"

@@ -29,6 +29,7 @@ from numba import njit
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
 from mapfilter._types import Floats, Floats32
+from mapfilter.geodesy import wrap_rad
 from mapfilter.options import NotNegative, Options, Positive, Share
 
 EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH, RATE = range(8)
@@ -61,7 +62,8 @@ class MotionErrors(Options):
     disturbances_per_m, disturbed_rad : float
         How often the deviation jumps, and the standard deviation of where to.
     remounts_per_m : float
-        How often the lasting heading error becomes any other, as a phone is turned in its pocket.
+        How often the lasting heading error of a tracked position becomes any other, as a phone is
+        turned in its pocket (:func:`remounted`).
     bias_sd_rad : float
         Standard deviation of the lasting heading error at the start.
     bias_drift_rad_per_sqrt_m : float
@@ -85,7 +87,7 @@ class MotionErrors(Options):
     heading_m: Positive = 28.0
     disturbances_per_m: NotNegative = 0.002
     disturbed_rad: NotNegative = _DISTURBED_RAD
-    remounts_per_m: NotNegative = 0.0
+    remounts_per_m: NotNegative = 0.0004
     bias_sd_rad: NotNegative = _BIAS_SD_RAD
     bias_drift_rad_per_sqrt_m: NotNegative = _BIAS_DRIFT_RAD
     rate_rad_per_m: NotNegative = _RATE_RAD
@@ -189,7 +191,6 @@ def move(
         _F(errors.stretch_sd * (1 - stretched**2) ** 0.5),
         _F(1 - exp(-errors.disturbances_per_m * length)),
         _F(errors.disturbed_rad),
-        _F(1 - exp(-errors.remounts_per_m * length)),
     )
     length_m = _F(length)
     long_m = _F(step_m * exp(0.5 * white_rad**2))
@@ -209,7 +210,6 @@ class _Noise(NamedTuple):
     stretch: np.float32
     jump: np.float32
     jump_rad: np.float32
-    remount: np.float32
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -232,9 +232,8 @@ def _move(
         a, b = normals(hashed(key, np.uint64(4 * i)))
         c, d = normals(hashed(key, np.uint64(4 * i + 1)))
         e, f = normals(hashed(key, np.uint64(4 * i + 2)))
-        u, v = uniforms(hashed(key, np.uint64(4 * i + 3)))
+        u, _ = uniforms(hashed(key, np.uint64(4 * i + 3)))
         lasting = wrap32(bias[i] + rate[i] * length_m + noise.bias_rad * c)
-        lasting = _F(2 * pi) * _F(v) - _F(pi) if _F(u) > _F(1) - noise.remount else lasting
         steady = scale[i] + noise.scale * d
         beside = noise.turn_keep * turn[i] + noise.turn_rad * e
         beside = noise.jump_rad * e if _F(u) < noise.jump else beside
@@ -250,6 +249,26 @@ def _move(
         to_north[i] = north[i] + (along * sine + across * cosine)
     moved[7:] = state[7:]
     return moved
+
+
+def remounted(
+    state: Floats32, length_m: float, errors: MotionErrors, rng: np.random.Generator
+) -> Floats32:
+    """Return hypotheses of which some have another lasting heading error after some metres.
+
+    Half of these point the other way round, as a phone that is held upside down; the others
+    anywhere.
+    """
+    share = 1 - exp(-errors.remounts_per_m * length_m)
+    count = int(rng.binomial(state.shape[1], share))
+    if count == 0:
+        return state
+    turned = state.copy()
+    chosen = rng.integers(state.shape[1], size=count)
+    anywhere_rad = rng.uniform(-pi, pi, count)
+    around_rad = wrap_rad(state[BIAS, chosen] + pi)
+    turned[BIAS, chosen] = np.where(rng.random(count) < 0.5, around_rad, anywhere_rad)
+    return turned
 
 
 def moved_back(state: Floats32, east_m: float, north_m: float) -> Floats32:

@@ -20,6 +20,8 @@ REASONS: Mapping[Reason, str] = {
     Reason.NO_READING: "nothing was measured",
     Reason.MOTION_MISSING: "motion is missing for a while",
     Reason.MOTION_STUCK: "the motion sensor repeats itself",
+    Reason.HEADING_STUCK: "the heading repeats itself while one walks",
+    Reason.DELIVERED_TWICE: "the same rows of motion were delivered again",
     Reason.STALE_RADIO: "the modem repeats an old report",
     Reason.NOT_STARTED: "there is no belief yet",
     Reason.NOT_USED_BY_FILTER: "this filter does not use readings of this kind",

@@ -31,6 +31,7 @@ from mapfilter.models.street_motion import (
     MapWeights,
     MotionErrors,
     move,
+    remounted,
 )
 from mapfilter.models.terms import atan2_lanes, log_lanes
 
@@ -70,7 +71,7 @@ def test_the_usual_options():
         "heading_m": 28.0,
         "disturbances_per_m": 0.002,
         "disturbed_rad": radians(40),
-        "remounts_per_m": 0.0,
+        "remounts_per_m": 0.0004,
         "bias_sd_rad": radians(10),
         "bias_drift_rad_per_sqrt_m": radians(0.3),
         "rate_rad_per_m": radians(0.15),
@@ -181,7 +182,7 @@ def test_angles_all_around():
 
 STILL = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, stretch_sd=0.0,
-    disturbances_per_m=0.0, remounts_per_m=0.0,
+    disturbances_per_m=0.0,
 )  # fmt: skip
 
 
@@ -213,19 +214,23 @@ def test_no_two_numbers_of_a_step_are_drawn_alike():
     assert np.abs(np.corrcoef(spread) - np.eye(14)).max() < 0.5
 
 
-def test_a_phone_that_is_turned_may_point_anywhere():
-    """So many are, by the metre; all others keep their lasting error."""
-    count = 40_000
+def test_a_phone_that_is_turned_points_the_other_way_round_or_anywhere():
+    """So many are, by the metre; all others keep their lasting error, and all the rest."""
+    count, errors = 40_000, MotionErrors(remounts_per_m=0.3)
     state = np.full((8, count), 0.25, dtype=np.float32)
-    errors = MotionErrors(step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0,
-                          disturbances_per_m=0.0, remounts_per_m=0.3)  # fmt: skip
-    state[RATE] = 0.0
-    bias = move(state, 1.4, 0.0, errors, np.uint64(3))[BIAS].astype(float)
+    after = remounted(state, 1.4, errors, np.random.default_rng(3))
+    bias = after[BIAS].astype(float)
     turned = bias != np.float32(0.25)
-    assert turned.mean() == pytest.approx(1 - np.exp(-0.42), abs=5 * np.sqrt(0.25 / count))
-    assert kstest(bias[turned], "uniform", (-np.pi, 2 * np.pi)).pvalue > 1e-3
-    never = move(state, 1.4, 0.0, replace(errors, remounts_per_m=0.0), np.uint64(3))
-    np.testing.assert_array_equal(never[BIAS], np.float32(0.25))
+    # Drawn with replacement: some are turned twice.
+    share = 1 - np.exp(-(1 - np.exp(-0.42)))
+    assert turned.mean() == pytest.approx(share, abs=5 * np.sqrt(0.25 / count))
+    around = np.isclose(bias, 0.25 - np.pi)
+    assert around[turned].mean() == pytest.approx(0.5, abs=5 * np.sqrt(0.25 / turned.sum()))
+    assert kstest(bias[turned & ~around], "uniform", (-np.pi, 2 * np.pi)).pvalue > 1e-3
+    others = np.delete(np.arange(8), BIAS)
+    np.testing.assert_array_equal(after[others], state[others])
+    never = remounted(state, 1.4, replace(errors, remounts_per_m=0.0), np.random.default_rng(3))
+    assert never is state
 
 
 def test_a_step_of_nothing_changes_nothing():

@@ -29,7 +29,7 @@ from mapfilter.models.street_motion import (
 
 EXACT = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0,
-    disturbances_per_m=0.0, remounts_per_m=0.0, stretch_sd=0.0,
+    disturbances_per_m=0.0, stretch_sd=0.0,
 )  # fmt: skip
 KEY = np.uint64(11)
 

@@ -21,7 +21,7 @@ from mapfilter.positioning.filter import locate
 
 STILL = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0,
-    disturbances_per_m=0.0, remounts_per_m=0.0, rate_share=0.0, scale_sd=0.0, stretch_sd=0.0,
+    disturbances_per_m=0.0, rate_share=0.0, scale_sd=0.0, stretch_sd=0.0,
 )  # fmt: skip
 MODEL = BayesModel(make_area(), STILL, MapWeights(), OPTIONS)
 REPORT = LevelReport(

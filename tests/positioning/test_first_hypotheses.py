@@ -51,7 +51,7 @@ ERRORS = MotionErrors(
 )  # fmt: skip
 EXACT = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0,
-    disturbances_per_m=0.0, remounts_per_m=0.0, stretch_sd=0.0,
+    disturbances_per_m=0.0, stretch_sd=0.0,
 )  # fmt: skip
 WEIGHTS = MapWeights(
     sd_m=6.0, weight_per_m=0.08, off_cost_per_m=0.06, leave_per_m=4e-3, return_per_m=0.03

@@ -21,6 +21,7 @@ from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
+from mapfilter.models.street_motion import remounted
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
@@ -43,7 +44,7 @@ from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.radio import RadioSource, name_of
-from mapfilter.positioning.bayes.sensors import watched
+from mapfilter.positioning.bayes.sensors import UNMEASURED, watched
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesState, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
@@ -179,7 +180,7 @@ class BayesPositioner(Filter[BayesState]):
                 belief, sources = started
                 state = replace(state, belief=belief, sources={**state.sources, **sources})
         else:
-            measured = motion is Reason.USED
+            measured = motion not in UNMEASURED
             state, why = self._weighed(state, state.belief, updates, epoch, rng, measured=measured)
             reason = reason if why is Reason.USED else why
             if state.belief is not None:
@@ -203,7 +204,7 @@ class BayesPositioner(Filter[BayesState]):
         spacing_m = state.particle_spacing_m
         watch, epoch, (motion, _) = watched(state.watch, epoch)
         moved, _ = self._moved(replace(state, watch=watch), epoch, rng)
-        return *self._collected(moved, epoch, spacing_m), motion is Reason.USED
+        return *self._collected(moved, epoch, spacing_m), motion not in UNMEASURED
 
     def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
         """Load the compiled kernels, and prepare the area."""
@@ -255,6 +256,7 @@ class BayesPositioner(Filter[BayesState]):
                     compass, belief = False, self._without_compass(belief, rng)
                 predict = self.filters[compass].predict
                 belief, why = predict(belief, step, rng)
+                belief = self._remounted(belief, abs(step.step_m), rng)
                 reckoning = reckoning.moved(step)
                 if alternative is not None:
                     other, _ = predict(alternative.belief, step, rng)
@@ -276,6 +278,18 @@ class BayesPositioner(Filter[BayesState]):
                 path=path,
             )
         return state, unused
+
+    def _remounted(self, belief: MapBelief, length_m: float, rng: np.random.Generator) -> MapBelief:
+        """Turn the phone of some hypotheses, once a position is tracked.
+
+        A search would find more places that fit.
+        """
+        if isinstance(belief, GridBelief) or belief.status is not Status.TRACKING:
+            return belief
+        if not (length_m > 0 and self.model.motion.remounts_per_m > 0):
+            return belief
+        state = remounted(belief.state, length_m, self.model.motion, rng)
+        return belief if state is belief.state else replace(belief, state=state)
 
     def _collected(
         self, state: BayesState, epoch: Epoch, particle_spacing_m: float

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from math import exp, isfinite, log, nan, sqrt
 
 from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.tracks.schema import SERVING
 
@@ -143,6 +144,8 @@ class SensorWatch:
         Distance since then.
     repeated_nats : float
         How much repeated reports speak for a radio that stands still.
+    repeats : MotionRepeats
+        How motion rows repeat each other.
     """
 
     motion_s: float = nan
@@ -158,6 +161,7 @@ class SensorWatch:
     report: tuple[ReportRow, ...] = ()
     moved_m: float = 0.0
     repeated_nats: float = 0.0
+    repeats: MotionRepeats = field(default_factory=MotionRepeats)
 
     @property
     def reports_always(self) -> bool:
@@ -165,6 +169,12 @@ class SensorWatch:
         if self.rows < _KNOWN_ROWS:
             return False
         return self.rests or self.irregular_s < _REGULAR * self.interval_s
+
+
+UNMEASURED = frozenset(
+    {Reason.NO_STEP, Reason.MOTION_MISSING, Reason.MOTION_STUCK, Reason.HEADING_STUCK}
+)
+"""Reasons for which the way of an epoch is not known."""
 
 
 def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple[Reason, Reason]]:
@@ -176,10 +186,15 @@ def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple
     epoch : Epoch
         With a step to all sides for motion that was not measured, without a report that is stale.
     reasons : tuple of Reason
-        Of motion and of the report: ``USED``, or ``NO_STEP``, ``MOTION_MISSING`` or
-        ``MOTION_STUCK``, and ``STALE_RADIO``.
+        Of motion and of the report: ``USED``, or ``NO_STEP``, ``MOTION_MISSING``,
+        ``MOTION_STUCK``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``, and ``STALE_RADIO``.
     """
+    repeats, motion, repeated = without_repeats(watch.repeats, epoch.motion)
+    watch = replace(watch, repeats=repeats)
+    if motion is not epoch.motion:
+        epoch = replace(epoch, motion=motion)
     watch, epoch, why = _moved(watch, epoch)
+    why = repeated if why is Reason.USED else why
     watch, is_stale = _repeated(watch, epoch)
     if is_stale:
         epoch = replace(epoch, radio=())

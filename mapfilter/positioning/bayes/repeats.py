@@ -1,0 +1,124 @@
+"""Motion rows that repeat others: headings that stand still, and rows that are delivered twice.
+
+A compass, or a fused orientation, hardly ever gives the same number for long while one walks. Where
+it does, it has died, and its last value is used on. Rows that come in pairs of equal ones are
+deliveries of one row: every other one is dropped, or all steps would count twice. Headings in whole
+degrees, and those of made logs, do repeat, so each repetition speaks by how rare it was before (a
+CUSUM; Page, 1954).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp, isfinite, log, nan, sqrt
+
+from mapfilter.filters.contract import MotionStep, Reason
+
+_PRIOR_ROWS, _PRIOR_REPEATS = 50.0, 49.0
+_MOST_NATS, _STILL_NATS = 1.0, 12.0
+"""Gain of one repetition at most, and the sum from which on a heading stands still."""
+_PAIRS = 8
+_TURNS_RAD = 1e-9
+_STRAIGHT_M = 84.0
+"""Distance after which the direction of an unmeasured way is forgotten by 1/e."""
+
+_Row = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class MotionRepeats:
+    """What is known of how the rows of a journey repeat each other; rests do not count.
+
+    Parameters
+    ----------
+    last : tuple of float
+        Step, heading and turn of the last row.
+    was_equal : bool
+        Whether it was equal to the one before.
+    rows, repeats : float
+        Rows so far, and those of them with the heading of the row before; without the present run.
+    run : int
+        Rows of the present run of equal headings.
+    nats : float
+        How much the run speaks for a heading that stands still.
+    still_m : float
+        Distance moved since that was found.
+    pairs : int
+        Pairs of equal rows, one after the other.
+    """
+
+    last: _Row = (nan, nan, nan)
+    was_equal: bool = False
+    rows: float = _PRIOR_ROWS
+    repeats: float = _PRIOR_REPEATS
+    run: int = 0
+    nats: float = 0.0
+    still_m: float = 0.0
+    pairs: int = 0
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether the heading no longer follows the way."""
+        return self.nats >= _STILL_NATS
+
+    @property
+    def come_twice(self) -> bool:
+        """Whether rows are delivered twice."""
+        return self.pairs >= _PAIRS
+
+
+def without_repeats(
+    repeats: MotionRepeats, steps: tuple[MotionStep, ...]
+) -> tuple[MotionRepeats, tuple[MotionStep, ...], Reason]:
+    """Return the rows of an epoch as far as they are news.
+
+    Returns
+    -------
+    repeats : MotionRepeats
+    steps : tuple of MotionStep
+        Without second deliveries; with a direction to all sides where the heading stands still.
+    reason : Reason
+        ``USED``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``.
+    """
+    kept, why = [], Reason.USED
+    for step in steps:
+        if not isfinite(step.step_m) or step.step_m == 0:
+            kept.append(step)
+            continue
+        repeats = _followed(repeats, step)
+        if repeats.come_twice and repeats.was_equal:
+            why = Reason.DELIVERED_TWICE
+            continue
+        if repeats.stands_still:
+            why = Reason.HEADING_STUCK
+            before_m = repeats.still_m
+            repeats = replace(repeats, still_m=before_m + abs(step.step_m))
+            spread_m2 = _spread_m2(repeats.still_m) - _spread_m2(before_m)
+            step = MotionStep(step.step_m, nan, nan, sqrt(max(spread_m2, 0.0)))
+        kept.append(step)
+    return (repeats, steps, why) if why is Reason.USED else (repeats, tuple(kept), why)
+
+
+def _followed(repeats: MotionRepeats, step: MotionStep) -> MotionRepeats:
+    """Return what is known after one more row."""
+    row = step.step_m, step.heading_rad, step.turn_rad
+    is_equal = all(map(_equal, row, repeats.last))
+    pairs = repeats.pairs + is_equal if is_equal != repeats.was_equal else 0
+    turns = abs(step.turn_rad) > _TURNS_RAD
+    if step.heading_rad == repeats.last[1] and not turns:
+        each = min(-log(repeats.repeats / repeats.rows), _MOST_NATS)
+        run, nats = repeats.run + 1, repeats.nats + each
+        return replace(repeats, last=row, was_equal=is_equal, pairs=pairs, run=run, nats=nats)
+    # A run in which the heading stood still is none of the usual ones.
+    run = 0 if repeats.stands_still else repeats.run
+    return MotionRepeats(row, is_equal, repeats.rows + run + 1, repeats.repeats + run, pairs=pairs)
+
+
+def _equal(value: float, other: float) -> bool:
+    return value == other or not (isfinite(value) or isfinite(other))
+
+
+def _spread_m2(way_m: float) -> float:
+    """Return the mean square of the distance of a way that forgets its direction."""
+    straight_m = _STRAIGHT_M
+    return 2 * straight_m * (way_m - straight_m * (1 - exp(-way_m / straight_m)))

@@ -1,0 +1,112 @@
+"""Headings that stand still, and motion rows that are delivered twice."""
+
+from itertools import chain
+from math import isfinite, nan
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
+
+
+def followed(steps):
+    """Return rows kept and reason of each row, one row an epoch."""
+    repeats, found = MotionRepeats(), []
+    for step in steps:
+        repeats, kept, why = without_repeats(repeats, (step,))
+        found.append((kept, why))
+    return found
+
+
+def walk(rows, seed=0, digits=None):
+    rng = np.random.default_rng(seed)
+    headings = 0.5 * np.sin(np.arange(rows) / 30) + 0.05 * rng.standard_normal(rows)
+    if digits is not None:
+        headings = np.radians(np.round(np.degrees(headings), digits))
+    return [MotionStep(0.7, heading) for heading in headings.tolist()]
+
+
+def reasons(found):
+    return [why for _, why in found]
+
+
+def test_headings_that_change_are_left_alone():
+    steps = walk(600)
+    found = followed(steps)
+    assert set(reasons(found)) == {Reason.USED}
+    assert [kept for kept, _ in found] == [(step,) for step in steps]
+
+
+def test_a_heading_that_stands_still_is_found_within_twenty_metres_and_given_up_when_it_moves():
+    before, after = walk(200), walk(50, seed=1)
+    frozen = [before[-1]] * 200
+    found = followed([*before, *frozen, *after])
+    stuck = [k for k, why in enumerate(reasons(found)) if why is Reason.HEADING_STUCK]
+    assert 200 + 8 <= stuck[0] <= 200 + 20 / 0.7
+    assert stuck == list(range(stuck[0], 400))
+    (step,), _ = found[stuck[0]]
+    assert step.step_m == 0.7
+    assert not isfinite(step.heading_rad)
+    assert step.spread_m == pytest.approx(0.7, rel=0.01)
+
+
+def test_the_spread_of_a_way_without_direction_adds_up_to_that_of_a_way_that_forgets_it():
+    before = walk(200)
+    found = followed([*before, *[before[-1]] * 1000])
+    spread_m = [kept[0].spread_m for kept, why in found if why is Reason.HEADING_STUCK]
+    way_m = 0.7 * len(spread_m)
+    # Of a persistent walk with the length L: 2 L (way - L (1 - exp(-way / L))).
+    expected_m2 = 2 * 84 * (way_m - 84 * (1 - np.exp(-way_m / 84)))
+    assert np.sum(np.square(spread_m)) == pytest.approx(expected_m2, rel=1e-6)
+
+
+def test_a_gyroscope_that_goes_on_keeps_its_turns():
+    before = walk(200)
+    turning = [MotionStep(0.7, before[-1].heading_rad, 0.01)] * 200
+    assert set(reasons(followed([*before, *turning]))) == {Reason.USED}
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whole_degrees_that_repeat_now_and_then_are_no_fault(seed):
+    found = followed(walk(1500, seed=seed, digits=0))
+    assert reasons(found).count(Reason.HEADING_STUCK) == 0
+
+
+def test_a_made_log_of_straight_legs_is_left_alone():
+    legs = [[MotionStep(0.7, quarter * np.pi / 2)] * 100 for quarter in (0, 1, 2, 1, 0, 3)]
+    assert set(reasons(followed(chain(*legs)))) == {Reason.USED}
+
+
+def test_rests_do_not_count():
+    still = [MotionStep(0.0, 0.3)] * 500
+    assert set(reasons(followed([*walk(200), *still, *walk(50)]))) == {Reason.USED}
+
+
+def test_rows_that_come_twice_count_once_after_eight_pairs():
+    once = walk(300)
+    twice = list(chain(*([step, step] for step in once[100:200])))
+    found = followed([*once[:100], *twice, *once[200:]])
+    dropped = [k for k, why in enumerate(reasons(found)) if why is Reason.DELIVERED_TWICE]
+    assert dropped == list(range(100 + 15, 100 + 200, 2))
+    assert all(found[k][0] == () for k in dropped)
+    assert sum(len(kept) for kept, _ in found) == 300 + 7
+
+
+def test_pairs_with_unknown_turns_or_headings_are_pairs_too():
+    steps = [MotionStep(0.6 + 0.001 * k, nan, 0.001 * k) for k in range(50)]
+    found = followed(chain(*([step, step] for step in steps)))
+    assert reasons(found).count(Reason.DELIVERED_TWICE) == 50 - 7
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.sampled_from([0.0, 0.7, nan]), st.sampled_from([0.1, 0.2, nan]))))
+def test_all_rows_but_second_deliveries_keep_their_length(rows):
+    for step, (kept, why) in zip(rows, followed(MotionStep(*row) for row in rows), strict=True):
+        lengths = [one.step_m for one in kept]
+        if why is Reason.DELIVERED_TWICE:
+            assert lengths == []
+        else:
+            np.testing.assert_equal(lengths, [step[0]])
