@@ -87,7 +87,7 @@ class MotionErrors(Options):
     heading_m: Positive = 28.0
     disturbances_per_m: NotNegative = 0.002
     disturbed_rad: NotNegative = _DISTURBED_RAD
-    remounts_per_m: NotNegative = 0.0004
+    remounts_per_m: NotNegative = 0.0
     bias_sd_rad: NotNegative = _BIAS_SD_RAD
     bias_drift_rad_per_sqrt_m: NotNegative = _BIAS_DRIFT_RAD
     rate_rad_per_m: NotNegative = _RATE_RAD

@@ -71,7 +71,7 @@ def test_the_usual_options():
         "heading_m": 28.0,
         "disturbances_per_m": 0.002,
         "disturbed_rad": radians(40),
-        "remounts_per_m": 0.0004,
+        "remounts_per_m": 0.0,
         "bias_sd_rad": radians(10),
         "bias_drift_rad_per_sqrt_m": radians(0.3),
         "rate_rad_per_m": radians(0.15),
