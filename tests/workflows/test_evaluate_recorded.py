@@ -39,7 +39,7 @@ class _Fake:
         names = sorted(path.stem for path in folder.glob("*.txt"))
         return [(name, "unit", 2) for name in names]
 
-    def judge(self, task):
+    def judge(self, task, _):
         if len(self.done) == self.stop_at:
             raise Stopped(15)
         self.done.append(task.name)
@@ -164,7 +164,7 @@ def test_parts_and_runs_are_chosen(fake, tmp_path):
 
 
 def test_all_names_what_is_missing_or_failed_and_keeps_the_rest(fake, tmp_path, monkeypatch):
-    def damaged_walk(task):
+    def damaged_walk(task, _):
         raise fail(InputError, f"{task.part}.txt", "a walk", "half of one")
 
     absent = replace(fake.benchmark(), name="absent", folder="absent-data")

@@ -32,7 +32,7 @@ from mapfilter.experiments.recorded.ground import (
     positions_of,
     predicted,
 )
-from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.filters.contract import Reason, Status
@@ -62,7 +62,7 @@ def units(folder: Path) -> list[tuple[str, str, int]]:
     return [(_place(file), file.stem, 1) for file in _walks(folder)]
 
 
-def judge(task: Task) -> Judged:
+def judge(task: Task, _: None = None) -> Judged:
     """Judge a walk: what the filter claims while the radio stands still, and each fresh report."""
     logs = {file: read_walk(file) for file in _walks(task.data) if _place(file) == task.part}
     own = next(log for file, log in logs.items() if file.stem == task.unit)
@@ -74,7 +74,7 @@ def judge(task: Task) -> Judged:
     predicted(near, lattice, corridor_routes(lattice, others), folder / "corridor")
     rng = named_rng(task.seed, "belgium", task.unit)
     named = name_by_plan(own, near)
-    located = locate_log(repeated(named), folder / "corridor", rng)
+    located = locate_log(repeated(named), OpenMap.open(folder / "corridor"), rng)
     truth = Truth.of_table(own.truth)
     assert truth is not None, "walks have more than one position"
     delay_s = stale_after_s(located.estimate, named)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.accuracy import Truth
@@ -74,7 +75,9 @@ class Benchmark:
     units : callable
         From the folder of the data to part and unit of each task and its number of runs.
     judge : callable
-        Locates a task.
+        Locates a task; also given what ``read`` returned, None without it.
+    read : callable, optional
+        From the first of several runs of a unit: reads what all of them share.
     prepare : callable, optional
         From the folder of the data and a new, empty folder to write to: makes what all tasks share.
         The folder is moved to :attr:`Task.work` when all is made, so nothing in it may name it.
@@ -88,10 +91,17 @@ class Benchmark:
     folder: str
     needs: tuple[str, ...]
     units: Callable[[Path], Sequence[tuple[str, str, int]]]
-    judge: Callable[[Task], Judged]
+    judge: Callable[[Task, Any], Judged]
     prepare: Callable[[Path, Path], None] | None = None
+    read: Callable[[Task], Any] | None = None
     published_m: Mapping[tuple[str, str], float] = field(default_factory=dict)
     baseline: str = "median"
+
+    def judged(self, tasks: Sequence[Task]) -> Iterator[Judged]:
+        """Yield the results of runs of one unit, which share what is read."""
+        shared = self.read(tasks[0]) if self.read is not None and tasks else None
+        for task in tasks:
+            yield self.judge(task, shared)
 
     def tasks(self, data: Path, work: Path, seed: int, runs: int | None = None) -> list[Task]:
         """Return all tasks, at most ``runs`` of each unit.
