@@ -152,7 +152,7 @@ def run_recorded(
 
     report(0, 0)
     with local_executor(workers) as executor, kept_when_stopped("runs"):
-        jobs = [(name, some, finished) for some in _together(todo)]
+        jobs = [(name, some, finished) for some in benchmark.together(todo, _MOST_TOGETHER)]
         judged = ordered_results(executor, _judge, jobs, in_flight=2 * workers)
         for done, _ in enumerate(judged, 1):
             report(sum(len(some) for _, some, _ in jobs[:done]), len(tasks))
@@ -256,21 +256,8 @@ def _prepare(benchmark: Benchmark, folder: Path, work: Path) -> None:
         write_json(new / PREPARED, {"name": benchmark.name})
 
 
-def _together(tasks: Sequence[Task]) -> list[tuple[Task, ...]]:
-    """Return runs that share what is read: of one unit, not too many for other workers."""
-    found: list[list[Task]] = []
-    for task in tasks:
-        last = found[-1] if found else []
-        same = bool(last) and (last[0].part, last[0].unit) == (task.part, task.unit)
-        if same and len(last) < _MOST_TOGETHER:
-            last.append(task)
-        else:
-            found.append([task])
-    return [tuple(some) for some in found]
-
-
 def _judge(job: tuple[str, tuple[Task, ...], Path]) -> None:
-    """Locate runs of one unit and keep the results of each."""
+    """Locate tasks that share what is read, and keep the results of each."""
     name, tasks, folder = job
     for task, judged in zip(tasks, BENCHMARKS[name].judged(tasks), strict=True):
         write_judged(judged, folder, task)

@@ -77,7 +77,9 @@ class Benchmark:
     judge : callable
         Locates a task; also given what ``read`` returned, None without it.
     read : callable, optional
-        From the first of several runs of a unit: reads what all of them share.
+        From the first of several tasks: reads what all of them share.
+    shared_by_part : bool
+        Whether all tasks of a part share what is read, or only the runs of a unit.
     prepare : callable, optional
         From the folder of the data and a new, empty folder to write to: makes what all tasks share.
         The folder is moved to :attr:`Task.work` when all is made, so nothing in it may name it.
@@ -96,9 +98,24 @@ class Benchmark:
     read: Callable[[Task], Any] | None = None
     published_m: Mapping[tuple[str, str], float] = field(default_factory=dict)
     baseline: str = "median"
+    shared_by_part: bool = False
+
+    def together(self, tasks: Sequence[Task], most: int) -> list[tuple[Task, ...]]:
+        """Return neighbouring tasks that share what is read, at most so many together."""
+        found: list[list[Task]] = []
+        for task in tasks:
+            last = found[-1] if found else []
+            if last and len(last) < most and self._shared(last[0]) == self._shared(task):
+                last.append(task)
+            else:
+                found.append([task])
+        return [tuple(some) for some in found]
+
+    def _shared(self, task: Task) -> tuple[str, ...]:
+        return (task.part,) if self.shared_by_part else (task.part, task.unit)
 
     def judged(self, tasks: Sequence[Task]) -> Iterator[Judged]:
-        """Yield the results of runs of one unit, which share what is read."""
+        """Yield the results of tasks that share what is read, in their order."""
         shared = self.read(tasks[0]) if self.read is not None and tasks else None
         for task in tasks:
             yield self.judge(task, shared)
