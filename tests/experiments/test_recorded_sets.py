@@ -84,6 +84,8 @@ def test_a_matched_trace_has_a_share_of_points_and_no_interval(town, tmp_path):
     denver.prepare(town, tmp_path)
     task = Task("made_trace_1", "trace", 0, town, tmp_path)
     judged = denver.judge(task, denver.read(task))
+    # For the picture of the worst trace.
+    assert len(judged.journeys["bayes"].truth.time_s) == 60
     rows = table_rows(judged.found)
     assert [(row.method, row.n) for row in rows] == [("bayes", 60), ("hmm", 60)]
     assert all(row.success > 0.9 for row in rows)

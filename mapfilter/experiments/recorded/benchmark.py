@@ -78,6 +78,8 @@ class Benchmark:
         Locates a task; also given what ``read`` returned, None without it.
     read : callable, optional
         From the first of several tasks: reads what all of them share.
+    usual_runs : int, optional
+        Runs of each unit where their number is not asked for; all when left out.
     shared_by_part : bool
         Whether all tasks of a part share what is read, or only the runs of a unit.
     prepare : callable, optional
@@ -98,6 +100,7 @@ class Benchmark:
     read: Callable[[Task], Any] | None = None
     published_m: Mapping[tuple[str, str], float] = field(default_factory=dict)
     baseline: str = "median"
+    usual_runs: int | None = None
     shared_by_part: bool = False
 
     def together(self, tasks: Sequence[Task], most: int) -> list[tuple[Task, ...]]:
@@ -121,7 +124,7 @@ class Benchmark:
             yield self.judge(task, shared)
 
     def tasks(self, data: Path, work: Path, seed: int, runs: int | None = None) -> list[Task]:
-        """Return all tasks, at most ``runs`` of each unit.
+        """Return all tasks, at most ``runs`` of each unit; by default the usual number.
 
         Raises
         ------
@@ -135,10 +138,11 @@ class Benchmark:
             faults = Faults()
             faults.add(str(folder), "recordings to be judged", "none", "see its README")
             faults.raise_if_any(InputError)
+        most = runs or self.usual_runs
         return [
             Task(part, unit, run, folder, work, seed)
-            for part, unit, usual in found
-            for run in range(min(usual, runs or usual))
+            for part, unit, count in found
+            for run in range(count if most is None else min(count, most))
         ]
 
 

@@ -19,7 +19,8 @@ from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.errors import InputError, fail
-from mapfilter.experiments.recorded.benchmark import Benchmark, Judged, Task
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import roads_alone
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.rows import Found
@@ -96,7 +97,9 @@ def judge(task: Task, shared: tuple[StreetGraph, OpenMap]) -> Judged:
             )
             for i in range(len(places))
         ]
-    return Judged(tuple(found))
+    # There is no other truth than the trace itself; for the picture.
+    known = Truth(np.arange(len(places), dtype=np.float64), places[:, 0], places[:, 1])
+    return Judged(tuple(found), {"bayes": Journey(located.estimate, known, over.path)})
 
 
 def read_trace(file: Path, crs: str) -> Floats:
