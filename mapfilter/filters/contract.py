@@ -63,6 +63,7 @@ class Reason(StrEnum):
     SECOND_READING = "second_reading"
     REJECTED_BY_EVIDENCE = "rejected_by_evidence"
     ON_PROBATION = "on_probation"
+    REPEATED_FIX = "repeated_fix"
 
 
 @dataclass(frozen=True, slots=True)

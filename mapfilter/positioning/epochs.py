@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from math import isfinite, isnan, nan
 from typing import Any, NamedTuple
 
@@ -54,6 +54,16 @@ class GnssFix:
     var_east_m2: float = nan
     var_north_m2: float = nan
     cov_east_north_m2: float = nan
+
+    def repeats(self, last: GnssFix | None) -> bool:
+        """Return whether position and errors are those of the last fix, to the last digit.
+
+        Noise makes two measured positions differ, also at a standstill.
+        """
+        if last is None:
+            return False
+        pairs = zip(astuple(self), astuple(last), strict=True)
+        return all(a == b or (isnan(a) and isnan(b)) for a, b in pairs)
 
 
 @dataclass(frozen=True, slots=True)

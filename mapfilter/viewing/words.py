@@ -32,4 +32,5 @@ REASONS: Mapping[Reason, str] = {
     Reason.SECOND_READING: "a second reading of the same satellite",
     Reason.REJECTED_BY_EVIDENCE: "contradicts the map and the other readings",
     Reason.ON_PROBATION: "was wrong before, and has to agree for a while first",
+    Reason.REPEATED_FIX: "the receiver repeats its last position",
 }

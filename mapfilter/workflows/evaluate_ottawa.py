@@ -16,6 +16,7 @@ from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, StoreError, fail
+from mapfilter.experiments.accuracy_row import Row
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,
     LEFT_OUT,
@@ -31,7 +32,6 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
 )
 from mapfilter.experiments.benchmarks.ottawa_table import (
     LeftOut,
-    PartRow,
     SessionRow,
     part_rows,
     read_left_out,
@@ -59,7 +59,7 @@ class OttawaResult:
 
     seed: int
     runs: int
-    rows: tuple[PartRow, ...]
+    rows: tuple[Row, ...]
     sessions: tuple[SessionRow, ...]
     seconds: float
     out: Path
@@ -162,7 +162,7 @@ def run_ottawa(
         )
         with kept_when_stopped("sessions"):
             deque(results, maxlen=0)
-    rows: list[PartRow] = []
+    rows: list[Row] = []
     sessions: list[SessionRow] = []
     for part in parts:
         every = [read_left_out(task.result) for task in tasks if task.part == part]

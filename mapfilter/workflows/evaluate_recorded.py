@@ -11,6 +11,7 @@ from mapfilter._io import atomic_dir, ensure_writable_folder, sha256_file, write
 from mapfilter._parallel import Progress, local_executor, ordered_results, part_of
 from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.experiments.accuracy_row import Row
 from mapfilter.experiments.benchmarks.ottawa import FOLDER as OTTAWA_FOLDER
 from mapfilter.experiments.benchmarks.ottawa import PARTS as OTTAWA_PARTS
 from mapfilter.experiments.recorded import (
@@ -29,7 +30,6 @@ from mapfilter.experiments.recorded.kept import (
     write_judged,
 )
 from mapfilter.experiments.recorded.rows import (
-    Row,
     UnitRow,
     table_rows,
     unit_rows,
@@ -50,6 +50,7 @@ HEAD, TABLE, PICTURES, WORK, UNITS = "benchmark.json", "table.json", "pictures",
 PREPARED = "prepared.json"
 """In the folder of the work, written last: without it the work is not resumed."""
 _VERSION = 1
+_MOST_TOGETHER = 5
 
 
 @dataclass(frozen=True)
@@ -151,9 +152,10 @@ def run_recorded(
 
     report(0, 0)
     with local_executor(workers) as executor, kept_when_stopped("runs"):
-        jobs = [(name, task, finished) for task in todo]
-        for _ in ordered_results(executor, _judge, jobs, in_flight=2 * workers, progress=report):
-            pass
+        jobs = [(name, some, finished) for some in benchmark.together(todo, _MOST_TOGETHER)]
+        judged = ordered_results(executor, _judge, jobs, in_flight=2 * workers)
+        for done, _ in enumerate(judged, 1):
+            report(sum(len(some) for _, some, _ in jobs[:done]), len(tasks))
     by_task = {task: read_scores(finished, task) or () for task in tasks}
     found = [one for each in by_task.values() for one in each]
     rows = table_rows(found, benchmark.published_m, baseline=benchmark.baseline)
@@ -242,7 +244,7 @@ def _rows_of(
         )
         return found.rows, found.seconds
     ottawa = run_ottawa(data, out, seed=seed, workers=workers, resume=resume, progress=progress)
-    return [Row(**vars(row)) for row in ottawa.rows], ottawa.seconds
+    return ottawa.rows, ottawa.seconds
 
 
 def _prepare(benchmark: Benchmark, folder: Path, work: Path) -> None:
@@ -254,10 +256,11 @@ def _prepare(benchmark: Benchmark, folder: Path, work: Path) -> None:
         write_json(new / PREPARED, {"name": benchmark.name})
 
 
-def _judge(job: tuple[str, Task, Path]) -> None:
-    """Locate one task and keep the results."""
-    name, task, folder = job
-    write_judged(BENCHMARKS[name].judge(task), folder, task)
+def _judge(job: tuple[str, tuple[Task, ...], Path]) -> None:
+    """Locate tasks that share what is read, and keep the results of each."""
+    name, tasks, folder = job
+    for task, judged in zip(tasks, BENCHMARKS[name].judged(tasks), strict=True):
+        write_judged(judged, folder, task)
 
 
 def _chosen(tasks: Sequence[Task], parts: Sequence[str]) -> list[Task]:

@@ -99,8 +99,8 @@ def test_sessions_of_which_half_lies_on_the_map_have_a_row_of_their_own():
 def test_a_part_without_any_fix():
     bayes, _, centroid = part_rows("carling", [], {})
     assert (bayes.unit_count, bayes.n, centroid.n) == (0, 0, 0)
-    assert (bayes.success_low, bayes.success_high) == (0.0, 1.0)
-    for value in (bayes.success, bayes.median_m, bayes.mean_m, bayes.p95_m, bayes.coverage_95,
+    for value in (bayes.success_low, bayes.success_high, bayes.success, bayes.median_m,
+                  bayes.mean_m, bayes.p95_m, bayes.coverage_95,
                   bayes.baseline_m, centroid.median_m):  # fmt: skip
         assert isnan(value)
 

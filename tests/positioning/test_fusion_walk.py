@@ -283,3 +283,30 @@ def test_levels_fall_as_cost_231_hata_says():
     at_10 = 46.3 + 33.9 * log10(1800.0) - 13.82 * log10(10.0) - lift
     found = low.of(POSITION, ("L",), ()).mean([EAST + 1000.0, NORTH])[0]
     assert found == pytest.approx(50.0 - at_10 - 15.0, abs=1e-6)
+
+
+def test_a_repeated_fix_is_one_measurement():
+    """What a receiver or a program repeats to the last digit makes the belief no narrower."""
+    made = walk()
+    fix = GnssFix(EAST + 700.0, NORTH, 100.0, 100.0, 0.0)
+    first = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), fix=fix))
+    for _ in range(9):
+        last = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), fix=fix))
+    # A step of no length with a heading spreads it a little.
+    assert last.radii_m[2] == pytest.approx(first.radii_m[2], rel=0.01)
+    assert [one.reason for one in made.unused if one.kind == "gnss"] == [Reason.REPEATED_FIX] * 9
+    other = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), fix=replace(fix, north_m=NORTH + 1.0)))
+    assert other.radii_m[2] < 0.8 * first.radii_m[2]
+
+
+@pytest.mark.parametrize(
+    ("last", "repeats"),
+    [
+        (None, False),
+        (GnssFix(1.0, 2.0), True),
+        (GnssFix(1.0, 2.0, 9.0, 9.0), False),
+        (GnssFix(1.0, 2.5), False),
+    ],
+)
+def test_what_a_repeated_fix_is(last, repeats):
+    assert GnssFix(1.0, 2.0).repeats(last) is repeats

@@ -18,7 +18,7 @@ from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.options import VEHICLE, BayesFilter, open_area
 from mapfilter.positioning.bayes.path import LEG_M, PATH_M, RecentPath
 from mapfilter.positioning.bayes.path_start import ends_of_path, possible_turns_rad
-from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.epochs import Epoch, epochs
 from mapfilter.positioning.filter import locate
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.raster import read_raster_ways
@@ -129,6 +129,55 @@ def test_a_fix_starts_the_belief_where_there_is_one(vehicle):
     estimate, error_m, _ = located(vehicle, log)
     assert np.all(estimate.hypotheses > 0)
     assert np.median(error_m) < 10
+
+
+def with_fixes(log, east_m, north_m, sd_m=3.0):
+    fixes = log.truth[["time_s"]].assign(east_m=east_m, north_m=north_m, cov_east_north_m2=0.0)
+    fixes = fixes.assign(var_east_m2=sd_m**2, var_north_m2=sd_m**2)
+    return make_log(CRS, motion=log.motion, truth=log.truth, gnss=fixes)
+
+
+def test_where_positions_are_measured_the_rules_of_the_map_alone_do_not_hold(vehicle):
+    """Three right angles and 200 m of agreement are asked of the map alone only."""
+    path = drive(TOWN, 3, 250.0)
+    log = as_log(path, odometry(path, 3))
+    rng = np.random.default_rng(4)
+    east_m, north_m = (log.truth[c] + 3.0 * rng.standard_normal(len(log.truth))
+                       for c in ("east_m", "north_m"))  # fmt: skip
+    _, error_m, found = located(vehicle, with_fixes(log, east_m, north_m))
+    assert found[-1]
+    assert log.motion["step_m"][: int(np.argmax(found))].abs().sum() < 120
+    assert np.max(error_m[found]) < 15
+    assert not located(vehicle, log)[2].any()
+
+
+def test_the_rules_of_the_map_alone_hold_again_after_the_last_position(vehicle):
+    path = drive(TOWN, 3, 600.0)
+    log = as_log(path, odometry(path, 3))
+    first = log.truth.iloc[:1]
+    fixed = with_fixes(log, first["east_m"].iloc[0], first["north_m"].iloc[0])
+    fixed = replace(fixed, gnss=fixed.gnss.iloc[:1])
+    state, rng = vehicle.begin(), np.random.default_rng(1)
+    alone = []
+    for epoch in epochs(fixed):
+        state, _ = vehicle.step(state, epoch, rng)
+        alone.append((state.reckoning.travelled_m, vehicle._by_map_alone(state)))
+    assert all(by_map == (travelled_m > 200.0) for travelled_m, by_map in alone)
+
+
+def test_a_repeated_fix_is_one_measurement(vehicle):
+    """A receiver that repeats its last fix while the vehicle drives on tells nothing new."""
+    path = drive(TOWN, 3, 400.0)
+    log = as_log(path, odometry(path, 3))
+    first = log.truth.iloc[0]
+    again = with_fixes(log, first["east_m"], first["north_m"])
+    once = replace(again, gnss=again.gnss.iloc[:1])
+    estimate, error_m, _ = located(vehicle, again)
+    _, error_by_one_m, _ = located(vehicle, once)
+    assert error_m[-1] < 10
+    np.testing.assert_array_equal(error_m, error_by_one_m)
+    reasons = [one.reason for one in estimate.unused if one.kind == "gnss"]
+    assert reasons == [Reason.REPEATED_FIX] * (len(again.gnss) - 1)
 
 
 def test_too_short_or_broken_a_path_starts_nothing(vehicle):

@@ -11,7 +11,7 @@ from scipy.io import savemat
 from mapfilter.errors import ConfigError, InputError, Stopped, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded import wifi
-from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
@@ -39,7 +39,7 @@ class _Fake:
         names = sorted(path.stem for path in folder.glob("*.txt"))
         return [(name, "unit", 2) for name in names]
 
-    def judge(self, task):
+    def judge(self, task, _):
         if len(self.done) == self.stop_at:
             raise Stopped(15)
         self.done.append(task.name)
@@ -163,8 +163,51 @@ def test_parts_and_runs_are_chosen(fake, tmp_path):
         run_recorded("fake", tmp_path, tmp_path / "out", parts=["three"])
 
 
+def test_the_usual_number_of_runs_is_less_than_all_of_them(fake, tmp_path, monkeypatch):
+    few = replace(fake.benchmark(), usual_runs=1)
+    monkeypatch.setattr(evaluate_recorded, "BENCHMARKS", {"fake": few})
+    run_recorded("fake", tmp_path, tmp_path / "few")
+    assert fake.done == ["one-unit-0", "two-unit-0"]
+    fake.done.clear()
+    run_recorded("fake", tmp_path, tmp_path / "all", runs=2)
+    assert fake.done == ["one-unit-0", "one-unit-1", "two-unit-0", "two-unit-1"]
+
+
+def test_what_runs_share_is_read_once_and_from_the_file_as_it_is(fake, tmp_path, monkeypatch):
+    given = []
+
+    def read(task):
+        return (task.data / f"{task.part}.txt").read_text()
+
+    def judge(task, shared):
+        given.append((task.part, task.run, shared))
+        return fake.judge(task, None)
+
+    reads = []
+    made = replace(fake.benchmark(), read=lambda task: reads.append(task.part) or read(task))
+    monkeypatch.setattr(evaluate_recorded, "BENCHMARKS", {"fake": replace(made, judge=judge)})
+    one = tmp_path / "fake-data" / "one.txt"
+    one.write_text("before")
+    run_recorded("fake", tmp_path, tmp_path / "first", parts=["one"])
+    one.write_text("after")
+    run_recorded("fake", tmp_path, tmp_path / "then", parts=["one"])
+    assert given == [("one", run, text) for text in ("before", "after") for run in (0, 1)]
+    assert reads == ["one", "one"]
+
+
+@pytest.mark.parametrize(
+    ("by_part", "most", "sizes"), [(False, 5, [2, 2]), (False, 1, [1] * 4), (True, 5, [4])]
+)
+def test_tasks_that_share_what_is_read_run_together(fake, tmp_path, by_part, most, sizes):
+    made = replace(fake.benchmark(), shared_by_part=by_part)
+    tasks = [Task("one", unit, run, tmp_path, tmp_path) for unit in ("a", "b") for run in (0, 1)]
+    some = made.together(tasks, most)
+    assert [len(each) for each in some] == sizes
+    assert [task for each in some for task in each] == tasks
+
+
 def test_all_names_what_is_missing_or_failed_and_keeps_the_rest(fake, tmp_path, monkeypatch):
-    def damaged_walk(task):
+    def damaged_walk(task, _):
         raise fail(InputError, f"{task.part}.txt", "a walk", "half of one")
 
     absent = replace(fake.benchmark(), name="absent", folder="absent-data")

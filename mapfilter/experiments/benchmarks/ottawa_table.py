@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from math import isfinite, nan
 from pathlib import Path
@@ -11,54 +11,20 @@ from typing import Any
 import numpy as np
 
 from mapfilter._io import read_sealed, write_sealed
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Floats
 from mapfilter.errors import StoreError, fail
-from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
+from mapfilter.experiments.accuracy_row import (
+    Row,
+    Success,
+    joined,
+    mean_of,
+    median_of,
+    row_of,
+    success_of,
+)
 from mapfilter.experiments.benchmarks.ottawa import METHODS, FoundSession
 
 _MAPPED_SHARE = 0.5
-
-
-@dataclass(frozen=True)
-class PartRow:
-    """Accuracy of one method on one part.
-
-    Parameters
-    ----------
-    method : str
-        ``bayes``: from CONVERGED on; ``smoothed``: whole tracks, smoothed; both also as
-        ``-mapped``, of the sessions of which at least half lies within 50 m of where others were;
-        ``centroid``: the mean place of the serving cell's rows.
-    unit_count : int
-        Sessions, each left out once.
-    n : int
-        Fixes that were scored, over all draws of the noise.
-    median_m, mean_m, p95_m : float
-        Of their errors.
-    success, success_low, success_high : float
-        Share of the runs that converged at most 50 m off, with the 95 % Wilson interval over
-        sessions.
-    coverage_95 : float
-        Share of the scored fixes within the 95 % radius.
-    baseline_m : float
-        Median error of the centroids of the same sessions.
-    published_m : float
-        NaN: no figures of others are known.
-    """
-
-    part: str
-    method: str
-    unit_count: int
-    n: int
-    median_m: float
-    mean_m: float
-    p95_m: float
-    success: float
-    success_low: float
-    success_high: float
-    coverage_95: float
-    baseline_m: float
-    published_m: float = nan
 
 
 @dataclass(frozen=True)
@@ -95,10 +61,19 @@ class SessionRow:
     lost: int
 
 
-def part_rows(
-    part: str, found: Sequence[FoundSession], centroid_m: dict[str, Floats]
-) -> list[PartRow]:
-    """Summarise the sessions of a part; ``centroid_m`` are errors of the centroids, by session."""
+def part_rows(part: str, found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -> list[Row]:
+    """Return a row for each method on a part, then that of the centroids.
+
+    Methods are ``bayes``, from CONVERGED on; ``smoothed``, whole tracks; both also as ``-mapped``,
+    of the sessions of which at least half lies within 50 m of where others were; ``centroid``, the
+    mean place of the serving cell's rows. A run succeeds that converges at most 50 m off. The
+    baseline is the median error of the centroids of the same sessions.
+
+    Parameters
+    ----------
+    centroid_m : dict of str to ndarray
+        Errors of the centroids, by session.
+    """
     mapped = {one.session for one in found if one.on_map >= _MAPPED_SHARE}
     rows = []
     for method in METHODS:
@@ -107,13 +82,10 @@ def part_rows(
         if mapped and len(mapped) < len(centroid_m):
             some = [one for one in own if one.session in mapped]
             rows.append(_row(part, f"{method}-mapped", some, centroid_m))
-    every = _joined(centroid_m.values())
-    errors = _errors(every)
-    rows.append(
-        PartRow(
-            part, "centroid", len(centroid_m), every.size, *errors, nan, nan, nan, nan, errors[0]
-        )
-    )
+    every = joined(centroid_m.values())
+    nobody = np.empty(0)
+    usual_m = median_of(every)
+    rows.append(row_of(part, "centroid", len(centroid_m), every, Success(), nobody, usual_m))
     return rows
 
 
@@ -124,7 +96,7 @@ def session_rows(found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -
         own = [one for one in found if one.session == name and one.method == "bayes"]
         smoothed = [one for one in found if one.session == name and one.method == "smoothed"]
         converged = [one for one in own if one.converged]
-        errors = _joined(one.error_m for one in own)
+        errors = joined(one.error_m for one in own)
         rows.append(
             SessionRow(
                 own[0].part,
@@ -133,13 +105,13 @@ def session_rows(found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -
                 len(own),
                 len(converged),
                 sum(one.success for one in own),
-                _median(np.array([one.switch_m for one in converged])),
-                _median(np.array([one.error_at_switch_m for one in converged])),
+                median_of(np.array([one.switch_m for one in converged])),
+                median_of(np.array([one.error_at_switch_m for one in converged])),
                 errors.size,
-                _median(errors),
-                _mean(_joined(one.covered for one in own)),
-                _median(_joined(one.error_m for one in smoothed)),
-                _median(centroid_m[name]),
+                median_of(errors),
+                mean_of(joined(one.covered for one in own)),
+                median_of(joined(one.error_m for one in smoothed)),
+                median_of(centroid_m[name]),
                 sum(one.lost for one in own),
             )
         )
@@ -148,46 +120,17 @@ def session_rows(found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -
 
 def _row(
     part: str, method: str, found: Sequence[FoundSession], centroid_m: dict[str, Floats]
-) -> PartRow:
+) -> Row:
     names = sorted({one.session for one in found})
-    runs = [sum(one.session == name for one in found) for name in names]
-    good = [sum(one.success for one in found if one.session == name) for name in names]
-    if len(found) == len(names):
-        low, high = wilson_interval(sum(good), len(found))
-    else:
-        low, high = wilson_interval_of_routes(good, runs)
-    errors = _joined(one.error_m for one in found)
-    return PartRow(
+    return row_of(
         part,
         method,
         len(names),
-        errors.size,
-        *_errors(errors),
-        sum(good) / len(found) if found else nan,
-        low,
-        high,
-        _mean(_joined(one.covered for one in found)),
-        _median(_joined(centroid_m[name] for name in names)),
+        joined(one.error_m for one in found),
+        success_of([one.session for one in found], [one.success for one in found]),
+        joined(one.covered for one in found),
+        median_of(joined(centroid_m[name] for name in names)),
     )
-
-
-def _joined(parts: Iterable[Floats | Bools]) -> Floats:
-    return np.concatenate([np.empty(0), *parts])
-
-
-def _errors(errors_m: Floats) -> tuple[float, float, float]:
-    """Return median, mean and 95 % of errors; NaN without any."""
-    p95_m = float(np.quantile(errors_m, 0.95)) if errors_m.size else nan
-    return _median(errors_m), _mean(errors_m), p95_m
-
-
-def _median(values: Floats) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else nan
-
-
-def _mean(values: Floats) -> float:
-    return float(np.mean(values)) if values.size else nan
 
 
 @dataclass(frozen=True, eq=False)

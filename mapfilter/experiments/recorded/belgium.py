@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -32,13 +32,13 @@ from mapfilter.experiments.recorded.ground import (
     positions_of,
     predicted,
 )
-from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
+from mapfilter.positioning.fingerprints.locating import ReportLocator, fit_locator, locate_by
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import Cell, CellPlan
@@ -55,6 +55,7 @@ HEIGHT_M, EIRP_DBM = 30.0, 58.0
 _TOWERS = "tower_data/towers.json"
 _MARGIN_M, _BOX_MARGIN_M, _BOX_RESOLUTION_M = 300.0, 1500.0, 25.0
 _LARGEST_BYTES = 10_000_000
+_BOX = "box"
 
 
 def units(folder: Path) -> list[tuple[str, str, int]]:
@@ -62,19 +63,43 @@ def units(folder: Path) -> list[tuple[str, str, int]]:
     return [(_place(file), file.stem, 1) for file in _walks(folder)]
 
 
-def judge(task: Task) -> Judged:
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Walks of a place by their files' names, the cells near them, and a locator of reports."""
+
+    logs: dict[str, TrackLog]
+    plan: CellPlan
+    locator: ReportLocator
+
+
+def prepare(folder: Path, work: Path) -> None:
+    """Predict the levels anywhere in the box around the towers of each place."""
+    for place in dict.fromkeys(_place(file) for file in _walks(folder)):
+        logs, plan = _place_of(folder, place)
+        at = np.array([(cell.east_m, cell.north_m) for cell in plan.cells])
+        towers = [Positions(at[:, 0], at[:, 1])]
+        crs = next(iter(logs.values())).crs
+        box = lattice_about(crs, towers, _BOX_MARGIN_M, _BOX_RESOLUTION_M)
+        predicted(plan, box, open_ground(box), work / place / _BOX)
+
+
+def read(task: Task) -> Place:
+    """Read the walks of a place, and fit the locator to the levels predicted there."""
+    logs, plan = _place_of(task.data, task.part)
+    box = open_database(task.work / task.part / _BOX)
+    return Place(logs, plan, fit_locator(reports_of_database(box), "probabilistic"))
+
+
+def judge(task: Task, shared: Place) -> Judged:
     """Judge a walk: what the filter claims while the radio stands still, and each fresh report."""
-    logs = {file: read_walk(file) for file in _walks(task.data) if _place(file) == task.part}
-    own = next(log for file, log in logs.items() if file.stem == task.unit)
-    others = [positions_of(log.truth) for log in logs.values() if log is not own]
-    plan = read_towers(task.data / _TOWERS, own.crs)
-    near = _near(plan, [positions_of(own.truth), *others])
+    own, near = shared.logs[task.unit], shared.plan
+    others = [positions_of(log.truth) for log in shared.logs.values() if log is not own]
     folder = task.work / task.unit
     lattice = lattice_about(own.crs, others, _MARGIN_M)
     predicted(near, lattice, corridor_routes(lattice, others), folder / "corridor")
     rng = named_rng(task.seed, "belgium", task.unit)
     named = name_by_plan(own, near)
-    located = locate_log(repeated(named), folder / "corridor", rng)
+    located = locate_log(repeated(named), OpenMap.open(folder / "corridor"), rng)
     truth = Truth.of_table(own.truth)
     assert truth is not None, "walks have more than one position"
     delay_s = stale_after_s(located.estimate, named)
@@ -82,7 +107,7 @@ def judge(task: Task) -> Judged:
     named_in_time = bool(delay_s <= LEAST_S) and not claimed_wrongly(located.estimate, truth)
     note = f"stale radio named after {delay_s:.0f} s. {live.note}"
     live = replace(live, success=named_in_time, seconds=located.filter_s, note=note)
-    alone = _fresh_reports(task, named, near, folder)
+    alone = _fresh_reports(task, named, shared)
     return Judged((live, alone), {"live": Journey(located.estimate, truth, folder / "corridor")})
 
 
@@ -138,17 +163,20 @@ def claimed_wrongly(estimate: TrackEstimate, truth: Truth) -> bool:
     return bool(np.any(position_errors_m(estimate, truth)[claims] > SUCCESS_RADIUS_M))
 
 
-def _fresh_reports(task: Task, log: TrackLog, plan: CellPlan, folder: Path) -> Found:
+def _place_of(folder: Path, place: str) -> tuple[dict[str, TrackLog], CellPlan]:
+    """Return the walks of a place, and the cells near them."""
+    logs = {file.stem: read_walk(file) for file in _walks(folder) if _place(file) == place}
+    plan = read_towers(folder / _TOWERS, next(iter(logs.values())).crs)
+    return logs, _near(plan, [positions_of(log.truth) for log in logs.values()])
+
+
+def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
     """Locate each report that was measured by itself, anywhere around the towers."""
-    at = np.array([(cell.east_m, cell.north_m) for cell in plan.cells])
-    box = lattice_about(log.crs, [Positions(at[:, 0], at[:, 1])], _BOX_MARGIN_M, _BOX_RESOLUTION_M)
-    database = predicted(plan, box, open_ground(box), folder / "box")
     # Without a position by GNSS at its time a report is not scored.
-    reports = reports_of_logs([log], plan)
-    fitted = fit_locator(reports_of_database(open_database(folder / "box")), "probabilistic")
-    located = locate_by(fitted, reports)
+    reports = reports_of_logs([log], place.plan)
+    located = locate_by(place.locator, reports)
     known = np.isfinite(located.error_m)
-    sites = _site_errors_m(log, database.plan)
+    sites = _site_errors_m(log, place.plan)
     held = (located.error_m <= located.radii_m[:, 2])[known]
     return Found(
         task.part,
@@ -221,4 +249,7 @@ BENCHMARK = Benchmark(
     ("walks/*.txt", _TOWERS),
     units,
     judge,
+    prepare,
+    read,
+    shared_by_part=True,
 )

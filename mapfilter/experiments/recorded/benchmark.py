@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.accuracy import Truth
@@ -74,7 +75,13 @@ class Benchmark:
     units : callable
         From the folder of the data to part and unit of each task and its number of runs.
     judge : callable
-        Locates a task.
+        Locates a task; also given what ``read`` returned, None without it.
+    read : callable, optional
+        From the first of several tasks: reads what all of them share.
+    usual_runs : int, optional
+        Runs of each unit where their number is not asked for; all when left out.
+    shared_by_part : bool
+        Whether all tasks of a part share what is read, or only the runs of a unit.
     prepare : callable, optional
         From the folder of the data and a new, empty folder to write to: makes what all tasks share.
         The folder is moved to :attr:`Task.work` when all is made, so nothing in it may name it.
@@ -88,13 +95,36 @@ class Benchmark:
     folder: str
     needs: tuple[str, ...]
     units: Callable[[Path], Sequence[tuple[str, str, int]]]
-    judge: Callable[[Task], Judged]
+    judge: Callable[[Task, Any], Judged]
     prepare: Callable[[Path, Path], None] | None = None
+    read: Callable[[Task], Any] | None = None
     published_m: Mapping[tuple[str, str], float] = field(default_factory=dict)
     baseline: str = "median"
+    usual_runs: int | None = None
+    shared_by_part: bool = False
+
+    def together(self, tasks: Sequence[Task], most: int) -> list[tuple[Task, ...]]:
+        """Return neighbouring tasks that share what is read, at most so many together."""
+        found: list[list[Task]] = []
+        for task in tasks:
+            last = found[-1] if found else []
+            if last and len(last) < most and self._shared(last[0]) == self._shared(task):
+                last.append(task)
+            else:
+                found.append([task])
+        return [tuple(some) for some in found]
+
+    def _shared(self, task: Task) -> tuple[str, ...]:
+        return (task.part,) if self.shared_by_part else (task.part, task.unit)
+
+    def judged(self, tasks: Sequence[Task]) -> Iterator[Judged]:
+        """Yield the results of tasks that share what is read, in their order."""
+        shared = self.read(tasks[0]) if self.read is not None and tasks else None
+        for task in tasks:
+            yield self.judge(task, shared)
 
     def tasks(self, data: Path, work: Path, seed: int, runs: int | None = None) -> list[Task]:
-        """Return all tasks, at most ``runs`` of each unit.
+        """Return all tasks, at most ``runs`` of each unit; by default the usual number.
 
         Raises
         ------
@@ -108,10 +138,11 @@ class Benchmark:
             faults = Faults()
             faults.add(str(folder), "recordings to be judged", "none", "see its README")
             faults.raise_if_any(InputError)
+        most = runs or self.usual_runs
         return [
             Task(part, unit, run, folder, work, seed)
-            for part, unit, usual in found
-            for run in range(min(usual, runs or usual))
+            for part, unit, count in found
+            for run in range(count if most is None else min(count, most))
         ]
 
 

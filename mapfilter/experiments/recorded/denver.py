@@ -9,7 +9,6 @@ wrong together, so the share of them has no interval.
 from __future__ import annotations
 
 import io
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +19,10 @@ from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.errors import InputError, fail
-from mapfilter.experiments.recorded.benchmark import Benchmark, Judged, Task
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import roads_alone
-from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.street_graph import StreetGraph, match_points, read_graph
 from mapfilter.geodesy import Lattice, project, utm_crs
@@ -57,9 +57,14 @@ def prepare(folder: Path, work: Path) -> None:
     roads_alone(LayerRoutes(source, lattice), work / _MAP)
 
 
-def judge(task: Task) -> Judged:
+def read(task: Task) -> tuple[StreetGraph, OpenMap]:
+    """Read the graph, and open the map of its streets."""
+    return _graph(task.data), OpenMap.open(task.work / _MAP)
+
+
+def judge(task: Task, shared: tuple[StreetGraph, OpenMap]) -> Judged:
     """Match the part of a trace that lies on the graph by both methods."""
-    graph = _graph(task.data)
+    graph, over = shared
     places = clipped(read_trace(task.data / f"{task.part}.csv", graph.crs), graph)
     if len(places) < LEAST_POINTS:
         expected = f"{LEAST_POINTS} points or more on the graph"
@@ -68,7 +73,7 @@ def judge(task: Task) -> Judged:
     hmm = np.where(edge >= 0, graph.street[edge], 0)
     rng = named_rng(task.seed, "denver", task.part)
     options = BayesFilter(vehicle=True)
-    located = locate_log(trace_log(places, graph.crs), task.work / _MAP, rng, options)
+    located = locate_log(trace_log(places, graph.crs), over, rng, options)
     at = np.searchsorted(located.estimate.time_s, np.arange(len(places), dtype=np.float64))
     ours = located.estimate.way_id[np.minimum(at, len(located.estimate) - 1)]
     found = []
@@ -92,7 +97,9 @@ def judge(task: Task) -> Judged:
             )
             for i in range(len(places))
         ]
-    return Judged(tuple(found))
+    # There is no other truth than the trace itself; for the picture.
+    known = Truth(np.arange(len(places), dtype=np.float64), places[:, 0], places[:, 1])
+    return Judged(tuple(found), {"bayes": Journey(located.estimate, known, over.path)})
 
 
 def read_trace(file: Path, crs: str) -> Floats:
@@ -149,7 +156,6 @@ def judged_streets(graph: StreetGraph, places: Floats, street: Ints) -> tuple[Fl
     return apart, (apart <= RIGHT_M) & follows
 
 
-@lru_cache(maxsize=1)
 def _graph(folder: Path) -> StreetGraph:
     files = sorted(folder.glob(_GRAPH))[:1]
     if not files:
@@ -171,4 +177,4 @@ def _degrees(file: Path) -> tuple[Floats, Floats]:
     return found
 
 
-BENCHMARK = Benchmark("denver", "mapmatch-denver", (_GRAPH, _TRACES), units, judge, prepare)
+BENCHMARK = Benchmark("denver", "mapmatch-denver", (_GRAPH, _TRACES), units, judge, prepare, read)

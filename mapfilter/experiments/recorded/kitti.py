@@ -18,7 +18,7 @@ from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
-from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import wrap_rad
 from mapfilter.propagation.shadowing import named_rng
@@ -29,7 +29,8 @@ from mapfilter.tracks.deadreckoning import dead_reckon
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.readers.formats import read_recording
 
-STARTS = 10
+STARTS, USUAL_STARTS = 10, 3
+"""Runs of a drive, and those that are made where their number is not asked for."""
 STRAIGHT = ("01", "04", "06")
 """A motorway, a straight drive, and one that goes up and down one street: by the data's README
 there is too little in them to converge."""
@@ -61,7 +62,12 @@ def prepare(folder: Path, work: Path) -> None:
     build_roads(LayerRoutes(source, lattice), work / _MAP)
 
 
-def judge(task: Task) -> Judged:
+def read(task: Task) -> OpenMap:
+    """Open the map."""
+    return OpenMap.open(task.work / _MAP)
+
+
+def judge(task: Task, over: OpenMap) -> Judged:
     """Locate one run of a drive."""
     truth = read_truth(task.data / "truth" / f"{task.part}.csv")
     rng = named_rng(task.seed, "kitti", task.part, task.unit, str(task.run))
@@ -71,8 +77,8 @@ def judge(task: Task) -> Judged:
         file = task.data / "odometry" / f"{task.unit}.csv"
         motion = read_recording(file).tables["motion"]
     first = int(len(truth) * _FIRST_PART * task.run / STARTS)
-    log = log_from(truth, motion, first, raster_lattice(task.data / "roads.tif", 5.0).crs)
-    located = locate_log(log, task.work / _MAP, rng)
+    log = log_from(truth, motion, first, over.database.lattice.crs)
+    located = locate_log(log, over, rng)
     known = Truth.of_table(log.truth)
     assert known is not None, "drives have more than one row"
     found = score_journey(
@@ -85,7 +91,7 @@ def judge(task: Task) -> Judged:
         seconds=located.filter_s,
         asked=(lambda claimed, _: not claimed) if task.part in STRAIGHT else None,
     )
-    return Judged((found,), {"bayes": Journey(located.estimate, known, task.work / _MAP)})
+    return Judged((found,), {"bayes": Journey(located.estimate, known, over.path)})
 
 
 def read_truth(path: Path) -> pd.DataFrame:
@@ -150,5 +156,7 @@ BENCHMARK = Benchmark(
     units,
     judge,
     prepare,
+    read,
     published_m={("", ""): 3.1},
+    usual_runs=USUAL_STARTS,
 )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -19,9 +19,34 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.placeless import in_frame
 
 
+@dataclass(frozen=True, eq=False)
+class OpenMap:
+    """A database that was opened once, and the filters over it that were asked for.
+
+    Reading the area of a filter takes seconds, so several logs share it.
+    """
+
+    database: RadioRouteDatabase
+    path: Path
+    filters: dict[tuple[BayesFilter, bool], BayesPositioner] = field(default_factory=dict)
+
+    @classmethod
+    def open(cls, path: Path) -> OpenMap:
+        """Open a database."""
+        return cls(open_database(path), path)
+
+    def filter_of(self, options: BayesFilter, *, alone: bool) -> BayesPositioner:
+        """Return the filter with these options, by the streets alone if asked for."""
+        key = options, alone
+        if key not in self.filters:
+            database = self.database.without_cells() if alone else self.database
+            self.filters[key] = options.over(database)
+        return self.filters[key]
+
+
 def locate_log(
     log: TrackLog,
-    database: Path,
+    over: OpenMap,
     rng: np.random.Generator,
     options: BayesFilter | None = None,
     *,
@@ -36,16 +61,8 @@ def locate_log(
     smooth : bool
         Whether positions are smoothed by the whole log.
     """
-    opened = open_database(database)
-    named = name_by_plan(in_frame(log, opened.lattice.crs), opened.plan)
+    database = over.database
+    named = name_by_plan(in_frame(log, database.lattice.crs), database.plan)
     fitted, _ = fitted_to_log(options or BayesFilter(), named)
-    alone = by_streets_alone(fitted, named, opened)
-    positioner = _over(database, fitted, alone)
+    positioner = over.filter_of(fitted, alone=by_streets_alone(fitted, named, database))
     return locate(named, replace(positioner, smooth=smooth), rng)
-
-
-# Tasks of one process share the map, which takes seconds to read.
-@lru_cache(maxsize=2)
-def _over(database: Path, options: BayesFilter, alone: bool) -> BayesPositioner:
-    opened = open_database(database)
-    return options.over(opened.without_cells() if alone else opened)

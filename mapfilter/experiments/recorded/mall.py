@@ -16,7 +16,6 @@ import json
 import tarfile
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,7 @@ from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.benchmarks.single_reports import BASELINE, METHODS
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import open_ground, roads_alone
-from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.outages import errors_at
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
@@ -60,6 +59,7 @@ _LARGEST_BYTES, _LARGEST_WALK_BYTES = 100_000_000, 100_000_000
 _SIGMA_OF_RADIUS_67 = 1 / 1.489
 """Deviation along one axis of a round normal distribution, of the radius of 67 %."""
 _MAP, _WALKS = "floor", "walks"
+_OPEN = OpenOptions(combine=CombineOptions(walk=WalkOptions(declination_deg=DECLINATION_DEG)))
 
 
 def units(_: Path) -> list[tuple[str, str, int]]:
@@ -70,13 +70,18 @@ def units(_: Path) -> list[tuple[str, str, int]]:
 def prepare(folder: Path, work: Path) -> None:
     """Unpack the walks, and build a database of the walkable part of the floor."""
     unpack(_first(folder, _ARCHIVE), work / _WALKS)
-    crs = next(iter(_logs(work).values())).crs
+    crs = open_log(_walks(work)[0], options=_OPEN).log.crs
     roads_alone(walkable(folder, crs), work / _MAP)
 
 
-def judge(task: Task) -> Judged:
+def read(task: Task) -> tuple[dict[str, TrackLog], OpenMap]:
+    """Read the walks, and open the map of the floor."""
+    return _logs(task.work), OpenMap.open(task.work / _MAP)
+
+
+def judge(task: Task, shared: tuple[dict[str, TrackLog], OpenMap]) -> Judged:
     """Locate the walks of a part by all others."""
-    logs = _logs(task.work)
+    logs, over = shared
     names = list(logs)
     later = names[len(names) // 2 :]
     own = later[int(task.unit.rpartition("-")[2]) - 1 :: PARTS]
@@ -101,7 +106,7 @@ def judge(task: Task) -> Judged:
         found.append(Found("floor", "wifi", name, *none, *wifi, note=note))
         fixed = with_fixes(log, alone)
         first_s = float(fixed.gnss["time_s"].min()) if len(fixed.gnss) else inf
-        for method, located in _located(fixed, task).items():
+        for method, located in _located(fixed, task, over).items():
             scored = score_journey(
                 "floor", method, name, located.estimate, truth, seconds=located.filter_s
             )
@@ -121,17 +126,17 @@ def judge(task: Task) -> Judged:
             located_m = errors_m[np.isfinite(errors_m)]
             if located_m.size and located_m.max() > worst_m.get(method, -1.0):
                 worst_m[method] = float(located_m.max())
-                journeys[method] = Journey(located.estimate, truth, task.work / _MAP)
+                journeys[method] = Journey(located.estimate, truth, over.path)
     return Judged(tuple(found), journeys)
 
 
-def _located(log: TrackLog, task: Task) -> dict[str, PositionedTrack]:
+def _located(log: TrackLog, task: Task, over: OpenMap) -> dict[str, PositionedTrack]:
     """Locate a walk with fixes by all filters."""
 
     def rng() -> np.random.Generator:
         return named_rng(task.seed, "mall", task.unit, str(log.start_utc_s))
 
-    found = {"bayes": locate_log(log, task.work / _MAP, rng())}
+    found = {"bayes": locate_log(log, over, rng())}
     for name, smooth in (("ekf", False), ("ekf-smoothed", True)):
         options, _ = fitted_to_log(KalmanFilter(smooth=smooth), log)
         found[name] = locate(log, options.over_sites(CellPlan(log.crs, ())), rng())
@@ -205,17 +210,17 @@ def with_fixes(log: TrackLog, located: LocatedReports) -> TrackLog:
     return replace(log, gnss=fixes, radio=log.radio.iloc[:0])
 
 
-@lru_cache(maxsize=1)
 def _logs(work: Path) -> dict[str, TrackLog]:
     """Return the walks by name, in the order of time."""
-    walk = WalkOptions(declination_deg=DECLINATION_DEG)
-    options = OpenOptions(combine=CombineOptions(walk=walk))
-    logs = {}
-    for file in sorted((work / _WALKS).glob("*.txt")):
-        logs[file.stem] = open_log(file, options=options).log
-    if len(logs) < 2 * PARTS:
-        raise fail(InputError, str(work / _WALKS), f"{2 * PARTS} walks or more", len(logs))
+    logs = {file.stem: open_log(file, options=_OPEN).log for file in _walks(work)}
     return dict(sorted(logs.items(), key=lambda item: item[1].start_utc_s))
+
+
+def _walks(work: Path) -> list[Path]:
+    files = sorted((work / _WALKS).glob("*.txt"))
+    if len(files) < 2 * PARTS:
+        raise fail(InputError, str(work / _WALKS), f"{2 * PARTS} walks or more", len(files))
+    return files
 
 
 def _first(folder: Path, pattern: str) -> Path:
@@ -232,5 +237,6 @@ BENCHMARK = Benchmark(
     units,
     judge,
     prepare,
+    read,
     baseline="mean",
 )

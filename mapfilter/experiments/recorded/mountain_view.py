@@ -9,7 +9,6 @@ along them is not.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ from mapfilter.experiments.recorded.ground import (
     positions_of,
     roads_alone,
 )
-from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.outages import (
     Outages,
     coasted_errors_m,
@@ -63,9 +62,14 @@ def prepare(folder: Path, work: Path) -> None:
     roads_alone(corridor_routes(lattice, [track]), work / _MAP)
 
 
-def judge(task: Task) -> Judged:
+def read(task: Task) -> tuple[TrackLog, OpenMap]:
+    """Read the drive, and open the map."""
+    return _drive(task.data), OpenMap.open(task.work / _MAP)
+
+
+def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
     """Locate the drive with outages and one draw of the errors; score their ends."""
-    log = _drive(task.data)
+    log, over = shared
     rng = named_rng(task.seed, "mountain-view", task.part, str(task.run))
     log = replace(log, motion=with_errors(log.motion, rng), imu=None)
     truth = Truth.of_table(log.truth)
@@ -75,7 +79,7 @@ def judge(task: Task) -> Judged:
     first_s = FIRST_S + task.run * (length_s + PAUSE_S) / RUNS
     spans = Outages(first_s, length_s, PAUSE_S).within(float(truth.time_s[-1]))
     spans = [span for span in spans if _moves(truth, *span) and _measured(log, *span)]
-    located = locate_log(log_without(log, spans), task.work / _MAP, rng)
+    located = locate_log(log_without(log, spans), over, rng)
     errors_m, held = errors_at(located.estimate, truth, [end_s for _, end_s in spans])
     whole = score_journey(
         task.part, "bayes", task.unit, located.estimate, truth, seconds=located.filter_s
@@ -90,7 +94,7 @@ def judge(task: Task) -> Judged:
         success=bool(np.median(errors_m) <= RIGHT_M) if len(errors_m) else None,
         note=f"{len(spans)} outages, {int(there.sum())} ends with a position. {whole.note}",
     )
-    return Judged((found,), {"bayes": Journey(located.estimate, truth, task.work / _MAP)})
+    return Judged((found,), {"bayes": Journey(located.estimate, truth, over.path)})
 
 
 def with_errors(motion: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
@@ -105,7 +109,6 @@ def with_errors(motion: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
     return motion.assign(step_m=step, turn_rad=turned, heading_rad=np.nan)
 
 
-@lru_cache(maxsize=1)
 def _drive(folder: Path) -> TrackLog:
     """Read the drive: fixes and motion of the receiver, the reference as truth."""
     found = [sorted(folder.glob(pattern))[:1] for pattern in (_RECEIVER, _REFERENCE)]
@@ -136,4 +139,5 @@ BENCHMARK = Benchmark(
     units,
     judge,
     prepare,
+    read,
 )

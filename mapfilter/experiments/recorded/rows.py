@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -13,48 +13,15 @@ import numpy as np
 from mapfilter._io import read_sealed, write_sealed
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import StoreError, fail
-from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
-
-
-@dataclass(frozen=True)
-class Row:
-    """Accuracy of one method on one part of a data set.
-
-    Parameters
-    ----------
-    unit_count : int
-        Journeys, sessions or reports: what is independent of each other.
-    n : int
-        Places or times that were scored.
-    median_m, p95_m : float
-        Of the errors there; NaN without any. An error without a position is infinite.
-    mean_m : float
-        Of the finite errors.
-    success, success_low, success_high : float
-        Share of the runs that did what the benchmark asks for, with its 95 % interval over units;
-        NaN where nothing is asked for but the errors. Without an interval where the runs are
-        neighbouring points of one journey.
-    coverage_95 : float
-        Share of what was scored where the 95 % radius held the truth; NaN without radii.
-    baseline_m : float
-        Error of the benchmark's baseline by the same statistic as its target.
-    published_m : float
-        Published figure of the same part; NaN if there is none.
-    """
-
-    part: str
-    method: str
-    unit_count: int
-    n: int
-    median_m: float
-    mean_m: float
-    p95_m: float
-    success: float
-    success_low: float
-    success_high: float
-    coverage_95: float
-    baseline_m: float
-    published_m: float
+from mapfilter.experiments.accuracy_row import (
+    Row,
+    joined,
+    mean_of,
+    median_of,
+    quantile_of,
+    row_of,
+    success_of,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +135,7 @@ def unit_rows(found: Sequence[Found]) -> list[UnitRow]:
     keys = dict.fromkeys((one.part, one.method, one.unit) for one in found)
     for part, method, unit in keys:
         own = [o for o in found if (o.part, o.method, o.unit) == (part, method, unit)]
-        errors = _joined(one.error_m for one in own)
+        errors = joined(one.error_m for one in own)
         worst = max(own, key=_worst_m)
         seconds = sum(one.seconds for one in own)
         rows.append(
@@ -180,10 +147,10 @@ def unit_rows(found: Sequence[Found]) -> list[UnitRow]:
                 sum(bool(one.success) for one in own),
                 sum(bool(one.claimed) for one in own),
                 sum(bool(one.wrong) for one in own),
-                _median(np.array([one.after_m for one in own])),
-                _median(errors),
-                _quantile(errors, 0.95),
-                _mean(_joined(one.covered for one in own)),
+                median_of(np.array([one.after_m for one in own])),
+                median_of(errors),
+                quantile_of(errors, 0.95),
+                mean_of(joined(one.covered for one in own)),
                 sum(one.lost for one in own),
                 sum(one.real_s for one in own) / seconds if seconds > 0 else nan,
                 worst.note,
@@ -213,66 +180,29 @@ def read_found(file: Path) -> tuple[Found, ...]:
 
 
 def _row(part: str, method: str, own: Sequence[Found], published_m: float, baseline: str) -> Row:
-    units = sorted({one.unit for one in own})
-    errors = _joined(one.error_m for one in own)
-    of_baseline = _joined(one.baseline_m for one in own)
+    units = {one.unit for one in own}
+    of_baseline = joined(one.baseline_m for one in own)
     of_baseline = of_baseline[np.isfinite(of_baseline)]
-    baseline_m = _mean(of_baseline) if baseline == "mean" else _median(of_baseline)
-    count = max(len(units), sum(one.count for one in own if one.count > 1))
-    return Row(
+    judged = [one for one in own if one.success is not None]
+    success = success_of(
+        [one.unit for one in judged],
+        [bool(one.success) for one in judged],
+        interval=not any(one.dependent for one in judged),
+    )
+    return row_of(
         part,
         method,
-        count,
-        errors.size,
-        _median(errors),
-        _mean(errors[np.isfinite(errors)]),
-        _quantile(errors, 0.95),
-        *_success(own, units),
-        _mean(_joined(one.covered for one in own)),
-        baseline_m,
+        max(len(units), sum(one.count for one in own if one.count > 1)),
+        joined(one.error_m for one in own),
+        success,
+        joined(one.covered for one in own),
+        mean_of(of_baseline) if baseline == "mean" else median_of(of_baseline),
         published_m,
     )
 
 
-def _success(own: Sequence[Found], units: Sequence[str]) -> tuple[float, float, float]:
-    judged = [one for one in own if one.success is not None]
-    if not judged:
-        return nan, nan, nan
-    runs = [sum(one.unit == name for one in judged) for name in units]
-    good = [sum(bool(one.success) for one in judged if one.unit == name) for name in units]
-    if any(one.dependent for one in judged):
-        return sum(good) / len(judged), nan, nan
-    # One unit says nothing of others: the interval is that of its runs.
-    single = len(units) == 1 or len(judged) == len(units)
-    low, high = (
-        wilson_interval(sum(good), len(judged)) if single else wilson_interval_of_routes(good, runs)
-    )
-    return sum(good) / len(judged), low, high
-
-
 def _worst_m(one: Found) -> float:
-    return _quantile(one.error_m, 0.95) if one.error_m.size else -1.0
-
-
-def _joined(parts: Iterable[Floats | Bools]) -> Floats:
-    return np.concatenate([np.empty(0), *parts])
-
-
-def _median(values: Floats) -> float:
-    known = values[~np.isnan(values)]
-    return float(np.median(known)) if known.size else nan
-
-
-def _quantile(values: Floats, share: float) -> float:
-    if not values.size:
-        return nan
-    above = float(np.quantile(values, share, method="higher"))
-    # Between a finite and an infinite error there is no interpolation.
-    return float(np.quantile(values, share)) if isfinite(above) else above
-
-
-def _mean(values: Floats) -> float:
-    return float(np.mean(values)) if values.size else nan
+    return quantile_of(one.error_m, 0.95) if one.error_m.size else -1.0
 
 
 def _plain(value: Any) -> Any:

@@ -9,7 +9,6 @@ them away for 60 s, again and again.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 from math import inf
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import lattice_about, open_ground, roads_alone
 from mapfilter.experiments.recorded.least_squares import least_squares_positions
-from mapfilter.experiments.recorded.locating import locate_log
+from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.outages import (
     Outages,
     coasted_errors_m,
@@ -70,9 +69,15 @@ def prepare(folder: Path, work: Path) -> None:
         roads_alone(open_ground(lattice), work / _name(file) / _MAP)
 
 
-def judge(task: Task) -> Judged:
+def read(task: Task) -> tuple[TrackLog, OpenMap]:
+    """Read a drive, and open its map."""
+    file = next(file for file in _inputs(task.data) if _name(file) == task.unit)
+    return _drive(file), OpenMap.open(task.work / task.unit / _MAP)
+
+
+def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
     """Locate a drive with some of its satellites."""
-    log = _drive(next(file for file in _inputs(task.data) if _name(file) == task.unit))
+    log, over = shared
     truth = Truth.of_table(log.truth)
     assert truth is not None, "the ground truth has more than one position"
     rng = named_rng(task.seed, "smartloc", task.part, str(task.run))
@@ -86,8 +91,7 @@ def judge(task: Task) -> Judged:
         most = SATELLITES.get(task.part)
         kept = log.pseudoranges if most is None else highest(log, most, FIRST_S)
         given = replace(log, pseudoranges=kept)
-    database = task.work / task.unit / _MAP
-    located = locate_log(given, database, rng)
+    located = locate_log(given, over, rng)
     found = score_journey(
         task.part, "bayes", task.unit, located.estimate, truth, seconds=located.filter_s
     )
@@ -111,7 +115,7 @@ def judge(task: Task) -> Judged:
         success=bool(np.median(errors_m) <= right_m) if np.isfinite(right_m) else found.success,
         note=f"{missing} of {len(errors_m)} without a position. {found.note}",
     )
-    return Judged((found,), {"bayes": Journey(located.estimate, truth, database)})
+    return Judged((found,), {"bayes": Journey(located.estimate, truth, over.path)})
 
 
 def highest(log: TrackLog, most: int, after_s: float) -> pd.DataFrame:
@@ -146,7 +150,6 @@ def _reckoned_errors_m(log: TrackLog, truth: Truth) -> Floats:
     return coasted_errors_m(log.motion, truth, [(FIRST_S, float(end)) for end in after])
 
 
-@lru_cache(maxsize=2)
 def _drive(file: Path) -> TrackLog:
     """Read a drive: odometry and pseudoranges, and its ground truth."""
     truth = file.with_name(file.name.replace("_Input", "_GT"))
@@ -173,4 +176,5 @@ BENCHMARK = Benchmark(
     units,
     judge,
     prepare,
+    read,
 )

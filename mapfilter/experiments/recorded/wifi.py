@@ -23,7 +23,7 @@ def units(_: Path) -> list[tuple[str, str, int]]:
     return [(name, "test", 1) for name in WIFI]
 
 
-def judge(task: Task) -> Judged:
+def judge(task: Task, _: None = None) -> Judged:
     """Locate the test reports of a set by all methods, beside three nearest neighbours."""
     training, test = read_wifi(task.data, task.part)
     names = (AUTO, "probabilistic", BASELINE)

@@ -51,12 +51,15 @@ from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
+from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 
 _TOLD_ELSEWHERE = (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING, Reason.STALE_RADIO)
 _MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
+_POSITIONED_M = 200.0
+"""Distance from the last position that was measured after which the map is the evidence again."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,9 @@ class BayesPositioner(Filter[BayesState]):
     """The map filter over an area.
 
     ``grid`` replaces particles by the exact filter on a grid; ``smooth`` smooths positions by the
-    whole log. ``more_sources`` are sources of evidence besides the built-in ones.
+    whole log. ``more_sources`` are sources of evidence besides the built-in ones. ``positioned``
+    holds the options and rules that take the place of the others as long as positions or satellites
+    are measured; None for the same ones.
     """
 
     model: BayesModel
@@ -75,6 +80,7 @@ class BayesPositioner(Filter[BayesState]):
     timing: TimingOptions = field(default_factory=TimingOptions)
     smooth: bool = False
     more_sources: tuple[EvidenceSource, ...] = ()
+    positioned: tuple[ParticleOptions, AlternativeRules] | None = None
 
     @property
     def crs(self) -> str:
@@ -106,13 +112,32 @@ class BayesPositioner(Filter[BayesState]):
             FirstFix(area.origin_m),
             self._radio,
             *self.more_sources,
-            *((MapSource(),) if self._by_map_alone else ()),
+            *((MapSource(),) if self._map_may_start else ()),
         )
 
     @property
-    def _by_map_alone(self) -> bool:
+    def _map_may_start(self) -> bool:
         """Whether the map alone may start a belief: there are no cells; a grid needs a start."""
         return not self.area.cell_ids and not self.grid
+
+    def _by_map_alone(self, state: BayesState) -> bool:
+        """Whether the map alone is the evidence: no position was measured for some way."""
+        if not self._map_may_start:
+            return False
+        gnss: GnssState = state.sources[GnssSource.name]
+        return state.reckoning.travelled_m - gnss.used_at_m > _POSITIONED_M
+
+    def _rules_of(self, state: BayesState) -> AlternativeRules:
+        """Return the rules for the evidence that there is."""
+        if self.positioned is None or self._by_map_alone(state):
+            return self.rules
+        return self.positioned[1]
+
+    def _filter_of(self, state: BayesState) -> BeliefFilter[Start, Any, RadioReading]:
+        """Return the filter of a single belief for the evidence that there is."""
+        if self.positioned is None or self._by_map_alone(state):
+            return self.filters[state.compass]
+        return self._filters_positioned[state.compass]
 
     @cached_property
     def _radio(self) -> RadioSource:
@@ -121,11 +146,19 @@ class BayesPositioner(Filter[BayesState]):
     @cached_property
     def filters(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
         """The filters of a single belief, for headings with and without a compass."""
-        known = self.options
         if self.grid:
             model = replace(self.model, remember=False)
             grids = {compass: StreetGrid(model, compass) for compass in (True, False)}
-            return {compass: GridFilter(grid, known) for compass, grid in grids.items()}
+            return {compass: GridFilter(grid, self.options) for compass, grid in grids.items()}
+        return self._particle_filters(self.options)
+
+    @cached_property
+    def _filters_positioned(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
+        return self._particle_filters(self.positioned[0] if self.positioned else self.options)
+
+    def _particle_filters(
+        self, known: ParticleOptions
+    ) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
         # Every place times every heading: most of them die out after a few steps.
         most = _MORE_PARTICLES * known.max_particles
         searching = _MORE_SEARCHING * known.min_search_particles
@@ -156,7 +189,7 @@ class BayesPositioner(Filter[BayesState]):
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[BayesState, StepOutput]:
         """Process one epoch."""
-        epoch = _with_a_known_fix(epoch)
+        state, epoch, repeated = _with_a_new_fix(state, epoch)
         unclear, spacing_m = state.unclear, state.particle_spacing_m
         if unclear:
             state = replace(state, status=Status.TRACKING, unclear=False)
@@ -168,6 +201,8 @@ class BayesPositioner(Filter[BayesState]):
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         if radio is not Reason.USED:
             unused += [UnusedReading(epoch.time_s, row.role, name_of(row), radio) for row in heard]
+        if repeated:
+            unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REPEATED_FIX))
         state, updates = self._collected(state, epoch, spacing_m)
         unused += [reading for update in updates for reading in update.unused]
         reasons = (update.reason for update in updates if update.reason is not None)
@@ -200,7 +235,7 @@ class BayesPositioner(Filter[BayesState]):
         The state moved to the epoch, the evidence, and whether motion was measured; with the
         generator as before the step these are its own.
         """
-        epoch = _with_a_known_fix(epoch)
+        state, epoch, _ = _with_a_new_fix(state, epoch)
         spacing_m = state.particle_spacing_m
         watch, epoch, (motion, _) = watched(state.watch, epoch)
         moved, _ = self._moved(replace(state, watch=watch), epoch, rng)
@@ -242,7 +277,7 @@ class BayesPositioner(Filter[BayesState]):
             step, heading_rad = headed(raw, state.heading_rad)
             belief, compass, alternative = state.belief, state.compass, state.alternative
             reckoning, why, path = state.reckoning, Reason.NOT_STARTED, state.path
-            if self._by_map_alone:
+            if self._map_may_start:
                 known = isfinite(raw.heading_rad) == compass or not path.here.travelled_m
                 path = (path if known else RecentPath()).moved(step)
                 why = Reason.USED if isfinite(step.step_m) else Reason.NO_STEP
@@ -350,8 +385,9 @@ class BayesPositioner(Filter[BayesState]):
         reading = weighed_by(before, updates, measured=measured)
         if reading is None:
             return state, Reason.USED
-        update, rules = self.filters[state.compass].update, self.rules
-        plain = self._by_map_alone and not state.path.is_distinctive
+        update, rules = self._filter_of(state).update, self._rules_of(state)
+        by_map_alone = self._by_map_alone(state)
+        plain = by_map_alone and not state.path.is_distinctive
         doubt = plain or doubted(rules, before, state.null, state.alternative)
         doubt = doubt or self.area.at_edge(before.summary.mean)
         reading = replace(reading, doubted=doubt)
@@ -398,7 +434,7 @@ class BayesPositioner(Filter[BayesState]):
             belief=now.belief,
             status=now.status,
             sources=sources,
-            null=null if self._by_map_alone and not now.taken_over else now.null,
+            null=null if by_map_alone and not now.taken_over else now.null,
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
         )
@@ -411,7 +447,7 @@ class BayesPositioner(Filter[BayesState]):
         measured spreads it to all sides, so it is LOST earlier, but kept as found: it is clear
         again when it has gathered.
         """
-        belief, rules = state.belief, self.rules
+        belief, rules = state.belief, self._rules_of(state)
         if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
             return state
         mass = belief.summary.mass_50m
@@ -433,7 +469,7 @@ class BayesPositioner(Filter[BayesState]):
             return None
         belief, sources = started
         null = NullHypothesis()
-        if self._by_map_alone:
+        if self._by_map_alone(state):
             # Many alternatives may follow each other, and each begins with the streets that fit
             # best: what speaks for a position off the map must not be forgotten with each.
             null = NullHypothesis(max(state.null.log_odds, null.log_odds))
@@ -462,11 +498,19 @@ class BayesPositioner(Filter[BayesState]):
         return replace(belief, state=state, log_weight=log_weight, kept=kept)
 
 
-def _with_a_known_fix(epoch: Epoch) -> Epoch:
-    """Return the epoch without a fix whose position is not known."""
+def _with_a_new_fix(state: BayesState, epoch: Epoch) -> tuple[BayesState, Epoch, bool]:
+    """Return an epoch without a fix that has no position, or repeats the last one.
+
+    Also returns the state with the last fix, and whether it was repeated.
+    """
     fix = epoch.fix
-    known = fix is None or (isfinite(fix.east_m) and isfinite(fix.north_m))
-    return epoch if known else replace(epoch, fix=None)
+    if fix is None:
+        return state, epoch, False
+    if not (isfinite(fix.east_m) and isfinite(fix.north_m)):
+        return state, replace(epoch, fix=None), False
+    if fix.repeats(state.last_fix):
+        return state, replace(epoch, fix=None), True
+    return replace(state, last_fix=fix), epoch, False
 
 
 def weighed_by(

@@ -249,7 +249,9 @@ class BayesFilter(Options):
             unclear_below_mass=min(rules.unclear_below_mass, self.switch_mass),
             clear_from_mass=min(rules.clear_from_mass, self.switch_mass),
         )
+        positioned = None
         if not area.cell_ids:
+            positioned = particles, rules
             rules = replace(
                 rules,
                 converge_log_odds=_CONVERGE_BY_MAP,
@@ -277,6 +279,7 @@ class BayesFilter(Options):
             satellites=satellites,
             timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
             smooth=self.smooth,
+            positioned=positioned,
         )
 
 

@@ -15,6 +15,7 @@ from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
+from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.integrity import sample_tail
 
@@ -57,6 +58,8 @@ class BayesState:
         The last output, which stays as it is as long as the belief does.
     watch : SensorWatch
         Whether sensors still measure.
+    last_fix : GnssFix or None
+        The last one with a position.
     """
 
     belief: MapBelief | None = None
@@ -72,6 +75,7 @@ class BayesState:
     path: RecentPath = field(default_factory=RecentPath)
     reported: Reported | None = None
     watch: SensorWatch = field(default_factory=SensorWatch)
+    last_fix: GnssFix | None = None
 
     @property
     def particle_spacing_m(self) -> float:

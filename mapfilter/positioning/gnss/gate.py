@@ -134,6 +134,12 @@ class GnssState:
         return gone_m >= options.spacing_m or time_s - self.compared_at_s >= options.pause_s
 
     @property
+    def used_at_m(self) -> float:
+        """Distance travelled when a fix or pseudoranges were last used; -inf before any were."""
+        ranges_m = -inf if self.receiver is None else self.receiver.used_at_m
+        return max(self.fix_used_at_m, ranges_m)
+
+    @property
     def rejecting(self) -> bool:
         """Whether the last readings contradicted the belief."""
         return isfinite(self.rejected_since_s)

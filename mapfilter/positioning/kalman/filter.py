@@ -98,6 +98,8 @@ class KalmanState:
         Normalised innovations squared of the last measurements, per component.
     motion : tuple of arrays
         Transition, noise and shift that led to the last epoch.
+    last_fix : GnssFix or None
+        The last one with a position.
     """
 
     layout: StateLayout
@@ -107,6 +109,7 @@ class KalmanState:
     status: Status = Status.SEARCHING
     recent_nis: tuple[float, ...] = ()
     motion: tuple[Floats, Floats, Floats] | None = None
+    last_fix: GnssFix | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +199,7 @@ class _Step:
         self.where = [self.layout.east, self.layout.north]
         self.moved_m, self.status = state.moved_m, state.status
         self.recent_nis = list(state.recent_nis)
-        self.motion = state.motion
+        self.motion, self.last_fix = state.motion, state.last_fix
         self.unused: list[UnusedReading] = []
 
     @property
@@ -210,6 +213,7 @@ class _Step:
             self.status,
             tuple(self.recent_nis),
             self.motion,
+            self.last_fix,
         )
 
     @property
@@ -274,6 +278,10 @@ class _Step:
         if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
             self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.NO_READING))
             fix = None
+        if fix is not None and fix.repeats(self.last_fix):
+            self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REPEATED_FIX))
+            fix = None
+        self.last_fix = fix or self.last_fix
         if fix is None and not given.cells and not given.timed:
             return Reason.UNKNOWN_CELL if epoch.radio else Reason.NO_READING
         if self.belief is None:
