@@ -85,7 +85,8 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
     """Check the columns of mapfilter's own layout, in which none has another meaning."""
     for name in header:
         if name not in _ALLOWED:
-            near = difflib.get_close_matches(name.lower(), sorted(_ALLOWED), n=1, cutoff=0.5)
+            absent = sorted(set(_ALLOWED) - set(header))
+            near = difflib.get_close_matches(name.lower(), absent, n=1, cutoff=0.6)
             hint = f"{near[0]} meant" if near else "name what it holds in [cells.columns]"
             faults.add(where, "known columns only", repr(name), hint)
     for name in sorted({name for name in header if header.count(name) > 1}):

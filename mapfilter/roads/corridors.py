@@ -28,6 +28,8 @@ _CLASS = "corridor"
 CORRIDOR_HALF_WIDTH_M = 15.0
 MAX_ACCURACY_M = 50.0
 MAX_GAP_M = 100.0
+_MANY_GAPS = 0.05
+"""Of the steps of all sessions: with fewer gaps, other sessions close them, or they are pauses."""
 
 _SHIFTS = 5
 _AT_A_TIME = 4096
@@ -234,6 +236,7 @@ def corridors(
     ):
         if count:
             notes.append(f"{count} positions left out: {why}")
+    notes += _gap_notes(sessions, max_accuracy_m, max_gap_m, step_m)
     if not pieces:
         hint = "tracks with gaps: raise max_gap_m"
         raise fail(InputError, "tracks", "positions that follow each other", "none", hint)
@@ -255,6 +258,28 @@ def corridors(
     )
     sessions_each = _sessions_near(middle, measured, of_session, half_width_m)
     return Corridors(ways, sessions_each, half_width_m, tuple(notes))
+
+
+def _gap_notes(
+    sessions: Sequence[Positions], max_accuracy_m: float, max_gap_m: float, step_m: float
+) -> list[str]:
+    """Return a note where so many positions are far apart that the ways are in pieces."""
+    apart_m = [np.empty(0)]
+    for one in sessions:
+        place_m = np.column_stack([one.east_m, one.north_m])
+        if one.accuracy_m is not None:
+            place_m = place_m[~(one.accuracy_m > max_accuracy_m)]
+        apart_m.append(np.hypot(*np.diff(place_m, axis=0).T))
+    moved_m = np.concatenate(apart_m)
+    moved_m = moved_m[moved_m >= step_m]
+    gaps = int(np.sum(moved_m > max_gap_m))
+    if gaps < _MANY_GAPS * len(moved_m) or not gaps:
+        return []
+    return [
+        f"ways interrupted at {gaps} of {len(moved_m)} steps from position to position, longer "
+        f"than max_gap_m = {max_gap_m:g} m (median step {np.median(moved_m):.0f} m): "
+        "raise max_gap_m"
+    ]
 
 
 class _Piece(NamedTuple):

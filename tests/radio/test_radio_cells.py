@@ -137,6 +137,13 @@ def test_wrong_headers_are_told(tmp_path: Path, header: str, said: str) -> None:
     assert said in _complaint(tmp_path, header + "A,1,2,3,4,5\n")
 
 
+def test_a_column_that_is_there_is_not_what_another_one_meant(tmp_path: Path) -> None:
+    said = _complaint(
+        tmp_path, "cell,site,breite,lon,height_m,eirp_dbm,frequency_mhz\nA,1,2,3,4,5,6\n"
+    )
+    assert "found 'breite' (likely: name what it holds in [cells.columns])" in said
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [

@@ -123,7 +123,21 @@ def test_positions_that_are_left_out_are_counted_by_their_cause():
     assert corridors(CRS, [positions], 10.0).notes[1:] == (
         "2 positions left out: less accurate than max_accuracy_m = 50 m",
         "9 positions left out: more than max_gap_m = 100 m from the others, or standing",
+        "ways interrupted at 9 of 27 steps from position to position, longer than "
+        "max_gap_m = 100 m (median step 5 m): raise max_gap_m",
     )
+
+
+def test_a_track_of_sparse_positions_is_interrupted_and_the_remedy_is_named():
+    """A car's positions every 9 s, 80 to 120 m apart: half of the way is missing at 100 m."""
+    east = np.cumsum(np.tile([80.0, 120.0, 80.0], 10))
+    sparse = Positions(east, np.zeros(east.size))
+    broken, whole = (corridors(CRS, [sparse], 10.0, max_gap_m=m) for m in (100.0, 150.0))
+    assert "at 10 of 29 steps" in broken.notes[-1]
+    assert "median step 80 m): raise max_gap_m" in broken.notes[-1]
+    assert len(broken.ways) > 1
+    assert len(whole.ways) == 1
+    assert not any("interrupted" in note for note in whole.notes)
 
 
 def test_ways_of_few_sessions_are_left_out_on_request(town):

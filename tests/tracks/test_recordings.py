@@ -192,7 +192,8 @@ def test_another_format_is_named(written):
         (b"\x89PNG\r\n\x1a\n", "PNG"),
         (bytes(range(256)) * 20, "binary"),
         (b"hello\nworld\n", "none of them"),
-        (b"lat,lon\n60.1,24.9\n", "without a column of times"),
+        (b"lat,lon\n60.1,24.9\n", "without a column of times.* and time=COLUMN"),
+        (b"time,lat,Laenge\n1,60.1,24.9\n", "likely: a CSV with other names of columns: --column"),
         (gzip.compress(b"", mtime=0), "an empty file"),
     ],
 )
@@ -205,6 +206,13 @@ def test_what_is_no_recording_is_said(data, said, tmp_path):
         read_recording(tmp_path / "absent")
     with pytest.raises(InputError, match="a folder"):
         read_recording(tmp_path)
+
+
+def test_times_of_a_measurement_are_found(tmp_path):
+    path = tmp_path / "own.csv"
+    stamps = [f"2026-05-01T08:00:0{i}Z,60.1{i},24.9" for i in range(5)]
+    path.write_text("\n".join(["measured_at,lat,lon", *stamps]))
+    assert len(read_recording(path).tables["positions"]) == 5
 
 
 def test_a_column_map_names_columns(tmp_path):

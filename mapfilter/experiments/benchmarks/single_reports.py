@@ -17,6 +17,7 @@ from scipy.io.matlab import MatReadError
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
+from mapfilter.evaluation.intervals import share_interval
 from mapfilter.experiments.benchmarks.ottawa import GOOD_M, MAP_M
 from mapfilter.experiments.benchmarks.ottawa_sessions import Session
 from mapfilter.positioning.fingerprints.locating import (
@@ -68,6 +69,9 @@ class SingleReportsRow:
         Reports, and those of which a transmitter is in the database.
     within_50, within_67, within_95 : float
         Shares of the located reports within the radii.
+    within_95_low, within_95_high : float
+        Ends of the 95 % interval of the last share over sessions
+        (:func:`mapfilter.evaluation.intervals.share_interval`); NaN for a single database.
     cross_validated_95 : float
         The last of these in cross-validation within the training reports; NaN for several
         databases.
@@ -84,6 +88,8 @@ class SingleReportsRow:
     within_50: float
     within_67: float
     within_95: float
+    within_95_low: float
+    within_95_high: float
     cross_validated_95: float
 
 
@@ -160,6 +166,8 @@ def row_of(data: str, method: str, parts: Sequence[LocatedReports]) -> SingleRep
     radii_m = np.concatenate([part.radii_m for part in parts])
     known = np.isfinite(error_m)
     within = [float(np.mean(error_m[known] <= radius_m)) for radius_m in radii_m[known].T]
+    held = [int(np.sum(part.error_m <= part.radii_m[:, 2])) for part in parts]
+    low, high = share_interval(held, [int(np.isfinite(part.error_m).sum()) for part in parts])
     chosen = [method_name(part.method) for part in parts]
     validated = parts[0].validations[0].within_95 if len(parts) == 1 else float("nan")
     return SingleReportsRow(
@@ -174,5 +182,7 @@ def row_of(data: str, method: str, parts: Sequence[LocatedReports]) -> SingleRep
         within[0],
         within[1],
         within[2],
+        low,
+        high,
         validated,
     )

@@ -169,9 +169,11 @@ def _unknown(path: Path, text: Text) -> MapfilterError:
     hint = _NOT_READ.get(path.suffix.lower(), "")
     if not hint and len(names) > 1 and names & fields:
         hint = (
-            "a CSV without a column of times, or with other names: --column FIELD=COLUMN, such as "
-            "acc_x=AX or wheel_speed_mps=SPEED"
+            "a CSV with other names of columns: --column FIELD=COLUMN, such as acc_x=AX or "
+            "wheel_speed_mps=SPEED"
         )
+        if not names & set(plain_csv.FIELDS["time"]):
+            hint = f"a CSV without a column of times; {hint}, and time=COLUMN"
     if not hint:
         hint = _other_separators(path, text)
     expected = f"a recording in a known format ({', '.join(f.name for f in FORMATS)})"

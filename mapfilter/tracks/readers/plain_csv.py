@@ -31,7 +31,10 @@ from mapfilter.tracks.readers.text import Text
 _UNIX_S = 1e8
 
 FIELDS: Mapping[str, tuple[str, ...]] = {
-    "time": ("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
+    "time": (
+        *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
+        *("measured_at", "recorded_at"),
+    ),
     "lat_deg": ("lat_deg", "lat", "latitude"),
     "lon_deg": ("lon_deg", "lon", "lng", "long", "longitude"),
     "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
