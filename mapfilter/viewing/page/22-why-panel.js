@@ -45,6 +45,7 @@
 
     const empty = (result, run) => {
       if (result.problem) return result.problem;
+      if (!run.count) return "No epoch has come yet.";
       if (result.kind === null && run.reports.length && result.x < 0) return "No radio report has been used yet. Step to the first one with “report ›”.";
       if (!run.explained && !page.bundle.why) return "This filter does not explain its readings; run the Bayes map filter to compare.";
       return "Nothing to compare with: no second hypothesis is kept. Click on the map to ask why the position is not there.";

@@ -66,10 +66,10 @@
     const button = (words, label, onclick) => MF.h("button", { type: "button", "aria-label": label, title: label, onclick: (event) => onclick(event.currentTarget) }, words);
     const theme = button("◐", "Dark or light (D)", () => MF.toggleTheme());
     theme.id = "theme";
-    host.replaceChildren(layerField(page), ...(page.runs.length > 1 ? runField(page) : []),
-      button("Link", "Copy a link to this moment", (one) => copyLink(page, one)), button("PNG", "Save the frame as PNG", () => MF.exportPng(page)),
+    host.replaceChildren(...[layerField(page), ...(page.runs.length > 1 ? runField(page) : []),
+      page.live ? null : button("Link", "Copy a link to this moment", (one) => copyLink(page, one)), button("PNG", "Save the frame as PNG", () => MF.exportPng(page)),
       button("SVG", "Save the frame as SVG", () => MF.exportSvg(page)), button("Print", "Print this moment", () => window.print()),
-      theme, button("?", "Keys (?)", page.help));
+      theme, button("?", "Keys (?)", page.help)].filter(Boolean));
   };
 
   // The live region: one sentence at a time for screen readers.
