@@ -42,6 +42,7 @@ class Door:
 
     def __call__(self, handler: Handler) -> Callable[[Request], Awaitable[Any]]:
         """Return a handler behind the door."""
+
         async def answered(request: Request) -> Any:
             try:
                 self._check(request)

@@ -128,15 +128,13 @@
         const range = spread(ground.levels.level, from, ground.levels.size);
         return { ...shaded(ground.levels.grid, ground.levels.level, from, range), title: `Predicted level of ${ground.cellName(cell)}`, range, unit: "dBm" };
       }
-      if (name === "bound" && ground.bound) {
-        const range = spread(ground.bound.value, 0, ground.bound.value.length);
-        return { ...shaded(ground.bound.grid, ground.bound.value, 0, range), title: ground.bound.name, range, unit: ground.bound.unit };
-      }
+      const bound = name === "bound" ? ground.bounds[cell] : null;
+      if (bound) return { ...shaded(bound.grid, bound.value, 0, bound.range), title: bound.name, range: bound.range, unit: bound.unit };
       return null;
     };
     return (name, cell) => {
       if (name === "none" && !ground.best) return null;
-      const key = `${name} ${name === "level" ? cell : ""} ${MF.themeName}`;
+      const key = `${name} ${name === "level" || name === "bound" ? cell : ""} ${MF.themeName}`;
       if (!kept.has(key)) {
         if (kept.size > 40) kept.clear();
         kept.set(key, make(name, cell));

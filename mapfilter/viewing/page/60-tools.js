@@ -6,7 +6,7 @@
     const list = [["none", "Streets only"]];
     if (ground.best) list.push(["best", "Best server"], ["strength", "Level of the best server"], ["margin", "Margin"]);
     if (ground.points) list.push(["points", "Points"]);
-    if (ground.bound) list.push(["bound", ground.bound.name]);
+    ground.bounds.forEach((one, number) => list.push([`bound ${number}`, one.name]));
     for (const cell of ground.levels?.cells ?? []) list.push([`level ${cell}`, `Level of ${ground.cellName(cell)}`]);
     return list;
   };
@@ -18,7 +18,7 @@
       page.store.set({ layer, layerCell: cell === undefined ? -1 : Number(cell) });
     });
     page.store.listen((changed, { layer, layerCell }) => {
-      if (changed.has("layer") || changed.has("layerCell")) select.value = layer === "level" ? `level ${layerCell}` : layer;
+      if (changed.has("layer") || changed.has("layerCell")) select.value = layer === "level" || layer === "bound" ? `${layer} ${layerCell}` : layer;
     });
     select.value = page.store.state.layer;
     return MF.h("label", { class: "field" }, "Layer", select);
