@@ -115,17 +115,17 @@ class Service:
         return _with_fixes(_shown(session), fixes, "fixes")
 
     async def _events(self, request: Request) -> EventStream:
+        detail = request.query_params.get(_DETAIL) == "1"
+        if detail:
+            await self.sessions.watch(self._session(request))
+        # From here on nothing is awaited: neither the session nor the number of listeners changes.
         session = self._session(request)
         if len(session.channel.listeners) >= self.limits.listeners:
             text = f"{self.limits.listeners} streams of this session are open already"
             raise RequestError(429, "tooManyRequests", text)
         # What a browser sends by itself when it comes back counts for more than the address.
-        asked = request.query_params
-        last = request.headers.get("last-event-id") or asked.get(_AFTER, "")
+        last = request.headers.get("last-event-id") or request.query_params.get(_AFTER, "")
         whole = last.isascii() and last.isdigit() and len(last) <= _MOST_DIGITS
-        detail = asked.get(_DETAIL) == "1"
-        if detail:
-            await self.sessions.watch(session)
         listener = session.channel.listen(int(last) if whole else 0, detail)
         return EventStream(session.channel, listener, self.limits.send_s)
 

@@ -272,3 +272,21 @@ def test_a_restored_session_shows_its_last_fix_at_once(positioner, cross, tmp_pa
     assert (fix[0], fix[1], belief[0]) == ("fix", "6", "belief")
     assert belief[2]["number"] == 6
     assert time.monotonic() - began_s < 20
+
+
+def test_a_session_that_ends_while_its_belief_is_made_has_no_stream(made):
+    held = made()
+
+    async def run():
+        app = held.app()
+        session = await begin(app)
+        watch = held.sessions.watch
+
+        async def slow(one):
+            await watch(one)
+            await held.sessions.end(one, "deleted")
+
+        held.sessions.watch = slow
+        return await ask(app, "GET", f"/sessions/{session}/events", query=b"detail=1")
+
+    assert asyncio.run(run()).code == 404
