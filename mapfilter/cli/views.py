@@ -23,7 +23,8 @@ def view(
         list[Path],
         typer.Argument(
             metavar="RESULT...",
-            help="Results of replay --html (folders or pages), side by side; or one database.",
+            help="Results of replay --html (folders or pages), side by side; or one database. "
+            "A result of bound beside them adds its layers.",
             callback=_given_paths,
         ),
     ],
@@ -31,12 +32,20 @@ def view(
         Path | None,
         typer.Option("--out", metavar="FILE", help="The page (view.html).", callback=given_path),
     ] = None,
+    street_map: Annotated[
+        str | None,
+        typer.Option(
+            "--map",
+            metavar="FILE",
+            help="OpenStreetMap file, or embedded map (helsinki), whose buildings are drawn.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show replays side by side, or a database, as one HTML page."""
     from mapfilter.workflows.views import run_view
 
-    print_result(run_view(results, out), as_json)
+    print_result(run_view(results, out, street_map), as_json)
 
 
 def film(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from collections import deque
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from math import isfinite
-from typing import Any
+from math import inf, isfinite
+from typing import Any, NamedTuple
 
 from starlette.types import Receive, Scope, Send
 
@@ -18,7 +18,12 @@ from mapfilter.positioning.estimate import StepOutput
 KEPT_FIXES = 120
 """Fixes that a session keeps for listeners that come back."""
 
-_WAITING = 256
+_WAITING = 512
+"""More than the kept fixes and those of one request together."""
+
+_WATCHED_S = 30.0
+"""Time for which a page that was cut off may come back and miss no details."""
+
 _QUIET_S = 15.0
 _RETRY_MS = 2000
 _HEADERS = [
@@ -102,8 +107,15 @@ def event(name: str, number: int | None, data: bytes) -> bytes:
 
 @dataclass(eq=False, slots=True)
 class Listener:
-    """One stream of events of a session; a slow one loses its stream, never the service memory."""
+    """One stream of events of a session; a slow one loses its stream, never the service memory.
 
+    Parameters
+    ----------
+    detail : bool
+        Whether its fixes come with what a page shows, and beliefs beside them.
+    """
+
+    detail: bool = False
     waiting: asyncio.Queue[bytes | None] = field(
         default_factory=lambda: asyncio.Queue(maxsize=_WAITING)
     )
@@ -131,28 +143,82 @@ class Listener:
         self.waiting.put_nowait(None)
 
 
+class KeptFix(NamedTuple):
+    """A fix, and the same with its details where somebody watched."""
+
+    number: int
+    fix: bytes
+    detailed: bytes
+
+    def event(self, detail: bool) -> bytes:
+        """Return the event for a listener."""
+        return event("fix", self.number, self.detailed if detail else self.fix)
+
+
 @dataclass(eq=False, slots=True)
 class Channel:
-    """The listeners of a session, and its last fixes for those that come back."""
+    """The listeners of a session, and its last fixes for those that come back.
 
-    kept: deque[tuple[int, bytes]] = field(default_factory=lambda: deque(maxlen=KEPT_FIXES))
+    Parameters
+    ----------
+    belief : bytes
+        The last one while somebody watches, as JSON.
+    watched_until_s : float
+        Time of the monotonic clock until which details are made although nobody is there.
+    """
+
+    kept: deque[KeptFix] = field(default_factory=lambda: deque(maxlen=KEPT_FIXES))
     listeners: set[Listener] = field(default_factory=set)
+    belief: bytes = b""
+    watched_until_s: float = -inf
 
-    def publish(self, fixes: Iterable[tuple[int, bytes]]) -> None:
-        """Send fixes, each with its number, to all listeners."""
-        for number, data in fixes:
-            self.kept.append((number, data))
+    def is_watched(self, now_s: float) -> bool:
+        """Return whether steps are to be described in detail."""
+        return now_s < self.watched_until_s or any(one.detail for one in self.listeners)
+
+    def keep(self, number: int, fix: bytes, detail: bytes = b"") -> KeptFix:
+        """Keep a fix for listeners to come."""
+        detailed = fix[:-1] + b',"detail":' + detail + b"}" if detail else fix
+        self.kept.append(KeptFix(number, fix, detailed))
+        return self.kept[-1]
+
+    def publish(
+        self, first: int, fixes: list[bytes], details: list[bytes], belief: bytes = b""
+    ) -> None:
+        """Send fixes, the first one with its number, to all listeners; the belief to pages.
+
+        Parameters
+        ----------
+        details : list of bytes
+            One for each fix, or none at all.
+        """
+        for index, fix in enumerate(fixes):
+            kept = self.keep(first + index, fix, details[index] if details else b"")
             for one in self.listeners:
-                one.send(event("fix", number, data))
+                one.send(kept.event(one.detail))
+        self.belief = belief
+        if belief:
+            for one in self.listeners:
+                if one.detail:
+                    one.send(event("belief", None, belief))
 
-    def listen(self, after: int) -> Listener:
+    def listen(self, after: int, detail: bool = False) -> Listener:
         """Add a listener, which first gets the kept fixes with larger numbers."""
-        listener = Listener()
-        for number, data in self.kept:
-            if number > after:
-                listener.send(event("fix", number, data))
+        listener = Listener(detail)
+        for one in self.kept:
+            if one.number > after:
+                listener.send(one.event(detail))
+        if detail and self.belief:
+            listener.send(event("belief", None, self.belief))
         self.listeners.add(listener)
         return listener
+
+    def leave(self, listener: Listener, now_s: float) -> None:
+        """Take a listener away; a page may come back."""
+        listener.close()
+        self.listeners.discard(listener)
+        if listener.detail:
+            self.watched_until_s = now_s + _WATCHED_S
 
     def end(self, reason: str) -> None:
         """Tell all listeners that there will be no more fixes, and why."""
@@ -189,8 +255,7 @@ class EventStream:
             return
         finally:
             gone.cancel()
-            self.listener.close()
-            self.channel.listeners.discard(self.listener)
+            self.channel.leave(self.listener, time.monotonic())
 
     async def _next(self, gone: asyncio.Future[None]) -> bytes | None:
         """Return the next event, a comment after a quiet while, None at the end."""

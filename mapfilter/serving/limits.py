@@ -37,6 +37,8 @@ class ServiceLimits:
         Requests of a session that may wait for the one before.
     listeners : int
         Streams of events of a session.
+    watched : int
+        Sessions that pages show at a time: their steps take several times as long.
     """
 
     sessions: int = 1000
@@ -49,6 +51,7 @@ class ServiceLimits:
     send_s: float = 30.0
     waiting: int = 4
     listeners: int = 8
+    watched: int = 32
 
 
 @dataclass(slots=True)

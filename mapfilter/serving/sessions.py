@@ -12,106 +12,22 @@ import secrets
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from functools import partial
-from math import nan
 from typing import Any, TypeVar
 
-import numpy as np
-
-from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import project
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.serving.documents import RequestError, check_keys, number, text, whole
-from mapfilter.serving.epoch_rows import read_epochs
-from mapfilter.serving.events import Channel, fix_document, json_bytes
+from mapfilter.serving.documents import RequestError
 from mapfilter.serving.limits import ServiceLimits
+from mapfilter.serving.session import Progress, Session
+from mapfilter.serving.steps import SEED_BITS, first, stepped, wanted
 from mapfilter.serving.store import SessionStore
+from mapfilter.serving.watching import Watcher
 from mapfilter.tracks.identify import PlanNames
 
 ResultT = TypeVar("ResultT")
 
-_SEED_BITS = 63
-_EMPTY_STATE_BYTES = 20_000
 _ROOM = 0.9
 """Share of the memory that is left in use when there was too little."""
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """All that a session needs to go on; frozen, so that it can be saved while others come.
-
-    Parameters
-    ----------
-    state : BayesState
-        Of the filter.
-    rng : mapping
-        State of the random generator.
-    epochs : int
-        Epochs so far.
-    time_s : float
-        Time of the last one; NaN before the first.
-    last : bytes
-        The last fix as JSON; empty before the first.
-    """
-
-    state: BayesState
-    rng: Mapping[str, Any]
-    epochs: int = 0
-    time_s: float = nan
-    last: bytes = b""
-
-    @property
-    def state_bytes(self) -> int:
-        """Memory of the state, but for some kilobytes."""
-        beliefs = [self.state.belief]
-        if self.state.alternative is not None:
-            beliefs.append(self.state.alternative.belief)
-        arrays = [getattr(b, name) for b in beliefs for name in _ARRAYS if hasattr(b, name)]
-        return _EMPTY_STATE_BYTES + sum(int(one.nbytes) for one in arrays)
-
-
-_ARRAYS = ("state", "log_weight", "kept")
-
-
-@dataclass(eq=False, slots=True)
-class Session:
-    """One device.
-
-    Parameters
-    ----------
-    id : str
-        128 random bits; who knows it may use the session.
-    name : str
-        As the client calls it; may be empty.
-    progress : Progress or None
-        None while it is on disk only.
-    saved_epochs : int
-        Epochs that are on disk; -1 for nothing.
-    """
-
-    id: str
-    name: str
-    seed: int
-    began_utc_s: float
-    progress: Progress | None
-    epochs: int = 0
-    time_s: float = nan
-    last: bytes = b""
-    saved_epochs: int = -1
-    saved_time_s: float = nan
-    used_s: float = field(default_factory=time.monotonic)
-    bytes: int = 0
-    waiting: int = 0
-    ended: bool = False
-    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
-    channel: Channel = field(default_factory=Channel)
-
-    def take(self, progress: Progress) -> None:
-        """Replace what is known by what is new."""
-        self.progress, self.epochs, self.time_s = progress, progress.epochs, progress.time_s
-        self.last, self.bytes = progress.last, progress.state_bytes
 
 
 class Sessions:
@@ -138,6 +54,7 @@ class Sessions:
         workers: int = 1,
     ) -> None:
         self.positioner, self.names, self.limits, self.store = positioner, names, limits, store
+        self.watcher = Watcher.over(positioner, names.plan)
         self.all: dict[str, Session] = {}
         self.room = asyncio.Lock()
         self.pool = ThreadPoolExecutor(workers, thread_name_prefix="step")
@@ -163,19 +80,19 @@ class Sessions:
         RequestError
             Faults (400), or there are as many sessions as there may be (503).
         """
-        name, seed, start = _wanted(document, self.positioner.crs)
+        name, seed, start = wanted(document, self.positioner.crs)
         if len(self.all) >= self.limits.sessions:
             most = f"{self.limits.sessions} sessions are open, the most there may be"
             raise RequestError(503, "tooManySessions", most)
         if self.store is None and self.held_bytes >= self.limits.state_bytes:
             raise RequestError(503, "outOfMemory", "no memory is left for another session")
-        seed = secrets.randbits(_SEED_BITS) if seed is None else seed
+        seed = secrets.randbits(SEED_BITS) if seed is None else seed
         session = Session(secrets.token_urlsafe(16), name, seed, time.time(), None)
         # Counted before the first await, so that no two requests take the last place.
         self.all[session.id] = session
         async with session.lock:
             try:
-                session.take(await self._run(partial(_first, self.positioner, seed, start)))
+                session.take(await self._run(partial(first, self.positioner, seed, start)))
                 await self._save(session)
             except BaseException:
                 session.ended = True
@@ -206,16 +123,38 @@ class Sessions:
                 before = await self._loaded(session)
                 if self.held_bytes > self.limits.state_bytes:
                     await self.make_room()
-                step = partial(_stepped, self.positioner, self.names, before, document)
+                channel = session.channel
+                watcher = self.watcher if channel.is_watched(time.monotonic()) else None
+                step = partial(stepped, self.positioner, self.names, before, document, watcher)
                 # Shielded: a client that hangs up does not leave a half-done session.
-                after, fixes = await asyncio.shield(self._run(step))
+                after = await asyncio.shield(self._run(step))
                 _refuse_ended(session)
-                session.take(after)
+                session.take(after.progress)
                 session.used_s = time.monotonic()
-                session.channel.publish(enumerate(fixes, before.epochs + 1))
-                return fixes
+                channel.publish(before.epochs + 1, after.fixes, after.details, after.belief)
+                return after.fixes
         finally:
             session.waiting -= 1
+
+    async def watch(self, session: Session) -> None:
+        """Prepare a session for a page: its present belief, which no epoch has brought yet.
+
+        Raises
+        ------
+        RequestError
+            As many sessions are watched as may be (429), or it has ended (404).
+        """
+        now_s = time.monotonic()
+        if not session.channel.is_watched(now_s):
+            watched = sum(one.channel.is_watched(now_s) for one in self.all.values())
+            if watched >= self.limits.watched:
+                text = f"{watched} sessions are watched already, the most there may be"
+                raise RequestError(429, "tooManyRequests", text)
+        async with session.lock:
+            _refuse_ended(session)
+            progress = await self._loaded(session)
+            work = partial(self.watcher.belief, progress.state, progress.epochs)
+            session.channel.belief = await self._run(work)
 
     async def end(self, session: Session, reason: str) -> None:
         """End a session, and remove what was saved of it."""
@@ -274,6 +213,8 @@ class Sessions:
                 saved["epochs"],
                 saved["time_s"],
             )
+            if saved["last"]:
+                self.all[session_id].channel.keep(saved["epochs"], saved["last"].encode())
 
     async def _loaded(self, session: Session) -> Progress:
         if session.progress is None:
@@ -319,60 +260,3 @@ class Sessions:
 def _refuse_ended(session: Session) -> None:
     if session.ended:
         raise RequestError(404, "notFound", "the session has ended meanwhile")
-
-
-def _first(
-    positioner: BayesPositioner, seed: int, start: tuple[float, float, float] | None
-) -> Progress:
-    rng = np.random.default_rng(seed)
-    state = positioner.begin() if start is None else positioner.begin_at(*start, rng)
-    return Progress(state, rng.bit_generator.state)
-
-
-def _stepped(
-    positioner: BayesPositioner, names: PlanNames, before: Progress, document: Mapping[str, Any]
-) -> tuple[Progress, list[bytes]]:
-    """Return the progress after a request's epochs, and their fixes."""
-    epochs = read_epochs(document, names, before.time_s)
-    rng = np.random.default_rng()
-    rng.bit_generator.state = before.rng
-    state, fixes = before.state, []
-    for number_, epoch in enumerate(epochs, before.epochs + 1):
-        state, output = positioner.step(state, epoch, rng)
-        fixes.append(json_bytes(fix_document(output, number_, positioner.crs)))
-    count, time_s = before.epochs + len(epochs), epochs[-1].time_s
-    return Progress(state, rng.bit_generator.state, count, time_s, fixes[-1]), fixes
-
-
-def _wanted(
-    document: Mapping[str, Any], crs: str
-) -> tuple[str, int | None, tuple[float, float, float] | None]:
-    """Return name, seed and start (east, north, deviation) of a new session."""
-    faults = Faults()
-    check_keys(document, ("name", "seed", "start"), "body", faults)
-    name, seed, start = "", None, None
-    if document.get("name") is not None:
-        name = text(document["name"], "name", "1..128 printable characters", faults) or ""
-    if document.get("seed") is not None:
-        most = 2**_SEED_BITS - 1
-        seed = whole(document["seed"], "seed", f"a whole number in 0..{most}", faults, 0, most)
-    given = document.get("start")
-    if given is not None and not isinstance(given, dict):
-        faults.add("start", "an object with lat_deg, lon_deg and sd_m", "something else")
-    elif given is not None:
-        ranges = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": 1e5}
-        check_keys(given, tuple(ranges), "start", faults)
-        found = [
-            number(given.get(key), f"start.{key}", f"a number up to {most:g}", faults, low, most)
-            for key, most in ranges.items()
-            for low in (0.0 if key == "sd_m" else -most,)
-        ]
-        if not faults.found:
-            lat_deg, lon_deg, sd_m = (float(one) for one in found if one is not None)
-            east_m, north_m = project(crs, lon_deg, lat_deg)
-            if not (np.isfinite(east_m) and np.isfinite(north_m)):
-                faults.add("start", f"a place that {crs} covers", "one beyond it")
-            start = float(east_m), float(north_m), sd_m
-    if faults.found:
-        raise RequestError.of(InputError(tuple(faults.found)))
-    return name, seed, start

@@ -66,6 +66,18 @@ def places(values_m: ArrayLike) -> dict[str, Any]:
     return packed(np.asarray(values_m, dtype=np.float64), "i4", scale=PLACE_M, none=_NOWHERE)
 
 
+def cell_numbers(values: ArrayLike) -> dict[str, Any]:
+    """Return numbers of cells, -1 for none, in two bytes each where they fit and else in four.
+
+    Examples
+    --------
+    >>> cell_numbers([-1, 7])["t"], cell_numbers([40_000])["t"]
+    ('i2', 'i4')
+    """
+    given = np.asarray(values, dtype=np.int64)
+    return packed(given, "i2" if given.max(initial=0) <= np.iinfo(np.int16).max else "i4")
+
+
 def unpacked(array: Mapping[str, Any]) -> NDArray[Any]:
     """Return the values of :func:`packed`; NaN where there are none.
 

@@ -16,10 +16,10 @@ from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError
 from mapfilter.geodesy import unproject
-from mapfilter.models.fingerprint import pixels
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.radio.cells import CellPlan
+from mapfilter.viewing.explain import TERMS
 from mapfilter.viewing.ground import (
     Bounds,
     ViewFrame,
@@ -29,14 +29,8 @@ from mapfilter.viewing.ground import (
     level_fields,
 )
 from mapfilter.viewing.here import constants
-from mapfilter.viewing.runs import (
-    REASONS,
-    STATUSES,
-    LevelAt,
-    ViewedRun,
-    run_of,
-    tracks_bounds,
-)
+from mapfilter.viewing.readings import REASONS, LevelAt, level_on
+from mapfilter.viewing.runs import STATUSES, ViewedRun, run_of, thresholds, tracks_bounds
 from mapfilter.viewing.words import REASONS as WORDS
 
 FORMAT, VERSION = "mapfilter-view", 1
@@ -79,23 +73,38 @@ def replay_bundle(
             fields = _fields(database, frame, tracks, measured)
             if fields is not None:
                 found["levels"], bands = fields
-                found["why"] = _why(runs, tuple(bands))
+                models = (one for run in runs if (one := _model(run)) is not None)
+                found["why"] = _why(next(models, None), tuple(bands))
     found["runs"] = [run_of(run, frame, plan, ways, _level_at(run)) for run in runs]
     return found
 
 
-def database_bundle(title: str, database: RadioRouteDatabase) -> dict[str, Any]:
-    """Return the bundle of a database: streets, cells, best servers, levels of every cell."""
+def database_bundle(
+    title: str, database: RadioRouteDatabase, filter_: BayesPositioner | None = None
+) -> dict[str, Any]:
+    """Return the bundle of a database: streets, cells, best servers, levels of every cell.
+
+    Parameters
+    ----------
+    filter_ : BayesPositioner, optional
+        Its positions are shown while they come: the bundle is "live" then, and holds what the page
+        needs to compare places by a report.
+    """
     bounds = database.lattice.bounds_m
     frame = _frame(database.lattice.crs, bounds)
-    found = _head("database", title, frame, bounds, database.plan)
+    kind = "database" if filter_ is None else "live"
+    found = _head(kind, title, frame, bounds, database.plan)
     found |= {
         "attribution": database.attribution,
         "database": database.generation,
         "background": background(database, frame),
     }
     if database.cell_ids:
-        found["levels"], _ = level_fields(database, frame, None)
+        found["levels"], bands = level_fields(database, frame, None)
+        if filter_ is not None:
+            found["why"] = _why(filter_.model, tuple(bands))
+    if filter_ is not None:
+        found["thresholds"], found["terms"] = thresholds(filter_), list(TERMS)
     return found
 
 
@@ -170,9 +179,8 @@ def _model(run: ViewedRun) -> BayesModel | None:
     return filter_.model if isinstance(filter_, BayesPositioner) else None
 
 
-def _why(runs: Sequence[ViewedRun], cells: Sequence[str]) -> dict[str, Any] | None:
-    """Return the constants of the first map filter's model."""
-    model = next((found for run in runs if (found := _model(run)) is not None), None)
+def _why(model: BayesModel | None, cells: Sequence[str]) -> dict[str, Any] | None:
+    """Return the constants of a map filter's model; ``cells`` are the bands of the levels."""
     if type(model) is not BayesModel:
         # Over measured maps serving cells count where they were measured, which is not in the page.
         return None
@@ -187,17 +195,4 @@ def _level_at(run: ViewedRun) -> LevelAt:
     def nothing(east_m: Floats, north_m: Floats, cells: Sequence[str | None]) -> Floats:  # noqa: ARG001
         return np.full(len(cells), np.nan)
 
-    if model is None or not model.area.cell_ids:
-        return nothing
-    area = model.area
-    (west, south), band_of = area.origin_m, area.band_of
-
-    def look_up(east_m: Floats, north_m: Floats, cells: Sequence[str | None]) -> Floats:
-        place = np.stack([east_m - west, north_m - south])
-        known = np.isfinite(place).all(axis=0)
-        at = pixels(np.where(known, place, 0.0).astype(np.float32), area.frame)
-        band = np.array([band_of.get(cell or "", -1) for cell in cells], dtype=np.int64)
-        level = area.level_dbm.reshape(-1, len(area.cell_ids) + 2)[at, band].astype(np.float64)
-        return np.where(known & (band >= 0), level, np.nan)
-
-    return look_up
+    return nothing if model is None else level_on(model.area)

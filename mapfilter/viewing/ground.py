@@ -15,7 +15,7 @@ from mapfilter.database.radioroutes import Points, RadioField, RadioRouteDatabas
 from mapfilter.models.level_errors import roughness
 from mapfilter.positioning.bayes.area_map import BELOW_FLOOR_DB
 from mapfilter.radio.cells import CellPlan
-from mapfilter.viewing.arrays import packed, places, starts
+from mapfilter.viewing.arrays import cell_numbers, packed, places, starts
 from mapfilter.viewing.streets import middle_lines
 
 LEVEL_DB = 0.3
@@ -150,7 +150,7 @@ def _best(points: Points, database: RadioRouteDatabase, frame: ViewFrame) -> dic
     west_m, _, _, north_m = lattice.bounds_m
     return {
         "grid": frame.grid(west_m, north_m, step * lattice.resolution_m, shape),
-        "server": packed(server, "i2"),
+        "server": cell_numbers(server),
         "level": packed(
             np.where(near, level[row, col], np.nan), "u1", scale=0.5, offset=-140.0, none=255
         ),

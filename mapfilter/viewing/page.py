@@ -23,34 +23,73 @@ from mapfilter.viewing.bundle import FORMAT, VERSION
 OPENING = '<script id="mapfilter-bundle" type="text/plain">'
 """Tag before the bundle, which base64 of gzip of JSON follows up to the next tag."""
 
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'"
+)
 _MOST_BYTES = 512 << 20
 _LEVEL = 6
 
 
+def compressed(bundle: Mapping[str, Any]) -> bytes:
+    """Return a bundle as gzip of JSON; equal bundles give equal bytes."""
+    text = json.dumps(_plain(bundle), ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return gzip.compress(text.encode("ascii"), _LEVEL, mtime=0)
+
+
 def encoded(bundle: Mapping[str, Any]) -> str:
     """Return a bundle as text without any character that HTML gives a meaning to."""
-    text = json.dumps(_plain(bundle), ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    # Equal bundles give equal bytes: no time of writing.
-    return b64encode(gzip.compress(text.encode("ascii"), _LEVEL, mtime=0)).decode("ascii")
+    return b64encode(compressed(bundle)).decode("ascii")
+
+
+def style_text() -> str:
+    """Return the styles of the page."""
+    return "\n".join([*_texts(_folder() / "vendor", ".css"), *_texts(_folder(), ".css")])
+
+
+def script_text() -> str:
+    """Return the scripts of the page, in the order of their names."""
+    return "\n".join([*_texts(_folder() / "vendor", ".js"), *_texts(_folder(), ".js")])
 
 
 def page_html(bundle: Mapping[str, Any]) -> str:
     """Return the page with a bundle in it."""
-    folder = resources.files("mapfilter.viewing") / "page"
-    style = "\n".join([*_texts(folder / "vendor", ".css"), *_texts(folder, ".css")])
-    scripts = [*_texts(folder / "vendor", ".js"), *_texts(folder, ".js")]
     # A script ends at this text wherever it stands; in a string of JavaScript both are the same.
-    script = "\n".join(scripts).replace("</script", "<\\/script")
-    html = (folder / "page.html").read_text(encoding="utf-8")
-    parts = {
-        "{{TITLE}}": escape(str(bundle.get("title", ""))),
-        "/*{{STYLE}}*/": style,
-        "/*{{SCRIPT}}*/": script,
-        "{{BUNDLE}}": encoded(bundle),
-    }
+    script = script_text().replace("</script", "<\\/script")
+    head = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+    return _filled(
+        title=escape(str(bundle.get("title", ""))),
+        head=f"{head}<style>{style_text()}</style>",
+        foot=f"{OPENING}{encoded(bundle)}</script>\n<script>{script}</script>",
+    )
+
+
+def live_html(query: str = "") -> str:
+    """Return the page without a bundle, which loads its files and a session from a service.
+
+    Parameters
+    ----------
+    query : str
+        Added to the addresses of its files.
+    """
+    added = escape(query, quote=True)
+    return _filled(
+        title="mapfilter",
+        head=f'<link rel="stylesheet" href="page.css{added}">',
+        foot=f'<script src="page.js{added}"></script>',
+    )
+
+
+def _filled(*, title: str, head: str, foot: str) -> str:
+    html = (_folder() / "page.html").read_text(encoding="utf-8")
+    parts = {"{{TITLE}}": title, "{{HEAD}}": head, "{{FOOT}}": foot}
     # Cut at all markers at once, so that one in a title is none.
     pieces = re.split("|".join(f"({re.escape(marker)})" for marker in parts), html)
     return "".join(parts.get(piece, piece) for piece in pieces if piece is not None)
+
+
+def _folder() -> Traversable:
+    return resources.files("mapfilter.viewing") / "page"
 
 
 def write_page(bundle: Mapping[str, Any], path: Path) -> None:

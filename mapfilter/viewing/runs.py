@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, nan
 from typing import Any
 
 import numpy as np
 
-from mapfilter._types import Floats, Ints
+from mapfilter._types import Ints
 from mapfilter.evaluation.accuracy import Truth, position_errors_m
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.epochs import ReportRow, epochs
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.filter import Filter
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.schema import SERVING
-from mapfilter.viewing.arrays import packed, starts
-from mapfilter.viewing.explain import TERMS
+from mapfilter.viewing.arrays import cell_numbers, packed
 from mapfilter.viewing.ground import ViewFrame
+from mapfilter.viewing.readings import REASONS, ROLES, LevelAt, NumberedTexts, Readings
+from mapfilter.viewing.recorded import belief_of, explained_of
 from mapfilter.viewing.trace import TraceRecorder
 
-STATUSES, REASONS = tuple(Status), tuple(Reason)
-ROLES = ("serving", "neighbour")
+STATUSES = tuple(Status)
 KINDS = ("motion", "serving", "neighbour", "gnss", "pseudorange", "ta", "tdoa", "other")
 MOST_EPOCHS = 100_000
-
-LevelAt = Callable[[Floats, Floats, Sequence[str | None]], Floats]
-"""Predicted levels of cells at places of the CRS, NaN where there are none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +51,6 @@ class ViewedRun:
     smoothed: bool = False
 
 
-class _Numbers(dict[str, int]):
-    """Numbers of texts in the order in which they come."""
-
-    def __missing__(self, key: str) -> int:
-        self[key] = len(self)
-        return self[key]
-
-
 def run_of(
     run: ViewedRun,
     frame: ViewFrame,
@@ -83,8 +71,8 @@ def run_of(
         every += 1
     kept = np.arange(0, count, every)
     truth = Truth.of_table(log.truth) if log is not None else None
-    whats = _Numbers()
-    rows = _Readings(estimate, log, kept, plan)
+    whats = NumberedTexts()
+    rows = Readings(estimate, log, kept, plan)
     start = estimate.start_utc_s
     return {
         "name": run.name,
@@ -101,13 +89,13 @@ def run_of(
             "east": frame.east(truth.east_m),
             "north": frame.north(truth.north_m),
         },
-        "thresholds": _thresholds(run.trace),
+        "thresholds": thresholds(run.trace.filter if run.trace is not None else None),
         "readings": rows.packed(whats, level_at),
         "roles": list(ROLES),
         "unused": _unused(estimate, kept, whats),
         "kinds": list(KINDS),
-        "belief": _belief(run.trace, every, frame),
-        "explained": _explained(run.trace, every, frame, plan, estimate),
+        "belief": belief_of(run.trace, every, frame),
+        "explained": explained_of(run.trace, every, frame, plan, estimate),
         "whats": list(whats),
         "smoothed": run.smoothed,
     }
@@ -115,10 +103,6 @@ def run_of(
 
 def _share(values: Any) -> dict[str, Any]:
     return packed(values, "u1", scale=1 / 250, none=255)
-
-
-def _dbm(values: Any) -> dict[str, Any]:
-    return packed(values, "u1", scale=0.5, offset=-150.0, none=255)
 
 
 def _epochs(
@@ -181,94 +165,11 @@ def _epochs(
         "truth_east": frame.east(true_east),
         "truth_north": frame.north(true_north),
         "error": packed(error, "f4"),
-        "serving": packed(serving, "i2"),
+        "serving": cell_numbers(serving),
     }
 
 
-class _Readings:
-    """The rows of the radio reports of those epochs that are shown."""
-
-    def __init__(
-        self, estimate: TrackEstimate, log: TrackLog | None, kept: Ints, plan: CellPlan
-    ) -> None:
-        self.count = np.zeros(kept.size, dtype=np.int64)
-        self.serving = np.full(kept.size, -1, dtype=np.int64)
-        self.cell: list[int] = []
-        self.names: list[str] = []
-        self.known: list[str | None] = []
-        self.role: list[int] = []
-        self.level: list[float] = []
-        self.use: list[int] = []
-        self.east_m: list[float] = []
-        self.north_m: list[float] = []
-        if log is None or not len(log.radio):
-            return
-        index = {cell: number for number, cell in enumerate(plan.ids)}
-        why = {(one.time_s, one.kind, one.what): one.reason for one in estimate.unused}
-        never = {one.kind for one in estimate.unused if one.reason is Reason.NOT_USED_BY_FILTER}
-        merged = epochs(log)
-        place = np.searchsorted(estimate.time_s, [epoch.time_s for epoch in merged])
-        of_epoch = dict(zip(place.tolist(), merged, strict=True))
-        for number, at in enumerate(kept.tolist()):
-            epoch = of_epoch.get(at)
-            if epoch is None:
-                continue
-            late = estimate.reason[at] in (Reason.NOT_MOVED_ENOUGH, Reason.STALE_RADIO)
-            self.count[number] = len(epoch.radio)
-            for row in epoch.radio:
-                name = _named(row.cell, row.arfcn, row.bsic)
-                serving = plan.ids[self.serving[number]] if self.serving[number] >= 0 else None
-                known = _cell_of(row, plan, serving)
-                cell = index.get(known, -1) if known is not None else -1
-                reason = why.get((epoch.time_s, row.role, name), Reason.USED)
-                if row.role in never:
-                    reason = Reason.NOT_USED_BY_FILTER
-                elif late and reason is Reason.USED:
-                    reason = estimate.reason[at]
-                if row.role == SERVING and self.serving[number] < 0:
-                    self.serving[number] = cell
-                self.cell.append(cell)
-                self.names.append(name)
-                self.known.append(known)
-                self.role.append(ROLES.index(row.role))
-                self.level.append(row.level_dbm)
-                self.use.append(REASONS.index(reason))
-                self.east_m.append(float(estimate.east_m[at]))
-                self.north_m.append(float(estimate.north_m[at]))
-
-    def packed(self, whats: _Numbers, level_at: LevelAt) -> dict[str, Any]:
-        """Return the rows as the page reads them."""
-        east_m, north_m = np.array(self.east_m), np.array(self.north_m)
-        predicted = level_at(east_m, north_m, self.known) if self.known else np.empty(0)
-        return {
-            "first": starts(self.count),
-            "cell": packed(np.array(self.cell, dtype=np.int64), "i2"),
-            "what": packed(np.array([whats[one] for one in self.names], np.int64), "u4"),
-            "role": packed(np.array(self.role, dtype=np.int64), "u1"),
-            "level": _dbm(np.array(self.level, dtype=np.float64)),
-            "predicted": _dbm(predicted),
-            "use": packed(np.array(self.use, dtype=np.int64), "u1"),
-        }
-
-
-def _cell_of(row: ReportRow, plan: CellPlan, serving: str | None) -> str | None:
-    """Return the cell of a row: as it is named, or the only one of its carrier and code."""
-    if row.cell is not None or row.arfcn is None:
-        return row.cell
-    alike = plan.ids_by_carrier.get((row.arfcn, -1 if row.bsic is None else row.bsic), ())
-    others = [cell for cell in alike if cell != serving]
-    return others[0] if len(others) == 1 else None
-
-
-def _named(cell: str | None, arfcn: int | None, bsic: int | None) -> str:
-    """Return a cell as the reasons of a filter name it."""
-    if cell is not None:
-        return cell
-    code = "unknown" if bsic is None else bsic
-    return "" if arfcn is None else f"ARFCN {arfcn}, BSIC {code}"
-
-
-def _unused(estimate: TrackEstimate, kept: Ints, whats: _Numbers) -> dict[str, Any]:
+def _unused(estimate: TrackEstimate, kept: Ints, whats: NumberedTexts) -> dict[str, Any]:
     """Return what was not used apart from radio reports, by the epoch that it belongs to."""
     radio = {"serving", "neighbour"}
     some = [
@@ -289,75 +190,16 @@ def _unused(estimate: TrackEstimate, kept: Ints, whats: _Numbers) -> dict[str, A
     }
 
 
-def _thresholds(trace: TraceRecorder | None) -> dict[str, float]:
-    if trace is None or not isinstance(trace.filter, BayesPositioner):
+def thresholds(filter_: Filter[Any] | None) -> dict[str, float]:
+    """Return the limits of the Bayes map filter that charts show; none of other filters."""
+    if not isinstance(filter_, BayesPositioner):
         return {}
-    rules = trace.filter.rules
+    rules = filter_.rules
     return {
         "start_log_odds": rules.start_log_odds,
         "lost": rules.lost_threshold,
         "search": rules.search_threshold,
-        "switch_mass": trace.filter.options.switch_mass,
-    }
-
-
-def _belief(trace: TraceRecorder | None, every: int, frame: ViewFrame) -> dict[str, Any] | None:
-    frames = list(trace.frames.kept.values()) if trace is not None else []
-    if not frames:
-        return None
-    step = np.array([one.step_m for one in frames])
-    # The corner of a view lies on the lines between squares of any size.
-    west, south = (np.rint(at_m / step) for at_m in (frame.west_m, frame.south_m))
-    col = [one.col - int(first) for one, first in zip(frames, west, strict=True)]
-    row = [one.row - int(first) for one, first in zip(frames, south, strict=True)]
-    return {
-        "epoch": packed(np.array([one.epoch // every for one in frames], np.int64), "u4"),
-        "first": starts([one.col.size for one in frames]),
-        "step": packed(step, "f4"),
-        "col": packed(np.concatenate(col), "i4"),
-        "row": packed(np.concatenate(row), "i4"),
-        "mass": packed(np.concatenate([one.shade for one in frames]), "u1"),
-        "peak": packed([one.peak for one in frames], "f4"),
-        "which": "density",
-    }
-
-
-def _explained(
-    trace: TraceRecorder | None,
-    every: int,
-    frame: ViewFrame,
-    plan: CellPlan,
-    estimate: TrackEstimate,
-) -> dict[str, Any] | None:
-    if trace is None or not isinstance(trace.filter, BayesPositioner) or not trace.explained.kept:
-        return None
-    area = trace.filter.area
-    number = np.array([plan.index(cell) for cell in area.cell_ids] + [-1], dtype=np.int64)
-    kept = sorted(trace.explained.kept.items())
-    at = np.array([epoch for epoch, _ in kept], dtype=np.int64)
-    rows = [row for _, one in kept for row in one.rows]
-    found = np.array([row[2:] for row in rows], dtype=np.float64).reshape(-1, 6)
-    sums = np.array([np.sum([row[5:] for row in one.rows], axis=0) for _, one in kept])
-    evidence = estimate.evidence
-    nowhere = np.full(len(estimate), nan)
-    return {
-        "epoch": packed(at // every, "u4"),
-        "first": starts([len(one.rows) for _, one in kept]),
-        "terms": list(TERMS),
-        "what": packed(np.array([TERMS.index(row.what) for row in rows], np.int64), "u1"),
-        "cell": packed(number[[row.cell for row in rows]], "i2"),
-        "measured": _dbm(found[:, 0]),
-        "lead_predicted": _dbm(found[:, 1]),
-        "runner_predicted": _dbm(found[:, 2]),
-        "lead": packed(found[:, 3], "f8"),
-        "runner": packed(found[:, 4], "f8"),
-        "alt": packed(found[:, 5], "f8"),
-        "lead_sum": packed(sums[:, 0], "f8"),
-        "runner_sum": packed(sums[:, 1], "f8"),
-        "alt_sum": packed(sums[:, 2], "f8"),
-        "runner_east": frame.east((evidence.runner_up_east_m if evidence else nowhere)[at]),
-        "runner_north": frame.north((evidence.runner_up_north_m if evidence else nowhere)[at]),
-        "runner_prior": packed([one.prior for _, one in kept], "f4"),
+        "switch_mass": filter_.options.switch_mass,
     }
 
 

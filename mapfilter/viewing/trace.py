@@ -122,7 +122,7 @@ class TraceRecorder:
         steps_m = (step.step_m for step in epoch.motion if isfinite(step.step_m))
         moved_m = sum(map(abs, steps_m))
         self._travelled_m += moved_m
-        self.moments.append(_moment(self.filter, self._travelled_m, after))
+        self.moments.append(moment_of(self.filter, self._travelled_m, after))
         changed = fix.status is not self._status
         self._status = fix.status
         rests = not moved_m and isinstance(after, BayesState) and after.belief is self._belief
@@ -133,22 +133,33 @@ class TraceRecorder:
                 self.frames.add(number, density(number, found), always=changed)
         measured = bool(epoch.radio) or epoch.fix is not None or bool(epoch.ranges)
         if measured and not rests and (changed or self.explained.due(number)):
-            explanation = self._explained(before, epoch, rng, output)
+            explanation = explanation_of(self.filter, before, epoch, rng, output)
             if explanation is not None:
                 self.explained.add(number, explanation, always=changed)
 
-    def _explained(
-        self, before: Any, epoch: Epoch, rng: np.random.Generator, output: StepOutput
-    ) -> Explanation | None:
-        if not isinstance(self.filter, BayesPositioner) or not isinstance(before, BayesState):
-            return None
-        (west, south), fix = self.filter.area.origin_m, output.fix
-        east_m, north_m = output.evidence[:2] if output.evidence is not None else (nan, nan)
-        lead = fix.east_m - west, fix.north_m - south
-        return explain(self.filter, before, epoch, rng, lead, (east_m - west, north_m - south))
+
+def explanation_of(
+    filter_: Filter[Any], before: Any, epoch: Epoch, rng: np.random.Generator, output: StepOutput
+) -> Explanation | None:
+    """Explain one step; None for other filters than the Bayes map filter, and before its start.
+
+    Parameters
+    ----------
+    before : state of the filter
+        Before the step.
+    rng : numpy.random.Generator
+        As it was before the step.
+    """
+    if not isinstance(filter_, BayesPositioner) or not isinstance(before, BayesState):
+        return None
+    (west, south), fix = filter_.area.origin_m, output.fix
+    east_m, north_m = output.evidence[:2] if output.evidence is not None else (nan, nan)
+    lead = fix.east_m - west, fix.north_m - south
+    return explain(filter_, before, epoch, rng, lead, (east_m - west, north_m - south))
 
 
-def _moment(filter_: Filter[Any], travelled_m: float, state: Any) -> Moment:
+def moment_of(filter_: Filter[Any], travelled_m: float, state: Any) -> Moment:
+    """Return what a state holds beside the estimate; NaN where the filter has no such thing."""
     if not isinstance(state, BayesState) or not isinstance(filter_, BayesPositioner):
         return Moment(travelled_m, nan, nan, nan, nan, nan)
     doubt = state.null.log_odds if state.belief is not None else nan

@@ -24,10 +24,12 @@ from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.serving.app import Service
 from mapfilter.serving.geolocate import Geolocator, geolocator
 from mapfilter.serving.limits import ServiceLimits
+from mapfilter.serving.live_page import LivePage
 from mapfilter.serving.server import listen, run
 from mapfilter.serving.sessions import Sessions
 from mapfilter.serving.store import SessionStore
 from mapfilter.tracks.identify import PlanNames
+from mapfilter.viewing.bundle import database_bundle
 from mapfilter.workflows.terminal import print_message
 from mapfilter.workflows.world import filter_choice
 
@@ -121,13 +123,16 @@ def run_serve(
         sessions = Sessions(positioner, names, limits, store, options.workers)
         sessions.restore(found)
         host_names = frozenset(name.lower() for name in options.host_names)
-        service = Service(sessions, locate, limits, token, host_names)
+        name = f"Live over {opened.path.name}"
+        page = LivePage(lambda: database_bundle(name, opened, positioner))
+        service = Service(sessions, locate, limits, token, host_names, page)
         host, port = made.getsockname()[:2]
         shown = f"[{host}]" if ":" in host else host
         restored = f"; {len(found)} saved sessions" if store is not None else ""
 
         def ready() -> None:
-            print_message(f"serving {database} at http://{shown}:{port}{restored}")
+            at = f"http://{shown}:{port}"
+            print_message(f"serving {database} at {at}{restored}; to watch: {at}/view/")
 
         ended = run(
             service, made, save_every_s=options.save_every_s, ready=ready, warn=print_message

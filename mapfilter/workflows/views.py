@@ -7,18 +7,34 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from rasterio.errors import RasterioError
+
+from mapfilter._gdal import open_raster
 from mapfilter._inputs import shown
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.evaluation.map_bound import BANDS
+from mapfilter.geodesy import Lattice, same_crs, short_crs
+from mapfilter.roads.buildings import read_buildings
 from mapfilter.viewing.bundle import database_bundle
+from mapfilter.viewing.layers import frame_of, with_bound, with_buildings
 from mapfilter.viewing.merge import side_by_side
 from mapfilter.viewing.page import read_page, write_page
 from mapfilter.workflows.pictures import REPLAY_HTML
 
 VIEW_HTML = "view.html"
 
+BOUND_TIF = "bound.tif"
+
 _MANIFEST = "manifest.json"
+_BOUND_LAYERS = {
+    "levels_to_fix_m": "Metres to convergence by levels, at best",
+    "cells_to_fix_m": "Metres to convergence by cells, at best",
+    "along_bound_m": "Least error along the street",
+}
+"""Bands of a bound that a page shows, and their names there."""
+
 _SHOWN = {
     "switched": "converged",
     "switch_time_s": "converged after, s",
@@ -32,16 +48,20 @@ _SHOWN = {
 """Figures of a run that a page shows, and their names there."""
 
 
-def run_view(paths: Sequence[Path], out: Path | None = None) -> dict[str, Any]:
+def run_view(
+    paths: Sequence[Path], out: Path | None = None, street_map: str | None = None
+) -> dict[str, Any]:
     """Show results of replays side by side, or a database.
 
     Parameters
     ----------
     paths : sequence of Path
         Results of ``replay --html`` (folders, or the HTML files in them), all over one database;
-        or one database.
+        or one database. A result of ``bound`` beside them adds its layers.
     out : Path, optional
         The HTML file; ``view.html`` in the working folder when left out.
+    street_map : str, optional
+        An OpenStreetMap file, or the name of an embedded map, whose buildings are drawn.
 
     Returns
     -------
@@ -54,14 +74,45 @@ def run_view(paths: Sequence[Path], out: Path | None = None) -> dict[str, Any]:
         A result has no view, or is of another database; or the file cannot be written.
     """
     file = (out or Path(VIEW_HTML)).absolute()
-    if len(paths) == 1 and (paths[0] / _MANIFEST).is_file():
-        database = open_database(paths[0])
-        bundle = database_view(database)
+    bounds = [path for path in paths if (path / BOUND_TIF).is_file()]
+    rest = [path for path in paths if path not in bounds]
+    if len(rest) == 1 and (rest[0] / _MANIFEST).is_file():
+        bundle = database_view(open_database(rest[0]))
     else:
-        pages = pages_of(paths)
+        pages = pages_of(rest or paths)
         bundle = side_by_side([(shown(str(page)), read_page(page)) for page in pages])
+    for path in bounds:
+        bundle = _bounded(bundle, path / BOUND_TIF)
+    if street_map is not None:
+        frame, bounds_m = frame_of(bundle)
+        buildings = read_buildings(street_map, frame.crs, bounds_m)
+        if not len(buildings):
+            hint = "a map of another area, or one without buildings"
+            raise fail(InputError, f"--map, {street_map}", "buildings of the area", "none", hint)
+        bundle = with_buildings(bundle, buildings)
     write_page(bundle, file)
     return view_figures(bundle, file)
+
+
+def _bounded(bundle: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Return a view with the layers of a result of ``bound``."""
+    frame, _ = frame_of(bundle)
+    where, numbers = shown(str(path)), {name: at for at, (name, _) in enumerate(BANDS, start=1)}
+    try:
+        with open_raster(path) as source:
+            if tuple(source.descriptions) != tuple(numbers):
+                raise fail(InputError, where, "what mapfilter bound writes", "other bands")
+            crs, side, top = str(source.crs), float(source.res[0]), source.bounds
+            values = {name: source.read(numbers[name]) for name in _BOUND_LAYERS}
+    except RasterioError as error:
+        raise fail(InputError, where, "a whole GeoTIFF", f"{error}", "cut off") from error
+    if not same_crs(crs, frame.crs):
+        hint = "the bound of another database"
+        raise fail(InputError, where, frame.crs, short_crs(crs), hint)
+    rows, cols = next(iter(values.values())).shape
+    lattice = Lattice(frame.crs, top.left, top.top, side, rows, cols)
+    layers = {label: ("m", values[name]) for name, label in _BOUND_LAYERS.items()}
+    return with_bound(bundle, lattice, layers)
 
 
 def database_view(database: RadioRouteDatabase) -> dict[str, Any]:

@@ -79,9 +79,9 @@ async def ask(app, method, path, body=b"", headers=None, query=b""):
 class Streamed:
     """A client of a stream of events; it takes a part when it is asked to."""
 
-    def __init__(self, app, path, headers=None):
+    def __init__(self, app, path, headers=None, query=b""):
         self.gone, self.parts = asyncio.Event(), asyncio.Queue(maxsize=1)
-        scope, messages = request("GET", path, headers={**JSON, **(headers or {})})
+        scope, messages = request("GET", path, headers={**JSON, **(headers or {})}, query=query)
 
         async def receive():
             if messages:

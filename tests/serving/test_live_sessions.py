@@ -290,18 +290,18 @@ def test_a_session_that_could_not_begin_is_not_there(positioner, cross, monkeypa
     def broken(*_):
         raise RuntimeError("inner words")
 
-    monkeypatch.setattr(sessions_module, "_first", broken)
+    monkeypatch.setattr(sessions_module, "first", broken)
     with service(positioner, cross.plan) as made:
         answer = asyncio.run(ask(made.app(), "POST", "/sessions", {}))
         assert (answer.code, made.sessions.all) == (500, {})
     assert "inner words" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("slow", ["_first", "write"])
+@pytest.mark.parametrize("slow", ["first", "write"])
 def test_a_session_whose_client_went_while_it_began_is_not_there(
     positioner, cross, tmp_path, monkeypatch, slow
 ):
-    where = sessions_module if slow == "_first" else SessionStore
+    where = sessions_module if slow == "first" else SessionStore
     whole = getattr(where, slow)
 
     def slowly(*given):

@@ -17,7 +17,7 @@ from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.fingerprints.locating import locate_by
 from mapfilter.positioning.fingerprints.reports import reports_of_log
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.serving import app as app_module
+from mapfilter.serving import door as door_module
 from mapfilter.serving.documents import RequestError
 from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.geolocate import geolocator
@@ -327,7 +327,7 @@ def test_what_is_sent_is_strict_json(made):
 def clock_of(monkeypatch):
     """The door's clock, as a list of one time in seconds."""
     now_s = [0.0]
-    monkeypatch.setattr(app_module, "time", SimpleNamespace(monotonic=lambda: now_s[0]))
+    monkeypatch.setattr(door_module, "time", SimpleNamespace(monotonic=lambda: now_s[0]))
     return now_s
 
 

@@ -35,13 +35,18 @@ def opened():
 
 
 class Watched:
-    """A page that remembers what must not happen: requests, errors, messages of the console."""
+    """A page that remembers what must not happen: requests, errors, messages of the console.
 
-    def __init__(self, browser, file, *, at="", width=1280, height=860, scheme="light"):
+    It is a file, with the network cut; or an address of the service ``own``, the only one it may
+    ask.
+    """
+
+    def __init__(self, browser, file, *, at="", width=1280, height=860, scheme="light", own=""):
+        self.own = (f"{own}/", "blob:", "data:") if own else ("file:", "blob:", "data:")
         self.context = browser.new_context(
             viewport={"width": width, "height": height},
             color_scheme=scheme,
-            offline=True,
+            offline=not own,
             accept_downloads=True,
             reduced_motion="reduce",
         )
@@ -51,7 +56,7 @@ class Watched:
         self.page.on("pageerror", lambda one: self.faults.append(str(one)))
         self.page.on("dialog", lambda one: (self.faults.append("dialog"), one.dismiss()))
         self.page.on("request", lambda one: self.requests.append(one.url))
-        self.page.goto(file.as_uri() + at)
+        self.page.goto(file if own else file.as_uri() + at)
         self.page.wait_for_selector("html[data-ready=true]")
         self.settle()
 
@@ -77,7 +82,6 @@ class Watched:
 
     def close(self):
         self.context.close()
-        own = ("file:", "blob:", "data:")
-        elsewhere = [url for url in self.requests if not url.startswith(own)]
+        elsewhere = [url for url in self.requests if not url.startswith(self.own)]
         assert elsewhere == []
         assert self.faults == []

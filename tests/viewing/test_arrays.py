@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mapfilter.viewing.arrays import PLACE_M, packed, places, starts, unpacked
-from mapfilter.viewing.runs import _belief
+from mapfilter.viewing.recorded import belief_of
 from mapfilter.viewing.trace import Frame
 
 LEVELS = st.floats(-150.0, -25.0) | st.just(float("nan"))
@@ -79,6 +79,6 @@ def test_squares_of_a_belief_far_from_the_corner_stay_where_they_are():
     col, row = (np.array(at, np.int32) for at in ([40_000, 7], [9, -50_000]))
     frame = Frame(0, 1.0, col, row, np.array([255, 9], np.uint8), 0.5)
     trace = SimpleNamespace(frames=SimpleNamespace(kept={0: frame}))
-    found = _belief(trace, 1, SimpleNamespace(west_m=0.0, south_m=0.0))
+    found = belief_of(trace, 1, SimpleNamespace(west_m=0.0, south_m=0.0))
     assert unpacked(found["col"]).tolist() == [40_000, 7]
     assert unpacked(found["row"]).tolist() == [9, -50_000]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from browser import Watched, opened
 
-from mapfilter.viewing.arrays import unpacked
+from mapfilter.viewing.arrays import packed, unpacked
 from mapfilter.viewing.here import Place, Report, report_terms
 from mapfilter.viewing.page import write_page
 
@@ -224,3 +224,15 @@ def test_a_damaged_page_says_so(browser, replay, tmp_path):
 def test_the_bundle_is_what_the_contract_names():
     """The made bundle is JSON, as those of runs are."""
     assert json.loads(json.dumps(made.replay_bundle(), allow_nan=False))["version"] == 1
+
+
+def test_a_run_of_another_filter_says_why_nothing_is_explained(browser, tmp_path):
+    one = made.run("walk, ekf", explained=False) | {"filter": "ekf"}
+    epochs = one["epochs"] | {"hypotheses": packed(np.ones(made.EPOCHS, int), "u4")}
+    bundle = made.replay_bundle() | {"why": None, "runs": [one | {"epochs": epochs}]}
+    write_page(bundle, tmp_path / "ekf.html")
+    with page(browser, tmp_path / "ekf.html") as view:
+        text = view.page.inner_text(".why")
+        assert "filter “ekf”, which holds one Gaussian" in text
+        assert "--filter bayes --html" in text
+        assert view.page.is_hidden(".why .segments")

@@ -32,21 +32,22 @@
 
   MF.isArray = (one) => one !== null && typeof one === "object" && typeof one.b === "string" && one.t in TYPES;
 
-  // The JSON of the page: gzip as base64 in a tag, or an object that a live page has set.
-  MF.readBundle = async () => {
-    const text = MF.byId("mapfilter-bundle").textContent.trim();
-    if (!text) {
-      if (window.MAPFILTER_BUNDLE) return window.MAPFILTER_BUNDLE;
-      throw new Error("This page has no data in it. Make it again with 'mapfilter view'.");
-    }
+  // JSON of gzip, from a tag of the page or from a service.
+  MF.unzipped = async (blob) => {
     if (typeof DecompressionStream === "undefined") {
       throw new Error("This browser is too old to unpack the data (DecompressionStream, 2023 or later).");
     }
-    const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("gzip"));
-    const bundle = await new Response(stream).json();
+    const bundle = await new Response(blob.stream().pipeThrough(new DecompressionStream("gzip"))).json();
     if (bundle.format !== "mapfilter-view" || bundle.version !== 1) {
       throw new Error(`Expected format mapfilter-view 1, found ${bundle.format} ${bundle.version}.`);
     }
     return bundle;
+  };
+
+  // The bundle in the page, gzip as base64 in a tag.
+  MF.readBundle = async () => {
+    const text = MF.byId("mapfilter-bundle").textContent.trim();
+    if (!text) throw new Error("This page has no data in it. Make it again with 'mapfilter view'.");
+    return MF.unzipped(new Blob([bytesOf(text)]));
   };
 })();

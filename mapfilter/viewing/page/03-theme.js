@@ -1,7 +1,7 @@
 "use strict";
 // Dark and light: the system's choice until a button says otherwise. Canvases read the same colors as the styles.
 (() => {
-  const NAMES = ["paper", "card", "ink", "soft", "line", "ground", "street", "building", "halo", "here", "there",
+  const NAMES = ["paper", "card", "ink", "soft", "line", "ground", "street", "building", "house", "halo", "here", "there",
     "alternative", "truth", "belief", "searching", "converged", "tracking", "lost", "outside", "accent"];
   const system = window.matchMedia("(prefers-color-scheme: dark)");
   const listeners = [];

@@ -6,6 +6,12 @@
   const rows = (object) => Object.fromEntries(Object.entries(object ?? {}).map(([key, value]) =>
     [key, MF.isArray(value) ? MF.array(value) : value]));
 
+  // The last explained report at or before an epoch; -1 where there is none.
+  MF.lastReport = (run, i) => {
+    if (!run.reports.length || run.reportEpochs[0] > i) return -1;
+    return run.reports[MF.lastAt(run.reportEpochs, i)];
+  };
+
   MF.makeRun = (data, bundle, index) => {
     const epochs = table(data.epochs);
     const count = data.epochs.count;
@@ -53,11 +59,7 @@
       }
       run.reportEpochs = run.reports.map((x) => explained.epoch.raw[x]);
     }
-    // The last explained report at or before an epoch; -1 where there is none.
-    run.reportAt = (i) => {
-      if (!run.reports.length || run.reportEpochs[0] > i) return -1;
-      return run.reports[MF.lastAt(run.reportEpochs, i)];
-    };
+    run.reportAt = (i) => MF.lastReport(run, i);
     run.rowsOf = (x) => {
       const list = [];
       for (let r = explained.first.raw[x]; r < explained.first.raw[x + 1]; r += 1) {
@@ -73,6 +75,9 @@
       if (!belief || !belief.epoch.length || belief.epoch.raw[0] > i) return -1;
       return MF.lastAt(belief.epoch.raw, i);
     };
+    run.frameKey = (frame) => frame;
+    run.squares = (frame) => ({ from: belief.first.raw[frame], to: belief.first.raw[frame + 1], col: belief.col.raw, row: belief.row.raw,
+      mass: belief.mass.raw, step: belief.step.at(frame), peak: belief.peak.at(frame) });
     run.truthAt = (i) => ({ east: epochs.truth_east?.[i], north: epochs.truth_north?.[i] });
     return run;
   };

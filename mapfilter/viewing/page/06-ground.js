@@ -17,16 +17,13 @@
   MF.makeGround = (bundle) => {
     const background = bundle.background ?? {};
     const ground = { frame: bundle.frame, cells: bundle.cells, streets: lines(background.streets),
-      buildings: lines(background.buildings), points: null, best: null, bound: null, levels: null };
+      buildings: lines(background.buildings), points: null, best: null, bounds: [], levels: null };
     if (background.points) ground.points = { grid: background.points.grid, bits: MF.array(background.points.bits).raw };
     if (background.best) {
       const { grid, server, level, margin } = background.best;
       ground.best = { grid, server: MF.array(server), level: MF.array(level), margin: MF.array(margin) };
     }
-    if (background.bound) {
-      const { grid, value, name, unit } = background.bound;
-      ground.bound = { grid, value: MF.array(value), name, unit };
-    }
+    ground.bounds = (background.bound ?? []).map((one) => ({ ...one, value: MF.array(one.value) }));
     if (bundle.levels) {
       const { grid, level, rough, best, second, distance } = bundle.levels;
       ground.levels = { ...bundle.levels, level: MF.array(level), rough: MF.array(rough), best: MF.array(best),
@@ -69,10 +66,9 @@
       if (at < 0 || one.server.raw[at] < 0) return null;
       return { cell: one.server.raw[at], level: one.level.at(at), margin: one.margin.at(at) };
     };
-    ground.boundAt = (east, north) => {
-      if (!ground.bound) return NaN;
-      return ground.bound.value.at(pixel(ground.bound.grid, east, north));
-    };
+    // What the bounds say of a place.
+    ground.boundsAt = (east, north) => ground.bounds.map((one) => ({ ...one, at: one.value.at(pixel(one.grid, east, north)) }))
+      .filter((one) => Number.isFinite(one.at));
     // Longitude and latitude by the frame's corners (bilinear: for labels).
     ground.lonLat = (east, north) => {
       const { corners, size } = bundle.frame;

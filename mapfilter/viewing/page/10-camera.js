@@ -4,7 +4,7 @@
   const BUTTONS = 56;
 
   MF.makeCamera = (changed) => {
-    const camera = { east: 0, north: 0, scale: 1, least: 0.001, most: 40 };
+    const camera = { east: 0, north: 0, scale: 1, least: 0.001, most: 40, moved: false };
     camera.x = (east, view) => (east - camera.east) * camera.scale + view.width / 2;
     camera.y = (north, view) => view.height / 2 - (north - camera.north) * camera.scale;
     camera.eastOf = (x, view) => (x - view.width / 2) / camera.scale + camera.east;
@@ -20,12 +20,14 @@
       changed();
     };
     camera.pan = (dx, dy) => {
+      camera.moved = true;
       camera.east -= dx / camera.scale;
       camera.north += dy / camera.scale;
       changed();
     };
     // Zoom with the place under (x, y) kept where it is.
     camera.zoom = (factor, x, y, view) => {
+      camera.moved = true;
       const east = camera.eastOf(x, view);
       const north = camera.northOf(y, view);
       camera.scale = MF.clamp(camera.scale * factor, camera.least, camera.most);

@@ -33,19 +33,14 @@
   const VIRIDIS = [[0, [68, 1, 84]], [0.17, [70, 50, 126]], [0.33, [54, 92, 141]], [0.5, [39, 127, 142]],
     [0.67, [31, 161, 135]], [0.83, [110, 206, 88]], [1, [253, 231, 37]]];
 
-  const squaresOf = (run, frame) => {
-    const { first, col, row, mass } = run.belief;
-    return { from: first.raw[frame], to: first.raw[frame + 1], col: col.raw, row: row.raw, mass: mass.raw,
-      step: run.belief.step.at(frame), peak: run.belief.peak.at(frame) };
-  };
-
   // The belief of a frame: darker where more mass is; the square root makes a hundredth of the peak visible.
   MF.makeDensity = () => {
-    let last = { run: null, frame: -1, theme: "", picture: null };
+    let last = { run: null, key: null, theme: "", picture: null };
     return (run, frame) => {
       if (frame < 0) return null;
-      if (last.run === run && last.frame === frame && last.theme === MF.themeName) return last.picture;
-      const { from, to, col, row, mass, step } = squaresOf(run, frame);
+      const key = run.frameKey(frame);
+      if (last.run === run && last.key === key && last.theme === MF.themeName) return last.picture;
+      const { from, to, col, row, mass, step } = run.squares(frame);
       let [c0, c1, r0, r1] = [Infinity, -Infinity, Infinity, -Infinity];
       for (let i = from; i < to; i += 1) {
         c0 = Math.min(c0, col[i]); c1 = Math.max(c1, col[i]);
@@ -70,7 +65,7 @@
         picture = { canvas, west: c0 * step, north: r0 * step + rows * wide, width: cols * wide, height: rows * wide,
           squares: to - from, step };
       }
-      last = { run, frame, theme: MF.themeName, picture };
+      last = { run, key, theme: MF.themeName, picture };
       return picture;
     };
   };
@@ -133,15 +128,13 @@
         const range = spread(ground.levels.level, from, ground.levels.size);
         return { ...shaded(ground.levels.grid, ground.levels.level, from, range), title: `Predicted level of ${ground.cellName(cell)}`, range, unit: "dBm" };
       }
-      if (name === "bound" && ground.bound) {
-        const range = spread(ground.bound.value, 0, ground.bound.value.length);
-        return { ...shaded(ground.bound.grid, ground.bound.value, 0, range), title: ground.bound.name, range, unit: ground.bound.unit };
-      }
+      const bound = name === "bound" ? ground.bounds[cell] : null;
+      if (bound) return { ...shaded(bound.grid, bound.value, 0, bound.range), title: bound.name, range: bound.range, unit: bound.unit };
       return null;
     };
     return (name, cell) => {
       if (name === "none" && !ground.best) return null;
-      const key = `${name} ${name === "level" ? cell : ""} ${MF.themeName}`;
+      const key = `${name} ${name === "level" || name === "bound" ? cell : ""} ${MF.themeName}`;
       if (!kept.has(key)) {
         if (kept.size > 40) kept.clear();
         kept.set(key, make(name, cell));

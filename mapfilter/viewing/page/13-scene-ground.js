@@ -111,7 +111,7 @@
     const { camera, view } = pen;
     pen.rect(0, 0, view.width, view.height, { fill: MF.color.ground });
     if (layer) picture(pen, layer);
-    if (ground.buildings) pen.lines(ground.buildings, { fill: MF.color.building }, true);
+    if (ground.buildings) pen.lines(ground.buildings, { fill: MF.color.house, alpha: layer && !layer.plain ? 0.45 : 1 }, true);
     if (points) picture(pen, points, layer && !layer.plain ? 0.35 : 1);
     if (ground.streets) {
       const plain = !layer || layer.plain;

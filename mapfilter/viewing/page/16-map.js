@@ -31,8 +31,7 @@
     for (const one of levels.slice(0, 4)) {
       if (one.cell !== best?.cell && !(layer === "level" && one.cell === layerCell)) add(ground.cellName(one.cell), MF.dbm(one.level));
     }
-    const bound = ground.boundAt(east, north);
-    if (Number.isFinite(bound)) add(ground.bound.name, MF.number(bound, 0, ground.bound.unit));
+    for (const one of ground.boundsAt(east, north)) add(one.name, MF.number(one.at, 0, one.unit));
     if (run) {
       const here = run.place(run.at(page.store.state.time));
       const away = Math.hypot(east - here.east, north - here.north);

@@ -45,8 +45,13 @@
 
     const empty = (result, run) => {
       if (result.problem) return result.problem;
+      if (!run.count) return "No epoch has come yet.";
       if (result.kind === null && run.reports.length && result.x < 0) return "No radio report has been used yet. Step to the first one with “report ›”.";
-      if (!run.explained && !page.bundle.why) return "This filter does not explain its readings; run the Bayes map filter to compare.";
+      if (!run.explained && !page.bundle.why) {
+        const alone = run.count && run.epochs.hypotheses?.every((one) => !(one > 1));
+        return `What readings contribute is recorded for the Bayes map filter only. This run is of the filter “${run.data.filter}”`
+          + `${alone ? ", which holds one Gaussian and no second place to compare with" : ""}. Replay the log with --filter bayes --html to compare.`;
+      }
       return "Nothing to compare with: no second hypothesis is kept. Click on the map to ask why the position is not there.";
     };
     let shown = "";
@@ -60,6 +65,7 @@
       when.textContent = result.x >= 0 ? `report at ${page.clock(result.time)}` : "";
       segments.replaceChildren(...result.choices.map((name) => MF.h("button", { type: "button",
         "aria-pressed": String(result.kind === name), onclick: () => page.ask(name) }, AGAINST[name])));
+      segments.hidden = !result.choices.length;
       clear.hidden = !place;
       for (const one of steps) one.disabled = !run.reports.length;
       if (!result.rows.length) {

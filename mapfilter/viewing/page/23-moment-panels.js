@@ -87,13 +87,23 @@
       for (const one of run.unusedOf(i)) {
         lines.push(MF.h("li", {}, MF.h("b", {}, one.what || one.kind), `${one.count > 1 ? ` (${one.count})` : ""}: ${sentence(one.reason)}`));
       }
-      body.replaceChildren(lines.length ? MF.h("ul", { class: "unused" }, lines) : MF.h("p", { class: "empty" }, "All readings of this moment were used."));
+      body.replaceChildren(lines.length ? MF.h("ul", { class: "unused" }, lines) : MF.h("p", { class: "empty" }, run.count ? "All readings of this moment were used." : "No epoch has come yet."));
     });
     return element;
   };
 
   // About the runs: figures and notes.
   MF.fillFacts = (page, host) => {
+    if (page.live) {
+      const missed = MF.h("p", { class: "quiet", role: "status" });
+      page.live.listeners.push(() => {
+        const { missed: count } = page.live.run;
+        missed.textContent = count ? `${count} fixes came while the connection was cut, and are not kept any more.` : "";
+      });
+      host.replaceChildren(missed, MF.h("p", { class: "quiet" }, `Shown by mapfilter ${page.bundle.mapfilter} while fixes come in: the last ones that the service keeps, and `
+        + `those since the page was opened. ${page.bundle.attribution ?? ""} It asks for nothing but this service.`));
+      return;
+    }
     const cards = page.runs.map((run) => MF.h("section", { class: "card" }, MF.h("header", {}, MF.h("h2", {}, run.name), MF.h("span", { class: "quiet" }, `${run.count} epochs${run.data.smoothed ? ", smoothed" : ""}`)),
       MF.h("dl", {}, Object.entries(run.data.figures ?? {}).map(([name, value]) => pair(name, value))),
       (run.data.notes ?? []).map((note) => MF.h("p", { class: "quiet" }, note))));

@@ -19,6 +19,7 @@
     let series = [];
     let times = [];
     let shown = -1;
+    let plotted = [];
 
     const marks = (u) => {
       for (const { at, label } of spec.lines ?? []) {
@@ -52,6 +53,11 @@
           paths: one.points ? () => null : undefined }))],
         hooks: { draw: [marks] } };
     };
+    // uPlot draws gaps at null; infinite values would spoil a scale.
+    const columns = () => {
+      plotted = [times[0], times[times.length - 1]];
+      return [Array.from(times), ...series.map((one) => Array.from(one.values, (value) => (Number.isFinite(value) ? value : null)))];
+    };
     const build = () => {
       plot?.destroy();
       [series, times, shown] = [[], [], -1];
@@ -63,9 +69,7 @@
       }
       ({ series, times } = made);
       host.replaceChildren();
-      // uPlot draws gaps at null; infinite values would spoil a scale.
-      const columns = series.map((one) => Array.from(one.values, (value) => (Number.isFinite(value) ? value : null)));
-      plot = new uPlot(options(Math.max(host.clientWidth, 200)), [Array.from(times), ...columns], host);
+      plot = new uPlot(options(Math.max(host.clientWidth, 200)), columns(), host);
       plot.over.append(head);
       let from = 0;
       plot.over.addEventListener("mousedown", (event) => { from = event.clientX; });
@@ -85,7 +89,18 @@
       keys.replaceChildren(...series.map((one) => MF.h("span", {}, MF.h("i", { class: one.points ? "dots" : one.dash ? "dashed" : "", style: { "border-color": one.color } }),
         one.label, MF.h("b", {}, (one.format ?? MF.number)(one.values[i])))));
     };
+    // New values at the end; who has zoomed in keeps what is seen.
+    const grow = () => {
+      const made = spec.data();
+      if (!plot || !made || made.series.length !== series.length) { build(); return; }
+      const { min, max } = plot.scales.x;
+      const zoomed = min > plotted[0] || max < plotted[1];
+      ({ series, times } = made);
+      shown = -1;
+      plot.setData(columns(), !zoomed);
+      if (zoomed) plot.redraw();
+    };
     const resize = () => { if (plot && host.clientWidth) plot.setSize({ width: host.clientWidth, height: HEIGHT }); };
-    return { element, build, refresh, resize };
+    return { element, build, grow, refresh, resize };
   };
 })();

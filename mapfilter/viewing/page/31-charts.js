@@ -78,12 +78,15 @@
     let shown = null;
     const fill = () => {
       const run = page.active();
-      if (shown === run || !run.readings.first) return;
+      if ((shown === run && !run.live) || !run.readings.first) return;
       shown = run;
+      const chosen = select.value;
       const counts = new Map();
       for (const cell of run.readings.cell.raw) if (cell >= 0) counts.set(cell, (counts.get(cell) ?? 0) + 1);
       const cells = [...counts].sort((a, b) => b[1] - a[1]);
       select.replaceChildren(...cells.map(([cell, count]) => MF.h("option", { value: cell }, `${page.ground.cellName(cell)} (${count})`)));
+      // While cells are added the chosen one stays.
+      if (run.live && [...select.options].some((one) => one.value === chosen)) select.value = chosen;
     };
     const chart = MF.makeChart(page, { title: "Level / dBm", control: MF.h("label", { class: "field" }, "cell", select), empty: "No level of a known cell was measured.",
       data: () => {
@@ -104,6 +107,7 @@
     host.replaceChildren(...charts.map((one) => one.element));
     return {
       build: () => charts.forEach((one) => one.build()),
+      grow: () => charts.forEach((one) => one.grow()),
       refresh: (time) => charts.forEach((one) => one.refresh(time)),
       resize: () => charts.forEach((one) => one.resize()),
     };

@@ -37,8 +37,17 @@
     const strip = MF.h("canvas", { "aria-hidden": "true" });
     const clock = MF.h("output", { class: "clock", for: "time" });
     const speed = MF.h("select", { id: "speed", "aria-label": "Speed" }, SPEEDS.map((one) => MF.h("option", { value: one }, `${one}×`)));
+    const follow = page.live ? MF.h("button", { type: "button", id: "follow", title: "Stay at the newest fix (L)",
+      onclick: () => page.follow(!store.state.follow) }, "Follow") : null;
+    const link = page.live ? MF.h("span", { class: "pill", id: "link" }, page.live.state) : null;
+    page.live?.listeners.push((state) => {
+      if (link.textContent === state) return;
+      link.textContent = state;
+      link.style.setProperty("--dot", state === "live" ? MF.color.converged : MF.color.lost);
+      MF.say(`Connection: ${state}`);
+    });
     host.replaceChildren(
-      MF.h("div", { class: "buttons" }, button("‹", "One epoch back (left arrow)", () => page.step(-1)), play, button("›", "One epoch on (right arrow)", () => page.step(1)), speed),
+      MF.h("div", { class: "buttons" }, button("‹", "One epoch back (left arrow)", () => page.step(-1)), play, button("›", "One epoch on (right arrow)", () => page.step(1)), speed, follow, link),
       MF.h("div", { class: "timeline" }, strip, slider), clock);
     host.hidden = false;
     slider.addEventListener("input", () => page.seek(Number(slider.value)));
@@ -49,7 +58,9 @@
       const { time, playing } = store.state;
       const run = page.active();
       const i = run.at(time);
+      if (page.live) { slider.min = page.start; slider.max = page.end; }
       slider.value = time;
+      follow?.setAttribute("aria-pressed", String(store.state.follow));
       const since = time - page.start;
       slider.setAttribute("aria-valuetext", `${MF.clock(since)} of ${MF.clock(page.end - page.start)}, ${run.status(i).toLowerCase()}`);
       const utc = Number.isFinite(run.data.start_utc_s ?? NaN) ? ` · ${new Date(1000 * (run.data.start_utc_s + time - run.start)).toISOString().slice(11, 19)} UTC` : "";
@@ -66,7 +77,7 @@
   };
 
   MF.KEYS = [["Space", "play or pause"], ["← →", "one epoch back, one epoch on"], ["Page ↑ ↓", "ten seconds on, ten seconds back"], ["Home End", "start, end"],
-    ["[ ]", "slower, faster"], ["P N", "previous, next report that was used"], ["1 2 …", "choose a run"],
+    ["[ ]", "slower, faster"], ["P N", "previous, next report that was used"], ["1 2 …", "choose a run"], ["L", "live: stay at the newest fix, or not"],
     ["Click, Enter on a map", "why is the position not there?"], ["Esc", "clear that place"], ["Shift + arrows", "move a map that has the focus"],
     ["+ −", "zoom a map that has the focus"], ["F", "show everything"], ["D", "dark or light"], ["?", "this help"]];
 
@@ -76,7 +87,7 @@
     const timed = { " ": () => page.play(!store.state.playing), ArrowLeft: () => page.step(-1), ArrowRight: () => page.step(1),
       PageUp: () => page.seek(store.state.time + 10), PageDown: () => page.seek(store.state.time - 10),
       Home: () => page.seek(page.start), End: () => page.seek(page.end), "[": () => faster(-1), "]": () => faster(1),
-      n: () => page.stepReport(1), p: () => page.stepReport(-1) };
+      l: () => page.live && page.follow(!store.state.follow), n: () => page.stepReport(1), p: () => page.stepReport(-1) };
     const always = { Escape: () => store.set({ place: null, against: "runner" }), f: () => page.fit(), d: () => MF.toggleTheme(), "?": () => page.help() };
     document.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;

@@ -6,7 +6,7 @@
     const list = [["none", "Streets only"]];
     if (ground.best) list.push(["best", "Best server"], ["strength", "Level of the best server"], ["margin", "Margin"]);
     if (ground.points) list.push(["points", "Points"]);
-    if (ground.bound) list.push(["bound", ground.bound.name]);
+    ground.bounds.forEach((one, number) => list.push([`bound ${number}`, one.name]));
     for (const cell of ground.levels?.cells ?? []) list.push([`level ${cell}`, `Level of ${ground.cellName(cell)}`]);
     return list;
   };
@@ -18,7 +18,7 @@
       page.store.set({ layer, layerCell: cell === undefined ? -1 : Number(cell) });
     });
     page.store.listen((changed, { layer, layerCell }) => {
-      if (changed.has("layer") || changed.has("layerCell")) select.value = layer === "level" ? `level ${layerCell}` : layer;
+      if (changed.has("layer") || changed.has("layerCell")) select.value = layer === "level" || layer === "bound" ? `${layer} ${layerCell}` : layer;
     });
     select.value = page.store.state.layer;
     return MF.h("label", { class: "field" }, "Layer", select);
@@ -66,10 +66,10 @@
     const button = (words, label, onclick) => MF.h("button", { type: "button", "aria-label": label, title: label, onclick: (event) => onclick(event.currentTarget) }, words);
     const theme = button("◐", "Dark or light (D)", () => MF.toggleTheme());
     theme.id = "theme";
-    host.replaceChildren(layerField(page), ...(page.runs.length > 1 ? runField(page) : []),
-      button("Link", "Copy a link to this moment", (one) => copyLink(page, one)), button("PNG", "Save the frame as PNG", () => MF.exportPng(page)),
+    host.replaceChildren(...[layerField(page), ...(page.runs.length > 1 ? runField(page) : []),
+      page.live ? null : button("Link", "Copy a link to this moment", (one) => copyLink(page, one)), button("PNG", "Save the frame as PNG", () => MF.exportPng(page)),
       button("SVG", "Save the frame as SVG", () => MF.exportSvg(page)), button("Print", "Print this moment", () => window.print()),
-      theme, button("?", "Keys (?)", page.help));
+      theme, button("?", "Keys (?)", page.help)].filter(Boolean));
   };
 
   // The live region: one sentence at a time for screen readers.

@@ -1,16 +1,16 @@
 "use strict";
 // Puts the parts together: one state, one loop that draws what has changed.
 (() => {
-  const SIDE_MS = 160;
+  const [SIDE_MS, GROW_MS, CHARTS_MS] = [160, 200, 1000];
 
-  const makePage = (bundle) => {
+  const makePage = (bundle, live) => {
     const ground = MF.makeGround(bundle);
-    const runs = (bundle.runs ?? []).map((run, index) => MF.makeRun(run, bundle, index)).filter((run) => run.count > 0);
+    const runs = live ? [live.run] : (bundle.runs ?? []).map((run, index) => MF.makeRun(run, bundle, index)).filter((run) => run.count > 0);
     runs.forEach((run, index) => { run.index = index; });
     const start = Math.min(...runs.map((run) => run.start));
     const end = Math.max(...runs.map((run) => run.end));
-    const page = { bundle, ground, runs, start: runs.length ? start : 0, end: runs.length ? end : 0, maps: [] };
-    page.store = MF.store({ time: page.start, playing: false, speed: 10, run: 0, second: runs.length > 1 ? 1 : -1, place: null, against: "runner",
+    const page = { bundle, ground, runs, live, start: runs.length ? start : 0, end: runs.length ? end : 0, maps: [] };
+    page.store = MF.store({ time: page.start, playing: false, speed: 10, follow: Boolean(live), run: 0, second: runs.length > 1 ? 1 : -1, place: null, against: "runner",
       layer: runs.length || !ground.best ? "none" : "best", layerCell: -1, show: { belief: true, regions: true, hypotheses: true, radio: true } });
     const redrawAll = () => { for (const map of page.maps) map.dirty = true; page.stale = true; };
     page.camera = MF.makeCamera(redrawAll);
@@ -24,7 +24,8 @@
     page.active = () => runs[page.store.state.run];
     // Times are shown since the start of the first run.
     page.clock = (time) => MF.clock(time - page.start);
-    page.seek = (time) => page.store.set({ time: MF.clamp(time, page.start, page.end) });
+    // Who looks back does not want to be taken away from there by what comes in.
+    page.seek = (time) => page.store.set({ time: MF.clamp(time, page.start, page.end), follow: Boolean(live) && time >= page.end });
     page.step = (by) => {
       const { time } = page.store.state;
       const run = page.active();
@@ -38,9 +39,13 @@
       page.store.set({ playing: false });
       if (next !== undefined) page.seek(run.epochs.time[next]);
     };
+    page.follow = (follow) => {
+      page.store.set({ follow, playing: false });
+      if (follow) page.seek(page.end);
+    };
     page.play = (playing) => {
       if (playing && page.store.state.time >= page.end) page.seek(page.start);
-      page.store.set({ playing });
+      page.store.set(playing ? { playing, follow: false } : { playing });
     };
     page.ask = (against) => {
       if (against === "place" && !page.store.state.place) {
@@ -76,14 +81,14 @@
     return status;
   };
 
-  const start = (bundle) => {
-    const page = makePage(bundle);
+  const start = (bundle, live = null) => {
+    const page = makePage(bundle, live);
     MF.page = page;
     const replay = page.runs.length > 0;
     document.body.dataset.kind = replay ? "replay" : "database";
-    MF.byId("title").textContent = bundle.title;
-    MF.byId("subtitle").textContent = replay ? page.runs.map((run) => run.name).join(" · ") : `${bundle.cells.length} cells`;
-    page.store.set(MF.readAddress(page));
+    MF.byId("title").textContent = document.title = bundle.title;
+    MF.byId("subtitle").textContent = live ? bundle.place : replay ? page.runs.map((run) => run.name).join(" · ") : `${bundle.cells.length} cells`;
+    if (!live) page.store.set(MF.readAddress(page));
     MF.makeTools(page, MF.byId("tools"));
     MF.fillFacts(page, MF.byId("facts"));
     let panels = [];
@@ -126,7 +131,7 @@
       for (const panel of panels) panel.refresh(run, i);
       charts.refresh(page.store.state.time);
       status = announce(page, status);
-      if (!page.store.state.playing) MF.writeAddress(page);
+      if (!live && !page.store.state.playing) MF.writeAddress(page);
     };
     page.store.listen((changed) => {
       page.stale = true;
@@ -144,7 +149,7 @@
       sideStale = true;
       draw(performance.now());
     });
-    window.addEventListener("hashchange", () => page.store.set(MF.readAddress(page)));
+    if (!live) window.addEventListener("hashchange", () => page.store.set(MF.readAddress(page)));
     window.addEventListener("resize", () => {
       measure();
       page.maps.forEach((map) => map.resize());
@@ -157,7 +162,22 @@
 
     const stats = { frames: 0, draw_ms: 0, since: performance.now() };
     MF.stats = stats;
+    let [grown, grownAt, chartsStale, chartsAt] = [false, 0, false, 0];
+    live?.listeners.push(() => { grown = true; });
+    const grow = (now) => {
+      if (grown && now - grownAt > GROW_MS) {
+        [grown, grownAt, chartsStale, sideStale] = [false, now, true, true];
+        MF.growPage(page);
+        player.strip();
+      }
+      if (chartsStale && now - chartsAt > CHARTS_MS) {
+        [chartsStale, chartsAt] = [false, now];
+        charts.grow();
+        sideStale = true;
+      }
+    };
     const draw = (now) => {
+      if (live) grow(now);
       if (page.stale) {
         page.stale = false;
         const from = performance.now();
@@ -191,5 +211,6 @@
     document.documentElement.dataset.ready = "failed";
   };
   MF.startTheme();
-  MF.readBundle().then(start).catch((error) => { fail(error); console.error(error); });
+  const opened = MF.byId("mapfilter-bundle") ? MF.readBundle().then((bundle) => start(bundle)) : MF.openLive(start);
+  opened.catch((error) => { fail(error); console.error(error); });
 })();

@@ -1,0 +1,89 @@
+"""One session: the filter's state of a device, and what is known of it besides."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import nan
+from typing import Any
+
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.serving.events import Channel
+
+_EMPTY_STATE_BYTES = 20_000
+_ARRAYS = ("state", "log_weight", "kept")
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """All that a session needs to go on; frozen, so that it can be saved while others come.
+
+    Parameters
+    ----------
+    state : BayesState
+        Of the filter.
+    rng : mapping
+        State of the random generator.
+    epochs : int
+        Epochs so far.
+    time_s : float
+        Time of the last one; NaN before the first.
+    last : bytes
+        The last fix as JSON; empty before the first.
+    """
+
+    state: BayesState
+    rng: Mapping[str, Any]
+    epochs: int = 0
+    time_s: float = nan
+    last: bytes = b""
+
+    @property
+    def state_bytes(self) -> int:
+        """Memory of the state, but for some kilobytes."""
+        beliefs = [self.state.belief]
+        if self.state.alternative is not None:
+            beliefs.append(self.state.alternative.belief)
+        arrays = [getattr(b, name) for b in beliefs for name in _ARRAYS if hasattr(b, name)]
+        return _EMPTY_STATE_BYTES + sum(int(one.nbytes) for one in arrays)
+
+
+@dataclass(eq=False, slots=True)
+class Session:
+    """One device.
+
+    Parameters
+    ----------
+    id : str
+        128 random bits; who knows it may use the session.
+    name : str
+        As the client calls it; may be empty.
+    progress : Progress or None
+        None while it is on disk only.
+    saved_epochs : int
+        Epochs that are on disk; -1 for nothing.
+    """
+
+    id: str
+    name: str
+    seed: int
+    began_utc_s: float
+    progress: Progress | None
+    epochs: int = 0
+    time_s: float = nan
+    last: bytes = b""
+    saved_epochs: int = -1
+    saved_time_s: float = nan
+    used_s: float = field(default_factory=time.monotonic)
+    bytes: int = 0
+    waiting: int = 0
+    ended: bool = False
+    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+    channel: Channel = field(default_factory=Channel)
+
+    def take(self, progress: Progress) -> None:
+        """Replace what is known by what is new."""
+        self.progress, self.epochs, self.time_s = progress, progress.epochs, progress.time_s
+        self.last, self.bytes = progress.last, progress.state_bytes

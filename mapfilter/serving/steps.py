@@ -1,0 +1,127 @@
+"""Work on one session: how it begins, and what its epochs make of it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import project
+from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.serving.documents import RequestError, check_keys, number, text, whole
+from mapfilter.serving.epoch_rows import read_epochs
+from mapfilter.serving.events import fix_document, json_bytes
+from mapfilter.serving.session import Progress
+from mapfilter.serving.watching import Watcher
+from mapfilter.tracks.identify import PlanNames
+
+SEED_BITS = 63
+
+_MOST_WATCHED = 30
+"""Last epochs of a request that are shown with what their readings contributed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stepped:
+    """What the epochs of a request make of a session.
+
+    Parameters
+    ----------
+    progress : Progress
+        After them.
+    fixes : list of bytes
+        One for each epoch, as JSON.
+    details : list of bytes
+        The same for a page that shows the session; empty where nobody watches.
+    belief : bytes
+        Of the last epoch; empty where nobody watches.
+    """
+
+    progress: Progress
+    fixes: list[bytes]
+    details: list[bytes]
+    belief: bytes
+
+
+def first(
+    positioner: BayesPositioner, seed: int, start: tuple[float, float, float] | None
+) -> Progress:
+    """Return the beginning of a session, at an unknown place or a known start."""
+    rng = np.random.default_rng(seed)
+    state = positioner.begin() if start is None else positioner.begin_at(*start, rng)
+    return Progress(state, rng.bit_generator.state)
+
+
+def stepped(
+    positioner: BayesPositioner,
+    names: PlanNames,
+    before: Progress,
+    document: Mapping[str, Any],
+    watcher: Watcher | None = None,
+) -> Stepped:
+    """Return what a request's epochs make of a session.
+
+    Parameters
+    ----------
+    watcher : Watcher or None
+        None where nobody watches.
+
+    Raises
+    ------
+    RequestError
+        Faults of the request.
+    """
+    epochs = read_epochs(document, names, before.time_s)
+    rng = np.random.default_rng()
+    rng.bit_generator.state = before.rng
+    state, fixes, details = before.state, [], []
+    count, explained_from = before.epochs + len(epochs), len(epochs) - _MOST_WATCHED
+    for index, epoch in enumerate(epochs):
+        held = state
+        drawn = copy.deepcopy(rng) if watcher is not None and index >= explained_from else None
+        state, output = positioner.step(held, epoch, rng)
+        number_ = before.epochs + index + 1
+        fixes.append(json_bytes(fix_document(output, number_, positioner.crs)))
+        if watcher is not None:
+            details.append(json_bytes(watcher.detail(held, epoch, drawn, state, output)))
+    progress = Progress(state, rng.bit_generator.state, count, epochs[-1].time_s, fixes[-1])
+    belief = watcher.belief(state, count) if watcher is not None else b""
+    return Stepped(progress, fixes, details, belief)
+
+
+def wanted(
+    document: Mapping[str, Any], crs: str
+) -> tuple[str, int | None, tuple[float, float, float] | None]:
+    """Return name, seed and start (east, north, deviation) of a new session."""
+    faults = Faults()
+    check_keys(document, ("name", "seed", "start"), "body", faults)
+    name, seed, start = "", None, None
+    if document.get("name") is not None:
+        name = text(document["name"], "name", "1..128 printable characters", faults) or ""
+    if document.get("seed") is not None:
+        most = 2**SEED_BITS - 1
+        seed = whole(document["seed"], "seed", f"a whole number in 0..{most}", faults, 0, most)
+    given = document.get("start")
+    if given is not None and not isinstance(given, dict):
+        faults.add("start", "an object with lat_deg, lon_deg and sd_m", "something else")
+    elif given is not None:
+        ranges = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": 1e5}
+        check_keys(given, tuple(ranges), "start", faults)
+        found = [
+            number(given.get(key), f"start.{key}", f"a number up to {most:g}", faults, low, most)
+            for key, most in ranges.items()
+            for low in (0.0 if key == "sd_m" else -most,)
+        ]
+        if not faults.found:
+            lat_deg, lon_deg, sd_m = (float(one) for one in found if one is not None)
+            east_m, north_m = project(crs, lon_deg, lat_deg)
+            if not (np.isfinite(east_m) and np.isfinite(north_m)):
+                faults.add("start", f"a place that {crs} covers", "one beyond it")
+            start = float(east_m), float(north_m), sd_m
+    if faults.found:
+        raise RequestError.of(InputError(tuple(faults.found)))
+    return name, seed, start

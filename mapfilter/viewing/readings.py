@@ -1,0 +1,181 @@
+"""The rows of radio reports as the page reads them: cell, level, prediction, and whether used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mapfilter._types import Floats, Ints
+from mapfilter.filters.contract import Reason
+from mapfilter.models.fingerprint import pixels
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
+from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
+from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.schema import SERVING
+from mapfilter.viewing.arrays import cell_numbers, packed, starts
+
+REASONS = tuple(Reason)
+ROLES = ("serving", "neighbour")
+
+LevelAt = Callable[[Floats, Floats, Sequence[str | None]], Floats]
+"""Predicted levels of cells at places of the CRS, NaN where there are none."""
+
+Unused = Mapping[tuple[float, str, str], Reason]
+"""Reasons by time, role and name of a reading."""
+
+_LATE = (Reason.NOT_MOVED_ENOUGH, Reason.STALE_RADIO)
+
+
+class NumberedTexts(dict[str, int]):
+    """Numbers of texts in the order in which they come."""
+
+    def __missing__(self, key: str) -> int:
+        self[key] = len(self)
+        return self[key]
+
+
+class ReadingRow(NamedTuple):
+    """A row of a radio report.
+
+    ``cell`` is its number in the plan, -1 for none; ``known`` its id there.
+    """
+
+    cell: int
+    name: str
+    known: str | None
+    role: str
+    level_dbm: float
+    use: Reason
+
+
+def unused_of(readings: Iterable[UnusedReading]) -> tuple[Unused, frozenset[str]]:
+    """Return why readings were not used, and the kinds that a filter never uses."""
+    some = list(readings)
+    why = {(one.time_s, one.kind, one.what): one.reason for one in some}
+    never = frozenset(one.kind for one in some if one.reason is Reason.NOT_USED_BY_FILTER)
+    return why, never
+
+
+def report_rows(
+    epoch: Epoch,
+    reason: Reason,
+    unused: tuple[Unused, frozenset[str]],
+    plan: CellPlan,
+    index: Mapping[str, int],
+) -> list[ReadingRow]:
+    """Return the rows of an epoch's report.
+
+    Parameters
+    ----------
+    reason : Reason
+        Of the epoch's fix.
+    unused : tuple
+        From :func:`unused_of`.
+    index : mapping of str to int
+        Numbers of the plan's cells.
+    """
+    why, never = unused
+    found: list[ReadingRow] = []
+    serving = -1
+    for row in epoch.radio:
+        name = _named(row.cell, row.arfcn, row.bsic)
+        known = _cell_of(row, plan, plan.ids[serving] if serving >= 0 else None)
+        cell = index.get(known, -1) if known is not None else -1
+        use = why.get((epoch.time_s, row.role, name), Reason.USED)
+        if row.role in never:
+            use = Reason.NOT_USED_BY_FILTER
+        elif use is Reason.USED and reason in _LATE:
+            use = reason
+        if row.role == SERVING and serving < 0:
+            serving = cell
+        found.append(ReadingRow(cell, name, known, row.role, row.level_dbm, use))
+    return found
+
+
+class Readings:
+    """The rows of the radio reports of those epochs that are shown."""
+
+    def __init__(
+        self, estimate: TrackEstimate, log: TrackLog | None, kept: Ints, plan: CellPlan
+    ) -> None:
+        self.count = np.zeros(kept.size, dtype=np.int64)
+        self.serving = np.full(kept.size, -1, dtype=np.int64)
+        self.rows: list[ReadingRow] = []
+        at_epoch: list[int] = []
+        if log is not None and len(log.radio):
+            index = {cell: number for number, cell in enumerate(plan.ids)}
+            unused = unused_of(estimate.unused)
+            merged = epochs(log)
+            place = np.searchsorted(estimate.time_s, [epoch.time_s for epoch in merged])
+            of_epoch = dict(zip(place.tolist(), merged, strict=True))
+            for number, at in enumerate(kept.tolist()):
+                epoch = of_epoch.get(at)
+                if epoch is None:
+                    continue
+                rows = report_rows(epoch, estimate.reason[at], unused, plan, index)
+                self.count[number] = len(rows)
+                self.serving[number] = next(
+                    (r.cell for r in rows if r.role == SERVING and r.cell >= 0), -1
+                )
+                self.rows += rows
+                at_epoch += [at] * len(rows)
+        at_row = np.array(at_epoch, dtype=np.int64)
+        self.east_m, self.north_m = estimate.east_m[at_row], estimate.north_m[at_row]
+
+    def packed(self, whats: NumberedTexts, level_at: LevelAt) -> dict[str, Any]:
+        """Return the rows as the page reads them."""
+        rows, known = self.rows, [one.known for one in self.rows]
+        predicted = level_at(self.east_m, self.north_m, known) if rows else np.empty(0)
+        level = np.array([one.level_dbm for one in rows], dtype=np.float64)
+        return {
+            "first": starts(self.count),
+            "cell": cell_numbers(np.array([one.cell for one in rows], dtype=np.int64)),
+            "what": packed(np.array([whats[one.name] for one in rows], np.int64), "u4"),
+            "role": packed(np.array([ROLES.index(one.role) for one in rows], np.int64), "u1"),
+            "level": dbm(level),
+            "predicted": dbm(predicted),
+            "use": packed(np.array([REASONS.index(one.use) for one in rows], np.int64), "u1"),
+        }
+
+
+def dbm(values: Any) -> dict[str, Any]:
+    """Return levels as the page reads them, in steps of 0.5 dB."""
+    return packed(values, "u1", scale=0.5, offset=-150.0, none=255)
+
+
+def level_on(area: AreaMap) -> LevelAt:
+    """Return a function that looks levels up on a filter's own map."""
+    (west, south), band_of = area.origin_m, area.band_of
+
+    def look_up(east_m: Floats, north_m: Floats, cells: Sequence[str | None]) -> Floats:
+        if not area.cell_ids:
+            return np.full(len(cells), np.nan)
+        place = np.stack([east_m - west, north_m - south])
+        known = np.isfinite(place).all(axis=0)
+        at = pixels(np.where(known, place, 0.0).astype(np.float32), area.frame)
+        band = np.array([band_of.get(cell or "", -1) for cell in cells], dtype=np.int64)
+        level = area.level_dbm.reshape(-1, len(area.cell_ids) + 2)[at, band].astype(np.float64)
+        return np.where(known & (band >= 0), level, np.nan)
+
+    return look_up
+
+
+def _cell_of(row: ReportRow, plan: CellPlan, serving: str | None) -> str | None:
+    """Return the cell of a row: as it is named, or the only one of its carrier and code."""
+    if row.cell is not None or row.arfcn is None:
+        return row.cell
+    alike = plan.ids_by_carrier.get((row.arfcn, -1 if row.bsic is None else row.bsic), ())
+    others = [cell for cell in alike if cell != serving]
+    return others[0] if len(others) == 1 else None
+
+
+def _named(cell: str | None, arfcn: int | None, bsic: int | None) -> str:
+    """Return a cell as the reasons of a filter name it."""
+    if cell is not None:
+        return cell
+    code = "unknown" if bsic is None else bsic
+    return "" if arfcn is None else f"ARFCN {arfcn}, BSIC {code}"
