@@ -193,5 +193,6 @@ if __name__ == "__main__":
     _OWN = Path(__file__).parent
     sys.path[:0] = [str(_OWN), str(_OWN / "roads")]
     from fuzz_command import main
+    from fuzz_readers import targets
 
-    sys.exit(main())
+    sys.exit(main(targets))

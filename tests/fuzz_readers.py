@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import geopandas
 import numpy as np
 import pandas as pd
 import rasterio
 import shapely
+from fuzz_command import Target
 from made_maps import AREA, write_pbf, write_xml
 from made_maps import CRS as MAP_CRS
 from made_recordings import MADE
@@ -40,14 +40,6 @@ WAYS = [
     (1, {"highway": "residential", "oneway": "yes"}, [(10, 10), (60, 10), (61, 40)]),
     (2, {"highway": "footway"}, [(50, 50), (90, 50), (90, 80)]),
 ]
-
-
-class Target(NamedTuple):
-    """A file, and what reads its folder's copy of it."""
-
-    name: str
-    path: Path
-    read: Callable[[Path], object]
 
 
 def targets(folder: Path) -> Iterator[Target]:

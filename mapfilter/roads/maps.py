@@ -41,6 +41,8 @@ _CHUNK_BYTES = 1 << 20
 _LARGEST_RATIO = 60
 _ALWAYS_ALLOWED_BYTES = 64 << 20
 _MOST_NODES_IN_MEMORY_MB = 100
+# Of a larger PBF, the part within the box is cut out first, without reading all into memory.
+_LARGEST_IN_MEMORY_BYTES = 50 << 20
 # Keys whose closed ways are areas; closed highways are lines here unless area=yes.
 _AREA_KEYS = "building,landuse,natural,place,water,waterway"
 _LAYERS = ("lines", "multipolygons")
@@ -163,7 +165,7 @@ def _read_layer(
                 bbox=box,
                 where=" OR ".join(wanted),
                 CONFIG_FILE=str(settings),
-                MAX_TMPFILE_SIZE=str(_MOST_NODES_IN_MEMORY_MB),
+                MAX_TMPFILE_SIZE=str(_nodes_mb(plain)),
             )
     except (DataSourceError, DataLayerError, GEOSException, ValueError) as error:
         reason = str(error).replace(str(plain), path.name)
@@ -175,6 +177,35 @@ def _read_layer(
     found["osm_type"] = np.where(is_way, "way", "relation")
     found = found[np.isfinite(found["id"]) & found.geometry.notna()]
     return found.astype({"id": np.int64})
+
+
+def _read_pbf(path: Path, folder: Path, box: BoxDeg | None, query: Query) -> Any:
+    def opened(file: Path) -> pyrosm.OSM:
+        # The other engine keeps what it read in a folder that all users share, and reads it there.
+        return pyrosm.OSM(
+            str(file),
+            bounding_box=list(box) if box else None,
+            complete_relations=True,
+            keep_metadata=False,
+            engine="in_memory",
+            progress=False,
+        )
+
+    osm = opened(path)
+    if box and path.stat().st_size > _LARGEST_IN_MEMORY_BYTES:
+        part = folder / "part.osm.pbf"
+        osm.to_pbf(str(part))
+        osm = opened(part)
+    return osm.get_data_by_custom_criteria(
+        custom_filter={key: list(values) or True for key, values in query.wanted.items()},
+        tags_as_columns=list(query.tags),
+        keep_nodes=False,
+    )
+
+
+def _nodes_mb(plain: Path) -> int:
+    """Return the memory for nodes: as GDAL fills all of it, no more than the file can need."""
+    return min(_MOST_NODES_IN_MEMORY_MB, 1 + (plain.stat().st_size >> 20))
 
 
 def _guarded(path: Path, read: Callable[[], Any]) -> Any:
@@ -310,24 +341,9 @@ def _read(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
 
     Of a PBF these are the elements with a node in the box.
     """
-
-    def from_pbf() -> Any:
-        osm = pyrosm.OSM(
-            str(path),
-            bounding_box=list(box) if box else None,
-            complete_relations=True,
-            keep_metadata=False,
-            progress=False,
-        )
-        return osm.get_data_by_custom_criteria(
-            custom_filter={key: list(values) or True for key, values in query.wanted.items()},
-            tags_as_columns=list(query.tags),
-            keep_nodes=False,
-        )
-
-    if path.suffix.lower() == ".pbf":
-        return _guarded(path, from_pbf)
     with tempfile.TemporaryDirectory(prefix="mapfilter-osm-") as folder:
+        if path.suffix.lower() == ".pbf":
+            return _guarded(path, lambda: _read_pbf(path, Path(folder), box, query))
         plain = _checked(path, Path(folder))
         settings = Path(folder) / "osmconf.ini"
         # GDAL's settings: which tags become columns, and which closed ways are areas.

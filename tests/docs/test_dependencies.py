@@ -35,3 +35,37 @@ def test_the_build_backend_and_all_extras_are_constrained():
         every |= names_of(extra)
     assert every <= constraints().keys()
     assert "PIP_BUILD_CONSTRAINT" in (ROOT / "Makefile").read_text()
+
+
+IMPORTED_AS = {
+    "scikit-learn": "sklearn",
+    "python-calamine": "python_calamine",
+    "annotated-types": "annotated_types",
+    "dask": "distributed",
+    "import-linter": "importlinter",
+    "pytest-xdist": "xdist",
+}
+COMMANDS = {"sphinx", "furo", "import-linter", "mypy", "pytest", "pytest-xdist", "ruff", "uvicorn"}
+"""Tools, which are called by their names and not imported."""
+CALLED_FOR = {"jinja2": ".to_latex("}
+"""What pandas calls a library for."""
+
+
+def test_every_dependency_and_every_extra_is_used():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    package = "".join(path.read_text() for path in (ROOT / "mapfilter").rglob("*.py"))
+    other = "".join(
+        path.read_text() for name in ("tests", "benchmarks") for path in (ROOT / name).rglob("*.py")
+    )
+
+    def unused(requirements, text):
+        return [
+            name
+            for name in sorted(names_of(requirements) - COMMANDS)
+            if not re.search(rf"^\s*(import|from) {IMPORTED_AS.get(name, name)}\b", text, re.M)
+            and CALLED_FOR.get(name, "no such call") not in text
+        ]
+
+    assert unused(project["dependencies"], package) == []
+    for extra, requirements in project["optional-dependencies"].items():
+        assert unused(requirements, package + other) == [], extra

@@ -1,5 +1,6 @@
 """A phone that stands still costs little time and memory, and is reported as it was."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -65,3 +66,14 @@ def test_what_is_reported_is_what_a_new_summary_says(positioner, log):
 def test_equal_rows_of_reports_are_one_object(log):
     rows = [row for epoch in epochs(log)[-STOOD:] for row in epoch.radio]
     assert len({id(row) for row in rows}) == len(set(map(repr, rows))) < len(rows)
+
+
+def test_a_state_does_not_grow_while_one_stands(positioner, log):
+    rng, state, sizes = np.random.default_rng(3), positioner.begin(), []
+    merged = epochs(log)
+    for number, epoch in enumerate(merged, 1):
+        state, _ = positioner.step(state, epoch, rng)
+        if len(merged) - number in (3 * STOOD // 4, 0):
+            sizes.append(len(pickle.dumps(state)))
+    assert len(sizes) == 2
+    assert sizes[1] <= sizes[0] + 200

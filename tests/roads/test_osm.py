@@ -1,5 +1,8 @@
 """Which ways and areas of a map a profile may use, and what is wrong with broken maps."""
 
+import os
+import tempfile
+
 import numpy as np
 import pytest
 import shapely
@@ -7,6 +10,7 @@ from made_maps import AREA, write_pbf
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project
+from mapfilter.roads import maps
 from mapfilter.roads.maps import box_deg, map_bounds_deg, resolve_map
 from mapfilter.roads.osm import read_squares, read_ways
 
@@ -202,3 +206,48 @@ def test_the_embedded_map_is_central_helsinki():
     assert len(ways) > 1000
     assert len(squares) > 10
     assert np.all(np.diff(ways.way_id) >= 0)
+
+
+@pytest.fixture
+def shared_temporary(monkeypatch, tmp_path):
+    folder = tmp_path / "shared"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def test_a_map_is_read_anew_each_time_and_nothing_of_it_is_kept(tmp_path, shared_temporary):
+    path, footway = tmp_path / "a.osm.pbf", {"highway": "footway"}
+    found = []
+    for corner in (50, 60):
+        write_pbf(path, [(1, footway, [(10, 10), (corner, 10)])])
+        # A file of the same size and time is another one nevertheless.
+        os.utime(path, (1_700_000_000, 1_700_000_000))
+        ways = read_ways(path, "walking", *AREA)
+        found.append((path.stat().st_size, shapely.length(ways.geometry).sum()))
+    assert found[0][0] == found[1][0]
+    assert [length_m for _, length_m in found] == pytest.approx([40, 50], abs=0.1)
+    assert not list(shared_temporary.iterdir())
+
+
+def test_folders_of_other_users_do_not_matter(make_map, shared_temporary):
+    (shared_temporary / "pyrosm").write_text("of another user")
+    path = make_map([(1, {"highway": "footway"}, [(10, 10), (50, 10)])])
+    assert len(read_ways(path, "walking", *AREA)) == 1
+
+
+def test_of_a_large_map_the_part_in_the_box_is_read(make_map, monkeypatch, shared_temporary):
+    squares = [(2, {"highway": "pedestrian", "area": "yes"}, [(9, 9), (9, 60), (60, 60), (9, 9)])]
+    ways = [(1, {"highway": "footway"}, [(10, 10), (50, 10)]),
+            (3, {"highway": "footway"}, [(9_000, 9_000), (9_050, 9_000)])]  # fmt: skip
+    path = make_map([*ways, *squares])
+
+    def read():
+        found = read_ways(path, "walking", *AREA), read_squares(path, *AREA)
+        return [shapely.to_wkb(one.geometry).tolist() for one in found]
+
+    whole = read()
+    assert [len(one) for one in whole] == [1, 1]
+    monkeypatch.setattr(maps, "_LARGEST_IN_MEMORY_BYTES", 0)
+    assert read() == whole
+    assert not list(shared_temporary.iterdir())

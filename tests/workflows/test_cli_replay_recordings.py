@@ -1,6 +1,7 @@
 """``replay`` takes recordings of other programs: cells by identity, motion, truth."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -192,3 +193,27 @@ def test_positions_alone_need_neither_database_nor_plan(tmp_path, monkeypatch):
         assert done.code == 0, done.err
         assert done.json["switched"]
         assert done.json["error_mean_m"] < 5
+
+
+def test_identities_in_the_radio_table_of_a_log_are_those_of_the_plan(database, world, tmp_path):
+    """Columns mcc, mnc, lac and ci in place of a cell's id find the positions that ids find."""
+    shutil.copytree(world.journeys / ONE, tmp_path / "named")
+    log = read_log(tmp_path / "named")
+    known = log.radio["cell"].map(IDENTITIES, na_action="ignore")
+    lac, ci = (known.map(lambda of, at=at: of[at], na_action="ignore") for at in (0, 1))
+    country = known.map(lambda _: 244, na_action="ignore")
+    network = known.map(lambda _: 91, na_action="ignore")
+    radio = log.radio.drop(columns="cell").assign(mcc=country, mnc=network, lac=lac, ci=ci)
+    by_hand = tmp_path / "by-hand"
+    by_hand.mkdir()
+    (by_hand / "log.json").write_text(json.dumps({"crs": log.crs}))
+    log.motion.to_csv(by_hand / "motion.csv", index=False)
+    radio.to_csv(by_hand / "radio.csv", index=False)
+    found = []
+    for folder in ("named", "by-hand"):
+        done = replayed(database, tmp_path / f"out-{folder}", "--log", tmp_path / folder)
+        assert done.code == 0, done.err
+        assert done.json["unknown_cells"] == {}
+        found.append((done.json["switched"], done.json["epochs"], done.json["unused"]))
+    assert found[0] == found[1]
+    assert any("named by the plan's identities" in note for note in done.json["notes"])
