@@ -9,6 +9,7 @@ intervals over journeys. KIND is --errors (the default), --radii (how often each
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -34,7 +35,9 @@ def of_cities(cities: Cities, name: str, digits: int) -> str:
 
 
 def share(result: CaseResult, name: str, digits: int = 3) -> str:
-    """Return a share over all cities with its interval."""
+    """Return a share over all cities with its interval; none where nothing was claimed."""
+    if not isfinite(getattr(result, f"{name}_low")):
+        return "–"
     low, high = (getattr(result, f"{name}_{end}") for end in ("low", "high"))
     return f"{getattr(result, name):.{digits}f} ({low:.{digits}f}–{high:.{digits}f})"
 

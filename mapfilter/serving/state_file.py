@@ -28,6 +28,7 @@ from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.repeats import MotionRepeats
 from mapfilter.positioning.bayes.sensors import Rest, SensorWatch
 from mapfilter.positioning.bayes.state import BayesState, Reported
 from mapfilter.positioning.bayes.timing import TimingState
@@ -54,6 +55,7 @@ _CLASSES: dict[str, type] = {
         GnssState,
         LevelErrors,
         LevelMemory,
+        MotionRepeats,
         NullHypothesis,
         ParticleBelief,
         Receiver,

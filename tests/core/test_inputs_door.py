@@ -376,6 +376,7 @@ OPENING = {
     "ZipFile", "GzipFile", "read_dataframe", "list_layers", "read_info", "read_parquet", "load",
     "loadtxt", "genfromtxt", "fromfile", "read_file", "read_excel", "read_json",
 }  # fmt: skip
+OWN = ("Ways", "OpenMap", "cls", "journeys")
 LIBRARIES = {"pd", "pq", "np", "rasterio", "pyogrio", "gzip", "zipfile", "geopandas", "os", "io"}
 
 
@@ -395,7 +396,9 @@ def openings():
             of = node.func.value
             owner = of.id if isinstance(of, ast.Name) else ""
             of_path = node.func.attr in ("open", "read_text", "read_bytes")
-            if owner in LIBRARIES or (of_path and owner not in ("Ways", "cls", "journeys")):
+            if owner in LIBRARIES or (
+                of_path and owner not in ("Ways", "OpenMap", "cls", "journeys")
+            ):
                 yield place, node.func.attr
 
 
