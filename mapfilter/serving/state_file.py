@@ -28,10 +28,11 @@ from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.repeats import MotionRepeats
 from mapfilter.positioning.bayes.sensors import Rest, SensorWatch
 from mapfilter.positioning.bayes.state import BayesState, Reported
 from mapfilter.positioning.bayes.timing import TimingState
-from mapfilter.positioning.epochs import ReportRow
+from mapfilter.positioning.epochs import GnssFix, ReportRow
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
@@ -51,9 +52,11 @@ _CLASSES: dict[str, type] = {
         Bins,
         DeadReckoning,
         Fix,
+        GnssFix,
         GnssState,
         LevelErrors,
         LevelMemory,
+        MotionRepeats,
         NullHypothesis,
         ParticleBelief,
         Receiver,
