@@ -153,7 +153,7 @@ def located(database: RadioRouteDatabase, logs: list[TrackLog]) -> dict[str, flo
         "to_converged_m": float(np.mean([one.switch_distance_m for one in right] or [np.nan])),
         "error_mean_m": float(np.mean([one.error_mean_m for one in right] or [np.nan])),
         "error_median_m": float(np.median([one.error_mean_m for one in right] or [np.nan])),
-        "off_50m": 1 - sum(claims.within_50m for _, claims in found) / max(claimed, 1),
+        "off_50m": 1 - sum(one.within_50m for _, one in found) / claimed if claimed else np.nan,
     }
 
 

@@ -116,18 +116,24 @@ class Service:
 
     async def _events(self, request: Request) -> EventStream:
         detail = request.query_params.get(_DETAIL) == "1"
+        session = self._listened(request)
         if detail:
-            await self.sessions.watch(self._session(request))
-        # From here on nothing is awaited: neither the session nor the number of listeners changes.
-        session = self._session(request)
-        if len(session.channel.listeners) >= self.limits.listeners:
-            text = f"{self.limits.listeners} streams of this session are open already"
-            raise RequestError(429, "tooManyRequests", text)
+            await self.sessions.watch(session)
+            # From here on nothing is awaited: neither session nor number of listeners changes.
+            session = self._listened(request)
         # What a browser sends by itself when it comes back counts for more than the address.
         last = request.headers.get("last-event-id") or request.query_params.get(_AFTER, "")
         whole = last.isascii() and last.isdigit() and len(last) <= _MOST_DIGITS
         listener = session.channel.listen(int(last) if whole else 0, detail)
         return EventStream(session.channel, listener, self.limits.send_s)
+
+    def _listened(self, request: Request) -> Session:
+        """Return a session that may have one more listener."""
+        session = self._session(request)
+        if len(session.channel.listeners) >= self.limits.listeners:
+            text = f"{self.limits.listeners} streams of this session are open already"
+            raise RequestError(429, "tooManyRequests", text)
+        return session
 
     async def _geolocate(self, request: Request) -> Response:
         document = await self._document(request)

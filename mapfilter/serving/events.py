@@ -22,7 +22,7 @@ _WAITING = 512
 """More than the kept fixes and those of one request together."""
 
 _WATCHED_S = 30.0
-"""Time for which a page that was cut off may come back and miss no details."""
+"""Time for which a page that is to come, or was cut off and may come back, misses no details."""
 
 _QUIET_S = 15.0
 _RETRY_MS = 2000
@@ -165,19 +165,34 @@ class Channel:
         The last one while somebody watches, as JSON.
     watched_until_s : float
         Time of the monotonic clock until which details are made although nobody is there.
+    described : bool
+        Whether details or a belief are kept.
     """
 
     kept: deque[KeptFix] = field(default_factory=lambda: deque(maxlen=KEPT_FIXES))
     listeners: set[Listener] = field(default_factory=set)
     belief: bytes = b""
     watched_until_s: float = -inf
+    described: bool = False
 
     def is_watched(self, now_s: float) -> bool:
         """Return whether steps are to be described in detail."""
         return now_s < self.watched_until_s or any(one.detail for one in self.listeners)
 
+    def expect(self, now_s: float) -> None:
+        """Make details for a while, for a page that is to come."""
+        self.watched_until_s = now_s + _WATCHED_S
+
+    def forget_details(self, now_s: float) -> None:
+        """Keep fixes alone once nobody watches: details take a hundred times their memory."""
+        if self.described and not self.is_watched(now_s):
+            bare = (KeptFix(one.number, one.fix, one.fix) for one in self.kept)
+            self.kept = deque(bare, maxlen=KEPT_FIXES)
+            self.belief, self.described = b"", False
+
     def keep(self, number: int, fix: bytes, detail: bytes = b"") -> KeptFix:
         """Keep a fix for listeners to come."""
+        self.described = self.described or bool(detail)
         detailed = fix[:-1] + b',"detail":' + detail + b"}" if detail else fix
         self.kept.append(KeptFix(number, fix, detailed))
         return self.kept[-1]
@@ -194,13 +209,20 @@ class Channel:
         """
         for index, fix in enumerate(fixes):
             kept = self.keep(first + index, fix, details[index] if details else b"")
+            # One object for all that wait for it.
+            both = kept.event(False), kept.event(True)
             for one in self.listeners:
-                one.send(kept.event(one.detail))
-        self.belief = belief
+                one.send(both[one.detail])
+        self.show(belief)
         if belief:
+            data = event("belief", None, belief)
             for one in self.listeners:
                 if one.detail:
-                    one.send(event("belief", None, belief))
+                    one.send(data)
+
+    def show(self, belief: bytes) -> None:
+        """Keep the last belief for pages to come."""
+        self.belief, self.described = belief, self.described or bool(belief)
 
     def listen(self, after: int, detail: bool = False) -> Listener:
         """Add a listener, which first gets the kept fixes with larger numbers."""
@@ -218,7 +240,7 @@ class Channel:
         listener.close()
         self.listeners.discard(listener)
         if listener.detail:
-            self.watched_until_s = now_s + _WATCHED_S
+            self.expect(now_s)
 
     def end(self, reason: str) -> None:
         """Tell all listeners that there will be no more fixes, and why."""

@@ -181,6 +181,7 @@ class _Server(uvicorn.Server):
         began_s = loop.time()
         while True:
             await asyncio.sleep(min(_TICK_S, self.save_every_s))
+            self.sessions.forget_details()
             try:
                 await self.sessions.end_idle()
                 await self.sessions.make_room()

@@ -150,11 +150,13 @@ class Sessions:
             if watched >= self.limits.watched:
                 text = f"{watched} sessions are watched already, the most there may be"
                 raise RequestError(429, "tooManyRequests", text)
+        # Counted before the first await, so that no two requests take the last place.
+        session.channel.expect(now_s)
         async with session.lock:
             _refuse_ended(session)
             progress = await self._loaded(session)
             work = partial(self.watcher.belief, progress.state, progress.epochs)
-            session.channel.belief = await self._run(work)
+            session.channel.show(await self._run(work))
 
     async def end(self, session: Session, reason: str) -> None:
         """End a session, and remove what was saved of it."""
@@ -172,6 +174,12 @@ class Sessions:
         for one in idle:
             await self.end(one, "idle")
         return len(idle)
+
+    def forget_details(self) -> None:
+        """Drop what pages were shown of sessions that nobody watches any more."""
+        now_s = time.monotonic()
+        for one in self.all.values():
+            one.channel.forget_details(now_s)
 
     async def save_all(self) -> int:
         """Save what is new; return the number of sessions saved."""

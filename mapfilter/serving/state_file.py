@@ -32,7 +32,7 @@ from mapfilter.positioning.bayes.repeats import MotionRepeats
 from mapfilter.positioning.bayes.sensors import Rest, SensorWatch
 from mapfilter.positioning.bayes.state import BayesState, Reported
 from mapfilter.positioning.bayes.timing import TimingState
-from mapfilter.positioning.epochs import ReportRow
+from mapfilter.positioning.epochs import GnssFix, ReportRow
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
@@ -52,6 +52,7 @@ _CLASSES: dict[str, type] = {
         Bins,
         DeadReckoning,
         Fix,
+        GnssFix,
         GnssState,
         LevelErrors,
         LevelMemory,

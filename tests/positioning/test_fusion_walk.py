@@ -299,6 +299,16 @@ def test_a_repeated_fix_is_one_measurement():
     assert other.radii_m[2] < 0.8 * first.radii_m[2]
 
 
+def test_a_vehicle_that_waits_stays_where_its_receiver_says_without_dead_reckoning():
+    """Positions in whole steps repeat themselves at a red light; the estimate must not coast on."""
+    made = walk(reckoned=False)
+    east_m = [*np.arange(0.0, 300.0, 10.0), *300.0 + np.cumsum([8.0, 6.0, 4.0, 2.0]), *[320.0] * 60]
+    for time_s, at_m in enumerate(east_m):
+        found = made.take(Epoch(float(time_s), fix=GnssFix(EAST + at_m, NORTH, 9.0, 9.0, 0.0)))
+    assert abs(found.east_m - EAST - 320.0) < 5.0
+    assert not made.unused
+
+
 @pytest.mark.parametrize(
     ("last", "repeats"),
     [

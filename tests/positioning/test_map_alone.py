@@ -18,7 +18,7 @@ from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.options import VEHICLE, BayesFilter, open_area
 from mapfilter.positioning.bayes.path import LEG_M, PATH_M, RecentPath
 from mapfilter.positioning.bayes.path_start import ends_of_path, possible_turns_rad
-from mapfilter.positioning.epochs import Epoch, epochs
+from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
 from mapfilter.positioning.filter import locate
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.raster import read_raster_ways
@@ -178,6 +178,30 @@ def test_a_repeated_fix_is_one_measurement(vehicle):
     np.testing.assert_array_equal(error_m, error_by_one_m)
     reasons = [one.reason for one in estimate.unused if one.kind == "gnss"]
     assert reasons == [Reason.REPEATED_FIX] * (len(again.gnss) - 1)
+
+
+def test_a_fix_that_was_not_used_yet_is_no_repetition(vehicle):
+    """On probation nothing is used: what a waiting receiver repeats afterwards is news."""
+    path = drive(TOWN, 3, 100.0)
+    fix = GnssFix(float(path[0, 0]), float(path[0, 1]), 9.0, 9.0, 0.0)
+    state, rng = vehicle.begin(), np.random.default_rng(1)
+    state, _ = vehicle.step(state, Epoch(0.0, (MotionStep(0.0, 0.0),), fix=fix), rng)
+    assert state.last_fix == fix
+    gnss = replace(state.sources["gnss"], probation_until_s=30.0)
+    state = replace(state, sources={**state.sources, "gnss": gnss})
+    other, reasons = replace(fix, east_m=fix.east_m + 1.0), {}
+    for time_s in range(1, 61):
+        state, output = vehicle.step(
+            state, Epoch(float(time_s), (MotionStep(0.0, 0.0),), fix=other), rng
+        )
+        reasons[time_s] = {one.reason for one in output.unused if one.kind == "gnss"}
+        if time_s <= 29:
+            assert state.last_fix == fix
+    assert Reason.ON_PROBATION in set().union(*(reasons[time_s] for time_s in range(1, 30)))
+    assert state.last_fix == other
+    repeated = [time_s for time_s in reasons if Reason.REPEATED_FIX in reasons[time_s]]
+    assert 30 < repeated[0] <= 42
+    assert repeated == list(range(repeated[0], 61))
 
 
 def test_too_short_or_broken_a_path_starts_nothing(vehicle):

@@ -223,6 +223,52 @@ def test_so_many_sessions_may_be_watched_and_no_more(made):
     asyncio.run(run())
 
 
+def test_the_last_place_to_watch_is_given_once(made):
+    """Pages that open at the same time are counted before their beliefs are made."""
+    held = made(watched=1)
+
+    async def run():
+        app = held.app()
+        ids = [await begin(app) for _ in range(3)]
+        streams = [Streamed(app, f"/sessions/{one}/events", query=b"detail=1") for one in ids]
+        await asyncio.sleep(0.3)
+        return [len(held.sessions.all[one].channel.listeners) for one in ids], streams
+
+    found, _ = asyncio.run(run())
+    assert sum(found) == 1
+
+
+def test_a_full_session_is_refused_before_its_belief_is_made(made):
+    held = made(listeners=1)
+
+    async def run():
+        app = held.app()
+        session = await begin(app)
+        first = Streamed(app, f"/sessions/{session}/events")
+        await asyncio.sleep(0.05)
+        answer = await ask(app, "GET", f"/sessions/{session}/events", query=b"detail=1")
+        now_s = time.monotonic()
+        return answer.code, held.sessions.all[session].channel.is_watched(now_s), first
+
+    code, watched, _ = asyncio.run(run())
+    assert (code, watched) == (429, False)
+
+
+def test_details_are_dropped_once_nobody_has_watched_for_a_while():
+    channel = Channel()
+    page = channel.listen(0, detail=True)
+    channel.publish(1, [b'{"a":1}'], [b'{"rows":[]}'], b'{"number":1}')
+    plain = channel.listen(0)
+    channel.leave(page, 100.0)
+    channel.forget_details(101.0)
+    assert channel.described
+    assert b"rows" in channel.kept[0].detailed
+    channel.forget_details(200.0)
+    assert [(one.number, one.detailed) for one in channel.kept] == [(1, b'{"a":1}')]
+    assert (channel.belief, channel.described) == (b"", False)
+    assert channel.listeners == {plain}
+
+
 def test_a_request_of_many_epochs_reaches_a_listener_whole():
     """As many fixes as a request may have fit into the queue, beside those that were kept."""
     channel = Channel()

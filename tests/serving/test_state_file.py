@@ -3,6 +3,8 @@
 import hashlib
 import json
 import pickle
+from dataclasses import replace
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -11,8 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import StoreError
-from mapfilter.positioning.epochs import epochs
+from mapfilter.filters.grid import GridBelief
+from mapfilter.positioning.epochs import GnssFix, epochs
+from mapfilter.positioning.integrity import RadialTail
+from mapfilter.serving import state_file
 from mapfilter.serving.state_file import decode, encode
+
+NOT_OF_PARTICLES = {GridBelief, RadialTail}
+"""The other belief of a state, and the protocol of all tails."""
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +44,31 @@ def test_states_come_back_to_the_bit_with_the_same_objects_shared(states):
         assert encode({"state": again}) == encode({"state": state})
         if state.reported is not None and state.reported.belief is state.belief:
             assert again.reported.belief is again.belief
+
+
+def classes_in(hint):
+    """The classes that a type hint names, in whatever union or tuple."""
+    parts = get_args(hint)
+    if parts:
+        return set().union(*map(classes_in, parts))
+    return {hint} if isinstance(hint, type) and hint.__module__.startswith("mapfilter") else set()
+
+
+@pytest.mark.parametrize("name", state_file._CLASSES)
+def test_whatever_a_saved_class_holds_can_be_saved(name):
+    saved = {*state_file._CLASSES.values(), *state_file._ENUMS.values()}
+    for hint in get_type_hints(state_file._CLASSES[name]).values():
+        assert classes_in(hint) - saved <= NOT_OF_PARTICLES
+
+
+def test_a_state_with_a_fix_comes_back(positioner):
+    epoch = next(one for one in epochs(documents()[1]) if one.radio)
+    west_m, south_m = positioner.area.origin_m
+    given_fix = replace(epoch, fix=GnssFix(west_m + 50.0, south_m + 50.0, 9.0, 9.0, 0.0))
+    state, _ = positioner.step(positioner.begin(), given_fix, np.random.default_rng(0))
+    again = decode(encode({"state": state}), "made")["state"]
+    assert again.last_fix == state.last_fix == given_fix.fix
+    assert repr(again.watch.repeats) == repr(state.watch.repeats)
 
 
 @settings(max_examples=40)

@@ -83,9 +83,9 @@ def part_rows(part: str, found: Sequence[FoundSession], centroid_m: dict[str, Fl
             some = [one for one in own if one.session in mapped]
             rows.append(_row(part, f"{method}-mapped", some, centroid_m))
     every = joined(centroid_m.values())
-    nobody = np.empty(0)
+    no_radii = np.empty(0)
     usual_m = median_of(every)
-    rows.append(row_of(part, "centroid", len(centroid_m), every, Success(), nobody, usual_m))
+    rows.append(row_of(part, "centroid", len(centroid_m), every, Success(), no_radii, usual_m))
     return rows
 
 

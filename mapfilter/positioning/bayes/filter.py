@@ -189,7 +189,7 @@ class BayesPositioner(Filter[BayesState]):
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[BayesState, StepOutput]:
         """Process one epoch."""
-        state, epoch, repeated = _with_a_new_fix(state, epoch)
+        epoch, repeated = _with_a_new_fix(state, epoch)
         unclear, spacing_m = state.unclear, state.particle_spacing_m
         if unclear:
             state = replace(state, status=Status.TRACKING, unclear=False)
@@ -222,6 +222,9 @@ class BayesPositioner(Filter[BayesState]):
                 belief, status = report(before, state.belief, state.status)
                 state = replace(state, belief=belief, status=status)
                 state = self._in_one_place(state, measured=measured, was_unclear=unclear)
+        gnss: GnssState = state.sources[GnssSource.name]
+        if epoch.fix is not None and gnss.was_used(epoch.time_s):
+            state = replace(state, last_fix=epoch.fix)
         if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
@@ -235,7 +238,7 @@ class BayesPositioner(Filter[BayesState]):
         The state moved to the epoch, the evidence, and whether motion was measured; with the
         generator as before the step these are its own.
         """
-        state, epoch, _ = _with_a_new_fix(state, epoch)
+        epoch, _ = _with_a_new_fix(state, epoch)
         spacing_m = state.particle_spacing_m
         watch, epoch, (motion, _) = watched(state.watch, epoch)
         moved, _ = self._moved(replace(state, watch=watch), epoch, rng)
@@ -498,19 +501,17 @@ class BayesPositioner(Filter[BayesState]):
         return replace(belief, state=state, log_weight=log_weight, kept=kept)
 
 
-def _with_a_new_fix(state: BayesState, epoch: Epoch) -> tuple[BayesState, Epoch, bool]:
-    """Return an epoch without a fix that has no position, or repeats the last one.
+def _with_a_new_fix(state: BayesState, epoch: Epoch) -> tuple[Epoch, bool]:
+    """Return an epoch without a fix that has no position, or repeats the last one that was used.
 
-    Also returns the state with the last fix, and whether it was repeated.
+    Also returns whether it was repeated.
     """
     fix = epoch.fix
     if fix is None:
-        return state, epoch, False
-    if not (isfinite(fix.east_m) and isfinite(fix.north_m)):
-        return state, replace(epoch, fix=None), False
-    if fix.repeats(state.last_fix):
-        return state, replace(epoch, fix=None), True
-    return replace(state, last_fix=fix), epoch, False
+        return epoch, False
+    repeated = fix.repeats(state.last_fix)
+    known = isfinite(fix.east_m) and isfinite(fix.north_m)
+    return (epoch if known and not repeated else replace(epoch, fix=None)), repeated
 
 
 def weighed_by(

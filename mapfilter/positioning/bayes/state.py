@@ -59,7 +59,7 @@ class BayesState:
     watch : SensorWatch
         Whether sensors still measure.
     last_fix : GnssFix or None
-        The last one with a position.
+        The last one that was used.
     """
 
     belief: MapBelief | None = None

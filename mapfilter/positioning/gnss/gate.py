@@ -139,6 +139,10 @@ class GnssState:
         ranges_m = -inf if self.receiver is None else self.receiver.used_at_m
         return max(self.fix_used_at_m, ranges_m)
 
+    def was_used(self, time_s: float) -> bool:
+        """Return whether a fix or pseudoranges of that time were compared, and not rejected."""
+        return self.compared_at_s == time_s >= self.probation_until_s and not self.rejecting
+
     @property
     def rejecting(self) -> bool:
         """Whether the last readings contradicted the belief."""

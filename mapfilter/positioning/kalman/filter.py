@@ -278,7 +278,8 @@ class _Step:
         if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
             self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.NO_READING))
             fix = None
-        if fix is not None and fix.repeats(self.last_fix):
+        # With a velocity, nothing but fixes tells that one stands: the estimate would coast on.
+        if fix is not None and self.layout is not MOVING and fix.repeats(self.last_fix):
             self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REPEATED_FIX))
             fix = None
         self.last_fix = fix or self.last_fix

@@ -48,6 +48,7 @@
       if (!run.count) return "No epoch has come yet.";
       if (result.kind === null && run.reports.length && result.x < 0) return "No radio report has been used yet. Step to the first one with “report ›”.";
       if (!run.explained && !page.bundle.why) {
+        if (run.live) return "No reading has been explained since this page was opened.";
         const alone = run.count && run.epochs.hypotheses?.every((one) => !(one > 1));
         return `What readings contribute is recorded for the Bayes map filter only. This run is of the filter “${run.data.filter}”`
           + `${alone ? ", which holds one Gaussian and no second place to compare with" : ""}. Replay the log with --filter bayes --html to compare.`;
