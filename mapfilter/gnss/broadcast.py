@@ -132,7 +132,9 @@ def place_by_broadcast(
     notes = []
     if without := int((missing & (nearest < 0)).sum()):
         lost = sorted(rows["satellite"][missing & (nearest < 0)].unique())
-        notes.append(f"pseudoranges: {without} {UNPLACED} ({', '.join(lost[:12])}{_days(rows, sane)})")
+        notes.append(
+            f"pseudoranges: {without} {UNPLACED} ({', '.join(lost[:12])}{_days(rows, sane)})"
+        )
     if not found.size:
         return rows, tuple(notes)
     _, clock = satellite_states(sane, nearest[found], sent[found])
