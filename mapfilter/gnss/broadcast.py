@@ -18,6 +18,10 @@ _GRAVITY = {"G": 3.986005e14, "J": 3.986005e14, "E": 3.986004418e14, "C": 3.9860
 _EARTH_RATE = {"C": 7.292115e-5}
 _RELATIVITY = -4.442807633e-10
 _OLDEST_S = 4 * 3600.0
+_DAY_S = 86_400.0
+UNPLACED = "without an ephemeris within 4 h"
+"""In the note on satellites that stay without a place."""
+
 _GEOSTATIONARY_BEIDOU = {f"C{n:02d}" for n in (*range(1, 6), *range(59, 64))}
 
 
@@ -129,7 +133,7 @@ def place_by_broadcast(
     if without := int((missing & (nearest < 0)).sum()):
         lost = sorted(rows["satellite"][missing & (nearest < 0)].unique())
         notes.append(
-            f"pseudoranges: {without} without an ephemeris within 4 h ({', '.join(lost[:12])})"
+            f"pseudoranges: {without} {UNPLACED} ({', '.join(lost[:12])}{_days(rows, sane)})"
         )
     if not found.size:
         return rows, tuple(notes)
@@ -146,3 +150,16 @@ def place_by_broadcast(
     notes.append(f"pseudoranges: {len(found)} placed by broadcast ephemerides")
     columns = dict(zip(("x_m", "y_m", "z_m"), placed.T, strict=True))
     return rows.assign(pseudorange_m=range_m, **columns), tuple(notes)
+
+
+def _days(rows: pd.DataFrame, ephemerides: pd.DataFrame) -> str:
+    """Return the days of ephemerides and ranges where they lie more than a day apart, else ""."""
+    if not len(ephemerides) or not len(rows):
+        return ""
+    middles = float(ephemerides["toe_s"].median()), float(gps_from_utc_s(rows["time_s"].median()))
+    if abs(middles[0] - middles[1]) <= _DAY_S:
+        return ""
+    of, measured = (
+        pd.Timestamp(GPS_EPOCH_UTC_S + seconds, unit="s").date().isoformat() for seconds in middles
+    )
+    return f"; the ephemerides are of {of}, the pseudoranges of {measured}"

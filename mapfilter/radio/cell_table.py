@@ -87,7 +87,8 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
         if name not in _ALLOWED:
             absent = sorted(set(_ALLOWED) - set(header))
             near = difflib.get_close_matches(name.lower(), absent, n=1, cutoff=0.6)
-            hint = f"{near[0]} meant" if near else "name what it holds in [cells.columns]"
+            hint = "name what it holds in [cells.columns]"
+            hint = f"{near[0]} meant; else {hint}" if near else hint
             faults.add(where, "known columns only", repr(name), hint)
     for name in sorted({name for name in header if header.count(name) > 1}):
         faults.add(where, "each column once", f"{name} {header.count(name)} times")

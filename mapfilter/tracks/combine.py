@@ -43,6 +43,8 @@ class CombineOptions:
         Latitude and longitude at which a local frame of metres has its origin.
     truth : collection of Path
         Recordings whose positions are the truth, and no measurements.
+    measured : collection of Path
+        Those of ``truth`` whose motion and sensors are measurements: they were given as logs, too.
     offsets_s : mapping of Path to float
         Seconds to add to the times of a recording.
     course_motion : bool
@@ -55,6 +57,7 @@ class CombineOptions:
     crs: str = ""
     origin_deg: tuple[float, float] | None = None
     truth: Collection[Path] = ()
+    measured: Collection[Path] = ()
     offsets_s: Mapping[Path, float] = field(default_factory=dict)
     course_motion: bool = False
     walk: WalkOptions | None = field(default_factory=WalkOptions)
@@ -98,15 +101,18 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         if "cells" in recording.tables:
             count = len(recording.tables["cells"])
             notes.append(f"{recording.path.name}: a list of {count} cells; {_CELLS_HINT}")
-    sensors = _sensors(shifted, frame, options.truth, notes)
+    true_alone = set(options.truth) - set(options.measured)
+    measured = [r for r in shifted if r.path not in true_alone]
+    sensors = _sensors(measured, frame, options.truth, notes)
     moved = journey_motion(
-        [r for r in shifted if r.path not in options.truth],
+        # Positions that are no truth first.
+        sorted(measured, key=lambda r: r.path in options.truth),
         sensors,
         frame,
         notes,
         course_motion=options.course_motion,
         walk=options.walk,
-        true=[r for r in shifted if r.path in options.truth],
+        true=[r for r in shifted if r.path in true_alone],
     )
     tables = {
         "motion": moved.rows,
@@ -224,12 +230,11 @@ def _sensors(
     recordings: Sequence[Recording], frame: Frame, truth: Collection[Path], notes: list[str]
 ) -> dict[str, pd.DataFrame]:
     found: dict[str, pd.DataFrame] = {}
-    measured = [r for r in recordings if r.path not in truth]
     for name, columns in SENSOR_COLUMNS.items():
         if name == "velocity":
-            rows = _velocity(measured, frame)
+            rows = _velocity([r for r in recordings if r.path not in truth], frame)
         else:
-            rows = _joined(_apart(measured, name, notes), name)
+            rows = _joined(_apart(recordings, name, notes), name)
         if rows is not None and len(rows):
             found[name] = rows[list(columns)]
     return found

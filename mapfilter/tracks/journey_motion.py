@@ -19,11 +19,11 @@ from mapfilter.tracks.moved import (
     course_errors,
     motion_from_course,
     motion_from_poses,
-    motion_from_positions,
 )
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
+from mapfilter.tracks.position_motion import motion_from_positions
 from mapfilter.tracks.readers.recording import Recording
 
 _PROVIDERS = ("gps", "fused", "flp", "network", "nlp")

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from mapfilter._html import html_table, shortened
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
+from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.gnss.orbits import Almanac
 from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -247,7 +248,7 @@ def make_log(
             every_note += (f"{called.get('motion', 'motion')}, heading_rad: {wrong}",)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
-    if almanac is None and placeless:
+    if almanac is None and placeless and not any(UNPLACED in note for note in every_note):
         why = "without the place of their satellite: give the day's navigation file (RINEX), too"
         every_note += (f"pseudoranges: {placeless} rows {why}",)
     if almanac is not None:

@@ -11,13 +11,10 @@ from mapfilter.tracks.imu_noise import ImuNoise
 
 _LONGEST_S = 5.0
 _USUAL_INTERVALS = 3
-_MAD_TO_SD = 1.4826
-_LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG = 0.05, 1.0, 90.0
+MAD_TO_SD = 1.4826
+LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG = 0.05, 1.0, 90.0
 _COURSE_BIAS_DEG = 1.0
-_MOVING_SD = 2.0
-_PART_S, _LONGEST_WAY_S = 1.0, 30.0
-_CHORD_SCALE = 0.1
-"""Straight ways between positions cut corners: a right angle in the middle of one takes 30 %."""
+MOVING_SD = 2.0
 
 
 def by_compass(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
@@ -196,83 +193,22 @@ def course_errors(motion: pd.DataFrame, east_m: Floats, north_m: Floats) -> ImuN
     east_m, north_m : (N,) array
         Positions at its times.
     """
-    step_m, heading = _chords(east_m, north_m)
+    step_m, heading = chords(east_m, north_m)
     more_m = motion["step_m"].to_numpy()[1:] - step_m
     turned = wrap_rad(motion["heading_rad"].to_numpy()[1:] - heading)
     known = np.isfinite(more_m) & np.isfinite(turned)
     if not known.any():
         return None
-    step_sd_m = max(_MAD_TO_SD * float(np.median(np.abs(more_m[known]))), _LEAST_STEP_SD_M)
-    moving = known & (step_m > _MOVING_SD * step_sd_m)
+    step_sd_m = max(MAD_TO_SD * float(np.median(np.abs(more_m[known]))), LEAST_STEP_SD_M)
+    moving = known & (step_m > MOVING_SD * step_sd_m)
     if not moving.any():
         return None
-    heading_sd = _MAD_TO_SD * float(np.degrees(np.median(np.abs(turned[moving]))))
+    heading_sd = MAD_TO_SD * float(np.degrees(np.median(np.abs(turned[moving]))))
     time_s = motion["time_s"].to_numpy()
-    return _receiver_noise(time_s, step_sd_m, heading_sd, bias_sd_deg=_COURSE_BIAS_DEG)
+    return receiver_noise(time_s, step_sd_m, heading_sd, bias_sd_deg=_COURSE_BIAS_DEG)
 
 
-def motion_from_positions(
-    time_s: Floats, east_m: Floats, north_m: Floats
-) -> tuple[pd.DataFrame, ImuNoise]:
-    """Return steps and headings from each position to the next, and their errors.
-
-    The way between two positions is parted into equal steps of at most 1 s, so that a filter
-    compares each with what it receives and with the streets. The errors of a way are the scatter of
-    positions about the straight line between the one before and the one after, which holds turns
-    and changes of speed, too; a part of n has them by 1/√n. A way of less than two of its standard
-    deviations has no heading. One that lasts longer than 30 s is one step, straight from its begin
-    to its end.
-
-    Parameters
-    ----------
-    time_s : (N,) array
-        In order, each once.
-    east_m, north_m : (N,) array
-
-    Examples
-    --------
-    >>> time_s = np.arange(5.0)
-    >>> motion, errors = motion_from_positions(time_s, 3 * time_s, 4 * time_s)
-    >>> motion.iloc[1].round(4).tolist(), errors.sigma_trans_m
-    ([1.0, 5.0, 0.9273, nan], 0.05)
-    """
-    step_m, heading = _chords(east_m, north_m)
-    sd_m = 0.0
-    if len(time_s) > 2:
-        part = (time_s[1:-1] - time_s[:-2]) / (time_s[2:] - time_s[:-2])
-        off = [p[1:-1] - (1 - part) * p[:-2] - part * p[2:] for p in (east_m, north_m)]
-        scaled = np.abs(off) / np.sqrt(1 + part**2 + (1 - part) ** 2)
-        sd_m = _MAD_TO_SD * float(np.median(scaled))
-    way_sd_m = max(np.sqrt(2) * sd_m, _LEAST_STEP_SD_M)
-    moving = step_m > _MOVING_SD * way_sd_m
-    lasted_s = np.diff(time_s)
-    parts = np.where(lasted_s > _LONGEST_WAY_S, 1.0, np.ceil(lasted_s / _PART_S)).astype(np.int64)
-    way = np.repeat(np.arange(len(parts)), parts)
-    # Each part's number in its way, from 1.
-    number = np.arange(1, len(way) + 1) - (np.cumsum(parts) - parts)[way]
-    at_s = np.where(
-        number == parts[way],
-        time_s[1:][way],
-        time_s[:-1][way] + number * (lasted_s / parts)[way],
-    )
-    motion = pd.DataFrame(
-        {
-            "time_s": np.concatenate([time_s[:1], at_s]),
-            "step_m": np.concatenate([[0.0], (step_m / parts)[way]]),
-            "heading_rad": np.concatenate([[np.nan], np.where(moving, heading, np.nan)[way]]),
-            "turn_rad": np.nan,
-        }
-    )
-    # Those of the usual way while moving.
-    usual = moving if moving.any() else np.ones(len(parts), dtype=bool)
-    count = float(np.median(parts[usual])) if len(parts) else 1.0
-    usual_m = float(np.median(step_m[moving])) if moving.any() else way_sd_m
-    step_sd_m = max(way_sd_m / np.sqrt(count), _LEAST_STEP_SD_M)
-    heading_sd = float(np.degrees(np.arctan2(step_sd_m, usual_m / count)))
-    return motion, _receiver_noise(at_s, step_sd_m, heading_sd, scale=_CHORD_SCALE)
-
-
-def _chords(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+def chords(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
     """Return lengths and headings from each position to the next."""
     east, north = np.diff(east_m), np.diff(north_m)
     return np.hypot(east, north), np.arctan2(north, east)
@@ -286,7 +222,7 @@ def _long(lasted_s: Floats) -> Bools:
     return np.asarray(lasted_s > max(_LONGEST_S, _USUAL_INTERVALS * usual_s))
 
 
-def _receiver_noise(
+def receiver_noise(
     time_s: Floats,
     step_sd_m: float,
     heading_sd_deg: float,
@@ -294,6 +230,7 @@ def _receiver_noise(
     bias_sd_deg: float = 0.0,
     scale: float = 0.0,
 ) -> ImuNoise:
+    """Return errors of motion by a receiver, with headings' between 1 and 90 degrees."""
     period_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
     return ImuNoise(
         period_s=period_s,

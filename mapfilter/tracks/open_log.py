@@ -90,7 +90,7 @@ def open_log(
         opened = OpenedLog(given[0].name, read_log(given[0]), read_sensors(given[0]))
     else:
         recordings, notes = read_recordings(given, options)
-        wanted = options.combine
+        wanted = with_measured(options.combine, given)
         joined = combine(recordings, replace(wanted, crs=wanted.crs or crs))
         log = replace(joined.log, notes=(*notes, *joined.log.notes))
         name = given[0].name.partition(".")[0] or given[0].name
@@ -149,6 +149,14 @@ def read_recordings(
             faults.found.extend(error.faults)
     faults.raise_if_any(InputError)
     return recordings, notes
+
+
+def with_measured(options: CombineOptions, paths: Sequence[Path]) -> CombineOptions:
+    """Return options by which a recording that is named as truth and as log keeps its motion.
+
+    One that only lies in a folder of logs is the truth alone.
+    """
+    return replace(options, measured=[path for path in options.truth if path in paths])
 
 
 def _is_own(path: Path) -> bool:

@@ -56,7 +56,9 @@ def log_pseudoranges(
     notes.extend(more)
     raw = missing & placed[list(PLACE)].notna().all(axis=1).to_numpy()
     here = _receiver(recordings)
-    if here is None or not raw.any():
+    if not raw.any():
+        return placed[list(_COLUMNS)]
+    if here is None:
         notes.append("pseudoranges: no position, delays in the atmosphere are not taken off")
         return placed[list(_COLUMNS)]
     range_m = placed["pseudorange_m"].to_numpy(dtype=np.float64).copy()

@@ -14,7 +14,7 @@ from mapfilter.errors import ConfigError, OutputError, fail
 from mapfilter.geodesy import short_crs
 from mapfilter.tracks.combine import combine
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.open_log import OpenOptions, read_recordings
+from mapfilter.tracks.open_log import OpenOptions, read_recordings, with_measured
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import check_log_replaceable, write_log
@@ -84,7 +84,7 @@ def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = 
     truth = [path for path in options.combine.truth if path not in files]
     _check_out(out, [*files, *truth])
     recordings, notes = read_recordings([*files, *truth], options)
-    combined = combine(recordings, options.combine)
+    combined = combine(recordings, with_measured(options.combine, files))
     write_log(combined.log, out, sensors=combined.sensors)
     rows = {table: len(getattr(combined.log, table)) for table in TABLES}
     rows |= {f"sensors/{name}": len(table) for name, table in combined.sensors.items()}

@@ -97,6 +97,11 @@ def _file_info(path: Path) -> dict[str, Any]:
     if is_log(path.parent):
         hint = "a part of a log; name the folder that it lies in"
         raise fail(InputError, str(path), _EXPECTED, "a file", hint)
+    if suffix == ".parquet":
+        whole = (path.parent / MANIFEST).exists()
+        hint = "a part of a database; name the folder that it lies in"
+        hint = hint if whole else "pandas, geopandas and QGIS open it"
+        raise fail(InputError, str(path), _EXPECTED, "a Parquet file", hint)
     if suffix in _LAYERS or (suffix == ".json" and _is_geojson(path)):
         return _layers_info(path)
     if suffix == ".mat":

@@ -16,7 +16,7 @@ from mapfilter.positioning.log_options import by_streets_alone
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
-from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.schema import PLACE, SERVING
 from mapfilter.workflows.world import outside_m
 
 _AWAY_M = 5000.0
@@ -66,9 +66,7 @@ def lack_of(
     if estimate.converged_at is not None:
         return ""
     if isinstance(options, KalmanFilter):
-        given = len(log.pseudoranges)
-        unused = f" ({given} pseudoranges: only the filter bayes uses them, over a map)"
-        return "too little was measured" + (unused if given else "")
+        return f"too little was measured{_unused_ranges(log)}"
     has_cells = database is None or bool(database.cell_ids)
     if database is not None and by_streets_alone(options, log, database):
         has_cells = False
@@ -86,6 +84,17 @@ def lack_of(
     if has_cells and len(log.radio):
         return f"{lack} (mapfilter locate needs none)"
     return lack
+
+
+def _unused_ranges(log: TrackLog) -> str:
+    """Return why pseudoranges were of no use to a filter without a map; "" without any."""
+    given = len(log.pseudoranges)
+    if not given:
+        return ""
+    if log.pseudoranges[list(PLACE)].isna().any(axis=1).all():
+        why = "their satellites have no places, for which the day's navigation file is needed"
+        return f" ({given} pseudoranges: {why}; then the filter bayes uses them, over a map)"
+    return f" ({given} pseudoranges: only the filter bayes uses them, over a map)"
 
 
 def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str, ...]:

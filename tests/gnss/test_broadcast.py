@@ -148,3 +148,13 @@ def test_directions_to_places():
     elevation, azimuth = directions(np.array([above, north, east]), *here)
     assert np.degrees(elevation) == pytest.approx([90.0, 0.0, 0.0], abs=0.02)
     assert np.degrees(azimuth[1:]) == pytest.approx([0.0, 90.0], abs=0.02)
+
+
+def test_ephemerides_of_another_day_are_said_to_be():
+    rows = pd.DataFrame({"satellite": ["G01"], "pseudorange_m": 2.2e7})
+    rows = rows.assign(time_s=float(utc_from_gps_s(TOE_S + 30 * 86_400.0)))
+    rows = rows.assign(x_m=np.nan, y_m=np.nan, z_m=np.nan)
+    (note,) = place_by_broadcast(rows, ephemerides())[1]
+    at_s = [float(utc_from_gps_s(TOE_S + days * 86_400)) for days in (0, 30)]
+    days = [pd.Timestamp(second, unit="s").date().isoformat() for second in at_s]
+    assert f"(G01; the ephemerides are of {days[0]}, the pseudoranges of {days[1]})" in note

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
+from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.gnss.orbits import (
     EARTH_RATE_RAD_S,
     Almanac,
@@ -146,6 +147,10 @@ def test_satellites_without_any_place_are_noted():
     assert "navigation file" in note
     placed = ranges(x_m=2.0e7, y_m=1.0e7, z_m=1.3e7)
     assert not make_log(CRS, pseudoranges=placed).notes
+    # One who gave a file of another day is not told to give one.
+    given = f"pseudoranges: 3 {UNPLACED} (G07)"
+    bare = ranges(**dict.fromkeys(PLACE, np.nan))
+    assert make_log(CRS, pseudoranges=bare, notes=[given]).notes == (given,)
 
 
 def test_unknown_and_unhealthy_satellites_are_noted():

@@ -150,3 +150,30 @@ def test_speed_and_course_of_the_truth_make_motion_on_request(made):
     log = open_log(alone, options=OpenOptions(combine=combine)).log
     assert log.motion["step_m"].sum() == pytest.approx(log.truth_length_m)
     assert any("motion comes from GNSS: its positions" in note for note in log.notes)
+
+
+@pytest.fixture
+def steps_and_places(tmp_path):
+    """A recording of steps, compass, sensors and positions."""
+    table = pd.DataFrame({"time": START_UTC_S + np.arange(20.0), "lat": 60.17, "lon": 24.94})
+    table = table.assign(step_m=1.4, compass_deg=90.0, pressure_hpa=1000.0)
+    table["lon"] += 1.4 * np.arange(20) / 55_400
+    table.to_csv(tmp_path / "walk.csv", index=False)
+    return tmp_path / "walk.csv"
+
+
+def test_a_recording_that_is_log_and_truth_keeps_its_motion_and_sensors(steps_and_places):
+    path = steps_and_places
+    options = OpenOptions(combine=CombineOptions(truth=[path]))
+    opened = open_log(path, options=options)
+    assert (len(opened.log.motion), len(opened.log.truth), len(opened.log.gnss)) == (20, 20, 0)
+    assert "barometer" in opened.sensors
+
+
+def test_a_recording_that_is_truth_alone_gives_no_motion(steps_and_places, made):
+    (gpx,) = made("gpx")
+    options = OpenOptions(combine=CombineOptions(truth=[steps_and_places]))
+    for given in (gpx, gpx.parent):
+        log = open_log(given, options=options).log
+        assert (len(log.motion), len(log.truth)) == (0, 20)
+        assert len(log.gnss) == COUNT

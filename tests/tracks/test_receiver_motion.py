@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.moved import course_errors, motion_from_course, motion_from_positions
+from mapfilter.tracks.moved import course_errors, motion_from_course
+from mapfilter.tracks.position_motion import motion_from_positions
 
 
 def drive(sd_m, seed=0, count=2000, speed_mps=8.0):
@@ -98,3 +99,37 @@ def test_the_errors_of_parts_add_up_to_those_of_their_way():
     # white errors of 2 √(n / 3) do: their ways have errors of √2 times that, each step of 2 √(2/3).
     assert errors.sigma_trans_m == pytest.approx(2.0 * np.sqrt(2 / 3), rel=0.1)
     assert errors.sigma_orient_deg == pytest.approx(np.degrees(errors.sigma_trans_m / 12), rel=0.1)
+
+
+def by_distance(slow_s: float, far_m: float = 104.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and places every 104 m, of which one way takes longer, and may be farther."""
+    lasted_s, way_m = np.full(40, 9.0), np.full(40, 104.0)
+    lasted_s[20], way_m[20] = slow_s, far_m
+    return np.r_[0.0, np.cumsum(lasted_s)], np.r_[0.0, np.cumsum(way_m)]
+
+
+@pytest.mark.parametrize(
+    ("slow_s", "far_m", "longest_s"),
+    [
+        pytest.param(120.0, 104.0, 1.0, id="slow traffic"),
+        pytest.param(120.0, 500.0, 120.0, id="a tunnel"),
+        pytest.param(400.0, 104.0, 400.0, id="parked"),
+    ],
+)
+def test_of_positions_renewed_by_distance_slow_ways_are_parted(slow_s, far_m, longest_s):
+    time_s, east_m = by_distance(slow_s, far_m)
+    motion, _ = motion_from_positions(time_s, east_m, np.zeros_like(east_m))
+    assert np.diff(motion["time_s"]).max() == pytest.approx(longest_s)
+    assert motion["step_m"].sum() == pytest.approx(east_m[-1])
+    at = motion["time_s"] <= time_s[21]
+    assert motion["step_m"][at].sum() == pytest.approx(east_m[21])
+
+
+def test_of_positions_renewed_by_time_a_short_way_over_a_gap_is_one_step():
+    """A drive of varied speed that stops for a minute without positions."""
+    rng = np.random.default_rng(5)
+    lasted_s, way_m = np.full(40, 9.0), rng.uniform(20, 150, 40)
+    lasted_s[20], way_m[20] = 60.0, 20.0
+    time_s, east_m = np.r_[0.0, np.cumsum(lasted_s)], np.r_[0.0, np.cumsum(way_m)]
+    motion, _ = motion_from_positions(time_s, east_m, np.zeros_like(east_m))
+    assert np.diff(motion["time_s"]).max() == pytest.approx(60.0)

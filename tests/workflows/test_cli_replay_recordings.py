@@ -176,6 +176,11 @@ def test_pseudoranges_that_no_filter_without_a_map_uses_are_said_to_be(tmp_path)
     done = mapfilter(*given)
     assert done.code == 3
     assert "pseudoranges: only the filter bayes uses them, over a map" in done.err
+    file, text = MADE["rinex-obs"]
+    (tmp_path / file).write_text(text)
+    done = mapfilter("replay", "--log", tmp_path / file, *given[3:])
+    assert done.code == 3
+    assert "their satellites have no places, for which the day's navigation file" in done.err
 
 
 def test_positions_alone_need_neither_database_nor_plan(tmp_path, monkeypatch):

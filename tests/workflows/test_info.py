@@ -124,6 +124,7 @@ def test_an_output_folder_names_what_it_holds(world):
     [
         ("towers.json", b'{"a": 1}\n', "it begins with '{\"a\": 1}'"),
         ("graph.gz", gzip.compress(b"<graphml>", mtime=0), "a binary file"),
+        ("ways.parquet", b"PAR1 and more", "pandas, geopandas and QGIS open it"),
     ],
 )
 def test_files_of_other_kinds(name, content, told, tmp_path):
@@ -136,6 +137,11 @@ def test_a_part_of_a_log_is_told_by_its_folder(tmp_path):
     assert info(tmp_path / "gnss.csv")["kind"] == "recording"
     (tmp_path / "log.json").write_text("{}")
     assert_refused(mapfilter("info", tmp_path / "gnss.csv"), "name the folder that it lies in")
+
+
+def test_a_part_of_a_database_is_told_by_its_folder(world):
+    points = world.out / "database" / "points.parquet"
+    assert_refused(mapfilter("info", points), "a part of a database; name the folder")
 
 
 def test_a_raster_in_degrees_without_its_empty_cells(tmp_path):
