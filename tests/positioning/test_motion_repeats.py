@@ -75,6 +75,22 @@ def test_whole_degrees_that_repeat_now_and_then_are_no_fault(seed):
     assert reasons(found).count(Reason.HEADING_STUCK) == 0
 
 
+@pytest.mark.parametrize("digits", [0, 1, 2])
+@pytest.mark.parametrize("seed", range(5))
+def test_smooth_rounded_headings_of_a_vehicle_on_straight_roads_are_no_fault(seed, digits):
+    """Turns every 18 s, then ten minutes of motorway; the error lasts for 20 s."""
+    rng = np.random.default_rng(seed)
+    rows = 1500
+    lasting = np.zeros(rows)
+    for k in range(1, rows):
+        lasting[k] = np.exp(-1 / 20) * lasting[k - 1] + 0.16 * rng.standard_normal()
+    legs = np.repeat(rng.uniform(-180, 180, rows // 18 + 1), 18)[:rows]
+    road = np.where(np.arange(rows) < 900, legs, 37.0)
+    headings = np.radians(np.round(road + lasting, digits))
+    steps = [MotionStep(14.0, heading) for heading in headings.tolist()]
+    assert set(reasons(followed(steps))) <= {Reason.USED}
+
+
 def test_a_made_log_of_straight_legs_is_left_alone():
     legs = [[MotionStep(0.7, quarter * np.pi / 2)] * 100 for quarter in (0, 1, 2, 1, 0, 3)]
     assert set(reasons(followed(chain(*legs)))) == {Reason.USED}

@@ -3,20 +3,23 @@
 A compass, or a fused orientation, hardly ever gives the same number for long while one walks. Where
 it does, it has died, and its last value is used on. Rows that come in pairs of equal ones are
 deliveries of one row: every other one is dropped, or all steps would count twice. Headings in whole
-degrees, and those of made logs, do repeat, so each repetition speaks by how rare it was before (a
+degrees, and those of made logs, do repeat, and go on doing so along a straight road: where headings
+are as coarse as that, repetitions say nothing. Elsewhere each speaks by how rare it was before (a
 CUSUM; Page, 1954).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp, isfinite, log, nan, sqrt
+from math import degrees, exp, isfinite, log, nan, sqrt
 
 from mapfilter.filters.contract import MotionStep, Reason
 
 _PRIOR_ROWS, _PRIOR_REPEATS = 50.0, 49.0
 _MOST_NATS, _STILL_NATS = 1.0, 12.0
 """Gain of one repetition at most, and the sum from which on a heading stands still."""
+_FINE_ROWS = 30
+_COARSE_PER_DEG, _COARSE_PER_RAD = 100.0, 1000.0
 _PAIRS = 8
 _TURNS_RAD = 1e-9
 _STRAIGHT_M = 84.0
@@ -45,6 +48,8 @@ class MotionRepeats:
         Distance moved since that was found.
     pairs : int
         Pairs of equal rows, one after the other.
+    fine : int
+        Rows whose heading has more digits than hundredths of a degree or thousandths of a radian.
     """
 
     last: _Row = (nan, nan, nan)
@@ -55,11 +60,12 @@ class MotionRepeats:
     nats: float = 0.0
     still_m: float = 0.0
     pairs: int = 0
+    fine: int = 0
 
     @property
     def stands_still(self) -> bool:
         """Whether the heading no longer follows the way."""
-        return self.nats >= _STILL_NATS
+        return self.nats >= _STILL_NATS and self.fine >= _FINE_ROWS
 
     @property
     def come_twice(self) -> bool:
@@ -111,7 +117,20 @@ def _followed(repeats: MotionRepeats, step: MotionStep) -> MotionRepeats:
         return replace(repeats, last=row, was_equal=is_equal, pairs=pairs, run=run, nats=nats)
     # A run in which the heading stood still is none of the usual ones.
     run = 0 if repeats.stands_still else repeats.run
-    return MotionRepeats(row, is_equal, repeats.rows + run + 1, repeats.repeats + run, pairs=pairs)
+    return MotionRepeats(
+        row,
+        is_equal,
+        repeats.rows + run + 1,
+        repeats.repeats + run,
+        pairs=pairs,
+        fine=repeats.fine + _is_fine(step.heading_rad),
+    )
+
+
+def _is_fine(heading_rad: float) -> bool:
+    """Return whether a heading is no multiple of a hundredth degree or a thousandth radian."""
+    in_units = (degrees(heading_rad) * _COARSE_PER_DEG, heading_rad * _COARSE_PER_RAD)
+    return all(isfinite(value) and abs(value - round(value)) > 1e-4 for value in in_units)
 
 
 def _equal(value: float, other: float) -> bool:
