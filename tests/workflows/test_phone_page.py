@@ -36,7 +36,7 @@ def test_the_walk_of_the_page_is_located(tmp_path, monkeypatch):
     assert first.startswith("2026-05-01 10:00:0")
     exec(scripts[0], {})
     printed = dict(line.split(": ", 1) for line in run(commands[0]).splitlines() if ": " in line)
-    shown = dict(line.split(": ", 1) for line in tables[1].splitlines() if line)
+    shown = dict(line.split(": ", 1) for line in tables[1].splitlines() if ": " in line)
     for name in ("final_status", "switched", "success"):
         assert printed[name] == shown[name]
     assert float(printed["error_mean_m"]) < 30
