@@ -12,11 +12,14 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
 
 
-def followed(steps):
-    """Return rows kept and reason of each row, one row an epoch."""
-    repeats, found = MotionRepeats(), []
+def followed(steps, again_s=0.3):
+    """Return rows kept and reason of each row, one a second; equal ones come sooner."""
+    repeats, found, time_s = MotionRepeats(), [], 0.0
     for step in steps:
-        repeats, kept, why = without_repeats(repeats, (step,))
+        row, last = (step.step_m, step.heading_rad, step.turn_rad), repeats.last
+        is_second = not repeats.was_equal and np.array_equal(row, last, equal_nan=True)
+        time_s += again_s if is_second else 1 - again_s if repeats.was_equal else 1.0
+        repeats, kept, why = without_repeats(repeats, time_s, (step,))
         found.append((kept, why))
     return found
 
@@ -109,6 +112,12 @@ def test_rows_that_come_twice_count_once_after_eight_pairs():
     assert dropped == list(range(100 + 15, 100 + 200, 2))
     assert all(found[k][0] == () for k in dropped)
     assert sum(len(kept) for kept, _ in found) == 300 + 7
+
+
+def test_a_sensor_that_is_read_twice_as_often_as_it_measures_keeps_its_rows():
+    once = walk(300)
+    found = followed(chain(*([step, step] for step in once)), again_s=0.5)
+    assert set(reasons(found)) == {Reason.USED}
 
 
 def test_pairs_with_unknown_turns_or_headings_are_pairs_too():

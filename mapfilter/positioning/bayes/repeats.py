@@ -2,7 +2,8 @@
 
 A compass, or a fused orientation, hardly ever gives the same number for long while one walks. Where
 it does, it has died, and its last value is used on. Rows that come in pairs of equal ones are
-deliveries of one row: every other one is dropped, or all steps would count twice. Headings in whole
+deliveries of one row: every other one is dropped, or all steps would count twice. Pairs at regular
+times are those of a sensor that is read more often than it measures, and stay. Headings in whole
 degrees, and those of made logs, do repeat, and go on doing so along a straight road: where headings
 are as coarse as that, repetitions say nothing. Elsewhere each speaks by how rare it was before (a
 CUSUM; Page, 1954).
@@ -20,7 +21,8 @@ _MOST_NATS, _STILL_NATS = 1.0, 12.0
 """Gain of one repetition at most, and the sum from which on a heading stands still."""
 _FINE_ROWS = 30
 _COARSE_PER_DEG, _COARSE_PER_RAD = 100.0, 1000.0
-_PAIRS = 8
+_PAIRS, _SOONER = 8, 0.8
+"""Pairs of equal rows, and the interval within a pair relative to that between two of them."""
 _TURNS_RAD = 1e-9
 _STRAIGHT_M = 84.0
 """Distance after which the direction of an unmeasured way is forgotten by 1/e."""
@@ -48,6 +50,8 @@ class MotionRepeats:
         Distance moved since that was found.
     pairs : int
         Pairs of equal rows, one after the other.
+    time_s, within_s, between_s : float
+        Time of the last row; the last interval between equal rows, and between others.
     fine : int
         Rows whose heading has more digits than hundredths of a degree or thousandths of a radian.
     """
@@ -60,6 +64,9 @@ class MotionRepeats:
     nats: float = 0.0
     still_m: float = 0.0
     pairs: int = 0
+    time_s: float = nan
+    within_s: float = nan
+    between_s: float = nan
     fine: int = 0
 
     @property
@@ -70,13 +77,22 @@ class MotionRepeats:
     @property
     def come_twice(self) -> bool:
         """Whether rows are delivered twice."""
-        return self.pairs >= _PAIRS
+        return self.pairs >= _PAIRS and self.within_s < _SOONER * self.between_s
 
 
 def without_repeats(
-    repeats: MotionRepeats, steps: tuple[MotionStep, ...]
+    repeats: MotionRepeats, time_s: float, steps: tuple[MotionStep, ...]
 ) -> tuple[MotionRepeats, tuple[MotionStep, ...], Reason]:
     """Return the rows of an epoch as far as they are news.
+
+    Parameters
+    ----------
+    repeats : MotionRepeats
+        After the rows before.
+    time_s : float
+        Of the epoch.
+    steps : tuple of MotionStep
+        Its rows.
 
     Returns
     -------
@@ -91,7 +107,7 @@ def without_repeats(
         if not isfinite(step.step_m) or step.step_m == 0:
             kept.append(step)
             continue
-        repeats = _followed(repeats, step)
+        repeats = _followed(repeats, time_s, step)
         if repeats.come_twice and repeats.was_equal:
             why = Reason.DELIVERED_TWICE
             continue
@@ -105,16 +121,29 @@ def without_repeats(
     return (repeats, steps, why) if why is Reason.USED else (repeats, tuple(kept), why)
 
 
-def _followed(repeats: MotionRepeats, step: MotionStep) -> MotionRepeats:
+def _followed(repeats: MotionRepeats, time_s: float, step: MotionStep) -> MotionRepeats:
     """Return what is known after one more row."""
     row = step.step_m, step.heading_rad, step.turn_rad
     is_equal = all(map(_equal, row, repeats.last))
     pairs = repeats.pairs + is_equal if is_equal != repeats.was_equal else 0
     turns = abs(step.turn_rad) > _TURNS_RAD
+    interval_s = time_s - repeats.time_s
+    within_s = interval_s if is_equal else repeats.within_s
+    between_s = repeats.between_s if is_equal else interval_s
     if step.heading_rad == repeats.last[1] and not turns:
         each = min(-log(repeats.repeats / repeats.rows), _MOST_NATS)
         run, nats = repeats.run + 1, repeats.nats + each
-        return replace(repeats, last=row, was_equal=is_equal, pairs=pairs, run=run, nats=nats)
+        return replace(
+            repeats,
+            last=row,
+            was_equal=is_equal,
+            pairs=pairs,
+            run=run,
+            nats=nats,
+            time_s=time_s,
+            within_s=within_s,
+            between_s=between_s,
+        )
     # A run in which the heading stood still is none of the usual ones.
     run = 0 if repeats.stands_still else repeats.run
     return MotionRepeats(
@@ -123,6 +152,9 @@ def _followed(repeats: MotionRepeats, step: MotionStep) -> MotionRepeats:
         repeats.rows + run + 1,
         repeats.repeats + run,
         pairs=pairs,
+        time_s=time_s,
+        within_s=within_s,
+        between_s=between_s,
         fine=repeats.fine + _is_fine(step.heading_rad),
     )
 

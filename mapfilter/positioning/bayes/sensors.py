@@ -189,7 +189,7 @@ def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple
         Of motion and of the report: ``USED``, or ``NO_STEP``, ``MOTION_MISSING``,
         ``MOTION_STUCK``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``, and ``STALE_RADIO``.
     """
-    repeats, motion, repeated = without_repeats(watch.repeats, epoch.motion)
+    repeats, motion, repeated = without_repeats(watch.repeats, epoch.time_s, epoch.motion)
     watch = replace(watch, repeats=repeats)
     if motion is not epoch.motion:
         epoch = replace(epoch, motion=motion)
