@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.positioning.fingerprints.censoring import bounds_of
 from mapfilter.positioning.fingerprints.locating import (
     LocatedReports,
     fit_locator,
@@ -60,5 +61,6 @@ def locate_reports(
         known = reports_of_logs([database] if isinstance(database, TrackLog) else database)
     reports = reports_of_logs([log], plan) if isinstance(log, TrackLog) else log
     rng = np.random.default_rng(seed)
-    fitted = fit_locator(known, method, rng, strongest=usual_readings(reports))
+    strongest = usual_readings(reports)
+    fitted = fit_locator(known, method, rng, strongest=strongest, bounds=bounds_of(reports))
     return locate_by(fitted, reports)

@@ -13,6 +13,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import percentile_m
+from mapfilter.positioning.fingerprints.censoring import Bounds, bounds_of
 from mapfilter.positioning.fingerprints.locating import (
     ReportLocator,
     fit_locator,
@@ -91,7 +92,7 @@ class Baselines:
 
     def __init__(self, database: RadioRouteDatabase | None, seed: int) -> None:
         self._database, self._seed = database, seed
-        self._fitted: dict[int, ReportLocator] = {}
+        self._fitted: dict[tuple[int, Bounds], ReportLocator] = {}
 
     @cached_property
     def _known(self) -> Reports | None:
@@ -114,17 +115,22 @@ class Baselines:
         count = min(of_truth.size, MOST_REPORTS)
         at = np.linspace(0, of_truth.size - 1, count).astype(np.int64)
         tried = placed.some(of_truth[at])
-        located = locate_by(self._locator(usual_readings(tried)), tried)
+        located = locate_by(self._locator(usual_readings(tried), bounds_of(tried)), tried)
         known = np.isfinite(located.error_m)
         error_m = located.error_m[known]
         within: Bools = error_m <= located.radii_m[known, 2]
         return SingleReports(of_truth.size, count, error_m, within)
 
-    def _locator(self, strongest: int) -> ReportLocator:
-        if strongest not in self._fitted:
+    def _locator(self, strongest: int, bounds: Bounds) -> ReportLocator:
+        if (strongest, bounds) not in self._fitted:
             assert self._known is not None
             rng = named_rng(self._seed, "replay", "single reports")
-            self._fitted[strongest] = fit_locator(
-                self._known, Probabilistic(), rng, strongest=strongest, validated=CALIBRATED_WITH
+            self._fitted[strongest, bounds] = fit_locator(
+                self._known,
+                Probabilistic(),
+                rng,
+                strongest=strongest,
+                validated=CALIBRATED_WITH,
+                bounds=bounds,
             )
-        return self._fitted[strongest]
+        return self._fitted[strongest, bounds]

@@ -15,6 +15,7 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import same_crs, unproject
+from mapfilter.positioning.fingerprints.censoring import OPEN, Bounds, bounded
 from mapfilter.positioning.fingerprints.matches import Locator, Position, Received, locator
 from mapfilter.positioning.fingerprints.options import (
     AUTO,
@@ -160,6 +161,7 @@ def fit_locator(
     *,
     strongest: int = STRONGEST,
     validated: int = MOST_VALIDATED,
+    bounds: Bounds = OPEN,
     progress: Progress | None = None,
 ) -> ReportLocator:
     """Cross-validate a method on a database, calibrate its regions, and prepare it.
@@ -180,6 +182,8 @@ def fit_locator(
         Number of cells in such a report.
     validated : int
         Most reports by which regions are calibrated.
+    bounds : Bounds
+        Ends of the scale of the reports to be located: those of the calibration end there, too.
     progress : callable, optional
         Called with folds done and folds in all.
 
@@ -205,6 +209,7 @@ def fit_locator(
         blocks = "reports drawn with the stated errors"
         rng = rng if rng is not None else np.random.default_rng(0)
         some = simulated_reports(placed, validated, strongest, Probabilistic().shared_db, rng)
+        some = bounded(some, bounds)
         found = [(one, _simulated(placed, one, some)) for one in tried]
     else:
         fold, blocks = folds_of(placed)
@@ -215,7 +220,7 @@ def fit_locator(
                 if progress is not None:
                     progress(begun + done, count * len(tried))
 
-            found.append((one, cross_validate(placed, one, fold, report, validated)))
+            found.append((one, cross_validate(placed, one, fold, report, validated, bounds)))
     found.sort(key=lambda pair: float(np.median(pair[1].error_m)) if len(pair[1]) else np.inf)
     chosen, errors = found[0]
     enough = len(errors) >= _LEAST_VALIDATED
@@ -275,11 +280,12 @@ def cross_validate(
     fold: Ints,
     progress: Progress | None = None,
     most: int = MOST_VALIDATED,
+    bounds: Bounds = OPEN,
 ) -> Errors:
     """Return the errors of a method where each fold is located by the database of the others.
 
     At most ``most`` reports are located, evenly taken; those of which no transmitter was received
-    in the other folds have no error.
+    in the other folds have no error. Their levels end where ``bounds`` does.
     """
     count = min(len(database), most)
     tried = np.linspace(0, max(len(database) - 1, 0), count).astype(np.int64)
@@ -288,7 +294,7 @@ def cross_validate(
         others = fold != one
         own = tried[fold[tried] == one]
         if others.any() and len(own):
-            left, query = database.some(others).compact(), database.some(own)
+            left, query = database.some(others).compact(), bounded(database.some(own), bounds)
             known, _ = query.named_as(left.cell_ids)
             try:
                 rest = locator(method, left)
@@ -343,7 +349,9 @@ def _positions(by: Locator, reports: Reports, index: Sequence[int] | Ints) -> tu
         cell, level_dbm = reports.readings(int(one))
         if len(cell):
             serving, advance = int(reports.serving[one]), float(reports.timing_advance[one])
-            found.append(by(Received(cell, level_dbm, serving, advance)))
+            censored = reports.censored[reports.first[one] : reports.first[one + 1]]
+            ends = censored if censored.any() else None
+            found.append(by(Received(cell, level_dbm, serving, advance, ends)))
             located[at] = True
     return np.array(found, dtype=np.float64).reshape(-1, 4), located
 

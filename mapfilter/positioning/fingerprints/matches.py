@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mapfilter._types import Floats, Ints, Ints32
+from mapfilter._types import Floats, Ints, Ints8, Ints32
 from mapfilter.errors import InputError, fail
+from mapfilter.positioning.fingerprints.censoring import likely
 from mapfilter.positioning.fingerprints.matching import (
     ByCell,
     Distances,
     LevelErrors,
     Likelihoods,
     Scale,
-    filled,
     usual_levels,
 )
 from mapfilter.positioning.fingerprints.options import (
@@ -38,12 +38,19 @@ _SOFT_M = 1.0
 
 
 class Received(NamedTuple):
-    """One report to be located: cells by index, levels, serving cell (-1: none), steps (or NaN)."""
+    """One report to be located: cells by index, levels, serving cell (-1: none), steps (or NaN).
+
+    Parameters
+    ----------
+    censored : ndarray of int8 or None
+        -1: the level is below; 1: above; None where no level is a bound.
+    """
 
     cell: Ints32
     level_dbm: Floats
     serving: int
     timing_advance: float
+    censored: Ints8 | None = None
 
 
 class Match(NamedTuple):
@@ -125,7 +132,7 @@ def _centroid(database: Reports) -> Matcher:
     def match(received: Received) -> Match:
         cell = received.serving
         if cell < 0 or by_cell.first[cell] == by_cell.first[cell + 1]:
-            level_dbm = filled(received.level_dbm, received.cell, usual_dbm)
+            level_dbm = likely(received.level_dbm, received.censored, received.cell, usual_dbm)
             # Of equally strong ones the first of the database, whatever the order of readings.
             cell = int(received.cell[level_dbm == level_dbm.max()].min())
         own = by_cell.report[by_cell.of_cell(cell)]
@@ -139,7 +146,7 @@ def _neighbours(database: Reports, method: Neighbours, scale: Scale) -> Matcher:
     k = min(method.k, len(database))
 
     def match(received: Received) -> Match:
-        distance = distances.of(received.cell, received.level_dbm)
+        distance = distances.of(received.cell, received.level_dbm, received.censored)
         index = np.argpartition(distance, k - 1)[:k]
         near = distance[index]
         weight = (near + _TINY) ** -method.weight_power
@@ -157,7 +164,7 @@ def _posterior(database: Reports, method: Probabilistic | SurveyMaps, floor_dbm:
     inlier = np.log(max(1 - method.outliers, np.finfo(np.float64).tiny))
 
     def match(received: Received) -> Match:
-        cells, levels = likelihoods.of(received.cell, received.level_dbm)
+        cells, levels = likelihoods.of(received.cell, received.level_dbm, received.censored)
         effective = min(len(received.cell), method.effective_readings)
         share = effective / len(received.cell)
         levels = share * levels + _timing(database, received, method.timing_sd_steps)

@@ -13,7 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from mapfilter._types import Floats, Ints, Ints32
+from mapfilter._types import Floats, Ints, Ints8, Ints32
+from mapfilter.positioning.fingerprints.censoring import likely
 from mapfilter.positioning.fingerprints.reports import Reports
 
 Representation = Literal["positive", "exponential", "powed"]
@@ -124,14 +125,14 @@ class Distances:
     def to(cls, reports: Reports, metric: Metric, scale: Scale) -> Distances:
         """Represent the reports of a database."""
         by_cell, usual_dbm = ByCell.of(reports), usual_levels(reports)
-        level_dbm = filled(reports.level_dbm, reports.cell, usual_dbm)
+        level_dbm = likely(reports.level_dbm, reports.censored, reports.cell, usual_dbm)
         value = scale(level_dbm)[by_cell.order]
         total, total2 = _sums(by_cell, value), _sums(by_cell, value**2)
         return cls(by_cell, scale, metric, usual_dbm, value, total, total2)
 
-    def of(self, cell: Ints32, level_dbm: Floats) -> Floats:
+    def of(self, cell: Ints32, level_dbm: Floats, censored: Ints8 | None = None) -> Floats:
         """Return the distances of one report to all of the database, shape (R,)."""
-        own = self.scale(filled(level_dbm, cell, self.usual_dbm))
+        own = self.scale(likely(level_dbm, censored, cell, self.usual_dbm))
         shared = np.zeros(self.by_cell.count)
         for one, value in zip(cell.tolist(), own.tolist(), strict=True):
             where = self.by_cell.of_cell(one)
@@ -146,11 +147,6 @@ class Distances:
             return apart
         absent = 2 * self.scale.absent * (len(self.by_cell.first) - 1)
         return np.asarray(apart / np.maximum(self.total + own.sum() + absent, _LEAST))
-
-
-def filled(level_dbm: Floats, cell: Ints32, usual_dbm: Floats) -> Floats:
-    """Return levels, those that are missing being the usual ones of their cells."""
-    return np.where(np.isnan(level_dbm), usual_dbm[cell], level_dbm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,7 +269,7 @@ class Likelihoods:
         level_dbm = reports.level_dbm[by_cell.order]
         variance_db2 = errors.level_db**2 + reports.sd_db[by_cell.order] ** 2
         cell = reports.cell[by_cell.order]
-        loss = _absence(filled(level_dbm, cell, usual_dbm), errors)
+        loss = _absence(likely(level_dbm, None, cell, usual_dbm), errors)
         absence = _sums(by_cell, loss)
         least_db2 = float(variance_db2.min()) if variance_db2.size else 1.0
         return cls(
@@ -292,15 +288,19 @@ class Likelihoods:
     def _excess(self) -> _Excess:
         return _Excess.of(self.by_cell, self.level_dbm)
 
-    def of(self, cell: Ints32, level_dbm: Floats) -> tuple[Floats, Floats]:
+    def of(
+        self, cell: Ints32, level_dbm: Floats, censored: Ints8 | None = None
+    ) -> tuple[Floats, Floats]:
         """Return log-likelihoods of one report: of which cells it has, and of their levels, (R,).
 
         The shared error is integrated out: levels d_i with variances v_i about a common offset of
         variance t have the log-likelihood
         ``-(s2 - s1^2 / (s0 + 1/t)) / 2 - log(1 + t s0) / 2``, with ``s_k = sum d_i^k / v_i``, and a
-        logarithm of each variance relative to the least of the database.
+        logarithm of each variance relative to the least of the database. A bound tells nothing
+        where the level of the database keeps it; elsewhere it counts by what it is off.
         """
-        strength_dbm = filled(level_dbm, cell, self.usual_dbm)
+        strength_dbm = likely(level_dbm, censored, cell, self.usual_dbm)
+        ends = (np.zeros(len(cell)) if censored is None else censored).tolist()
         own = _absence(strength_dbm, self.errors)
         count, lost, absence, errors = self.by_cell.count, self.loss, self.absence, self.errors
         if self.predicted:
@@ -311,7 +311,8 @@ class Likelihoods:
         received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
         least_db2 = self.least_db2
-        for one, dbm, own_loss in zip(cell.tolist(), level_dbm.tolist(), own.tolist(), strict=True):
+        readings = zip(cell.tolist(), level_dbm.tolist(), ends, own.tolist(), strict=True)
+        for one, dbm, end, own_loss in readings:
             where = self.by_cell.of_cell(one)
             report = self.by_cell.report[where]
             own_lost = _absence(self.level_dbm[where], errors) if self.predicted else lost[where]
@@ -320,6 +321,8 @@ class Likelihoods:
                 continue
             apart_db, variance_db2 = dbm - self.level_dbm[where], self.variance_db2[where]
             known = np.isfinite(apart_db)
+            if end:
+                known &= apart_db * end > 0
             report, apart_db, variance_db2 = report[known], apart_db[known], variance_db2[known]
             s0[report] += 1 / variance_db2
             s1[report] += apart_db / variance_db2
