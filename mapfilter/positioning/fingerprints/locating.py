@@ -162,6 +162,7 @@ def fit_locator(
     strongest: int = STRONGEST,
     validated: int = MOST_VALIDATED,
     bounds: Bounds = OPEN,
+    timed: float = 0.0,
     progress: Progress | None = None,
 ) -> ReportLocator:
     """Cross-validate a method on a database, calibrate its regions, and prepare it.
@@ -184,6 +185,8 @@ def fit_locator(
         Most reports by which regions are calibrated.
     bounds : Bounds
         Ends of the scale of the reports to be located: those of the calibration end there, too.
+    timed : float
+        Share of the reports to be located that have a timing advance.
     progress : callable, optional
         Called with folds done and folds in all.
 
@@ -208,7 +211,8 @@ def fit_locator(
     if placed.predicted:
         blocks = "reports drawn with the stated errors"
         rng = rng if rng is not None else np.random.default_rng(0)
-        some = simulated_reports(placed, validated, strongest, Probabilistic().shared_db, rng)
+        shared_db = Probabilistic().shared_db
+        some = simulated_reports(placed, validated, strongest, shared_db, rng, timed)
         some = bounded(some, bounds)
         found = [(one, _simulated(placed, one, some)) for one in tried]
     else:
@@ -235,6 +239,12 @@ def usual_readings(reports: Reports) -> int:
     """Return the median number of readings of the reports that have any; at least 1."""
     counts = np.diff(reports.first)
     return int(np.median(counts[counts > 0])) if (counts > 0).any() else 1
+
+
+def timed_share(reports: Reports) -> float:
+    """Return the share of the reports with readings that have a timing advance."""
+    timed = np.isfinite(reports.timing_advance[np.diff(reports.first) > 0])
+    return float(timed.mean()) if timed.size else 0.0
 
 
 def locate_by(fitted: ReportLocator, reports: Reports) -> LocatedReports:
