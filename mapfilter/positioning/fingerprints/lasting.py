@@ -24,9 +24,6 @@ from mapfilter.positioning.fingerprints.reports import Reports
 
 _BIN_S, _LONGEST_S = 2.0, 60.0
 _LEAST_PAIRS, _LEAST_BINS = 30, 4
-_CLIPPED = 2.0
-"""Errors longer than so many medians count as that long; of normal ones a sixteenth is."""
-_TINY_M = 1e-9
 _TIMES_S = np.geomspace(2.0, 200.0, 60)
 
 
@@ -81,8 +78,7 @@ def fit_lasting(log: Ints, time_s: Floats, off_m: Floats) -> LastingError | None
         Errors of different logs are not compared.
     time_s : (N,) array
     off_m : (N, 2) array
-        Errors east and north. Those longer than twice the median are shortened to that: a filter
-        takes errors as normal, and a few scans that are located elsewhere say little of the others.
+        Errors east and north.
 
     Examples
     --------
@@ -96,9 +92,6 @@ def fit_lasting(log: Ints, time_s: Floats, off_m: Floats) -> LastingError | None
     """
     if not len(log):
         return None
-    length_m = np.hypot(*off_m.T)
-    most_m = _CLIPPED * float(np.median(length_m))
-    off_m = off_m * np.minimum(1.0, most_m / np.maximum(length_m, _TINY_M))[:, None]
     bins = int(_LONGEST_S / _BIN_S)
     products, counts, lags = np.zeros(bins), np.zeros(bins), np.zeros(bins)
     for one in np.unique(log):
