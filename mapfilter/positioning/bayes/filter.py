@@ -141,7 +141,7 @@ class BayesPositioner(Filter[BayesState]):
 
     @cached_property
     def _radio(self) -> RadioSource:
-        return RadioSource(self.area, self.model.evidence)
+        return RadioSource(self.area, self.model.evidence, self.model.usual_serving)
 
     @cached_property
     def filters(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
