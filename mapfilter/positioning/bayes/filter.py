@@ -141,7 +141,7 @@ class BayesPositioner(Filter[BayesState]):
 
     @cached_property
     def _radio(self) -> RadioSource:
-        return RadioSource(self.area, self.model.evidence)
+        return RadioSource(self.area, self.model.evidence, self.model.usual_serving)
 
     @cached_property
     def filters(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
@@ -429,7 +429,7 @@ class BayesPositioner(Filter[BayesState]):
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
-            and (now.null.log_odds >= rules.start_log_odds or disputed)
+            and (now.null.log_odds >= rules.start_log_odds or disputed or gone)
         ):
             alternative = self._alternative(state, now.belief, epoch, rng)
         after = replace(

@@ -39,7 +39,7 @@ from mapfilter.models.street_motion import (
     weigh_by_map,
 )
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.evidence import SERVING_UNDER_NULL, RadioReading
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.path_start import (
     OFF_AT_START,
@@ -102,6 +102,10 @@ class BayesModel:
     def timed_by_sites(self) -> bool:
         """Whether timing advances are compared with the distances of sites."""
         return True
+
+    def usual_serving(self, serving: int, timing_advance: float) -> float:  # noqa: ARG002
+        """Return the log-likelihood of a serving cell (band) under the null hypothesis."""
+        return SERVING_UNDER_NULL
 
     @cached_property
     def bins(self) -> Bins:
