@@ -1,0 +1,97 @@
+"""Compiled arithmetic of :mod:`mapfilter.models.level_memory`: small matrices, once per report.
+
+Sums and products are taken in the order of the formulas, without fused operations, so that results
+are those of the same formulas over arrays, to the last bit.
+"""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+from numba import njit
+
+from mapfilter._types import Floats, Floats32, Ints32
+
+
+@njit(error_model="numpy", cache=True)
+def aged_covariance(covariance: Floats, prior: Floats, decay: Floats) -> Floats:
+    """Return a covariance whose errors decay by factors (E,) towards the prior one, (E, E)."""
+    now = np.empty_like(covariance)
+    for i in range(decay.size):
+        for j in range(decay.size):
+            both = decay[i] * decay[j]
+            now[i, j] = covariance[i, j] * both + prior[i, j] * (1.0 - both)
+    return now
+
+
+@njit(error_model="numpy", cache=True)
+def sequential_updates(
+    covariance: Floats,
+    slot: Ints32,
+    level_dbm: Floats32,
+    white_db2: float,
+    other_white_db2: Floats,
+    other_dbm: Floats,
+    other_db2: Floats,
+    negligible: float,
+) -> tuple[Floats32, Floats32, Floats32]:
+    """Update a covariance (2S + 1, 2S + 1) by levels (K,), one after the other, in place.
+
+    So are ``other_dbm`` and ``other_db2`` (S,), mean and variance of the next level of a cell that
+    the prediction is wrong about, to whose variance ``other_white_db2`` (K,) is added.
+
+    Returns
+    -------
+    gain, variance_db2, other : ndarray of float32, shapes (K, 2S + 1), (K,) and (K,)
+        Gains, where not negligible, variances of innovations, and log-likelihoods of the levels if
+        the prediction is wrong.
+    """
+    count, size = slot.size, covariance.shape[0]
+    slots, last = (size - 1) // 2, size - 1
+    gains = np.zeros((count, size), dtype=np.float32)
+    variances = np.empty(count, dtype=np.float32)
+    others = np.empty(count, dtype=np.float32)
+    column, gain = np.empty(size), np.empty(size)
+    for k in range(count):
+        s = slot[k]
+        for i in range(size):
+            column[i] = covariance[i, s] + covariance[i, slots + s] + covariance[i, last]
+        variance = column[s] + column[slots + s] + column[last] + white_db2
+        variances[k] = np.float32(variance)
+        for i in range(size):
+            gain[i] = column[i] / variance
+            if not abs(gain[i]) < negligible:
+                gains[k, i] = np.float32(gain[i])
+        for i in range(size):
+            for j in range(size):
+                covariance[i, j] -= gain[i] * column[j]
+        off_dbm = np.float64(level_dbm[k]) - other_dbm[s]
+        off_db2 = other_db2[s] + other_white_db2[k]
+        others[k] = np.float32(-0.5 * (off_dbm * off_dbm) / off_db2 - 0.5 * log(off_db2))
+        other_dbm[s] += other_db2[s] / off_db2 * off_dbm
+        other_db2[s] *= 1.0 - other_db2[s] / off_db2
+    return gains, variances, others
+
+
+@njit(error_model="numpy", cache=True)
+def absence_gains(
+    covariance: Floats, slot: Ints32, more_db2: float, negligible: float
+) -> tuple[Floats32, Floats32]:
+    """Return gains (K, 2S + 1), where not negligible, and variances (K,) of absent cells."""
+    count, size = slot.size, covariance.shape[0]
+    slots, last = (size - 1) // 2, size - 1
+    gains = np.zeros((count, size), dtype=np.float32)
+    variances = np.empty(count, dtype=np.float32)
+    column = np.empty(size)
+    for k in range(count):
+        s = slot[k]
+        for i in range(size):
+            column[i] = covariance[i, s] + covariance[i, slots + s] + covariance[i, last]
+        variance = column[s] + column[slots + s] + column[last] + more_db2
+        variances[k] = np.float32(variance)
+        for i in range(size):
+            gain = column[i] / variance
+            if not abs(gain) < negligible:
+                gains[k, i] = np.float32(gain)
+    return gains, variances
