@@ -15,6 +15,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.level_errors import roughness
 from mapfilter.models.street_motion import map_log_likelihood
+from mapfilter.models.way_map import places_beyond
 from mapfilter.radio.cells import CellPlan
 
 BELOW_FLOOR_DB = 6.0
@@ -162,8 +163,7 @@ class AreaMap:
 
     def beyond(self, state: Floats32) -> Bools:
         """Return whether each hypothesis, by its first two rows, lies beyond the area, (N,)."""
-        (width_m, height_m), east_m, north_m = self.size_m, state[0], state[1]
-        found: Bools = (east_m < 0) | (east_m > width_m) | (north_m < 0) | (north_m > height_m)
+        found: Bools = places_beyond(state, *self.size_m)
         return found
 
     def holds(self, east_m: Floats32, north_m: Floats32, weight: Floats32) -> bool:

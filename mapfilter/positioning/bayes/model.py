@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import exp, isfinite, log, pi, sqrt
+from math import exp, isfinite, log, nan, pi, sqrt
 
 import numpy as np
 
-from mapfilter._types import Bytes, Floats, Floats32, Ints32
+from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import Cloud
-from mapfilter.filters.resampling import systematic
+from mapfilter.filters.resampling import log_sum, systematic
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models import fingerprint
 from mapfilter.models.level_errors import LevelReport
@@ -34,10 +34,9 @@ from mapfilter.models.street_motion import (
     TURN,
     MapWeights,
     MotionErrors,
-    interpolate,
     move,
-    weigh_by_map,
 )
+from mapfilter.models.way_map import WayMap, weighed_by_ways
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.path import RecentPath
@@ -113,6 +112,10 @@ class BayesModel:
     def log_map(self) -> Floats32:
         """Log-likelihood of the map at every pixel."""
         return self.area.log_map(self.weights.sd_m)
+
+    @cached_property
+    def _ways(self) -> WayMap:
+        return WayMap(self.log_map, self.area.lattice.resolution_m, *self.area.size_m)
 
     @cached_property
     def _serving_table(self) -> Floats32:
@@ -241,15 +244,12 @@ class BayesModel:
             moved = move(state, 0.0, 0.0, self.motion, key)
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
             moved[: NORTH + 1] += (motion.all_sides_m / sqrt(2.0) * noise).astype(np.float32)
-        weighed = log_weight.copy()
-        rows, step = self.area.lattice.rows, self.area.lattice.resolution_m
-        found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)
-        beyond = self.area.beyond(moved)
-        if beyond.any() and self.weights.weight_per_m > 0:
-            # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
-            cost = _BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
-            found[beyond] = -cost / self.weights.weight_per_m
-        weigh_by_map(found, moved[OFF], self.weights.over(length_m), weighed)
+        # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
+        cost = _BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
+        per_m = self.weights.weight_per_m
+        beyond = -cost / per_m if per_m > 0 else nan
+        factors = self.weights.over(length_m)
+        weighed: Floats = weighed_by_ways(moved, self._ways, factors, beyond, log_weight)
         return moved, weighed
 
     def weigh(
@@ -265,7 +265,7 @@ class BayesModel:
         # A serving cell that the map lacks weighs all hypotheses in the area alike.
         used = reading.serving_weight > 0
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
-            pixel = self._pixels(cloud.state)
+            pixel, beyond = self._pixels(cloud.state), self.area.beyond(cloud.state)
             used = True
             cloud, before = self._aged(cloud, reading), log_weight.copy()
             other = 0.0
@@ -285,8 +285,8 @@ class BayesModel:
             if kept_back is not None:
                 counted = log_weight - kept_back
                 share = self.evidence.levels.tracking_share
-                self._weigh_beyond(cloud.state, before, counted, reading, share * other)
-            self._weigh_beyond(cloud.state, before, log_weight, reading, other)
+                _weigh_beyond(beyond, before, counted, reading, share * other)
+            _weigh_beyond(beyond, before, log_weight, reading, other)
         for term in reading.terms:
             log_likelihood = term.log_likelihood(cloud.state)
             log_weight += log_likelihood
@@ -294,24 +294,9 @@ class BayesModel:
                 counted += log_likelihood
             used = True
         if counted is not None:
-            whole = float(np.logaddexp.reduce(log_weight))
-            cloud = cloud._replace(withheld=whole - float(np.logaddexp.reduce(counted)))
+            cloud = cloud._replace(withheld=log_sum(log_weight) - log_sum(counted))
             log_weight[:] = counted
         return cloud, Reason.USED if used else Reason.NO_READING
-
-    def _weigh_beyond(
-        self,
-        state: Floats32,
-        before: Floats,
-        log_weight: Floats,
-        reading: RadioReading,
-        other_log_likelihood: float,
-    ) -> None:
-        """Mix what a report says beyond the area: predictions at the edge may hold, or not."""
-        beyond = self.area.beyond(state)
-        if beyond.any():
-            unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
-            log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
 
     def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
         """Return whether the leading hypothesis is on the map, and nothing else is as probable."""
@@ -401,6 +386,19 @@ class BayesModel:
 def _sample(pixel: Ints32) -> Ints32:
     """Return the pixels of some hypotheses, which stand for all of them."""
     return pixel[:: max(pixel.size // _SAMPLE, 1)]
+
+
+def _weigh_beyond(
+    beyond: Bools,
+    before: Floats,
+    log_weight: Floats,
+    reading: RadioReading,
+    other_log_likelihood: float,
+) -> None:
+    """Mix what a report says beyond the area: predictions at the edge may hold, or not."""
+    if beyond.any():
+        unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
+        log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
 
 
 def _gained(before: Floats, after: Floats) -> Floats:
