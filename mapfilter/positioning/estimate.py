@@ -131,9 +131,19 @@ class StepOutput:
         """
         if tail is None:
             return self
-        wide_m = max(tail.radius_m(0.99), float(self.fix.radii_m[-1]))
-        fix = replace(self.fix, radius_99_m=wide_m, protection_m=tail.protection_m(risk))
+        wide_m, protection_m = protected_m(tail, self.fix.radii_m, risk)
+        fix = replace(self.fix, radius_99_m=wide_m, protection_m=protection_m)
         return StepOutput(fix, self.evidence, self.unused, tail)
+
+
+def protected_m(
+    tail: RadialTail, radii_m: Floats, risk: float = DEFAULT_RISK
+) -> tuple[float, float]:
+    """Return the radius that holds 99 % of a belief, and its protection level for a risk.
+
+    The former is at least the largest of the other radii, ``radii_m``.
+    """
+    return max(tail.radius_m(0.99), float(radii_m[-1])), tail.protection_m(risk)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -219,10 +219,30 @@ def _heaviest(
     per_m: float,
 ) -> tuple[int, float]:
     rows, cols = way_rank.shape
-    mass = np.zeros(ways, dtype=np.float32)
-    for i in range(weight.size):
-        col = min(max(int(east_m[i] * per_m), 0), cols - 1)
-        row = rows - 1 - min(max(int(north_m[i] * per_m), 0), rows - 1)
-        mass[way_rank[row, col]] += weight[i]
-    best = int(np.argmax(mass))
-    return best, mass[best]
+    count, last_col, last_row = weight.size, np.int32(cols - 1), np.int32(rows - 1)
+    pixel, flat = np.empty(count, dtype=np.int32), way_rank.ravel()
+    zero = np.int32(0)
+    for i in range(count):
+        col, row = np.int32(east_m[i] * per_m), np.int32(north_m[i] * per_m)
+        col = col if col > zero else zero
+        row = row if row > zero else zero
+        col = col if col < last_col else last_col
+        row = row if row < last_row else last_row
+        pixel[i] = np.int32(np.int32(last_row - row) * np.int32(cols)) + col
+    mass, seen, changes = np.zeros(ways, dtype=np.float32), np.empty(count + 1, np.int32), 0
+    # Neighbours are mostly on one way, whose sum stays in a register.
+    at, held = np.int32(0), np.float32(0.0)
+    for i in range(count):
+        rank = flat[np.uint32(pixel[i])]
+        if rank != at:
+            mass[at], seen[changes] = held, at
+            changes += 1
+            at, held = rank, mass[rank]
+        held += weight[i]
+    mass[at], seen[changes] = held, at
+    best = np.int32(0)
+    for k in range(changes + 1):
+        rank = seen[k]
+        if mass[rank] > mass[best] or (mass[rank] == mass[best] and rank < best):
+            best = rank
+    return int(best), mass[best]
