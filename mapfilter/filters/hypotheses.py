@@ -159,21 +159,14 @@ def _summarise(
     mass = np.zeros((bins.rows, bins.cols), dtype=np.float32)
     flat, of_bin, count = mass.ravel(), _bin_of(state, bins), 0
     touched = np.empty(weight.size, dtype=np.int32)
-    # Neighbours are mostly in one bin, whose sum stays in a register.
-    here, held, least = np.int32(-1), np.float32(0.0), np.float32(1e-30)
+    least = np.float32(1e-30)
     for i in range(weight.size):
-        at = of_bin[i]
-        if at != here:
-            if here >= 0:
-                flat[np.uint32(here)] = held
-            here, held = at, flat[np.uint32(at)]
-            if held == 0:
-                touched[count] = at
-                count += 1
+        at = np.uint32(of_bin[i])
+        if flat[at] == 0:
+            touched[count] = of_bin[i]
+            count += 1
         # A weight of zero must not make its bin look untouched.
-        held += weight[i] if weight[i] > least else least
-    if here >= 0:
-        flat[np.uint32(here)] = held
+        flat[at] += weight[i] if weight[i] > least else least
     touched, entropy = touched[:count], 0.0
     for k in range(count):
         share = float(flat[touched[k]])

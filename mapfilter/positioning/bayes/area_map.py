@@ -229,20 +229,8 @@ def _heaviest(
         col = col if col < last_col else last_col
         row = row if row < last_row else last_row
         pixel[i] = np.int32(np.int32(last_row - row) * np.int32(cols)) + col
-    mass, seen, changes = np.zeros(ways, dtype=np.float32), np.empty(count + 1, np.int32), 0
-    # Neighbours are mostly on one way, whose sum stays in a register.
-    at, held = np.int32(0), np.float32(0.0)
+    mass = np.zeros(ways, dtype=np.float32)
     for i in range(count):
-        rank = flat[np.uint32(pixel[i])]
-        if rank != at:
-            mass[at], seen[changes] = held, at
-            changes += 1
-            at, held = rank, mass[rank]
-        held += weight[i]
-    mass[at], seen[changes] = held, at
-    best = np.int32(0)
-    for k in range(changes + 1):
-        rank = seen[k]
-        if mass[rank] > mass[best] or (mass[rank] == mass[best] and rank < best):
-            best = rank
-    return int(best), mass[best]
+        mass[np.uint32(flat[np.uint32(pixel[i])])] += weight[i]
+    best = int(np.argmax(mass))
+    return best, mass[best]

@@ -20,7 +20,14 @@ from mapfilter.filters.resampling import log_sum, systematic
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models import fingerprint
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.models.level_kernels import Prediction, decayed, weigh_by_absence, weigh_by_levels
+from mapfilter.models.level_kernels import (
+    Prediction,
+    decayed,
+    rough_squares,
+    shares_above,
+    weigh_by_absence,
+    weigh_by_levels,
+)
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import (
     BIAS,
@@ -347,16 +354,17 @@ class BayesModel:
         memory, kept, weight = cloud.shared, cloud.kept, errors.weight
         if not self.remember and reading.length_m > 0:
             weight *= 1 - exp(-2 * reading.length_m / _NEW_M)
+        predicted = Prediction(area.flat_level_dbm, self.rough_db(), self._bands, errors.roughness)
         # Cells that nobody expects say nothing, neither for the belief nor against it.
-        report = report._replace(absent=self._expected(pixel, report))
+        report = report._replace(absent=_expected(predicted, pixel, report))
         cells = np.concatenate([report.cell, report.absent])
         memory, kept = memory.with_cells(cells[: memory.slots], kept)
         if report.cell.size > memory.slots:
             slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
-        memory, terms = memory.updated(report, self._mean_rough_db2(pixel, report.cell))
+        rough_db2 = _mean_rough_db2(predicted, pixel, report.cell)
+        memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
-        predicted = Prediction(area.flat_level_dbm, self.rough_db(), self._bands, errors.roughness)
         weigh_by_levels(kept, pixel, predicted, terms, weight, log_weight)
         if absent.cell.size:
             table = self._bound_table
@@ -365,27 +373,27 @@ class BayesModel:
         memory = replace(memory, other_log_likelihood=other)
         return Cloud(cloud.state, kept, memory)
 
-    def _mean_rough_db2(self, pixel: Ints32, cell: Ints32) -> Floats:
-        """Return the mean variance that the roughness of the prediction adds, for each cell."""
-        rough_db = 0.1 * self.rough_db().reshape(-1, self._bands)[_sample(pixel)][:, cell]
-        return np.asarray(self.evidence.levels.roughness * np.mean(rough_db**2, axis=0))
 
-    def _expected(self, pixel: Ints32, report: LevelReport) -> Ints32:
-        """Return absent cells that hypotheses expect to be in the report, most expected first."""
-        absent = report.absent
-        if not absent.size:
-            return absent
-        some = _sample(pixel)
-        level = self.area.level_dbm.reshape(-1, self._bands)[some][:, absent]
-        expected = np.mean(level > report.limit_dbm, axis=0)
-        order = np.argsort(-expected, kind="stable")
-        found: Ints32 = absent[order[expected[order] > _LEAST_EXPECTED]]
-        return found
+def _mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:
+    """Return the mean variance that the roughness of the prediction adds, for each cell."""
+    squares = rough_squares(pixel, _every(pixel), predicted, cell)
+    return np.asarray(predicted.share * np.mean(squares, axis=1))
 
 
-def _sample(pixel: Ints32) -> Ints32:
-    """Return the pixels of some hypotheses, which stand for all of them."""
-    return pixel[:: max(pixel.size // _SAMPLE, 1)]
+def _expected(predicted: Prediction, pixel: Ints32, report: LevelReport) -> Ints32:
+    """Return absent cells that hypotheses expect to be in the report, most expected first."""
+    absent = report.absent
+    if not absent.size:
+        return absent
+    share = shares_above(pixel, _every(pixel), predicted, absent, report.limit_dbm)
+    order = np.argsort(-share, kind="stable")
+    found: Ints32 = absent[order[share[order] > _LEAST_EXPECTED]]
+    return found
+
+
+def _every(pixel: Ints32) -> int:
+    """Return how many hypotheses one stands for, where some stand for all of them."""
+    return max(pixel.size // _SAMPLE, 1)
 
 
 def _weigh_beyond(

@@ -124,9 +124,11 @@ def _output(
     unused: tuple[UnusedReading, ...],
 ) -> StepOutput:
     belief, (west, south) = state.belief, area.origin_m
-    summary, count, way, tail = empty_summary(STATES), 0, (0, nan), None
+    count, way, tail = 0, (0, nan), None
     wide_m = protection_m = nan
-    if belief is not None and state.status is not Status.OUTSIDE:
+    if belief is None or state.status is Status.OUTSIDE:
+        summary = empty_summary(STATES)
+    else:
         summary, count = belief.summary, belief.log_weight.size
         places = belief.state[0], belief.state[1], belief.weight
         way = area.matched_way(*places)
