@@ -157,6 +157,16 @@ def weigh_by_absence(
 
 
 @njit(error_model="numpy", cache=True)
+def gained(before: Floats, after: Floats, share: float) -> Floats:
+    """Return a share of what log weights (N,) have gained; 0 where there is no weight."""
+    found = np.zeros(after.size)
+    for i in range(after.size):
+        if np.isfinite(after[i]):
+            found[i] = share * (after[i] - before[i])
+    return found
+
+
+@njit(error_model="numpy", cache=True)
 def shares_above(
     pixel: Ints32, every: int, predicted: Prediction, cell: Ints32, limit_dbm: float
 ) -> Floats:

@@ -45,6 +45,16 @@ def places_beyond(state: Floats32, width_m: float, height_m: float) -> Bools:
 
 
 @njit(error_model="numpy", cache=True)
+def all_inside(east_m: Floats32, north_m: Floats32, width_m: float, height_m: float) -> bool:
+    """Return whether all places (N,) lie in an area; those without a position do not."""
+    wide, high, zero, inside = _F(width_m), _F(height_m), _F(0.0), True
+    for i in range(east_m.size):
+        along = (east_m[i] >= zero) & (east_m[i] <= wide)
+        inside &= along & (north_m[i] >= zero) & (north_m[i] <= high)
+    return inside
+
+
+@njit(error_model="numpy", cache=True)
 def weighed_by_ways(
     moved: Floats32, ways: WayMap, factors: MapFactors, beyond: float, log_weight: Floats
 ) -> Floats:

@@ -15,7 +15,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.level_errors import roughness
 from mapfilter.models.street_motion import map_log_likelihood
-from mapfilter.models.way_map import places_beyond
+from mapfilter.models.way_map import all_inside, places_beyond
 from mapfilter.radio.cells import CellPlan
 
 BELOW_FLOOR_DB = 6.0
@@ -169,6 +169,8 @@ class AreaMap:
     def holds(self, east_m: Floats32, north_m: Floats32, weight: Floats32) -> bool:
         """Return whether most of a belief in the local frame lies in the area."""
         width_m, height_m = self.size_m
+        if all_inside(east_m, north_m, width_m, height_m):
+            return bool(weight.size)
         inside = (east_m >= 0) & (east_m <= width_m) & (north_m >= 0) & (north_m <= height_m)
         return bool(np.sum(weight[inside]) > 0.5)
 

@@ -23,6 +23,7 @@ from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import (
     Prediction,
     decayed,
+    gained,
     rough_squares,
     shares_above,
     weigh_by_absence,
@@ -283,9 +284,8 @@ class BayesModel:
                 cloud = self._weigh_levels(cloud, pixel, log_weight, reading)
                 other = cloud.shared.other_log_likelihood
                 if reading.tracked and self.remember:
-                    kept_back = (1 - self.evidence.levels.tracking_share) * _gained(
-                        start, log_weight
-                    )
+                    withheld_share = 1 - self.evidence.levels.tracking_share
+                    kept_back = gained(start, log_weight, withheld_share)
             flat, bands, table = self.area.flat_level_dbm, self._bands, self._bound_table
             for bound in reading.bounds:
                 fingerprint.weigh_by_bound(pixel, flat, bands, bound, table, log_weight)
@@ -407,14 +407,6 @@ def _weigh_beyond(
     if beyond.any():
         unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
         log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
-
-
-def _gained(before: Floats, after: Floats) -> Floats:
-    """Return by how much log weights have grown; 0 where there is no weight."""
-    counted = np.isfinite(after)
-    gained = np.zeros(after.size)
-    gained[counted] = after[counted] - before[counted]
-    return gained
 
 
 def _new(state: Floats32) -> Cloud:

@@ -77,6 +77,25 @@ class BayesState:
     watch: SensorWatch = field(default_factory=SensorWatch)
     last_fix: GnssFix | None = None
 
+    def with_output(self, reported: Reported) -> BayesState:
+        """Return the state with its output."""
+        return BayesState(
+            self.belief,
+            self.status,
+            self.unclear,
+            self.sources,
+            self.reckoning,
+            self.heading_rad,
+            self.compass,
+            self.null,
+            self.alternative,
+            self.takeovers,
+            self.path,
+            reported,
+            self.watch,
+            self.last_fix,
+        )
+
     @property
     def particle_spacing_m(self) -> float:
         """Distance between hypotheses along the streets that the belief covers."""
@@ -113,7 +132,7 @@ def step_output(
         fix = replace(known.output.fix, time_s=time_s, reason=reason)
         return state, StepOutput(fix, known.output.evidence, unused, known.output.tail)
     output = _output(area, state, time_s, reason, unused)
-    return replace(state, reported=Reported(*made_of, output)), output
+    return state.with_output(Reported(*made_of, output)), output
 
 
 def _output(
