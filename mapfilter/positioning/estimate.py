@@ -305,24 +305,6 @@ class TrackEstimate:
         return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
 
     @classmethod
-    def of_outputs(
-        cls,
-        crs: str,
-        filter_name: str,
-        outputs: Sequence[StepOutput],
-        *,
-        start_utc_s: float = float("nan"),
-        unused: Sequence[UnusedReading] = (),
-    ) -> TrackEstimate:
-        """Put the outputs of a track's steps together; unused readings are given apart."""
-        fixes = [output.fix for output in outputs]
-        estimate = cls.of_fixes(crs, filter_name, fixes, start_utc_s=start_utc_s, unused=unused)
-        if not outputs or outputs[0].evidence is None:
-            return estimate
-        columns = np.array([output.evidence for output in outputs], dtype=np.float64).T
-        return replace(estimate, evidence=TrackEvidence(*columns))
-
-    @classmethod
     def of_fixes(
         cls,
         crs: str,

@@ -240,7 +240,7 @@ def _held_radius(distance: Floats, mass: Floats, share: float) -> float:
         if held >= wanted:
             break
         at += 1
-    return distance[min(at, mass.size - 1)]
+    return float(distance[min(at, mass.size - 1)])
 
 
 @njit(error_model="numpy", cache=True)
