@@ -15,14 +15,43 @@ from mapfilter._types import Floats, Floats32, Ints32
 
 
 @njit(error_model="numpy", cache=True)
-def aged_covariance(covariance: Floats, prior: Floats, decay: Floats) -> Floats:
-    """Return a covariance whose errors decay by factors (E,) towards the prior one, (E, E)."""
-    now = np.empty_like(covariance)
-    for i in range(decay.size):
-        for j in range(decay.size):
+def aged(
+    covariance: Floats,
+    prior: Floats,
+    slow: float,
+    fast: float,
+    level: tuple[Floats, float, float],
+    variance: tuple[Floats, float, float],
+) -> tuple[Floats, Floats32, Floats, Floats]:
+    """Return a covariance (2S + 1, 2S + 1) whose errors decay towards the prior one.
+
+    Parameters
+    ----------
+    slow, fast : float
+        Factors of slow and fast errors; that of the device stays.
+    level, variance : tuple
+        Values (S,), what they decay to, and the factor of the difference.
+
+    Returns
+    -------
+    covariance, factors, level, variance : ndarray
+        Factors of all errors are in single precision.
+    """
+    size = covariance.shape[0]
+    decay, now = np.ones(size), np.empty((size, size))
+    decay[: size // 2] = slow
+    decay[size // 2 : size - 1] = fast
+    for i in range(size):
+        for j in range(size):
             both = decay[i] * decay[j]
             now[i, j] = covariance[i, j] * both + prior[i, j] * (1.0 - both)
-    return now
+    (dbm, usual_dbm, keep), (db2, usual_db2, keep_db2) = level, variance
+    return (
+        now,
+        decay.astype(np.float32),
+        usual_dbm + (dbm - usual_dbm) * keep,
+        usual_db2 + (db2 - usual_db2) * keep_db2,
+    )
 
 
 @njit(error_model="numpy", cache=True)

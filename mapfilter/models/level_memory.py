@@ -14,7 +14,7 @@ import numpy as np
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.models.level_covariance import (
     absence_gains,
-    aged_covariance,
+    aged,
     sequential_updates,
 )
 from mapfilter.models.level_errors import LevelErrors, LevelReport
@@ -128,9 +128,9 @@ class LevelMemory:
         """
         slot_of = self.slot_of
         wanted = [band for band in bands.tolist() if band not in slot_of]
-        held = [slot_of[band] for band in bands.tolist() if band in slot_of]
         if not wanted:
             return self, kept
+        held = [slot_of[band] for band in bands.tolist() if band in slot_of]
         order = [slot for slot in np.lexsort((self.band >= 0, self.used)) if slot not in held]
         at = np.array(order[: len(wanted)], dtype=np.intp)
         band = self.band.copy()
@@ -174,19 +174,27 @@ class LevelMemory:
 
     def after(self, length_m: float) -> tuple[LevelMemory, Floats32]:
         """Return the memory after a distance, and the factor of each mean, shape (2S + 1,)."""
-        errors, slots = self.errors, self.slots
-        decay = np.ones(2 * slots + 1)
-        decay[:slots], decay[slots:-1] = (
+        errors, keep = self.errors, exp(-length_m / _OTHER_M)
+        covariance, decay, other_dbm, other_db2 = aged(
+            self.covariance_db2,
+            self.prior_db2,
             exp(-length_m / errors.slow_m),
             exp(-length_m / errors.fast_m),
+            (self.other_dbm, OTHER_DBM, keep),
+            (self.other_db2, OTHER_SD_DB**2, keep**2),
         )
-        keep = exp(-length_m / _OTHER_M)
-        return replace(
-            self,
-            covariance_db2=aged_covariance(self.covariance_db2, self.prior_db2, decay),
-            other_dbm=OTHER_DBM + (self.other_dbm - OTHER_DBM) * keep,
-            other_db2=OTHER_SD_DB**2 + (self.other_db2 - OTHER_SD_DB**2) * keep**2,
-        ), decay.astype(np.float32)
+        return LevelMemory(
+            errors,
+            self.site,
+            self.band,
+            self.prior_db2,
+            covariance,
+            other_dbm,
+            other_db2,
+            self.used,
+            self.reports,
+            self.other_log_likelihood,
+        ), decay
 
     def updated(
         self, report: LevelReport, rough_db2: Floats | None = None
@@ -216,13 +224,17 @@ class LevelMemory:
             _NEGLIGIBLE / 10,
         )
         used[slot] = self.reports
-        memory = replace(
-            self,
-            covariance_db2=covariance,
-            other_dbm=other_dbm,
-            other_db2=other_db2,
-            used=used,
-            reports=self.reports + 1,
+        memory = LevelMemory(
+            self.errors,
+            self.site,
+            self.band,
+            self.prior_db2,
+            covariance,
+            other_dbm,
+            other_db2,
+            used,
+            self.reports + 1,
+            self.other_log_likelihood,
         )
         return memory, LevelTerms(report.cell, slot, report.level_dbm, gain, variance, other)
 

@@ -20,7 +20,8 @@ from mapfilter.radio.cells import CellPlan
 
 BELOW_FLOOR_DB = 6.0
 """How far below the floor a level is assumed to be that the database does not hold."""
-_EDGE_M, _EDGE_SHARE = 60.0, 0.05
+_EDGE_M, _EDGE_SHARE, _ROUNDING_M = 60.0, 0.05, 1.0
+_F = np.float32
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +159,22 @@ class AreaMap:
 
     def at_edge(self, place_m: Floats) -> bool:
         """Return whether a place in the local frame is near the edge of the area, or beyond."""
-        inside = [min(place_m[i], self.size_m[i] - place_m[i]) for i in range(2)]
-        return bool(min(inside) < min(_EDGE_M, _EDGE_SHARE * min(self.size_m)))
+        (width_m, height_m), east_m, north_m = self.size_m, float(place_m[0]), float(place_m[1])
+        inside_m = min(east_m, width_m - east_m, north_m, height_m - north_m)
+        return inside_m < self._edge_m
+
+    def clear_of_edge(self, state: Floats32) -> bool:
+        """Return whether all hypotheses, by their first two rows, lie well away from the edge.
+
+        Then so does their mean.
+        """
+        (width_m, height_m), away_m = self.size_m, self._edge_m + _ROUNDING_M
+        shape = width_m - 2 * away_m, height_m - 2 * away_m
+        return bool(all_inside(state[0] - _F(away_m), state[1] - _F(away_m), *shape))
+
+    @property
+    def _edge_m(self) -> float:
+        return min(_EDGE_M, _EDGE_SHARE * min(self.size_m))
 
     def beyond(self, state: Floats32) -> Bools:
         """Return whether each hypothesis, by its first two rows, lies beyond the area, (N,)."""

@@ -274,6 +274,7 @@ class BayesModel:
         used = reading.serving_weight > 0
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
             pixel, beyond = self._pixels(cloud.state), self.area.beyond(cloud.state)
+            some_beyond = bool(beyond.any())
             used = True
             cloud, before = self._aged(cloud, reading), log_weight.copy()
             other = 0.0
@@ -292,8 +293,10 @@ class BayesModel:
             if kept_back is not None:
                 counted = log_weight - kept_back
                 share = self.evidence.levels.tracking_share
-                _weigh_beyond(beyond, before, counted, reading, share * other)
-            _weigh_beyond(beyond, before, log_weight, reading, other)
+                if some_beyond:
+                    _weigh_beyond(beyond, before, counted, reading, share * other)
+            if some_beyond:
+                _weigh_beyond(beyond, before, log_weight, reading, other)
         for term in reading.terms:
             log_likelihood = term.log_likelihood(cloud.state)
             log_weight += log_likelihood
@@ -377,7 +380,7 @@ class BayesModel:
 def _mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:
     """Return the mean variance that the roughness of the prediction adds, for each cell."""
     squares = rough_squares(pixel, _every(pixel), predicted, cell)
-    return np.asarray(predicted.share * np.mean(squares, axis=1))
+    return np.asarray(predicted.share * (squares.sum(axis=1) / squares.shape[1]))
 
 
 def _expected(predicted: Prediction, pixel: Ints32, report: LevelReport) -> Ints32:
@@ -386,8 +389,9 @@ def _expected(predicted: Prediction, pixel: Ints32, report: LevelReport) -> Ints
     if not absent.size:
         return absent
     share = shares_above(pixel, _every(pixel), predicted, absent, report.limit_dbm)
-    order = np.argsort(-share, kind="stable")
-    found: Ints32 = absent[order[share[order] > _LEAST_EXPECTED]]
+    expected = [k for k, part in enumerate(share.tolist()) if part > _LEAST_EXPECTED]
+    expected.sort(key=lambda k: -share[k])
+    found: Ints32 = absent[expected]
     return found
 
 
@@ -404,9 +408,8 @@ def _weigh_beyond(
     other_log_likelihood: float,
 ) -> None:
     """Mix what a report says beyond the area: predictions at the edge may hold, or not."""
-    if beyond.any():
-        unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
-        log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
+    unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
+    log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
 
 
 def _new(state: Floats32) -> Cloud:

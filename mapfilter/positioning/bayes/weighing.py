@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
@@ -18,6 +19,7 @@ from mapfilter.positioning.bayes.alternative import (
     doubted,
     resolve_alternative,
 )
+from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.evidence import (
     Context,
@@ -109,7 +111,7 @@ class Weighing:
 
         ``measured`` is whether motion was.
         """
-        reading = weighed_by(before, updates, measured=measured)
+        reading = joined(updates)
         if reading is None:
             return state, Reason.USED
         beliefs, area = self.beliefs, self.beliefs.model.area
@@ -117,8 +119,9 @@ class Weighing:
         by_map_alone = beliefs.by_map_alone(state)
         plain = by_map_alone and not state.path.is_distinctive
         doubt = plain or doubted(rules, before, state.null, state.alternative)
-        doubt = doubt or area.at_edge(before.summary.mean)
-        reading = replace(reading, doubted=doubt)
+        doubt = doubt or _at_edge(area, before)
+        tracked = measured and before.status is Status.TRACKING
+        reading = replace(reading, tracked=tracked, doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
@@ -220,6 +223,14 @@ def weighed_by(
     reading = joined(updates, alternative=alternative)
     tracked = measured and belief.status is Status.TRACKING
     return reading if reading is None else replace(reading, tracked=tracked)
+
+
+def _at_edge(area: AreaMap, belief: MapBelief) -> bool:
+    """Return whether a belief lies at the edge of the area."""
+    if isinstance(belief, ParticleBelief) and area.clear_of_edge(belief.state):
+        # A summary takes longer.
+        return False
+    return area.at_edge(belief.summary.mean)
 
 
 def _challenged(
