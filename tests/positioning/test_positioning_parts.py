@@ -16,8 +16,9 @@ from mapfilter.models.motion import random_walk
 from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
 from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.radio import name_of
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, headed

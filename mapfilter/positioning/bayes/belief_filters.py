@@ -14,8 +14,9 @@ from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.models.street_motion import remounted
 from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
@@ -106,7 +107,7 @@ class BeliefFilters:
                 for mass in (belief.on, belief.off)
             )
             return replace(belief, on=on, off=off, model=grid)
-        state = self.model.any_heading(belief.state, _MORE_PARTICLES, rng)
+        state = any_heading(self.model, belief.state, _MORE_PARTICLES, rng)
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
         kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
         return replace(belief, state=state, log_weight=log_weight, kept=kept)

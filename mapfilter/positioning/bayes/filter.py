@@ -30,8 +30,9 @@ from mapfilter.positioning.bayes.evidence import (
     EvidenceUpdate,
     RadioReading,
 )
+from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.map_source import MapSource
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
 from mapfilter.positioning.bayes.radio import RadioSource, name_of
 from mapfilter.positioning.bayes.sensors import UNMEASURED, watched

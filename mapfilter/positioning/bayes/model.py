@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import exp, isfinite, log, nan, pi, sqrt
+from math import exp, isfinite, log, nan, sqrt
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import Cloud
-from mapfilter.filters.resampling import log_sum, systematic
-from mapfilter.geodesy import wrap_rad
+from mapfilter.filters.resampling import log_sum
 from mapfilter.models import fingerprint
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import (
@@ -31,15 +30,8 @@ from mapfilter.models.level_kernels import (
 )
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import (
-    BIAS,
-    EAST,
-    LOG_SCALE,
     NORTH,
     OFF,
-    RATE,
-    STATES,
-    STRETCH,
-    TURN,
     MapWeights,
     MotionErrors,
     move,
@@ -47,48 +39,14 @@ from mapfilter.models.street_motion import (
 from mapfilter.models.way_map import WayMap, weighed_by_ways
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.path import RecentPath
-from mapfilter.positioning.bayes.path_start import (
-    OFF_AT_START,
-    ends_of_path,
-    possible_turns_rad,
-)
+from mapfilter.positioning.bayes.first_hypotheses import BEYOND_M, Start, first_hypotheses
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 
-_F = np.float32
-_OFF_SHARE, _TRIES = 0.2, 2
-_BEYOND_M, _BEYOND_SHARE, _BEYOND_AT_START = 300.0, 0.15, 0.02
 _BEYOND_COST_PER_M = 0.015
-"""Width of the belt around the area, its share of the first hypotheses and of the first belief, and
-the negative log-likelihood of each metre there, in a database with cells."""
-_AT_ONCE = 50_000
+"""Negative log-likelihood of each metre beyond the area, in a database with cells."""
 _NEW_M = 50.0
 _LEAST_EXPECTED = 0.02
 _SAMPLE = 256
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """Prior of a belief.
-
-    Parameters
-    ----------
-    reading : RadioReading or None
-        First evidence.
-    compass : bool
-        Headings are those of a compass; else their lasting error is uniform.
-    east_m, north_m, sd_m : float
-        Known start in the CRS of the database; NaN for an unknown one.
-    path : RecentPath or None
-        Way to the start, where the map alone is the first evidence.
-    """
-
-    reading: RadioReading | None
-    compass: bool = True
-    east_m: float = float("nan")
-    north_m: float = float("nan")
-    sd_m: float = float("nan")
-    path: RecentPath | None = None
 
 
 @dataclass(frozen=True)
@@ -113,7 +71,7 @@ class BayesModel:
     @cached_property
     def bins(self) -> Bins:
         """Bins of 25 m over the area and what surrounds it."""
-        (width_m, height_m), more_m = self.area.size_m, _BEYOND_M
+        (width_m, height_m), more_m = self.area.size_m, BEYOND_M
         return Bins.over((-more_m, -more_m, width_m + more_m, height_m + more_m))
 
     @cached_property
@@ -134,111 +92,14 @@ class BayesModel:
         return fingerprint.bound_table()
 
     def start(self, prior: Start, most: int, rng: np.random.Generator) -> tuple[Cloud, Floats]:
-        """Draw the first hypotheses: by the first evidence, or about a known start.
-
-        Without a known start they are drawn in proportion to their likelihood from the points on
-        ways and from places anywhere; those on ways are spread over their pixel. Others lie around
-        the area, as one may come into it.
-        """
-        state = np.zeros((STATES, most), dtype=np.float32)
-        log_weight = np.full(most, -np.log(most))
-        if isfinite(prior.east_m):
-            west, south = self.area.origin_m
-            place = np.array([[prior.east_m - west], [prior.north_m - south]])
-            state[EAST : NORTH + 1] = place + prior.sd_m * rng.standard_normal((2, most))
-            state[OFF] = OFF_AT_START
-        elif prior.path is None:
-            self._spread(state, log_weight, prior.reading, rng)
-        bias = rng.standard_normal(most) * self.motion.bias_sd_rad
-        state[BIAS] = bias if prior.compass else pi * (2 * rng.random(most) - 1)
-        state[LOG_SCALE] = self.motion.scale_sd * rng.standard_normal(most)
-        state[TURN] = self.motion.turn_sd_rad * rng.standard_normal(most)
-        state[STRETCH] = self.motion.stretch_sd * rng.standard_normal(most)
-        if prior.path is not None:
-            turns = possible_turns_rad(self.motion.bias_sd_rad, compass=prior.compass)
-            ends = ends_of_path(self.area, self.weights, prior.path, turns, most, rng)
-            state[EAST : NORTH + 1], state[OFF], log_weight = (
-                ends.place_m,
-                ends.off,
-                ends.log_weight,
-            )
-            state[BIAS] = wrap_rad(ends.turned_rad - state[TURN])
-        biased = rng.random(most) < self.motion.rate_share
-        state[RATE] = self.motion.rate_rad_per_m * rng.standard_normal(most) * biased
-        cloud = _new(state)
+        """Draw the first hypotheses: by the first evidence, or about a known start."""
+        cloud, log_weight = first_hypotheses(self, prior, most, rng)
         if prior.reading is not None:
             # Hypotheses that were drawn by this evidence keep what it says of the levels' errors.
             drawn_by = not isfinite(prior.east_m)
             weighed = log_weight.copy() if drawn_by else log_weight
             cloud, _ = self.weigh(cloud, weighed, prior.reading)
         return cloud, log_weight
-
-    def _spread(
-        self,
-        state: Floats32,
-        log_weight: Floats,
-        reading: RadioReading | None,
-        rng: np.random.Generator,
-    ) -> None:
-        """Fill places on the map and off it; off it more of them, with smaller weights."""
-        size_m, spread_m = np.array(self.area.size_m), self.area.lattice.resolution_m
-        beyond = int(_BEYOND_SHARE * state.shape[1])
-        off = int(_OFF_SHARE * state.shape[1])
-        on = state.shape[1] - off - beyond
-        anywhere = (size_m * rng.random((_TRIES * off, 2))).T.astype(np.float32)
-        inside = 1 - _BEYOND_AT_START
-        first = 0
-        for count, points, pixel_m, is_off, share in (
-            (on, self.area.points, spread_m, 0.0, inside * (1 - OFF_AT_START)),
-            (off, anywhere, 0.0, 1.0, inside * OFF_AT_START),
-            (beyond, self._around(beyond, rng), 0.0, OFF_AT_START, _BEYOND_AT_START),
-        ):
-            part = slice(first, first + count)
-            first += count
-            if not points.shape[1] or not count:
-                log_weight[part] = -np.inf
-                continue
-            chosen, log_mean = self._likely(points, reading, count, rng)
-            beside = rng.random((2, count), dtype=np.float32) - _F(0.5)
-            state[EAST : NORTH + 1, part] = points[:, chosen] + _F(pixel_m) * beside
-            state[OFF, part] = is_off
-            log_weight[part] = log_mean + np.log(share / count)
-
-    def _around(self, count: int, rng: np.random.Generator) -> Floats32:
-        """Draw places around the area, shape (2, count)."""
-        size_m = np.array(self.area.size_m)[:, None]
-        found = np.empty((2, 0), dtype=np.float32)
-        while found.shape[1] < count:
-            some = (size_m + 2 * _BEYOND_M) * rng.random((2, 4 * count)) - _BEYOND_M
-            places = some.astype(np.float32)
-            found = np.concatenate([found, places[:, np.flatnonzero(self.area.beyond(places))]], 1)
-        return found[:, :count]
-
-    def _likely(
-        self, points: Floats32, reading: RadioReading | None, count: int, rng: np.random.Generator
-    ) -> tuple[Ints32, float]:
-        """Draw points by their likelihood; return them and the logarithm of its mean."""
-        log_weight = np.zeros(points.shape[1])
-        if reading is not None:
-            for first in range(0, points.shape[1], _AT_ONCE):
-                part = slice(first, first + _AT_ONCE)
-                state = np.zeros((STATES, points[:, part].shape[1]), dtype=np.float32)
-                state[EAST : NORTH + 1] = points[:, part]
-                self.weigh(_new(state), log_weight[part], reading)
-        most = log_weight.max()
-        weight = np.exp(log_weight - most)
-        chosen = np.empty(count, dtype=np.int32)
-        systematic((weight / weight.sum()).astype(np.float32), rng.random(), chosen)
-        return chosen, float(most + np.log(weight.mean()))
-
-    def any_heading(self, state: Floats32, times: int, rng: np.random.Generator) -> Floats32:
-        """Return ``times`` copies with uniform heading errors, spread over their pixels."""
-        turned = np.tile(state, times)
-        resolution_m = _F(self.area.lattice.resolution_m)
-        spread = rng.random((2, turned.shape[1]), dtype=np.float32) - _F(0.5)
-        turned[: NORTH + 1] += resolution_m * spread
-        turned[BIAS] = pi * (2 * rng.random(turned.shape[1]) - 1)
-        return turned
 
     def move(
         self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
@@ -410,7 +271,3 @@ def _weigh_beyond(
     """Mix what a report says beyond the area: predictions at the edge may hold, or not."""
     unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
     log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
-
-
-def _new(state: Floats32) -> Cloud:
-    return Cloud(state, np.empty((0, state.shape[1]), dtype=np.float32))

@@ -7,22 +7,19 @@ sides into the epoch, as long as one goes in that time, so the belief grows as i
 that stands still while the phone moves is taken out.
 
 Rows that are missing, or lengths of zero, can also be those of a phone that rests, so levels
-decide: at rest they change by fading alone. Each block of a rest is compared with its first one, by
-the likelihoods of "still there" and "carried elsewhere", and their ratio is added up from zero (a
-CUSUM; Page, 1954).
+decide (:mod:`mapfilter.positioning.bayes.rest`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import exp, isfinite, log, nan, sqrt
+from math import exp, isfinite, nan, sqrt
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
+from mapfilter.positioning.bayes.rest import Rest, levels_of
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.tracks.schema import SERVING
 
 _GAP_S, _GAP_INTERVALS, _REGULAR = 5.0, 3.0, 0.02
 """After so long, in seconds and in intervals of the log, motion rows are missing; intervals of rows
@@ -34,78 +31,10 @@ _WALK_MPS = 1.4
 _STRAIGHT_S = 60.0
 """Time after which the direction of an unmeasured way is forgotten by 1/e."""
 
-_BLOCK_S = 10.0
-_AT_REST_DB, _ELSEWHERE_DB, _ALL_DB = 4.0, 9.0, 6.0
-"""Deviations of a level from an earlier one at rest, and elsewhere; of all levels together, as a
-phone is put into a pocket."""
-_BLOCK_SHARE = 0.5
-"""Power of a block's likelihoods: blocks near each other repeat the same deviation."""
-_CELLS_AT_REST, _NATS_PER_CELL, _CELLS_S = 3, 2.5, 600.0
-_NATS_PER_S = 1 / 300
-"""Serving cells that are usual at rest, gain from each further one that has not served for so long,
-and what is forgotten with time: now and then others serve, also at rest."""
-_CARRIED_NATS = 6.0
-
 _NATS_PER_M, _NATS_PER_REPEAT, _MOST_ROWS = 0.12, 0.9, 3
 """Gain, for each level of at most three, from a report that repeats the last one: by the metres
 between them, and at most."""
 _STALE_NATS = 8.0
-
-
-@dataclass(frozen=True, slots=True)
-class Rest:
-    """Reports since motion stands still.
-
-    Parameters
-    ----------
-    since_s : float
-        Time of the last step.
-    block_s : float
-        When the present block began.
-    first, present : mapping of str to tuple of float
-        Sum and number of each cell's levels, in the first and the present block.
-    served : mapping of str to float
-        When each cell has served last.
-    heard_s : float
-        Time of the last report.
-    carried_nats : float
-        How much the levels speak for being carried on.
-    """
-
-    since_s: float
-    block_s: float = nan
-    first: Mapping[str, tuple[float, int]] = field(default_factory=dict)
-    present: Mapping[str, tuple[float, int]] = field(default_factory=dict)
-    served: Mapping[str, float] = field(default_factory=dict)
-    heard_s: float = nan
-    carried_nats: float = 0.0
-
-    def heard(self, time_s: float, rows: tuple[ReportRow, ...]) -> Rest:
-        """Add a report; a phone that was carried on stays so until a step is measured."""
-        if self.is_carried:
-            return self
-        cells = {row.cell for row in rows if row.role == SERVING and row.cell is not None}
-        recent = {cell: at_s for cell, at_s in self.served.items() if time_s - at_s <= _CELLS_S}
-        known, all_cells = max(len(recent), _CELLS_AT_REST), len(cells | recent.keys())
-        gone_s = time_s - self.heard_s if isfinite(self.heard_s) else 0.0
-        kept = max(self.carried_nats - _NATS_PER_S * gone_s, 0.0)
-        nats = min(kept + _NATS_PER_CELL * max(all_cells - known, 0), _CARRIED_NATS)
-        served = recent | dict.fromkeys(cells, time_s)
-        block_s, first, present = self.block_s, self.first, dict(self.present)
-        if not isfinite(block_s):
-            block_s = time_s
-        elif time_s - block_s >= _BLOCK_S:
-            nats = min(max(nats + _BLOCK_SHARE * _carried(first, present), 0.0), _CARRIED_NATS)
-            block_s, first, present = time_s, {**present, **first}, {}
-        for name, level_dbm in _levels(rows):
-            total, count = present.get(name, (0.0, 0))
-            present[name] = (total + level_dbm, count + 1)
-        return Rest(self.since_s, block_s, first, present, served, time_s, nats)
-
-    @property
-    def is_carried(self) -> bool:
-        """Whether the phone is carried on though no motion is reported."""
-        return self.carried_nats >= _CARRIED_NATS
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,48 +243,24 @@ def _repeated(watch: SensorWatch, moved_m: float, radio: tuple[ReportRow, ...]) 
     if not _equal(radio, watch.report):
         return 0.0
     # Beyond the end of its scale a level stays the same anywhere.
-    levels = min(len(_levels(radio)), _MOST_ROWS)
+    levels = min(len(levels_of(radio)), _MOST_ROWS)
     each = min(_NATS_PER_M * moved_m, _NATS_PER_REPEAT)
     return watch.repeated_nats + levels * each if levels else 0.0
 
 
 def _equal(report: tuple[ReportRow, ...], before: tuple[ReportRow, ...]) -> bool:
-    # Nearly all pairs differ in their first rows.
-    return len(report) == len(before) and all(
-        row is other or _key(row) == _key(other) for row, other in zip(report, before, strict=True)
-    )
+    if len(report) != len(before):
+        return False
+    for row, other in zip(report, before, strict=True):
+        level_dbm, other_dbm = row.level_dbm, other.level_dbm
+        # Nearly all pairs differ in the level of their first rows.
+        if level_dbm != other_dbm and (isfinite(level_dbm) or isfinite(other_dbm)):
+            return False
+        if row is not other and _key(row) != _key(other):
+            return False
+    return True
 
 
 def _key(row: ReportRow) -> tuple[object, ...]:
     measured = [x if isfinite(x) else None for x in (row.level_dbm, row.timing_advance)]
     return row.role, row.cell, row.arfcn, row.bsic, row.censored, *measured
-
-
-def _levels(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:
-    """Return the levels of a report by their cells."""
-    return [
-        (row.cell if row.cell is not None else f"{row.arfcn}/{row.bsic}", row.level_dbm)
-        for row in rows
-        if isfinite(row.level_dbm) and row.censored == 0
-    ]
-
-
-def _carried(first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[float, int]]) -> float:
-    """Return the log-likelihood ratio of "elsewhere" to "still there", by the levels of both."""
-    changes = [
-        now[name][0] / now[name][1] - first[name][0] / first[name][1]
-        for name in now
-        if name in first
-    ]
-    if not changes:
-        return 0.0
-    return _log_density(changes, _ELSEWHERE_DB) - _log_density(changes, _AT_REST_DB)
-
-
-def _log_density(changes_db: list[float], sd_db: float) -> float:
-    """Return the log density of changes that share an error, up to a constant."""
-    count, mean = len(changes_db), sum(changes_db) / len(changes_db)
-    apart = sum((change - mean) ** 2 for change in changes_db)
-    shared_db2 = sd_db**2 + count * _ALL_DB**2
-    exponent = apart / sd_db**2 + count * mean**2 / shared_db2
-    return -0.5 * exponent - (count - 1) * log(sd_db) - 0.5 * log(shared_db2)

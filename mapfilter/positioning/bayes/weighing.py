@@ -28,7 +28,7 @@ from mapfilter.positioning.bayes.evidence import (
     RadioReading,
     joined,
 )
-from mapfilter.positioning.bayes.model import Start
+from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
