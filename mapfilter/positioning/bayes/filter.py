@@ -206,7 +206,9 @@ class BayesPositioner(Filter[BayesState]):
         state = small.begin_at(west, south, 1.0, rng)
         state, _ = small.step(state, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
         if state.belief is not None and model.area.cell_ids:
-            small.beliefs.by_compass[True].update(state.belief, _every_kind(), rng)
+            update, reading = small.beliefs.by_compass[True].update, _every_kind()
+            belief, _ = update(state.belief, reading, rng)
+            update(belief, replace(reading, length_m=5.0, tracked=True), rng)
 
     def smoother(self) -> BayesSmoother | None:
         """Return a new smoother if positions are to be smoothed."""
