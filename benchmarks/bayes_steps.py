@@ -12,6 +12,7 @@ import resource
 import time
 from dataclasses import replace
 from math import pi
+from multiprocessing import Process
 from pathlib import Path
 from statistics import median
 
@@ -26,7 +27,7 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, epochs
 from mapfilter.positioning.filter import locate, usable_part
 from mapfilter.tracks.log import TrackLog, make_log
-from mapfilter.tracks.store import read_log
+from mapfilter.tracks.store import read_log, write_log
 
 _DAY = 86_400
 _STOOD = 600
@@ -73,8 +74,13 @@ def day_of(log: TrackLog) -> TrackLog:
         pd.concat([table.assign(time_s=table["time_s"] + 2 * end_s * k) for k in repeats])
         for table in both
     ]
-    motion, radio = (table[table["time_s"] < _DAY] for table in tables)
+    motion, radio = (table[table["time_s"] <= _DAY] for table in tables)
     return make_log(log.crs, motion=motion, radio=radio)
+
+
+def write_day(walk: Path, folder: Path) -> None:
+    """Write the log of a day beside a walk."""
+    write_log(day_of(read_log(walk)), folder)
 
 
 def main() -> None:
@@ -85,9 +91,15 @@ def main() -> None:
     arguments.add_argument("--day", action="store_true")
     given = arguments.parse_args()
     filter_ = BayesFilter().over(open_database(given.demo / "database"))
-    log = read_log(next((given.demo / "journeys").iterdir()))
+    walk = next((given.demo / "journeys").iterdir())
     if given.day:
-        day = day_of(log)
+        folder = given.demo / "day"
+        if not folder.exists():
+            # In another process, as it takes more memory than the filter.
+            made = Process(target=write_day, args=(walk, folder))
+            made.start()
+            made.join()
+        day = read_log(folder)
         before_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         found = locate(day, filter_, np.random.default_rng(7))
         most_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -97,7 +109,7 @@ def main() -> None:
         )
         print(f"{most_mb:.0f} MB, {before_mb:.0f} MB before it")
         return
-    merged = epochs(usable_part(log, filter_)[0])
+    merged = epochs(usable_part(read_log(walk), filter_)[0])
     filter_.warm_up(merged)
     state, first = tracked_from(filter_, merged)
     rest = merged[first:]
