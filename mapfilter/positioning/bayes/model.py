@@ -178,6 +178,12 @@ class BayesModel:
         return self.area.flat_rough_db
 
     @property
+    def prediction(self) -> Prediction:
+        """Predicted levels of the area, as kernels take them."""
+        share = self.evidence.levels.roughness
+        return Prediction(self.area.flat_level_dbm, self.rough_db(), self._bands, share)
+
+    @property
     def _bands(self) -> int:
         return len(self.area.cell_ids) + 2
 
@@ -213,20 +219,20 @@ class BayesModel:
         self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
     ) -> Cloud:
         """Add the log-likelihood of levels and absent cells; return what hypotheses keep now."""
-        errors, area, report = self.evidence.levels, self.area, reading.levels
+        errors, report = self.evidence.levels, reading.levels
         assert report is not None
         memory, kept, weight = cloud.shared, cloud.kept, errors.weight
         if not self.remember and reading.length_m > 0:
             weight *= 1 - exp(-2 * reading.length_m / _NEW_M)
-        predicted = Prediction(area.flat_level_dbm, self.rough_db(), self._bands, errors.roughness)
+        predicted = self.prediction
         # Cells that nobody expects say nothing, neither for the belief nor against it.
-        report = report._replace(absent=_expected(predicted, pixel, report))
+        report = report._replace(absent=expected_absent(predicted, pixel, report))
         cells = np.concatenate([report.cell, report.absent])
         memory, kept = memory.with_cells(cells[: memory.slots], kept)
         if report.cell.size > memory.slots:
             slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
-        rough_db2 = _mean_rough_db2(predicted, pixel, report.cell)
+        rough_db2 = mean_rough_db2(predicted, pixel, report.cell)
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
         weigh_by_levels(kept, pixel, predicted, terms, weight, log_weight)
@@ -238,13 +244,13 @@ class BayesModel:
         return Cloud(cloud.state, kept, memory)
 
 
-def _mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:
+def mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:
     """Return the mean variance that the roughness of the prediction adds, for each cell."""
     squares = rough_squares(pixel, _every(pixel), predicted, cell)
     return np.asarray(predicted.share * (squares.sum(axis=1) / squares.shape[1]))
 
 
-def _expected(predicted: Prediction, pixel: Ints32, report: LevelReport) -> Ints32:
+def expected_absent(predicted: Prediction, pixel: Ints32, report: LevelReport) -> Ints32:
     """Return absent cells that hypotheses expect to be in the report, most expected first."""
     absent = report.absent
     if not absent.size:
