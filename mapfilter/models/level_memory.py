@@ -238,21 +238,6 @@ class LevelMemory:
         )
         return memory, LevelTerms(report.cell, slot, report.level_dbm, gain, variance, other)
 
-    def with_other(self, log_likelihood: float) -> LevelMemory:
-        """Return the memory with the log-likelihood of a report if all its cells are at fault."""
-        return LevelMemory(
-            self.errors,
-            self.site,
-            self.band,
-            self.prior_db2,
-            self.covariance_db2,
-            self.other_dbm,
-            self.other_db2,
-            self.used,
-            self.reports,
-            log_likelihood,
-        )
-
     def absence(self, report: LevelReport) -> LevelTerms:
         """Return the terms of absent cells that have slots; levels are the limit."""
         slot_of = self.slot_of

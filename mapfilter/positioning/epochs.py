@@ -13,9 +13,6 @@ from mapfilter.filters.contract import MotionStep
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SCHEMA, SERVING, TABLES
 
-_AT_ONCE = 20_000
-"""Rows of a table that are taken out of it at a time: as objects they are ten times as large."""
-
 
 @dataclass(frozen=True, slots=True)
 class ReportRow:
@@ -183,34 +180,29 @@ def make_epoch(time_s: float, rows: Mapping[str, Sequence[Sequence[Any]]]) -> Ep
 
 def _by_time(log: TrackLog, table: str, row: Callable[..., Any]) -> dict[float, list[Any]]:
     """Return what ``row`` makes of the columns of each row, by time."""
-    rows: pd.DataFrame = getattr(log, table)
-    names = [known.name for known in SCHEMA[table][1:] if not known.optional]
+    rows, columns = getattr(log, table), []
+    for column in (rows[known.name] for known in SCHEMA[table][1:] if not known.optional):
+        values = column.tolist()
+        if str(column.dtype) in ("Int64", "Int8", "object", "str", "string"):
+            values = [None if value is pd.NA or value != value else value for value in values]
+        else:
+            # One NaN for all, so that rows without a value are equal.
+            values = [nan if value != value else value for value in values]
+        columns.append(values)
     found: dict[float, list[Any]] = {}
     # Reports repeat themselves; equal rows are one object.
     made: dict[tuple[Any, ...], Any] = {}
-    for first in range(0, len(rows), _AT_ONCE):
-        part = rows.iloc[first : first + _AT_ONCE]
-        columns = [_values(part[name]) for name in names]
-        for time_s, *values in zip(part["time_s"].tolist(), *columns, strict=True):
-            key = tuple(values)
-            one = made.get(key)
-            if one is None:
-                one = made[key] = row(*values)
-            at = found.get(time_s)
-            if at is None:
-                found[time_s] = [one]
-            else:
-                at.append(one)
+    for time_s, *values in zip(rows["time_s"].tolist(), *columns, strict=True):
+        key = tuple(values)
+        one = made.get(key)
+        if one is None:
+            one = made[key] = row(*values)
+        at = found.get(time_s)
+        if at is None:
+            found[time_s] = [one]
+        else:
+            at.append(one)
     return found
-
-
-def _values(column: pd.Series) -> list[Any]:
-    """Return the values of a column, missing ones as None, or as one NaN where they are numbers."""
-    values = column.tolist()
-    if str(column.dtype) in ("Int64", "Int8", "object", "str", "string"):
-        return [None if value is pd.NA or value != value else value for value in values]
-    # One NaN for all, so that rows without a value are equal.
-    return [nan if value != value else value for value in values]
 
 
 def _report_row(

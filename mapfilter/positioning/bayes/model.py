@@ -6,7 +6,7 @@ map of ways, by radio reports and by the terms of other sources.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import exp, isfinite, log, nan, sqrt
 
@@ -240,7 +240,8 @@ class BayesModel:
             table = self._bound_table
             weigh_by_absence(kept, pixel, predicted, absent, table, weight, log_weight)
         other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
-        return Cloud(cloud.state, kept, memory.with_other(other))
+        memory = replace(memory, other_log_likelihood=other)
+        return Cloud(cloud.state, kept, memory)
 
 
 def mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:
