@@ -12,6 +12,7 @@ from mapfilter.positioning.fingerprints.locating import (
     LocatedReports,
     fit_locator,
     locate_by,
+    timed_share,
     usual_readings,
 )
 from mapfilter.positioning.fingerprints.options import AUTO, Method
@@ -62,5 +63,12 @@ def locate_reports(
     reports = reports_of_logs([log], plan) if isinstance(log, TrackLog) else log
     rng = np.random.default_rng(seed)
     strongest = usual_readings(reports)
-    fitted = fit_locator(known, method, rng, strongest=strongest, bounds=bounds_of(reports))
+    fitted = fit_locator(
+        known,
+        method,
+        rng,
+        strongest=strongest,
+        bounds=bounds_of(reports),
+        timed=timed_share(reports),
+    )
     return locate_by(fitted, reports)

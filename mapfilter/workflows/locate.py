@@ -21,6 +21,7 @@ from mapfilter.positioning.fingerprints.locating import (
     figures_of,
     fit_locator,
     locate_by,
+    timed_share,
     usual_readings,
 )
 from mapfilter.positioning.fingerprints.matches import locator
@@ -105,7 +106,15 @@ def run_locate(
     ensure_writable_folder(out)
     rng, strongest = np.random.default_rng(seed), usual_readings(reports)
     bounds = bounds_of(reports)
-    fitted = fit_locator(known, method, rng, strongest=strongest, bounds=bounds, progress=progress)
+    fitted = fit_locator(
+        known,
+        method,
+        rng,
+        strongest=strongest,
+        bounds=bounds,
+        timed=timed_share(reports),
+        progress=progress,
+    )
     located = locate_by(fitted, reports)
     baseline_m = _centroid_errors_m(fitted, reports)
     figures = figures_of(located)

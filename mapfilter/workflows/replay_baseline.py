@@ -18,6 +18,7 @@ from mapfilter.positioning.fingerprints.locating import (
     ReportLocator,
     fit_locator,
     locate_by,
+    timed_share,
     usual_readings,
 )
 from mapfilter.positioning.fingerprints.options import Probabilistic, method_name
@@ -92,7 +93,7 @@ class Baselines:
 
     def __init__(self, database: RadioRouteDatabase | None, seed: int) -> None:
         self._database, self._seed = database, seed
-        self._fitted: dict[tuple[int, Bounds], ReportLocator] = {}
+        self._fitted: dict[tuple[int, Bounds, float], ReportLocator] = {}
 
     @cached_property
     def _known(self) -> Reports | None:
@@ -115,22 +116,27 @@ class Baselines:
         count = min(of_truth.size, MOST_REPORTS)
         at = np.linspace(0, of_truth.size - 1, count).astype(np.int64)
         tried = placed.some(of_truth[at])
-        located = locate_by(self._locator(usual_readings(tried), bounds_of(tried)), tried)
+        located = locate_by(self._locator(tried), tried)
         known = np.isfinite(located.error_m)
         error_m = located.error_m[known]
         within: Bools = error_m <= located.radii_m[known, 2]
         return SingleReports(of_truth.size, count, error_m, within)
 
-    def _locator(self, strongest: int, bounds: Bounds) -> ReportLocator:
-        if (strongest, bounds) not in self._fitted:
+    def _locator(self, tried: Reports) -> ReportLocator:
+        strongest, bounds = usual_readings(tried), bounds_of(tried)
+        # In tenths, so that logs share locators.
+        timed = round(timed_share(tried), 1)
+        key = strongest, bounds, timed
+        if key not in self._fitted:
             assert self._known is not None
             rng = named_rng(self._seed, "replay", "single reports")
-            self._fitted[strongest, bounds] = fit_locator(
+            self._fitted[key] = fit_locator(
                 self._known,
                 Probabilistic(),
                 rng,
                 strongest=strongest,
                 validated=CALIBRATED_WITH,
                 bounds=bounds,
+                timed=timed,
             )
-        return self._fitted[strongest, bounds]
+        return self._fitted[key]

@@ -10,7 +10,6 @@ from sklearn.neighbors import NearestNeighbors
 
 from mapfilter.positioning.fingerprints.matches import Received, locator
 from mapfilter.positioning.fingerprints.matching import (
-    ByCell,
     Distances,
     LevelErrors,
     Likelihoods,
@@ -217,8 +216,7 @@ def test_a_mismatch_grows_with_strange_levels():
 )
 def test_sums_above_a_threshold_are_those_of_all_levels(readings, threshold_dbm):
     report, level_dbm = (np.array(column) for column in zip(*readings, strict=True))
-    by_cell = ByCell(7, np.array([0, len(report)]), report, np.arange(len(report)))
-    found = _Excess.of(by_cell, level_dbm.astype(float)).above(threshold_dbm)
+    found = _Excess.of(7, report, level_dbm.astype(float)).above(threshold_dbm)
     expected = [
         sum(max(level - threshold_dbm, 0.0) for at, level in readings if at == one)
         for one in range(7)

@@ -38,10 +38,18 @@ from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.fingerprints.locating import ReportLocator, fit_locator, locate_by
+from mapfilter.positioning.fingerprints.censoring import bounds_of
+from mapfilter.positioning.fingerprints.locating import (
+    ReportLocator,
+    fit_locator,
+    locate_by,
+    timed_share,
+    usual_readings,
+)
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.reported_power import reported_eirp_dbm
 from mapfilter.roads.corridors import Positions
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.identify import name_by_plan
@@ -50,10 +58,12 @@ from mapfilter.tracks.open_log import OpenOptions, open_log
 
 ZONE = "Europe/Brussels"
 LEAST_S = 60.0
-HEIGHT_M, EIRP_DBM = 30.0, 58.0
-"""Usual values: the table of towers has neither."""
+HEIGHT_M, CARRIER_DBM = 30.0, 58.0
+"""Usual values, the latter of a carrier's EIRP: the table of towers has neither."""
 _TOWERS = "tower_data/towers.json"
 _MARGIN_M, _BOX_MARGIN_M, _BOX_RESOLUTION_M = 300.0, 1500.0, 25.0
+_FLOOR_DBM = -130.0
+"""Phones report RSRP down to about this."""
 _LARGEST_BYTES = 10_000_000
 _BOX = "box"
 
@@ -80,14 +90,23 @@ def prepare(folder: Path, work: Path) -> None:
         towers = [Positions(at[:, 0], at[:, 1])]
         crs = next(iter(logs.values())).crs
         box = lattice_about(crs, towers, _BOX_MARGIN_M, _BOX_RESOLUTION_M)
-        predicted(plan, box, open_ground(box), work / place / _BOX)
+        predicted(plan, box, open_ground(box), work / place / _BOX, floor_dbm=_FLOOR_DBM)
 
 
 def read(task: Task) -> Place:
     """Read the walks of a place, and fit the locator to the levels predicted there."""
     logs, plan = _place_of(task.data, task.part)
     box = open_database(task.work / task.part / _BOX)
-    return Place(logs, plan, fit_locator(reports_of_database(box), "probabilistic"))
+    # As ``locate`` does: regions are those of reports with as many cells and timing advances.
+    reports = reports_of_logs([name_by_plan(log, plan) for log in logs.values()], plan)
+    fitted = fit_locator(
+        reports_of_database(box),
+        "probabilistic",
+        strongest=usual_readings(reports),
+        bounds=bounds_of(reports),
+        timed=timed_share(reports),
+    )
+    return Place(logs, plan, fitted)
 
 
 def judge(task: Task, shared: Place) -> Judged:
@@ -96,7 +115,8 @@ def judge(task: Task, shared: Place) -> Judged:
     others = [positions_of(log.truth) for log in shared.logs.values() if log is not own]
     folder = task.work / task.unit
     lattice = lattice_about(own.crs, others, _MARGIN_M)
-    predicted(near, lattice, corridor_routes(lattice, others), folder / "corridor")
+    routes = corridor_routes(lattice, others)
+    predicted(near, lattice, routes, folder / "corridor", floor_dbm=_FLOOR_DBM)
     rng = named_rng(task.seed, "belgium", task.unit)
     named = name_by_plan(own, near)
     located = locate_log(repeated(named), OpenMap.open(folder / "corridor"), rng)
@@ -210,6 +230,7 @@ def _site_errors_m(log: TrackLog, plan: CellPlan) -> np.ndarray:
 def _cell(name: str, row: dict[str, Any], crs: str) -> Cell:
     east, north = project(crs, [float(row["longitude"])], [float(row["latitude"])])
     frequency = float(str(row["downlink_frequency"]).split()[0])
+    assumed = ["height_m", "eirp_dbm", *(["azimuth_deg"] if row["azimuth"] is None else [])]
     return Cell(
         name,
         str(row["enb_id"]),
@@ -217,13 +238,14 @@ def _cell(name: str, row: dict[str, Any], crs: str) -> Cell:
         float(north[0]),
         HEIGHT_M,
         None if row["azimuth"] is None else float(row["azimuth"]),
-        EIRP_DBM,
+        reported_eirp_dbm(CARRIER_DBM, "LTE"),
         frequency,
         antenna="omni" if row["azimuth"] is None else "sector",
         ci=int(name),
         arfcn=int(row["earfcn"]),
         bsic=int(row["pci"]),
         technology="LTE",
+        assumed=" ".join(assumed),
     )
 
 

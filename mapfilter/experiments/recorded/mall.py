@@ -3,10 +3,11 @@
 The whole chain: the access points of the other walks are the radio map, each scan is located by
 itself (``wifi``), and the positions with their radii go as fixes into the Bayes map filter over
 the walkable part of the plan (``bayes``), and into a Kalman filter without a map (``ekf`` and
-``ekf-smoothed``), with steps and headings made of the raw sensors. Walks are judged at their
-surveyed waypoints, from the first scan on, claimed or not: most walks end before the map filter
-claims one. The later half of the walks is judged, in two parts, each by all other walks:
-parameters of steps and headings were chosen on walks of the first half.
+``ekf-smoothed``), with steps and headings made of the raw sensors. How much of the fixes' errors
+lasts, and for how long, is found where walks of the radio map are left out in turn. Walks are
+judged at their surveyed waypoints, from the first scan on, claimed or not: most walks end before
+the map filter claims one. The later half of the walks is judged, in two parts, each by all other
+walks: parameters of steps and headings were chosen on walks of the first half.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack
 from mapfilter.positioning.filter import locate
+from mapfilter.positioning.fingerprints.lasting import LastingError, lasting_error
 from mapfilter.positioning.fingerprints.locating import LocatedReports, fit_locator, locate_by
 from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.positioning.fingerprints.sources import reports_of_logs
@@ -87,6 +89,7 @@ def judge(task: Task, shared: tuple[dict[str, TrackLog], OpenMap]) -> Judged:
     own = later[int(task.unit.rpartition("-")[2]) - 1 :: PARTS]
     training = reports_of_logs([log for name, log in logs.items() if name not in own])
     fitted = {name: fit_locator(training, METHODS[name]) for name in (AUTO, BASELINE)}
+    lasting = lasting_error(fitted[AUTO])
     found: list[Found] = []
     journeys: dict[str, Journey] = {}
     worst_m: dict[str, float] = {}
@@ -106,7 +109,7 @@ def judge(task: Task, shared: tuple[dict[str, TrackLog], OpenMap]) -> Judged:
         found.append(Found("floor", "wifi", name, *none, *wifi, note=note))
         fixed = with_fixes(log, alone)
         first_s = float(fixed.gnss["time_s"].min()) if len(fixed.gnss) else inf
-        for method, located in _located(fixed, task, over).items():
+        for method, located in _located(fixed, task, over, lasting).items():
             scored = score_journey(
                 "floor", method, name, located.estimate, truth, seconds=located.filter_s
             )
@@ -130,15 +133,20 @@ def judge(task: Task, shared: tuple[dict[str, TrackLog], OpenMap]) -> Judged:
     return Judged(tuple(found), journeys)
 
 
-def _located(log: TrackLog, task: Task, over: OpenMap) -> dict[str, PositionedTrack]:
-    """Locate a walk with fixes by all filters."""
+def _located(
+    log: TrackLog, task: Task, over: OpenMap, lasting: LastingError | None
+) -> dict[str, PositionedTrack]:
+    """Locate a walk with fixes, of whose errors a part lasts, by all filters."""
+    kalman = KalmanFilter()
+    if lasting is not None:
+        kalman = replace(kalman, fix_lasting_m=lasting.sd_m, fix_lasting_s=lasting.memory_s)
 
     def rng() -> np.random.Generator:
         return named_rng(task.seed, "mall", task.unit, str(log.start_utc_s))
 
     found = {"bayes": locate_log(log, over, rng())}
     for name, smooth in (("ekf", False), ("ekf-smoothed", True)):
-        options, _ = fitted_to_log(KalmanFilter(smooth=smooth), log)
+        options, _ = fitted_to_log(replace(kalman, smooth=smooth), log)
         found[name] = locate(log, options.over_sites(CellPlan(log.crs, ())), rng())
     return found
 

@@ -158,7 +158,10 @@ def _neighbours(database: Reports, method: Neighbours, scale: Scale) -> Matcher:
 
 
 def _posterior(database: Reports, method: Probabilistic | SurveyMaps, floor_dbm: float) -> Matcher:
-    errors = LevelErrors(method.level_db, method.shared_db, method.absence_per_db, floor_dbm)
+    shared_db = method.shared_db
+    if database.planned is not None:
+        shared_db = float(np.hypot(shared_db, database.planned.common_db))
+    errors = LevelErrors(method.level_db, shared_db, method.absence_per_db, floor_dbm)
     likelihoods = Likelihoods.at(database, errors)
     out = np.log(max(method.outliers, np.finfo(np.float64).tiny))
     inlier = np.log(max(1 - method.outliers, np.finfo(np.float64).tiny))
@@ -186,6 +189,9 @@ def _timing(database: Reports, received: Received, sd_steps: float) -> Floats:
     found = np.zeros(len(database))
     if received.serving < 0 or np.isnan(received.timing_advance):
         return found
+    if database.planned is not None:
+        own = (received.serving, received.timing_advance)
+        return database.planned.log_timing(database.places, *own)
     apart = received.timing_advance - database.timing_advance
     same = (database.serving == received.serving) & np.isfinite(apart)
     found[same] = -0.5 * (apart[same] / sd_steps) ** 2

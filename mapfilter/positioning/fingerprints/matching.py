@@ -7,14 +7,14 @@ Torres-Sospedra et al., Expert Systems with Applications 42 (2015), 9263-9278.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from mapfilter._types import Floats, Ints, Ints8, Ints32
 from mapfilter.positioning.fingerprints.censoring import likely
+from mapfilter.positioning.fingerprints.planned import Planned
 from mapfilter.positioning.fingerprints.reports import Reports
 
 Representation = Literal["positive", "exponential", "powed"]
@@ -200,12 +200,13 @@ class _Excess:
     report: Ints
 
     @classmethod
-    def of(cls, by_cell: ByCell, level_dbm: Floats) -> _Excess:
+    def of(cls, reports: int, of_level: Ints, level_dbm: Floats) -> _Excess:
+        """Prepare levels, each of the report ``of_level``."""
         whole = np.floor(level_dbm).astype(np.int64)
         first, last = int(whole.min()), int(whole.max())
         order = np.argsort(whole, kind="stable")
         edges = np.searchsorted(whole[order], np.arange(first, last + 2))
-        level, report, reports = level_dbm[order], by_cell.report[order], by_cell.count
+        level, report = level_dbm[order], of_level[order]
         steps = last + 2 - first
         sums, count = np.zeros((steps, reports)), np.zeros((steps, reports), dtype=np.int32)
         for step in range(steps - 2, -1, -1):
@@ -250,6 +251,8 @@ class Likelihoods:
         Least of the variances.
     predicted : bool
         Whether the absence of a cell weaker than all that were reported is no evidence.
+    planned : Planned or None
+        With it, only cells that would have been measured with those of a report can be absent.
     """
 
     by_cell: ByCell
@@ -261,6 +264,8 @@ class Likelihoods:
     usual_dbm: Floats
     least_db2: float
     predicted: bool
+    planned: Planned | None = None
+    _prepared: dict[bytes, _Excess] = field(default_factory=dict)
 
     @classmethod
     def at(cls, reports: Reports, errors: LevelErrors) -> Likelihoods:
@@ -282,11 +287,21 @@ class Likelihoods:
             usual_dbm,
             least_db2,
             reports.predicted,
+            reports.planned,
         )
 
-    @cached_property
-    def _excess(self) -> _Excess:
-        return _Excess.of(self.by_cell, self.level_dbm)
+    def _excess(self, cell: Ints32) -> _Excess:
+        """Return the levels of cells that would have been reported with some."""
+        cells = len(self.by_cell.first) - 1
+        counts = np.ones(cells, np.bool_)
+        if self.planned is not None:
+            counts = self.planned.measured_with(cell)
+        key = counts.tobytes()
+        if key not in self._prepared:
+            kept = np.repeat(counts, np.diff(self.by_cell.first))
+            report, level_dbm = self.by_cell.report[kept], self.level_dbm[kept]
+            self._prepared[key] = _Excess.of(self.by_cell.count, report, level_dbm)
+        return self._prepared[key]
 
     def of(
         self, cell: Ints32, level_dbm: Floats, censored: Ints8 | None = None
@@ -307,7 +322,7 @@ class Likelihoods:
             # Phones report the strongest cells: the absence of weaker ones is no evidence.
             least_dbm = max(float(strength_dbm.min()), self.errors.floor_dbm)
             errors = replace(self.errors, floor_dbm=least_dbm)
-            absence = self.errors.absence_per_db * self._excess.above(least_dbm)
+            absence = self.errors.absence_per_db * self._excess(cell).above(least_dbm)
         received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
         least_db2 = self.least_db2

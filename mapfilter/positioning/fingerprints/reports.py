@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints, Ints8, Ints32
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import same_crs
+from mapfilter.positioning.fingerprints.planned import Planned
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.scans import SCAN_S, advertised, scan_of_rows
 from mapfilter.tracks.schema import SERVING
@@ -59,6 +60,8 @@ class Reports:
         What was left out, and why.
     predicted : bool
         Whether the levels are those of a map, of all cells; phones report the strongest only.
+    planned : Planned or None
+        What the plan states of the cells of such a map.
     """
 
     crs: str
@@ -76,6 +79,7 @@ class Reports:
     block: Ints32
     notes: tuple[str, ...] = ()
     predicted: bool = False
+    planned: Planned | None = None
 
     def __len__(self) -> int:
         return len(self.first) - 1
@@ -125,6 +129,7 @@ class Reports:
             self.block[chosen],
             (*self.notes, *notes),
             self.predicted,
+            self.planned,
         )
 
     def placed(self) -> Reports:
@@ -174,6 +179,10 @@ class Reports:
             self.notes,
             self.predicted,
         )
+        if self.planned is not None:
+            own = {cell_id: i for i, cell_id in enumerate(self.cell_ids)}
+            kept = np.array([own[cell_id] for cell_id in cell_ids], dtype=np.int64)
+            found = replace(found, planned=self.planned.some(kept))
         return found, unknown
 
 
