@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import Any
@@ -15,7 +15,7 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import same_crs, unproject
-from mapfilter.positioning.fingerprints.matches import Locator, Position, Received, locator
+from mapfilter.positioning.fingerprints.matches import Position, Received, locator
 from mapfilter.positioning.fingerprints.options import (
     AUTO,
     CANDIDATES,
@@ -84,7 +84,7 @@ class ReportLocator:
 
     method: Method
     database: Reports
-    locator: Locator
+    locator: Callable[[Received], Position]
     regions: Regions | None
     validations: tuple[Validation, ...]
 
@@ -335,7 +335,9 @@ def folds_of(database: Reports) -> tuple[Ints, str]:
     return scattered, f"squares of {side_m:.3g} m"
 
 
-def _positions(by: Locator, reports: Reports, index: Sequence[int] | Ints) -> tuple[Floats, Bools]:
+def _positions(
+    by: Callable[[Received], Position], reports: Reports, index: Sequence[int] | Ints
+) -> tuple[Floats, Bools]:
     """Return the positions of reports, shape (L, 4), and which of the reports have one."""
     found: list[Position] = []
     located = np.zeros(len(index), dtype=np.bool_)

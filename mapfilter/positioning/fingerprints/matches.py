@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -117,6 +118,34 @@ def locator(method: Method, database: Reports) -> Locator:
     if isinstance(method, SurveyMaps):
         database = surveyed_levels(database)
     return Locator(places, _posterior(database, method, floor_dbm), median=True)
+
+
+def located_once(
+    locate: Callable[[Received], Position], most: int = 1 << 14
+) -> Callable[[Received], Position]:
+    """Return a function that locates equal reports once; the latest ``most`` are kept.
+
+    Journeys that differ in their dead reckoning alone have the same reports.
+    """
+
+    # Arrays are no keys; as bytes missing levels are equal, too.
+    @lru_cache(most)
+    def position(cell: bytes, level_dbm: bytes, serving: int, advance: bytes) -> Position:
+        received = Received(
+            np.frombuffer(cell, np.int32),
+            np.frombuffer(level_dbm, np.float64),
+            serving,
+            float(np.frombuffer(advance, np.float64)[0]),
+        )
+        return locate(received)
+
+    def once(received: Received) -> Position:
+        cell = received.cell.astype(np.int32, copy=False).tobytes()
+        level_dbm = received.level_dbm.astype(np.float64, copy=False).tobytes()
+        advance = np.float64(received.timing_advance).tobytes()
+        return position(cell, level_dbm, received.serving, advance)
+
+    return once
 
 
 def _centroid(database: Reports) -> Matcher:
