@@ -8,7 +8,7 @@ from made_fingerprints import reports_at
 from scipy.stats import multivariate_normal
 from sklearn.neighbors import NearestNeighbors
 
-from mapfilter.positioning.fingerprints.matches import Received, locator
+from mapfilter.positioning.fingerprints.matches import Received, located_once, locator
 from mapfilter.positioning.fingerprints.matching import (
     ByCell,
     Distances,
@@ -223,3 +223,30 @@ def test_sums_above_a_threshold_are_those_of_all_levels(readings, threshold_dbm)
         for one in range(7)
     ]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_equal_reports_are_located_once():
+    places, level, names = made(4)
+    reports = reports_at(places, level, names=names).placed()
+    plain, asked = locator(Probabilistic(), reports), []
+
+    def counted(received):
+        asked.append(received)
+        return plain(received)
+
+    once = located_once(counted)
+    cell, dbm = reports.readings(0)
+    unknown = np.where(np.arange(len(dbm)) == 0, np.nan, dbm)
+    different = [
+        Received(cell, dbm, -1, np.nan),
+        Received(cell, dbm, int(cell[0]), np.nan),
+        Received(cell, dbm, int(cell[0]), 1.0),
+        Received(cell, dbm + 1.0, -1, np.nan),
+        Received(cell, unknown, -1, np.nan),
+        Received(*reports.readings(1), -1, np.nan),
+    ]
+    for _ in range(2):
+        for one in different:
+            copy = one._replace(cell=one.cell.copy(), level_dbm=one.level_dbm.copy())
+            assert once(copy) == plain(one)
+    assert len(asked) == len(different)
