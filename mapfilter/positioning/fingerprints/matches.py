@@ -219,8 +219,10 @@ def _timing(database: Reports, received: Received, sd_steps: float) -> Floats:
 def _geometric_median(places: Floats, weight: Floats, start: Floats) -> Floats:
     """Return the place with the least mean distance to weighted places (Weiszfeld 1937)."""
     at = start
+    # Sums over an axis of two are slow.
+    east_m, north_m = np.ascontiguousarray(places.T)
     for _ in range(_ROUNDS):
-        distance_m = np.sqrt(np.sum((places - at) ** 2, axis=1) + _SOFT_M**2)
+        distance_m = np.sqrt((east_m - at[0]) ** 2 + (north_m - at[1]) ** 2 + _SOFT_M**2)
         pull = weight / distance_m
         new = pull @ places / pull.sum()
         if np.abs(new - at).max() < _SOFT_M / 100:

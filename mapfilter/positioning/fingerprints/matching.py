@@ -292,6 +292,14 @@ class Likelihoods:
     def _excess(self) -> _Excess:
         return _Excess.of(self.by_cell, self.level_dbm)
 
+    @cached_property
+    def _log_variance(self) -> Floats:
+        return np.asarray(np.log(self.variance_db2 / self.least_db2))
+
+    @cached_property
+    def _is_whole(self) -> bool:
+        return bool(np.isfinite(self.level_dbm).all())
+
     def of(self, cell: Ints32, level_dbm: Floats) -> tuple[Floats, Floats]:
         """Return log-likelihoods of one report: of which cells it has, and of their levels, (R,).
 
@@ -310,7 +318,6 @@ class Likelihoods:
             absence = self.errors.absence_per_db * self._excess.above(least_dbm)
         received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
-        least_db2 = self.least_db2
         for one, dbm, own_loss in zip(cell.tolist(), level_dbm.tolist(), own.tolist(), strict=True):
             where = self.by_cell.of_cell(one)
             report = self.by_cell.report[where]
@@ -319,12 +326,15 @@ class Likelihoods:
             if np.isnan(dbm):
                 continue
             apart_db, variance_db2 = dbm - self.level_dbm[where], self.variance_db2[where]
-            known = np.isfinite(apart_db)
-            report, apart_db, variance_db2 = report[known], apart_db[known], variance_db2[known]
+            log_variance = self._log_variance[where]
+            if not self._is_whole:
+                known = np.isfinite(apart_db)
+                report, apart_db, log_variance = report[known], apart_db[known], log_variance[known]
+                variance_db2 = variance_db2[known]
             s0[report] += 1 / variance_db2
             s1[report] += apart_db / variance_db2
             s2[report] += apart_db**2 / variance_db2
-            logs[report] += np.log(variance_db2 / least_db2)
+            logs[report] += log_variance
         shared_db2 = self.errors.shared_db**2
         explained = s1**2 * shared_db2 / (1 + shared_db2 * s0)
         return received, -0.5 * (s2 - explained + np.log1p(shared_db2 * s0) + logs)
