@@ -39,6 +39,8 @@ rmtree(Path(__file__).parent / "api", ignore_errors=True)
 autosummary_generate = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+# There are none, and looking for them parses every source again.
+autodoc_use_type_comments = False
 autodoc_default_options = {"members": True}
 _ALIASES = "ArrayLike Bools Bounds Floats Floats32 Geometries Ints Ints32 Levels Progress Rows"
 autodoc_type_aliases = {name: name for name in _ALIASES.split()}
