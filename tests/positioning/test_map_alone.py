@@ -81,6 +81,7 @@ def test_a_drive_of_another_town_never_converges(vehicle, seed):
     assert not found.any()
 
 
+@pytest.mark.long
 def test_a_road_raster_gives_the_result_of_its_ways(town, vehicle, tmp_path):
     side_m = 1.0
     fine = replace(LATTICE, resolution_m=side_m, rows=5 * LATTICE.rows, cols=5 * LATTICE.cols)
