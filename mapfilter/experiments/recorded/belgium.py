@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import nan
+from math import log10, nan
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ from mapfilter.experiments.recorded.ground import (
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
+from mapfilter.experiments.recorded.worst_report import WorstReport, worst_report
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import TrackEstimate
@@ -51,10 +52,14 @@ from mapfilter.tracks.open_log import OpenOptions, open_log
 ZONE = "Europe/Brussels"
 LEAST_S = 60.0
 HEIGHT_M, EIRP_DBM = 30.0, 58.0
-"""Usual values: the table of towers has neither."""
+"""Usual values, of the whole carrier: the table of towers has neither."""
+WIDE_MHZ, NARROW_MHZ = 20.0, 10.0
+"""Usual bandwidths above and below 1 GHz, where the table has none."""
 _TOWERS = "tower_data/towers.json"
 _MARGIN_M, _BOX_MARGIN_M, _BOX_RESOLUTION_M = 300.0, 1500.0, 25.0
 _LARGEST_BYTES = 10_000_000
+_BLOCKS_PER_MHZ = 5
+"""Resource blocks of LTE, of 12 subcarriers each: 100 in 20 MHz."""
 _BOX = "box"
 
 
@@ -107,8 +112,9 @@ def judge(task: Task, shared: Place) -> Judged:
     named_in_time = bool(delay_s <= LEAST_S) and not claimed_wrongly(located.estimate, truth)
     note = f"stale radio named after {delay_s:.0f} s. {live.note}"
     live = replace(live, success=named_in_time, seconds=located.filter_s, note=note)
-    alone = _fresh_reports(task, named, shared)
-    return Judged((live, alone), {"live": Journey(located.estimate, truth, folder / "corridor")})
+    alone, worst = _fresh_reports(task, named, shared)
+    journeys = {"live": Journey(located.estimate, truth, folder / "corridor")}
+    return Judged((live, alone), journeys, {} if worst is None else {alone.method: worst})
 
 
 def read_walk(file: Path) -> TrackLog:
@@ -170,7 +176,7 @@ def _place_of(folder: Path, place: str) -> tuple[dict[str, TrackLog], CellPlan]:
     return logs, _near(plan, [positions_of(log.truth) for log in logs.values()])
 
 
-def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
+def _fresh_reports(task: Task, log: TrackLog, place: Place) -> tuple[Found, WorstReport | None]:
     """Locate each report that was measured by itself, anywhere around the towers."""
     # Without a position by GNSS at its time a report is not scored.
     reports = reports_of_logs([log], place.plan)
@@ -178,7 +184,7 @@ def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
     known = np.isfinite(located.error_m)
     sites = _site_errors_m(log, place.plan)
     held = (located.error_m <= located.radii_m[:, 2])[known]
-    return Found(
+    found = Found(
         task.part,
         "locate",
         task.unit,
@@ -190,6 +196,7 @@ def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
         sites,
         note=f"{int(known.sum())} reports were measured",
     )
+    return found, worst_report(reports, located, place.locator.database)
 
 
 def _site_errors_m(log: TrackLog, plan: CellPlan) -> np.ndarray:
@@ -217,7 +224,7 @@ def _cell(name: str, row: dict[str, Any], crs: str) -> Cell:
         float(north[0]),
         HEIGHT_M,
         None if row["azimuth"] is None else float(row["azimuth"]),
-        EIRP_DBM,
+        EIRP_DBM - 10 * log10(_resource_elements(row, frequency)),
         frequency,
         antenna="omni" if row["azimuth"] is None else "sector",
         ci=int(name),
@@ -225,6 +232,13 @@ def _cell(name: str, row: dict[str, Any], crs: str) -> Cell:
         bsic=int(row["pci"]),
         technology="LTE",
     )
+
+
+def _resource_elements(row: dict[str, Any], frequency_mhz: float) -> float:
+    """Return the subcarriers of a carrier: RSRP, which phones report, is the power of one."""
+    usual = WIDE_MHZ if frequency_mhz > 1000 else NARROW_MHZ
+    stated = row.get("bandwidth_mhz") or str(row.get("bandwidth") or usual).split()[0]
+    return 12 * _BLOCKS_PER_MHZ * float(stated)
 
 
 def _near(plan: CellPlan, tracks: Sequence[Positions]) -> CellPlan:

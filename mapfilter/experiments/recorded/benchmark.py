@@ -10,6 +10,7 @@ from typing import Any
 from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.rows import Found
+from mapfilter.experiments.recorded.worst_report import WorstReport
 from mapfilter.positioning.estimate import TrackEstimate
 
 
@@ -54,10 +55,14 @@ class Journey:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Results of one task by all methods, and the journeys of some of them, by method."""
+    """Results of one task by all methods, and of some of them, by method, what pictures show.
+
+    That is a journey, or the worst of many single reports.
+    """
 
     found: tuple[Found, ...]
     journeys: Mapping[str, Journey] = field(default_factory=dict)
+    reports: Mapping[str, WorstReport] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
