@@ -154,12 +154,13 @@ def read_worst_report(file: Path) -> WorstReport | None:
         return None
     read = read_sealed(file)
     try:
-        arrays = {
+        values: dict[str, Any] = {
             name: np.array(read[name], dtype=np.float64)
             for name in ("truth_m", "place_m", "map_m", "places_m", "errors_m")
         }
-        numbers = {name: float(read[name]) for name in ("error_m", "radius_m")}
-        return WorstReport(int(read["number"]), **numbers, **arrays, causes=tuple(read["causes"]))
+        values |= {name: float(read[name]) for name in ("error_m", "radius_m")}
+        values |= {"number": int(read["number"]), "causes": tuple(read["causes"])}
+        return WorstReport(**values)
     except (KeyError, TypeError, ValueError) as error:
         raise fail(StoreError, str(file), "a worst report", error, "cut off") from error
 
