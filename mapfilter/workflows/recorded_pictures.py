@@ -87,7 +87,7 @@ def draw_journey(
     if story is None:
         return None
     ground, points_m = _ground(journey)
-    causes = causes_of(journey.estimate, journey.truth, story, points_m)
+    causes = causes_of(journey.estimate, journey.truth, story, points_m, journey.fixes)
     drawn = plot_worst_run(
         journey.estimate,
         journey.truth,

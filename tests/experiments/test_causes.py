@@ -69,6 +69,16 @@ def test_readings_that_were_not_used_in_the_stretch_alone():
     )
 
 
+def test_fixes_that_are_off_themselves():
+    found, truth = _journey()
+    fixes = np.column_stack([truth.time_s, truth.east_m, truth.north_m + 40.0])[::10]
+    story = explain(found, truth)
+    causes = causes_of(found, truth, story, None, fixes)
+    assert "the 6 fixes there are themselves 40 m off (median)" in causes
+    right = fixes - [0.0, 0.0, 30.0]
+    assert not any("fixes" in one for one in causes_of(found, truth, story, None, right))
+
+
 def test_satellites_that_contradict():
     unused = tuple(
         UnusedReading(float(t), "pseudorange", name, Reason.REJECTED_BY_EVIDENCE)

@@ -24,6 +24,7 @@ _STRAIGHT_DEG, _LEAST_STRAIGHT_M = 60.0, 150.0
 _ALONG, _LEAST_ALONG_M = 0.8, 5.0
 _AMBIGUOUS = 0.01
 _SHORT_M = 300.0
+_FIX_SHARE, _EARLIER_S = 0.5, 10.0
 _UNKNOWN = (Reason.UNKNOWN_CELL, Reason.NO_CELL, Reason.NO_POINTS_IN_CELL, Reason.AMBIGUOUS_CELL)
 _MOTIONLESS = (Reason.MOTION_MISSING, Reason.MOTION_STUCK, Reason.HEADING_STUCK, Reason.NO_STEP)
 _REFUSED = (Reason.REJECTED_BY_EVIDENCE, Reason.ON_PROBATION)
@@ -38,6 +39,7 @@ class _Stretch:
     worst: WorstEpoch
     inside: Bools
     map_m: Floats | None
+    fixes: Floats | None
 
     @property
     def way_m(self) -> float:
@@ -52,7 +54,11 @@ class _Stretch:
 
 
 def causes_of(
-    estimate: TrackEstimate, truth: Truth, worst: WorstEpoch, map_m: Floats | None = None
+    estimate: TrackEstimate,
+    truth: Truth,
+    worst: WorstEpoch,
+    map_m: Floats | None = None,
+    fixes: Floats | None = None,
 ) -> tuple[str, ...]:
     """Return what can have caused the worst stretch of a journey, in words; empty if no rule holds.
 
@@ -65,6 +71,8 @@ def causes_of(
         From :func:`mapfilter.experiments.benchmarks.worst_run.explain`.
     map_m : (N, 2) array, optional
         East and north of the map's points in the CRS of the estimate, m.
+    fixes : (K, 3) array, optional
+        Time, east and north of the fixes that the filter was given.
     """
     gone_m = truth.distance_at(estimate.time_s)
     inside = (gone_m >= gone_m[worst.first] - _BEFORE_M) & (gone_m <= gone_m[worst.last])
@@ -72,7 +80,7 @@ def causes_of(
         inside = np.isfinite(truth.at(estimate.time_s)[0])
     if not inside.any():
         return ()
-    stretch = _Stretch(estimate, truth, worst, inside, map_m)
+    stretch = _Stretch(estimate, truth, worst, inside, map_m, fixes)
     return tuple(filter(None, (rule(stretch) for rule in _RULES)))
 
 
@@ -114,6 +122,23 @@ def _silent(stretch: _Stretch) -> str:
 def _motionless(stretch: _Stretch) -> str:
     share = stretch.share(_MOTIONLESS)
     return f"motion missing or stuck in {100 * share:.0f} % of the epochs" if share >= 0.1 else ""
+
+
+def _wrong_fixes(stretch: _Stretch) -> str:
+    """Return how far off the fixes of the stretch are, where that is half of the error or more."""
+    if stretch.fixes is None or not len(stretch.fixes):
+        return ""
+    time_s = stretch.estimate.time_s[stretch.inside]
+    errors_m = position_errors_m(stretch.estimate, stretch.truth)
+    own_m = float(errors_m[stretch.worst.index])
+    at_s = stretch.fixes[:, 0]
+    given = stretch.fixes[(at_s >= time_s[0] - _EARLIER_S) & (at_s <= time_s[-1])]
+    east, north = stretch.truth.at(given[:, 0])
+    off_m = np.hypot(given[:, 1] - east, given[:, 2] - north)
+    off_m = off_m[np.isfinite(off_m)]
+    if not off_m.size or not np.median(off_m) >= _FIX_SHARE * own_m:
+        return ""
+    return f"the {off_m.size} fixes there are themselves {np.median(off_m):.0f} m off (median)"
 
 
 def _refused(stretch: _Stretch) -> str:
@@ -179,6 +204,7 @@ _RULES: tuple[Callable[[_Stretch], str], ...] = (
     _unknown,
     _silent,
     _motionless,
+    _wrong_fixes,
     _refused,
     _straight,
     _short,

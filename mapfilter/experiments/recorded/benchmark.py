@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.rows import Found
@@ -46,11 +47,20 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Journey:
-    """A located journey and its truth, for pictures; and the database it was located over."""
+    """A located journey and its truth, for pictures; and what it was located by.
+
+    Parameters
+    ----------
+    database : Path, optional
+        Its map.
+    fixes : (K, 3) array, optional
+        Time, east and north of the fixes that the filter was given.
+    """
 
     estimate: TrackEstimate
     truth: Truth
     database: Path | None = None
+    fixes: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,9 @@ def write_judged(judged: Judged, folder: Path, task: Task) -> None:
         write_estimate(journey.estimate, _estimate_file(folder, task, method))
         truth = {name: getattr(journey.truth, name).tolist() for name in _TRUTH}
         database = None if journey.database is None else str(journey.database)
-        write_sealed(_truth_file(folder, task, method), {"truth": truth, "database": database})
+        fixes = None if journey.fixes is None else journey.fixes.tolist()
+        kept = {"truth": truth, "database": database, "fixes": fixes}
+        write_sealed(_truth_file(folder, task, method), kept)
     for method, report in judged.reports.items():
         write_worst_report(report, _report_file(folder, task, method))
     write_found(judged.found, scores_file(folder, task))
@@ -56,9 +58,11 @@ def read_journey(folder: Path, task: Task, method: str) -> Journey | None:
     try:
         truth = Truth(*(np.array(read["truth"][name], dtype=np.float64) for name in _TRUTH))
         database = None if read["database"] is None else Path(read["database"])
+        fixes = read.get("fixes")
+        given = None if fixes is None else np.array(fixes, dtype=np.float64).reshape(-1, 3)
     except (KeyError, TypeError, ValueError) as error:
         raise fail(StoreError, str(file), "a true track", error, "cut off") from error
-    return Journey(read_estimate(_estimate_file(folder, task, method)), truth, database)
+    return Journey(read_estimate(_estimate_file(folder, task, method)), truth, database, given)
 
 
 def read_report(folder: Path, task: Task, method: str) -> WorstReport | None:

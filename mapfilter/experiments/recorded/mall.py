@@ -135,7 +135,8 @@ def judge(task: Task, shared: tuple[dict[str, TrackLog], OpenMap]) -> Judged:
             located_m = errors_m[np.isfinite(errors_m)]
             if located_m.size and located_m.max() > worst_m.get(method, -1.0):
                 worst_m[method] = float(located_m.max())
-                journeys[method] = Journey(located.estimate, truth, over.path)
+                given = fixed.gnss[["time_s", "east_m", "north_m"]].to_numpy()
+                journeys[method] = Journey(located.estimate, truth, over.path, given)
     return Judged(tuple(found), journeys)
 
 
