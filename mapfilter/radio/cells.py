@@ -40,7 +40,8 @@ class Cell:
     azimuth_deg : float or None
         Boresight, degrees clockwise from true north; None for an omnidirectional antenna.
     eirp_dbm : float
-        Radiated power at boresight, antenna gain included.
+        Radiated power at boresight, antenna gain included. For LTE and NR, whose phones report
+        RSRP, that of one subcarrier: of a carrier of 20 MHz 30.8 dB less than the whole.
     antenna : str
         ``"sector"``, ``"omni"``, ``"3gpp"`` or the name of a pattern file.
     downtilt_deg : float
