@@ -44,8 +44,8 @@ def test_a_way_off_the_map():
 @pytest.mark.parametrize(
     ("reason", "words"),
     [
-        (Reason.STALE_RADIO, "radio frozen: stale in 100 % of the epochs"),
-        (Reason.UNKNOWN_CELL, "the database does not have the serving cell in 100 %"),
+        (Reason.STALE_RADIO, "radio frozen: 100 % of the reports are stale"),
+        (Reason.UNKNOWN_CELL, "the database does not have the serving cell of 100 %"),
         (Reason.MOTION_STUCK, "motion missing or stuck in 100 % of the epochs"),
     ],
 )
@@ -53,6 +53,15 @@ def test_reasons_of_the_epochs(reason, words):
     causes = _causes(*_journey(reasons=[reason] * COUNT))
     assert any(one.startswith(words) for one in causes)
     assert not any(one.startswith(words) for one in _causes(*_journey()))
+
+
+def test_epochs_without_a_report_do_not_count():
+    reasons = [Reason.STALE_RADIO if i % 9 == 0 else Reason.NO_READING for i in range(COUNT)]
+    causes = _causes(*_journey(reasons=reasons))
+    assert "radio frozen: 100 % of the reports are stale" in causes
+    assert not any(
+        "radio" in one for one in _causes(*_journey(reasons=[Reason.NO_READING] * COUNT))
+    )
 
 
 def test_readings_that_were_not_used_in_the_stretch_alone():

@@ -26,6 +26,7 @@ _AMBIGUOUS = 0.01
 _SHORT_M = 300.0
 _FIX_SHARE, _EARLIER_S = 0.5, 10.0
 _UNKNOWN = (Reason.UNKNOWN_CELL, Reason.NO_CELL, Reason.NO_POINTS_IN_CELL, Reason.AMBIGUOUS_CELL)
+_NO_REPORT = (Reason.NO_READING, Reason.NOT_MOVED_ENOUGH)
 _MOTIONLESS = (Reason.MOTION_MISSING, Reason.MOTION_STUCK, Reason.HEADING_STUCK, Reason.NO_STEP)
 _REFUSED = (Reason.REJECTED_BY_EVIDENCE, Reason.ON_PROBATION)
 
@@ -48,9 +49,17 @@ class _Stretch:
         return float(gone_m[-1] - gone_m[0])
 
     def share(self, reasons: tuple[Reason, ...]) -> float:
-        """Return the share of the stretch's epochs with one of some reasons."""
+        """Return the share of the stretch's epochs with one of some reasons; 0 without any."""
+        return self._share_of(reasons, self.inside)
+
+    def share_of_reports(self, reasons: tuple[Reason, ...]) -> float:
+        """Return the share of the stretch's radio reports with one of some reasons."""
+        report = np.array([why not in _NO_REPORT for why in self.estimate.reason])
+        return self._share_of(reasons, self.inside & report)
+
+    def _share_of(self, reasons: tuple[Reason, ...], which: Bools) -> float:
         found = np.array([why in reasons for why in self.estimate.reason])
-        return float(np.mean(found[self.inside]))
+        return float(np.mean(found[which])) if which.any() else 0.0
 
 
 def causes_of(
@@ -100,15 +109,15 @@ def _off_map(stretch: _Stretch) -> str:
 
 
 def _frozen(stretch: _Stretch) -> str:
-    share = stretch.share((Reason.STALE_RADIO,))
-    return f"radio frozen: stale in {100 * share:.0f} % of the epochs" if share >= 0.5 else ""
+    share = stretch.share_of_reports((Reason.STALE_RADIO,))
+    return f"radio frozen: {100 * share:.0f} % of the reports are stale" if share >= 0.5 else ""
 
 
 def _unknown(stretch: _Stretch) -> str:
-    share = stretch.share(_UNKNOWN)
+    share = stretch.share_of_reports(_UNKNOWN)
     if share < _LEAST_SHARE:
         return ""
-    return f"the database does not have the serving cell in {100 * share:.0f} % of the epochs"
+    return f"the database does not have the serving cell of {100 * share:.0f} % of the reports"
 
 
 def _silent(stretch: _Stretch) -> str:
