@@ -37,21 +37,19 @@ def aged(
     covariance, factors, level, variance : ndarray
         Factors of all errors are in single precision.
     """
-    size = covariance.shape[0]
-    decay, now = np.ones(size), np.empty((size, size))
-    decay[: size // 2] = slow
-    decay[size // 2 : size - 1] = fast
+    size, slots = covariance.shape[0], level[0].size
+    decay, now = np.ones(size, dtype=np.float32), np.empty((size, size))
+    other_dbm, other_db2 = np.empty(slots), np.empty(slots)
+    for k in range(slots):
+        decay[k], decay[slots + k] = slow, fast
+        other_dbm[k] = level[1] + (level[0][k] - level[1]) * level[2]
+        other_db2[k] = variance[1] + (variance[0][k] - variance[1]) * variance[2]
     for i in range(size):
+        own = slow if i < slots else (fast if i < 2 * slots else 1.0)
         for j in range(size):
-            both = decay[i] * decay[j]
+            both = own * (slow if j < slots else (fast if j < 2 * slots else 1.0))
             now[i, j] = covariance[i, j] * both + prior[i, j] * (1.0 - both)
-    (dbm, usual_dbm, keep), (db2, usual_db2, keep_db2) = level, variance
-    return (
-        now,
-        decay.astype(np.float32),
-        usual_dbm + (dbm - usual_dbm) * keep,
-        usual_db2 + (db2 - usual_db2) * keep_db2,
-    )
+    return now, decay, other_dbm, other_db2
 
 
 @njit(error_model="numpy", cache=True)

@@ -68,15 +68,15 @@ class EstimateColumns:
         unused : tuple of UnusedReading
             Besides those of the outputs.
         """
-        numbers = np.array(self._numbers, dtype=np.float64).reshape(-1, _NUMBERS)
-        whole = np.array(self._whole, dtype=np.int64).reshape(-1, 2)
+        numbers = np.asarray(self._numbers, dtype=np.float64).reshape(-1, _NUMBERS)
+        whole = np.asarray(self._whole, dtype=np.int64).reshape(-1, 2)
         time_s, east_m, north_m, mass, way_probability, wide_m, protection_m = _columns(
             numbers[:, :7]
         )
         evidence = None
         if self._evidence and len(self._evidence) == 5 * time_s.size:
             evidence = TrackEvidence(
-                *_columns(np.array(self._evidence, dtype=np.float64).reshape(-1, 5))
+                *_columns(np.asarray(self._evidence, dtype=np.float64).reshape(-1, 5))
             )
         labelled = sorted([*unused, *self._unused], key=lambda reading: reading.time_s)
         return TrackEstimate(
@@ -86,7 +86,7 @@ class EstimateColumns:
             time_s,
             east_m,
             north_m,
-            numbers[:, 7:11].reshape(-1, 2, 2),
+            numbers[:, 7:11].copy().reshape(-1, 2, 2),
             numbers[:, 11:].copy(),
             tuple(self._status),
             whole[:, 0].copy(),
@@ -102,4 +102,4 @@ class EstimateColumns:
 
 
 def _columns(table: Floats) -> list[Floats]:
-    return [np.ascontiguousarray(column) for column in table.T]
+    return [column.copy() for column in table.T]

@@ -49,3 +49,12 @@ def test_no_epochs_make_arrays_of_their_shapes():
         0, (0, 2, 2), (0, 3),
     )  # fmt: skip
     assert estimate.evidence is None
+
+
+def test_an_estimate_stays_as_it_is_when_epochs_are_added():
+    columns = EstimateColumns()
+    columns.add(output_of(0))
+    first = columns.estimate(CRS, "bayes")
+    columns.add(output_of(1))
+    assert (len(first), len(columns.estimate(CRS, "bayes"))) == (1, 2)
+    assert first.east_m.tolist() == [10.0]
