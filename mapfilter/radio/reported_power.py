@@ -20,6 +20,9 @@ RSRP and SS-RSRP are those of one subcarrier: 10 log10(12 N), with N resource bl
 29.5 and 30.8 dB with 10, 15 and 20 MHz of LTE, and 27.9 to 35.2 dB of NR.
 """
 
+MOST_SUBCARRIER_DBM: Final = 46.0
+"""No LTE subcarrier has more: 46 dBm of the narrowest carrier (72 of them) into 18 dBi."""
+
 ASSUMABLE: Final = ("height_m", "azimuth_deg", "eirp_dbm")
 """Fields of a cell that public lists lack, so that usual values stand for them."""
 

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mapfilter.experiments.recorded.ground import open_ground, predicted
+from mapfilter.geodesy import Lattice
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
 from mapfilter.positioning.fingerprints.planned import (
     LTE_STEP_M,
@@ -13,12 +15,13 @@ from mapfilter.positioning.fingerprints.planned import (
     level_deviations_db,
 )
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
+from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"
 EAST_M, NORTH_M = 385_000.0, 6_672_000.0
 AT_M = np.array([EAST_M, NORTH_M])
-SIDE_M, SPACING_M = 1500.0, 50.0
+SIDE_M, SPACING_M = 1500.0, 100.0
 
 
 def _cell(name: str, east_m: float, north_m: float, mhz: float, **more: object) -> Cell:
@@ -74,7 +77,9 @@ def _received(plan: CellPlan, count: int, rng: np.random.Generator) -> Reports:
 
 
 def _share_within_95(plan: CellPlan, reports: Reports) -> float:
-    fitted = fit_locator(_map(plan), "probabilistic", np.random.default_rng(1), strongest=4)
+    fitted = fit_locator(
+        _map(plan), "probabilistic", np.random.default_rng(1), strongest=4, validated=800
+    )
     located = locate_by(fitted, reports)
     return float(np.mean(located.error_m <= located.radii_m[:, 2]))
 
@@ -131,3 +136,22 @@ def test_a_timing_advance_counts_by_the_distance_to_the_site():
         for steps in (200 // LTE_STEP_M, 1000 // LTE_STEP_M)
     ]
     assert east_m[1] > east_m[0] + 150
+
+
+def test_a_database_keeps_what_its_plan_assumes(tmp_path):
+    """Levels of a database err by what its plan lacks; powers of whole carriers are named."""
+    lattice = Lattice.covering(CRS, (EAST_M, NORTH_M, EAST_M + 400, NORTH_M + 400), 50.0)
+    cells = (
+        _cell("a", 100, 100, 1800.0, assumed="eirp_dbm"),
+        replace(_cell("b", 300, 100, 1800.0), eirp_dbm=58.0),
+    )
+    database = predicted(
+        CellPlan(CRS, cells), lattice, open_ground(lattice), tmp_path / "db", floor_dbm=-130.0
+    )
+    assert [cell.assumed for cell in database.plan.cells] == ["eirp_dbm", ""]
+    found = reports_of_database(database)
+    of_a = found.cell == found.cell_ids.index("a")
+    assert found.sd_db[of_a] == pytest.approx(np.hypot(6.0, OWN_DB["eirp_dbm"]))
+    assert found.sd_db[~of_a].tolist() == [6.0] * int((~of_a).sum())
+    assert "usual values for what the plan lacks" in found.notes[0]
+    assert "eirp_dbm of 1 cells is that of a carrier" in found.notes[1]
