@@ -24,7 +24,7 @@ _SHORT = 20
 
 
 def wrap_rad(angle_rad: ArrayLike) -> Floats:
-    """Wrap angles into [-π, π).
+    """Wrap angles into [-π, π); those that are not finite become NaN.
 
     Examples
     --------
@@ -33,7 +33,8 @@ def wrap_rad(angle_rad: ArrayLike) -> Floats:
     """
     angle = np.asarray(angle_rad, dtype=np.float64)
     # np.mod may round up to 2π itself for tiny negative arguments.
-    wrapped = np.mod(angle + np.pi, 2 * np.pi) - np.pi
+    with np.errstate(invalid="ignore"):
+        wrapped = np.mod(angle + np.pi, 2 * np.pi) - np.pi
     return np.where(wrapped >= np.pi, -np.pi, wrapped)
 
 

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.positioning.fingerprints.censoring import bounds_of
 from mapfilter.positioning.fingerprints.locating import (
     LocatedReports,
     fit_locator,
     locate_by,
+    timed_share,
     usual_readings,
 )
 from mapfilter.positioning.fingerprints.options import AUTO, Method
@@ -60,5 +62,13 @@ def locate_reports(
         known = reports_of_logs([database] if isinstance(database, TrackLog) else database)
     reports = reports_of_logs([log], plan) if isinstance(log, TrackLog) else log
     rng = np.random.default_rng(seed)
-    fitted = fit_locator(known, method, rng, strongest=usual_readings(reports))
+    strongest = usual_readings(reports)
+    fitted = fit_locator(
+        known,
+        method,
+        rng,
+        strongest=strongest,
+        bounds=bounds_of(reports),
+        timed=timed_share(reports),
+    )
     return locate_by(fitted, reports)

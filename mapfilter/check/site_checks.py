@@ -309,11 +309,14 @@ def check_power(
         for cell in plan.cells
         if cell.azimuth_deg is not None and not cell.indoor and cell.height_m >= _MAST_M
     ]
+    cells = [cell for cell in cells if "eirp_dbm" not in cell.assumes]
     small = [cell for cell in cells if 0 < cell.eirp_dbm <= _SMALL_EIRP_DBM]
     above_db = {
         s.cell_id: above_free_space_db(s, plan[s.cell_id])
         for s in samples
-        if s.cell_id in plan and not plan[s.cell_id].indoor
+        if s.cell_id in plan
+        and not plan[s.cell_id].indoor
+        and "eirp_dbm" not in plan[s.cell_id].assumes
     }
     # One cell may have reflections and shadowing on its side, but not most of them.
     most = bool(above_db) and float(np.median(list(above_db.values()))) > _ABOVE_DB

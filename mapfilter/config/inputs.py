@@ -139,7 +139,8 @@ class Cells(Section):
     frequency_mhz : float
         Carrier of a plan by rule, and of listed cells without one.
     eirp_dbm : float
-        EIRP of outdoor cells by rule, and of listed cells without one.
+        EIRP of a carrier: of outdoor cells by rule, and of listed cells without one. Of listed
+        UMTS, LTE and NR cells it is lowered to what phones report.
     height_m : float
         Antenna height above ground of outdoor cells by rule, and of listed cells without one.
     seed : int

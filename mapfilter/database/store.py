@@ -27,6 +27,7 @@ from mapfilter.database.parquet import (
 from mapfilter.database.radioroutes import RadioRouteDatabase, part_named
 from mapfilter.errors import Faults, MapfilterError, StoreError, fail
 from mapfilter.geodesy import Lattice
+from mapfilter.radio.cell_layouts import SELDOM
 from mapfilter.radio.cells import Cell, CellPlan
 
 _ARROW_TYPES = {
@@ -38,7 +39,7 @@ _ARROW_TYPES = {
     "int | None": pa.int64(),
     "bool": pa.bool_(),
 }
-_OPTIONAL = ("technology",)
+_OPTIONAL = SELDOM
 """Columns that older databases, and those whose plan does not state them, lack."""
 
 _MOST_REPLACED = 50
@@ -50,9 +51,9 @@ def write_cells(plan: CellPlan, path: Path) -> None:
 
 
 def cells_table(plan: CellPlan) -> pa.Table:
-    """Return the cell table; without technologies where no cell states one."""
-    stated = any(cell.technology for cell in plan.cells)
-    columns = [one for one in fields(Cell) if stated or one.name not in _OPTIONAL]
+    """Return the cell table, without the columns that are optional and that no cell states."""
+    lacking = {name for name in _OPTIONAL if not any(getattr(c, name) for c in plan.cells)}
+    columns = [one for one in fields(Cell) if one.name not in lacking]
     schema = pa.schema([(one.name, _ARROW_TYPES[str(one.type)]) for one in columns])
     rows = [asdict(cell) for cell in plan.cells]
     return pa.Table.from_pylist(rows, schema)

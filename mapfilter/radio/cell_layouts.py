@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from mapfilter.errors import Faults, InputError
-from mapfilter.radio.identities import parse_cgi
+from mapfilter.radio.cell_rules import TECHNOLOGIES
+from mapfilter.radio.identities import parse_cgi, technology
+from mapfilter.radio.reported_power import ASSUMABLE, REPORTED_SHARE_DB, reported_eirp_dbm
 from mapfilter.radio.tables import Table
 
 _LONGEST_SHOWN = 200
@@ -25,9 +27,11 @@ COLUMNS = (
     *("mechanical_downtilt_deg", "antenna", "beamwidth_deg", "max_attenuation_db"),
     *("vertical_beamwidth_deg", "side_lobe_db", "eirp_dbm", "frequency_mhz", "indoor"),
     *("penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic"),
-    "technology",
+    *("technology", "assumed"),
 )
 """Columns of a file that mapfilter writes, in order."""
+SELDOM = ("technology", "assumed")
+"""Those that are left out where no cell has them."""
 ATOLL: Columns = {
     "cell": ("TX_ID", "TX_NAME"),
     "site": ("SITE_NAME", "SITE"),
@@ -51,6 +55,7 @@ ATOLL: Columns = {
     "technology": ("TECHNOLOGY",),
 }
 OPENCELLID: Columns = {
+    "technology": ("radio",),
     "lat": ("lat",),
     "lon": ("lon",),
     "mcc": ("mcc",),
@@ -117,7 +122,8 @@ def arrange(
     columns : mapping of str to str
         Column of the file, by field.
     defaults : mapping of str to float
-        For fields without a column, or empty ones.
+        For fields without a column, or empty ones. An EIRP is that of a carrier: cells of a known
+        technology get that of what phones report.
     faults : Faults
         Rows of another length are added, and left out.
     """
@@ -133,18 +139,29 @@ def arrange(
     implied = any(header[i].casefold() in _IMPLIED for at in picked.values() for i in at)
     if implied and "technology" not in fields:
         fields.append("technology")
+    if (defaults or layout == "opencellid") and "assumed" not in fields:
+        fields.append("assumed")
     names = (*fields, "cell") if composed else tuple(fields)
     filled: Counter[str] = Counter()
-    found = []
+    lowered, found = 0, []
     for line, texts in table.whole_rows(len(header), faults):
         values = {name: _first(texts, at) for name, at in picked.items()}
         _by_technology(
             values, [header[i] for at in picked.values() for i in at if texts[i].strip()]
         )
+        if layout == "opencellid":
+            known = technology(values.get("technology", "")) or ""
+            values["technology"] = known if known in TECHNOLOGIES else ""
+        unknown = layout == "opencellid" and not values.get("azimuth_deg")
+        assumed = {"azimuth_deg"} if unknown else set[str]()
         for name, default in defaults.items():
             if not values.get(name):
-                values[name] = repr(default)
+                values[name] = repr(_usual(name, default, values.get("technology", "")))
                 filled[name] += 1
+                assumed.add(name)
+        if not values.get("assumed"):
+            values["assumed"] = " ".join(name for name in ASSUMABLE if name in assumed)
+        lowered += "eirp_dbm" in assumed and float(values["eirp_dbm"]) != defaults["eirp_dbm"]
         if composed:
             parts = (values[name] for name in _IDENTITY)
             values["cell"] = "-".join(part for part in parts if part)
@@ -153,6 +170,12 @@ def arrange(
         f"{name} = {defaults[name]:g} for {count} of {len(found)} cells without one"
         for name, count in sorted(filled.items())
     )
+    if lowered:
+        shares = ", ".join(f"{name} {db:g}" for name, db in REPORTED_SHARE_DB.items() if db)
+        notes += (
+            f"eirp_dbm of {lowered} cells lowered to what phones report (dB: {shares}), which they "
+            f"do down to -125 dBm or less: database.floor_dbm",
+        )
     shown = {
         name: f"{header[at[0]]} ({name})" for name, at in picked.items() if header[at[0]] != name
     }
@@ -164,6 +187,14 @@ def none_of(header: Sequence[str]) -> str:
     shown = ", ".join(header)
     shown = f"{shown[:_LONGEST_SHOWN]}, …" if len(shown) > _LONGEST_SHOWN else shown
     return f"none (columns: {shown})"
+
+
+def _usual(name: str, default: float, stated: str) -> float:
+    """Return the value of a field that a cell lacks; the EIRP is that of what phones report."""
+    family = technology(stated) if stated else None
+    if name != "eirp_dbm" or family not in REPORTED_SHARE_DB:
+        return default
+    return reported_eirp_dbm(default, family)
 
 
 def _first(texts: list[str], places: tuple[int, ...]) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter.radio.identities import LIMITS, limit_fault
+from mapfilter.radio.reported_power import ASSUMABLE
 
 POINTED = ("sector", "3gpp")
 """Antennas that need an azimuth."""
@@ -119,6 +120,14 @@ def antenna_fault(value: Any) -> tuple[str, str] | None:
     if wrong is None:
         return None
     return f"{', '.join(ANTENNAS)}, or the name of a pattern file in one folder", wrong[1]
+
+
+def assumed_fault(value: Any) -> tuple[str, str] | None:
+    """Return (expected, found) when ``value`` names other fields than may be assumed, else None."""
+    expected = f"nothing, or some of {', '.join(ASSUMABLE)} with blanks between them"
+    if not isinstance(value, str):
+        return expected, type(value).__name__
+    return None if set(value.split()) <= set(ASSUMABLE) else (expected, repr(value))
 
 
 def technology_faults(technology: Any, value: Callable[[str], Any]) -> list[tuple[str, str, Any]]:

@@ -22,6 +22,7 @@ from mapfilter.radio.cell_rules import (
     RANGES,
     TECHNOLOGIES,
     antenna_fault,
+    assumed_fault,
     id_fault,
 )
 from mapfilter.radio.identities import technology
@@ -160,6 +161,9 @@ def _row(where: str, line: int, given: Mapping[str, str], table: Arranged, fault
     if stated and values["technology"] not in TECHNOLOGIES:
         values["technology"] = None
         refuse("technology", f"one of {', '.join(TECHNOLOGIES)}, or nothing", repr(stated))
+    values["assumed"] = " ".join(given.get("assumed", "").split())
+    if wrong := assumed_fault(values["assumed"]):
+        refuse("assumed", *wrong)
     if given.get("crs"):
         try:
             values["crs"] = projected_crs(given["crs"], f"{where}, crs")

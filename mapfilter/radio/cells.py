@@ -12,12 +12,13 @@ from pathlib import Path
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, short_crs, unproject
-from mapfilter.radio.cell_layouts import COLUMNS, Layout
+from mapfilter.radio.cell_layouts import COLUMNS, SELDOM, Layout
 from mapfilter.radio.cell_rules import (
     OPTIONAL,
     POINTED,
     RANGES,
     antenna_fault,
+    assumed_fault,
     id_fault,
     looks_like_radians,
     technology_faults,
@@ -40,7 +41,9 @@ class Cell:
     azimuth_deg : float or None
         Boresight, degrees clockwise from true north; None for an omnidirectional antenna.
     eirp_dbm : float
-        Radiated power at boresight, antenna gain included.
+        Radiated power at boresight, antenna gain included, of what phones report: in LTE and NR of
+        one subcarrier, which is 28 to 35 dB below that of the carrier
+        (:mod:`mapfilter.radio.reported_power`).
     antenna : str
         ``"sector"``, ``"omni"``, ``"3gpp"`` or the name of a pattern file.
     downtilt_deg : float
@@ -67,6 +70,10 @@ class Cell:
         reported neighbour.
     technology : str or None
         "GSM", "UMTS", "LTE" or "NR"; it limits identity, carrier and code. None where unknown.
+    assumed : str
+        Names of fields that hold usual values, as this cell's own are unknown: some of
+        ``height_m``, ``azimuth_deg`` and ``eirp_dbm``, separated by blanks. An unknown azimuth
+        is that of an omnidirectional antenna.
     """
 
     id: str
@@ -93,6 +100,12 @@ class Cell:
     arfcn: int | None = None
     bsic: int | None = None
     technology: str | None = None
+    assumed: str = ""
+
+    @property
+    def assumes(self) -> frozenset[str]:
+        """Names of the fields that hold usual values."""
+        return frozenset(self.assumed.split())
 
 
 @dataclass(frozen=True, repr=False)
@@ -211,6 +224,8 @@ def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> No
             faults.add(where(name), *wrong)
     if wrong := antenna_fault(cell.antenna):
         faults.add(where("antenna"), *wrong)
+    if wrong := assumed_fault(cell.assumed):
+        faults.add(where("assumed"), *wrong)
     for name, allowed in RANGES.items():
         value = getattr(cell, name)
         if not allowed.holds(value) and not (value is None and name in OPTIONAL):
@@ -302,8 +317,8 @@ def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
     )
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    stated = any(cell.technology for cell in plan.cells)
-    columns = COLUMNS if stated else [name for name in COLUMNS if name != "technology"]
+    lacking = {name for name in SELDOM if not any(getattr(cell, name) for cell in plan.cells)}
+    columns = [name for name in COLUMNS if name not in lacking]
     writer.writerow(columns)
     for cell, lon, lat in zip(plan.cells, lon_deg.tolist(), lat_deg.tolist(), strict=True):
         named = {"cell": cell.id, "lat": f"{lat:.9f}", "lon": f"{lon:.9f}"}

@@ -50,7 +50,7 @@ class LivePage:
             ("", self._list),
             ("page.js", self._script),
             ("page.css", self._style),
-            ("map", partial(self._map, sessions)),
+            ("map", self._map),
             ("{id}", partial(self._session, sessions)),
         ]
 
@@ -69,13 +69,13 @@ class LivePage:
         del request
         return Response(self.style, 200, _HEADERS, "text/css")
 
-    async def _map(self, sessions: Sessions, request: Request) -> Response:
+    async def _map(self, request: Request) -> Response:
         """Answer the database's bundle as gzip, which the page unpacks as that of a file."""
         del request
         async with self.making:
             if not self.map:
-                loop = asyncio.get_running_loop()
-                self.map = await loop.run_in_executor(sessions.pool, self._made)
+                # Beside the threads of the steps, for which devices wait.
+                self.map = await asyncio.to_thread(self._made)
         return Response(self.map, 200, _HEADERS, "application/gzip")
 
     def _made(self) -> bytes:

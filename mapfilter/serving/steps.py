@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+import sys
+import traceback
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +15,9 @@ import numpy as np
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import project
 from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.estimate import StepOutput
 from mapfilter.serving.documents import RequestError, check_keys, number, text, whole
 from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.events import fix_document, json_bytes
@@ -87,10 +93,33 @@ def stepped(
         number_ = before.epochs + index + 1
         fixes.append(json_bytes(fix_document(output, number_, positioner.crs)))
         if watcher is not None:
-            details.append(json_bytes(watcher.detail(held, epoch, drawn, state, output)))
+            make = partial(_detail, watcher, held, epoch, drawn, state, output)
+            details.append(_shown(make, b"{}"))
     progress = Progress(state, rng.bit_generator.state, count, epochs[-1].time_s, fixes[-1])
-    belief = watcher.belief(state, count) if watcher is not None else b""
+    belief = b""
+    if watcher is not None:
+        belief = _shown(partial(watcher.belief, state, count), b"")
     return Stepped(progress, fixes, details, belief)
+
+
+def _detail(
+    watcher: Watcher,
+    before: BayesState,
+    epoch: Epoch,
+    rng: np.random.Generator | None,
+    after: BayesState,
+    output: StepOutput,
+) -> bytes:
+    return json_bytes(watcher.detail(before, epoch, rng, after, output))
+
+
+def _shown(make: Callable[[], bytes], nothing: bytes) -> bytes:
+    """Return what a page shows; a fault there costs the page this part, and the device nothing."""
+    try:
+        return make()
+    except Exception:
+        traceback.print_exc(file=sys.stderr)
+        return nothing
 
 
 def wanted(

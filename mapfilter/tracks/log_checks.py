@@ -107,7 +107,8 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
         return ()
     lasted_s, moved_m = float(np.ptp(time_s)), float(np.abs(step_m).sum())
     between_s = np.diff(time_s)
-    speed_mps = np.abs(step_m[1:])[between_s > 0] / between_s[between_s > 0]
+    with np.errstate(over="ignore"):
+        speed_mps = np.abs(step_m[1:])[between_s > 0] / between_s[between_s > 0]
     typical_mps = float(np.median(speed_mps)) if speed_mps.size else 0.0
     is_slow, moving = typical_mps < _FASTEST_KMPS, step_m[step_m != 0]
     extent_m = _extent_m(tables, float(time_s[0]), float(time_s[-1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +143,9 @@ def _layers_info(path: Path) -> dict[str, Any]:
     """Describe the layers of a vector file."""
     place = vector_source(path)
     try:
-        with sealed_gdal():
+        with sealed_gdal(), warnings.catch_warnings():
+            # GDAL warns of much that it copes with.
+            warnings.simplefilter("ignore", RuntimeWarning)
             layers = [
                 _layer_info(place, layer, kind) for layer, kind in pyogrio.list_layers(place.path)
             ]

@@ -14,12 +14,14 @@ from mapfilter._io import atomic_file, ensure_writable_folder, write_json
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.positioning.fingerprints.censoring import bounds_of
 from mapfilter.positioning.fingerprints.locating import (
     LocatedReports,
     ReportLocator,
     figures_of,
     fit_locator,
     locate_by,
+    timed_share,
     usual_readings,
 )
 from mapfilter.positioning.fingerprints.matches import locator
@@ -103,7 +105,16 @@ def run_locate(
     known, (reports, names) = _inputs(database, log, crs, level_error_db)
     ensure_writable_folder(out)
     rng, strongest = np.random.default_rng(seed), usual_readings(reports)
-    fitted = fit_locator(known, method, rng, strongest=strongest, progress=progress)
+    bounds = bounds_of(reports)
+    fitted = fit_locator(
+        known,
+        method,
+        rng,
+        strongest=strongest,
+        bounds=bounds,
+        timed=timed_share(reports),
+        progress=progress,
+    )
     located = locate_by(fitted, reports)
     baseline_m = _centroid_errors_m(fitted, reports)
     figures = figures_of(located)

@@ -13,10 +13,12 @@ from mapfilter._types import Bools, Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import percentile_m
+from mapfilter.positioning.fingerprints.censoring import Bounds, bounds_of
 from mapfilter.positioning.fingerprints.locating import (
     ReportLocator,
     fit_locator,
     locate_by,
+    timed_share,
     usual_readings,
 )
 from mapfilter.positioning.fingerprints.matches import located_once
@@ -92,7 +94,7 @@ class Baselines:
 
     def __init__(self, database: RadioRouteDatabase | None, seed: int) -> None:
         self._database, self._seed = database, seed
-        self._fitted: dict[int, ReportLocator] = {}
+        self._fitted: dict[tuple[int, Bounds, float], ReportLocator] = {}
 
     @cached_property
     def _known(self) -> Reports | None:
@@ -115,19 +117,29 @@ class Baselines:
         count = min(of_truth.size, MOST_REPORTS)
         at = np.linspace(0, of_truth.size - 1, count).astype(np.int64)
         tried = placed.some(of_truth[at])
-        located = locate_by(self._locator(usual_readings(tried)), tried)
+        located = locate_by(self._locator(tried), tried)
         known = np.isfinite(located.error_m)
         error_m = located.error_m[known]
         within: Bools = error_m <= located.radii_m[known, 2]
         return SingleReports(of_truth.size, count, error_m, within)
 
-    def _locator(self, strongest: int) -> ReportLocator:
-        if strongest not in self._fitted:
+    def _locator(self, tried: Reports) -> ReportLocator:
+        strongest, bounds = usual_readings(tried), bounds_of(tried)
+        # In tenths, so that logs share locators.
+        timed = round(timed_share(tried), 1)
+        key = strongest, bounds, timed
+        if key not in self._fitted:
             assert self._known is not None
             rng = named_rng(self._seed, "replay", "single reports")
             fitted = fit_locator(
-                self._known, Probabilistic(), rng, strongest=strongest, validated=CALIBRATED_WITH
+                self._known,
+                Probabilistic(),
+                rng,
+                strongest=strongest,
+                validated=CALIBRATED_WITH,
+                bounds=bounds,
+                timed=timed,
             )
             # Draws of one journey receive the same.
-            self._fitted[strongest] = replace(fitted, locator=located_once(fitted.locator))
-        return self._fitted[strongest]
+            self._fitted[key] = replace(fitted, locator=located_once(fitted.locator))
+        return self._fitted[key]

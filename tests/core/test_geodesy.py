@@ -223,3 +223,7 @@ def test_bad_boxes_are_told_with_their_likely_mistake(box, hint):
         check_bbox(box, "area.bbox")
     (fault,) = caught.value.faults
     assert (fault.where, fault.hint) == ("area.bbox", hint)
+
+
+def test_angles_that_are_not_finite_are_unknown_without_a_warning():
+    assert np.isnan(wrap_rad([np.inf, -np.inf, np.nan])).all()

@@ -15,8 +15,9 @@ from mapfilter.filters.grid import GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import epochs
@@ -200,3 +201,19 @@ def test_a_fix_pulls_the_belief(positioner):
                          "var_east_m2": [9.0], "var_north_m2": [9.0]})  # fmt: skip
     estimate = found(positioner, replace(log, gnss=make_log(CRS, gnss=gnss).gnss))
     assert estimate.radii_m[5, 2] < 15
+
+
+def test_a_belief_that_has_left_the_area_has_an_alternative_in_it(positioner, area):
+    """Nothing refutes a belief beyond the map; the phone may have come back nevertheless."""
+    log = walk_log()
+    rng = np.random.default_rng(0)
+    east_m, north_m = area.origin_m[0] - 200.0, area.origin_m[1] + area.size_m[1] / 2
+    state = positioner.begin_at(east_m, north_m, 5.0, rng)
+    state = replace(state, null=replace(state.null, log_odds=-15.0))
+    for epoch in epochs(log)[:12]:
+        state, output = positioner.step(state, epoch, rng)
+        if output.fix.status is Status.OUTSIDE and epoch.radio:
+            break
+    assert output.fix.status is Status.OUTSIDE
+    assert state.null.log_odds < positioner.rules.start_log_odds
+    assert state.alternative is not None

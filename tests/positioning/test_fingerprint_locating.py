@@ -8,6 +8,7 @@ from made_fingerprints import CRS, NAMES, levels_at, reports_at, survey
 
 import mapfilter as mf
 from mapfilter.errors import ConfigError, InputError
+from mapfilter.positioning.fingerprints.censoring import Bounds, bounded, bounds_of
 from mapfilter.positioning.fingerprints.locating import (
     NOTHING,
     UNKNOWN,
@@ -186,3 +187,18 @@ def test_serving_cells_without_levels_are_enough(method):
     found = mf.locate_reports(asked, known, method)
     west, east_m = found.east_m
     assert west < 50 < east_m
+
+
+@pytest.mark.parametrize("method", ["knn", "probabilistic", "auto"])
+def test_levels_that_end_at_a_full_scale_are_bounds(floor, method):
+    """A phone with bars shows all that is strong alike; taken as levels, they point elsewhere."""
+    known, asked = floor
+    full = Bounds(high_dbm=float(np.quantile(asked.level_dbm, 0.3)))
+    shown = bounded(asked, full)
+    assert bounds_of(shown) == full
+    taken_as_levels = replace(shown, censored=np.zeros_like(shown.censored))
+    found, naive = (mf.locate_reports(one, known, method) for one in (shown, taken_as_levels))
+    within = np.mean(found.error_m <= found.radii_m[:, 2])
+    assert within > 0.88
+    assert within > np.mean(naive.error_m <= naive.radii_m[:, 2])
+    assert found.error_m.mean() < naive.error_m.mean()

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_fingerprints import reports_at
+from made_fingerprints import CRS, reports_at
 from scipy.stats import multivariate_normal
 from sklearn.metrics import pairwise_distances
 from sklearn.neighbors import NearestNeighbors
 
 from mapfilter.positioning.fingerprints.matches import Received, located_once, locator
 from mapfilter.positioning.fingerprints.matching import (
-    ByCell,
     Distances,
     LevelErrors,
     Likelihoods,
@@ -19,6 +18,7 @@ from mapfilter.positioning.fingerprints.matching import (
     _Excess,
 )
 from mapfilter.positioning.fingerprints.options import Centroid, Neighbours, Probabilistic
+from mapfilter.positioning.fingerprints.reports import make_reports
 
 SKLEARN = {"sorensen": "braycurtis", "euclidean": "euclidean", "manhattan": "manhattan"}
 
@@ -214,13 +214,25 @@ def test_a_mismatch_grows_with_strange_levels():
 )
 def test_sums_above_a_threshold_are_those_of_all_levels(readings, threshold_dbm):
     report, level_dbm = (np.array(column) for column in zip(*readings, strict=True))
-    by_cell = ByCell(7, np.array([0, len(report)]), report, np.arange(len(report)))
-    found = _Excess.of(by_cell, level_dbm.astype(float)).above(threshold_dbm)
+    found = _Excess.of(7, report, level_dbm.astype(float)).above(threshold_dbm)
     expected = [
         sum(max(level - threshold_dbm, 0.0) for at, level in readings if at == one)
         for one in range(7)
     ]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("censored", "off_db"), [(1, -12.0), (-1, 12.0)])
+def test_a_bound_is_no_evidence_where_it_is_kept_and_counts_where_it_is_not(censored, off_db):
+    """Places beyond the bound are alike; one before it loses by what it is off."""
+    dbm = -70.0
+    reports = make_reports(
+        CRS, [0, 1, 2], ["a"] * 3, [dbm - off_db, dbm - 3 * off_db, dbm + off_db], count=3
+    )
+    by = Likelihoods.at(reports, LevelErrors(4.0, 0.0, 0.0, -120.0))
+    _, levels = by.of(np.array([0]), np.array([dbm]), np.array([censored], np.int8))
+    assert levels[0] == levels[1] == 0.0
+    assert levels[2] == pytest.approx(-0.5 * (off_db / 4.0) ** 2)
 
 
 def test_equal_reports_are_located_once():
@@ -242,6 +254,8 @@ def test_equal_reports_are_located_once():
         Received(cell, dbm + 1.0, -1, np.nan),
         Received(cell, unknown, -1, np.nan),
         Received(*reports.readings(1), -1, np.nan),
+        Received(cell, dbm, -1, np.nan, np.ones(len(cell), np.int8)),
+        Received(cell, dbm, -1, np.nan, -np.ones(len(cell), np.int8)),
     ]
     for _ in range(2):
         for one in different:

@@ -52,13 +52,16 @@ def test_the_usual_options():
     assert asdict(KalmanOptions()) == {
         "level_error_db": 9.0, "timing_step_m": pytest.approx(553.46, abs=0.01),
         "timing_sd_m": 200.0, "level_memory_m": 100.0, "timing_memory_m": 500.0,
-        "fix_sd_m": 10.0, "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0, "step_sd_m": 0.3,
+        "fix_sd_m": 10.0, "fix_lasting_m": 0.0, "fix_lasting_s": 30.0,
+        "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0, "step_sd_m": 0.3,
         "heading_sd_deg": 11.459155902616464, "drift_m_per_sqrt_s": 0.3, "start_sd_m": 1500.0,
         "start_parts": 11, "start_spacing_m": 600.0, "reach_m": 35_000.0,
         "converged_radius_m": 1000.0,
     }  # fmt: skip
     for name in asdict(KalmanOptions()):
         for value in (0, -1.0, inf, nan):
+            if value == 0 and name == "fix_lasting_m":
+                continue
             with pytest.raises(ConfigError, match=f"KalmanOptions, {name}: expected a .*r (>|in)"):
                 KalmanOptions(**{name: value})
         assert getattr(KalmanOptions(**{name: 7}), name) == 7

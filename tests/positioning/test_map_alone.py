@@ -162,7 +162,7 @@ def test_the_rules_of_the_map_alone_hold_again_after_the_last_position(vehicle):
     alone = []
     for epoch in epochs(fixed):
         state, _ = vehicle.step(state, epoch, rng)
-        alone.append((state.reckoning.travelled_m, vehicle._by_map_alone(state)))
+        alone.append((state.reckoning.travelled_m, vehicle.beliefs.by_map_alone(state)))
     assert all(by_map == (travelled_m > 200.0) for travelled_m, by_map in alone)
 
 

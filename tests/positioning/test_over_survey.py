@@ -19,17 +19,22 @@ from mapfilter.database.measured import (
 from mapfilter.database.merge import merge
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
+from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import Lattice
 from mapfilter.models.measured_map import MeasuredMapOptions
+from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.bayes.over_survey import filled_field, site_of
+from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.fingerprints.locating import fit_locator
 from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.tracks.schema import SERVING
 
 CRS = "EPSG:32618"
 WEST, SOUTH, SIDE_M, SIZE = 445_000.0, 5_030_000.0, 10.0, 12
@@ -226,11 +231,42 @@ def test_the_filter_compares_with_what_was_measured(surveyed):
     assert not model.timed_by_sites
 
 
+@pytest.mark.parametrize("steps", [np.nan, 2.0, 9.0])
+def test_a_place_that_is_as_good_as_any_is_no_evidence_against_the_map(surveyed, steps):
+    """The null hypothesis has the mean likelihood of all ways, by hand from the statistics."""
+    bound = BayesFilter().over(surveyed[0])
+    model, area = bound.model, bound.model.area
+    serving = area.band_of[CELLS[0]]
+    pixels = np.flatnonzero(area.on_way)
+    statistics = model.serving_model
+    likelihood = np.exp(statistics.log_share[serving, pixels].astype(float))
+    if np.isfinite(steps):
+        sd = statistics.deviation_steps[serving, pixels].astype(float)
+        off = np.minimum(abs(steps - statistics.advance_steps[serving, pixels]) / sd, 4.0)
+        likelihood *= np.exp(-0.5 * off**2) / sd
+    usual = model.usual_serving(serving, steps)
+    assert usual == pytest.approx(np.log(likelihood.mean()), rel=1e-4)
+    row = ReportRow(SERVING, CELLS[0], None, None, np.nan, 0, steps)
+    source = RadioSource(area, model.evidence, model.usual_serving)
+    reading = source.first(Epoch(0.0, radio=(row,))).radio
+    assert reading.radio_under_null(0.0) == pytest.approx(usual * reading.serving_weight)
+    state = np.zeros((STATES, len(pixels)), dtype=np.float32)
+    row_, col = np.divmod(pixels, SIZE)
+    state[EAST], state[NORTH] = (col + 0.5) * SIDE_M, (SIZE - row_ - 0.5) * SIDE_M
+    log_weight = np.zeros(len(pixels))
+    model.weigh(Cloud(state, np.empty((0, len(pixels)), np.float32)), log_weight, reading)
+    mean = np.exp(log_weight / reading.serving_weight).mean()
+    assert np.log(mean) == pytest.approx(usual, rel=1e-3)
+
+
 def test_own_settings_stay(surveyed):
     database, _, _ = surveyed
     given = BayesFilter(level_weight=0.2, device_error_db=4.0, level_correlation_m=50.0)
     levels = given.over(database).model.evidence.levels
     assert (levels.weight, levels.device_db, levels.slow_m) == (0.2, 4.0, 50.0)
+    usual = BayesFilter().over(database).options
+    assert (usual.switch_mass, usual.switch_hold_m) == (0.95, 60.0)
+    assert BayesFilter(switch_mass=0.9).over(database).options.switch_mass == 0.9
     assert isinstance(GridFilter().over(database).model, MeasuredMapModel)
 
 

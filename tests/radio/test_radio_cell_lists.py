@@ -7,7 +7,7 @@ from fuzz import fuzz
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project
-from mapfilter.radio.cells import CellPlan, read_cell_plan
+from mapfilter.radio.cells import CellPlan, read_cell_plan, write_cell_plan
 
 CRS = "EPSG:32635"
 DEFAULTS = {"height_m": 25.0, "eirp_dbm": 52.0, "frequency_mhz": 1800.0}
@@ -150,3 +150,22 @@ def test_damaged_lists(tmp_path: Path, text: str, layout: str, mutation_count: i
     tally = fuzz(text.encode(), read, mutation_count)
     print(f"{layout}: {tally}")  # noqa: T201
     assert tally.refused > 0.2 * mutation_count
+
+
+def test_usual_values_of_public_lists_are_marked(tmp_path: Path) -> None:
+    plan = _read(tmp_path, MLS, layout="opencellid")
+    gsm, lte = plan.cells
+    # RSRP is the power of one subcarrier.
+    assert (gsm.eirp_dbm, lte.eirp_dbm) == (52.0, 22.5)
+    assert gsm.assumes == lte.assumes == {"height_m", "azimuth_deg", "eirp_dbm"}
+    assert any("eirp_dbm of 1 cells lowered to what phones report" in note for note in plan.notes)
+    write_cell_plan(plan, tmp_path / "again.csv")
+    assert read_cell_plan(tmp_path / "again.csv", CRS).cells[1].assumes == lte.assumes
+
+
+def test_a_plan_of_ones_own_assumes_nothing(tmp_path: Path) -> None:
+    assert not _read(tmp_path, PLAN)["A"].assumes
+    said = _complaint(
+        tmp_path, PLAN.replace("bsic\n", "bsic,assumed\n").replace(",17\n", ",17,x\n")
+    )
+    assert "assumed: expected nothing, or some of height_m, azimuth_deg, eirp_dbm" in said

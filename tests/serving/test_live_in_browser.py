@@ -66,9 +66,9 @@ class Running:
 
 
 @contextmanager
-def running(positioner, cross):
+def running(positioner, cross, **options):
     bundle = database_bundle("Made cross", cross, positioner)
-    with service(positioner, cross.plan) as held:
+    with service(positioner, cross.plan, **options) as held:
         object.__setattr__(held, "page", LivePage(lambda: bundle))
         made = Running(held)
         try:
@@ -132,6 +132,26 @@ def test_after_a_cut_the_page_gets_what_it_missed(browser, positioner, cross):
         assert numbers == list(range(1, 26))
         assert view.page.evaluate("MF.page.live.run.missed") == 0
         view.close()
+
+
+def test_a_page_that_is_refused_says_why_and_comes_in_when_there_is_room(
+    browser, positioner, cross
+):
+    with running(positioner, cross, listeners=1) as made:
+        session = made.ask("/sessions", {"seed": 0})["id"]
+        address = f"{made.address}/view/{session}"
+        first = Watched(browser, address, own=made.address)
+        first.until("MF.page.live.state === 'live'")
+        second = Watched(browser, address, own=made.address)
+        second.until("MF.page.live.state.startsWith('refused: 1 streams')")
+        second.page.wait_for_selector("#link:has-text('refused')")
+        first.close()
+        second.until("MF.page.live.state === 'live'", 60)
+        made.post(session, SENT[:5])
+        second.until("MF.page.live.run.count === 5")
+        # The browser itself reports the refusals.
+        second.faults = [one for one in second.faults if "429" not in one]
+        second.close()
 
 
 def test_sent_again_after_a_crash_counts_once(browser, positioner, cross):

@@ -204,6 +204,29 @@ def test_nothing_is_described_where_nobody_watches(made, monkeypatch):
     assert all("detail" not in fix for *_, fix in asyncio.run(run()))
 
 
+def test_a_fault_in_what_pages_show_costs_the_device_nothing(made, monkeypatch, capsys):
+    def failing(*_):
+        raise ValueError("a fault of the page")
+
+    monkeypatch.setattr(steps.Watcher, "detail", failing)
+    monkeypatch.setattr(steps.Watcher, "belief", failing)
+    held = made()
+    sent = documents(4)[0]
+
+    async def run():
+        app = held.app()
+        session = await begin(app)
+        plain = await post(app, session, sent[:2])
+        held.sessions.all[session].channel.expect(time.monotonic())
+        watched = await post(app, session, sent[2:])
+        return plain + watched, held.sessions.all[session].channel.kept[-1].detailed
+
+    fixes, detailed = asyncio.run(run())
+    assert [one["number"] for one in fixes] == [1, 2, 3, 4]
+    assert json.loads(detailed)["detail"] == {}
+    assert "a fault of the page" in capsys.readouterr().err
+
+
 def test_so_many_sessions_may_be_watched_and_no_more(made):
     held = made(watched=1)
 

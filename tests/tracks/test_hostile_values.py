@@ -5,10 +5,12 @@ from datetime import datetime
 from zoneinfo import ZoneInfo
 
 import numpy as np
+import pandas as pd
 import pytest
 from made_recordings import MADE
 
-from mapfilter.errors import InputError
+from mapfilter.errors import Faults, InputError
+from mapfilter.tracks.log_checks import check_steps
 from mapfilter.tracks.readers import gnettrack, smartloc, times
 from mapfilter.tracks.readers.formats import read_recording
 
@@ -77,3 +79,13 @@ def test_local_times_beyond_all_calendars_stay_numbers():
     assert found[0].tolist() == [-3600.0, 1e300]
     assert found[1, 0] == -1e300
     assert np.isnan(found[1, 1])
+
+
+def test_speeds_beyond_all_numbers_are_no_warning():
+    count = 40
+    motion = pd.DataFrame(
+        {"time_s": 1e-9 * np.arange(count), "step_m": 1e303, "heading_rad": 0.0, "turn_rad": 0.0}
+    )
+    none = pd.DataFrame({"time_s": [], "east_m": [], "north_m": []})
+    tables = {"motion": motion, "truth": none, "gnss": none}
+    check_steps(tables, "motion.csv", Faults())

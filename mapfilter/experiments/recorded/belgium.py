@@ -35,13 +35,22 @@ from mapfilter.experiments.recorded.ground import (
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
+from mapfilter.experiments.recorded.worst_report import WorstReport, worst_report
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.fingerprints.locating import ReportLocator, fit_locator, locate_by
+from mapfilter.positioning.fingerprints.censoring import bounds_of
+from mapfilter.positioning.fingerprints.locating import (
+    ReportLocator,
+    fit_locator,
+    locate_by,
+    timed_share,
+    usual_readings,
+)
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.reported_power import reported_eirp_dbm
 from mapfilter.roads.corridors import Positions
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.identify import name_by_plan
@@ -50,10 +59,12 @@ from mapfilter.tracks.open_log import OpenOptions, open_log
 
 ZONE = "Europe/Brussels"
 LEAST_S = 60.0
-HEIGHT_M, EIRP_DBM = 30.0, 58.0
-"""Usual values: the table of towers has neither."""
+HEIGHT_M, CARRIER_DBM = 30.0, 58.0
+"""Usual values, the latter of a carrier's EIRP: the table of towers has neither."""
 _TOWERS = "tower_data/towers.json"
 _MARGIN_M, _BOX_MARGIN_M, _BOX_RESOLUTION_M = 300.0, 1500.0, 25.0
+_FLOOR_DBM = -130.0
+"""Phones report RSRP down to about this."""
 _LARGEST_BYTES = 10_000_000
 _BOX = "box"
 
@@ -80,14 +91,23 @@ def prepare(folder: Path, work: Path) -> None:
         towers = [Positions(at[:, 0], at[:, 1])]
         crs = next(iter(logs.values())).crs
         box = lattice_about(crs, towers, _BOX_MARGIN_M, _BOX_RESOLUTION_M)
-        predicted(plan, box, open_ground(box), work / place / _BOX)
+        predicted(plan, box, open_ground(box), work / place / _BOX, floor_dbm=_FLOOR_DBM)
 
 
 def read(task: Task) -> Place:
     """Read the walks of a place, and fit the locator to the levels predicted there."""
     logs, plan = _place_of(task.data, task.part)
     box = open_database(task.work / task.part / _BOX)
-    return Place(logs, plan, fit_locator(reports_of_database(box), "probabilistic"))
+    # As ``locate`` does: regions are those of reports with as many cells and timing advances.
+    reports = reports_of_logs([name_by_plan(log, plan) for log in logs.values()], plan)
+    fitted = fit_locator(
+        reports_of_database(box),
+        "probabilistic",
+        strongest=usual_readings(reports),
+        bounds=bounds_of(reports),
+        timed=timed_share(reports),
+    )
+    return Place(logs, plan, fitted)
 
 
 def judge(task: Task, shared: Place) -> Judged:
@@ -96,7 +116,8 @@ def judge(task: Task, shared: Place) -> Judged:
     others = [positions_of(log.truth) for log in shared.logs.values() if log is not own]
     folder = task.work / task.unit
     lattice = lattice_about(own.crs, others, _MARGIN_M)
-    predicted(near, lattice, corridor_routes(lattice, others), folder / "corridor")
+    routes = corridor_routes(lattice, others)
+    predicted(near, lattice, routes, folder / "corridor", floor_dbm=_FLOOR_DBM)
     rng = named_rng(task.seed, "belgium", task.unit)
     named = name_by_plan(own, near)
     located = locate_log(repeated(named), OpenMap.open(folder / "corridor"), rng)
@@ -107,8 +128,9 @@ def judge(task: Task, shared: Place) -> Judged:
     named_in_time = bool(delay_s <= LEAST_S) and not claimed_wrongly(located.estimate, truth)
     note = f"stale radio named after {delay_s:.0f} s. {live.note}"
     live = replace(live, success=named_in_time, seconds=located.filter_s, note=note)
-    alone = _fresh_reports(task, named, shared)
-    return Judged((live, alone), {"live": Journey(located.estimate, truth, folder / "corridor")})
+    alone, worst = _fresh_reports(task, named, shared)
+    journeys = {"live": Journey(located.estimate, truth, folder / "corridor")}
+    return Judged((live, alone), journeys, {} if worst is None else {alone.method: worst})
 
 
 def read_walk(file: Path) -> TrackLog:
@@ -170,7 +192,7 @@ def _place_of(folder: Path, place: str) -> tuple[dict[str, TrackLog], CellPlan]:
     return logs, _near(plan, [positions_of(log.truth) for log in logs.values()])
 
 
-def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
+def _fresh_reports(task: Task, log: TrackLog, place: Place) -> tuple[Found, WorstReport | None]:
     """Locate each report that was measured by itself, anywhere around the towers."""
     # Without a position by GNSS at its time a report is not scored.
     reports = reports_of_logs([log], place.plan)
@@ -178,7 +200,7 @@ def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
     known = np.isfinite(located.error_m)
     sites = _site_errors_m(log, place.plan)
     held = (located.error_m <= located.radii_m[:, 2])[known]
-    return Found(
+    found = Found(
         task.part,
         "locate",
         task.unit,
@@ -190,6 +212,7 @@ def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
         sites,
         note=f"{int(known.sum())} reports were measured",
     )
+    return found, worst_report(reports, located, place.locator.database)
 
 
 def _site_errors_m(log: TrackLog, plan: CellPlan) -> np.ndarray:
@@ -210,6 +233,7 @@ def _site_errors_m(log: TrackLog, plan: CellPlan) -> np.ndarray:
 def _cell(name: str, row: dict[str, Any], crs: str) -> Cell:
     east, north = project(crs, [float(row["longitude"])], [float(row["latitude"])])
     frequency = float(str(row["downlink_frequency"]).split()[0])
+    assumed = ["height_m", "eirp_dbm", *(["azimuth_deg"] if row["azimuth"] is None else [])]
     return Cell(
         name,
         str(row["enb_id"]),
@@ -217,13 +241,14 @@ def _cell(name: str, row: dict[str, Any], crs: str) -> Cell:
         float(north[0]),
         HEIGHT_M,
         None if row["azimuth"] is None else float(row["azimuth"]),
-        EIRP_DBM,
+        reported_eirp_dbm(CARRIER_DBM, "LTE"),
         frequency,
         antenna="omni" if row["azimuth"] is None else "sector",
         ci=int(name),
         arfcn=int(row["earfcn"]),
         bsic=int(row["pci"]),
         technology="LTE",
+        assumed=" ".join(assumed),
     )
 
 

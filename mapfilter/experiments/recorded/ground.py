@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from mapfilter.database.build import build, build_roads
+from mapfilter.database.build import FLOOR_DBM, build, build_roads
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes
 from mapfilter.geodesy import Lattice
@@ -80,6 +80,8 @@ def predicted(
     routes: RouteLattice | LayerRoutes,
     folder: Path,
     model: PredictionModel | None = None,
+    *,
+    floor_dbm: float = FLOOR_DBM,
 ) -> RadioRouteDatabase:
     """Predict the levels of a plan without buildings, and build a database of them."""
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -87,4 +89,4 @@ def predicted(
     levels = predict(plan, lattice, None, model or PredictionModel())
     write_rasters(raster, lattice, levels, plan.ids)
     source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
-    return build(open_rasters(raster), plan, source, folder)
+    return build(open_rasters(raster), plan, source, folder, floor_dbm=floor_dbm)

@@ -27,9 +27,10 @@ from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.tracks.schema import Kind
 
-_SERVING_NATS, _UNKNOWN_NATS = 0.7, 0.5
-"""Negative log-likelihood, under the null hypothesis, of a serving cell at full weight; the gain
-from a serving cell that the map does not have."""
+SERVING_UNDER_NULL = -0.7
+"""Log-likelihood, under the null hypothesis, of a serving cell at full weight."""
+_UNKNOWN_NATS = 0.5
+"""Gain from a serving cell that the map does not have."""
 
 
 class Term(Protocol):
@@ -77,6 +78,8 @@ class RadioReading:
         Distance since the last report that was used; 0 for the first.
     timing_advance : float
         Of the serving cell, in steps; NaN if not reported. Used by models with measured maps only.
+    serving_under_null : float
+        Log-likelihood of the serving cell at full weight, under the null hypothesis.
     """
 
     serving: int = -1
@@ -89,13 +92,14 @@ class RadioReading:
     timing_advance: float = nan
     doubted: bool = False
     tracked: bool = False
+    serving_under_null: float = SERVING_UNDER_NULL
 
     def radio_under_null(self, other_log_likelihood: float) -> float:
         """Return the log-likelihood of the report under the null hypothesis.
 
         ``other_log_likelihood`` is that of its levels if the prediction is wrong about all cells.
         """
-        each = -_SERVING_NATS if self.serving >= 0 else _UNKNOWN_NATS
+        each = self.serving_under_null if self.serving >= 0 else _UNKNOWN_NATS
         return other_log_likelihood + each * self.serving_weight
 
 
@@ -178,11 +182,12 @@ def joined(updates: Sequence[EvidenceUpdate], *, alternative: bool = False) -> R
 
     Terms are added in the reverse order of the sources: radio first, satellites last.
     """
-    radio = next((one.radio for one in updates if one.radio is not None), None)
-    terms: list[Term] = []
-    for one in reversed(updates):
+    radio: RadioReading | None = None
+    terms: tuple[Term, ...] = ()
+    for one in updates:
+        radio = one.radio if radio is None else radio
         other = alternative and one.alternative_terms is not None
-        terms += (one.alternative_terms or ()) if other else one.terms
+        terms = ((one.alternative_terms or ()) if other else one.terms) + terms
     if radio is None and not terms:
         return None
     radio = radio or RadioReading()
@@ -190,4 +195,4 @@ def joined(updates: Sequence[EvidenceUpdate], *, alternative: bool = False) -> R
     for one in updates:
         other = alternative and one.alternative_under_null is not None
         under_null += (one.alternative_under_null or 0.0) if other else one.under_null
-    return replace(radio, terms=tuple(terms), under_null=under_null)
+    return replace(radio, terms=terms, under_null=under_null)

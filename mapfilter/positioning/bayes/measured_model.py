@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
+from math import isfinite, log
 
 import numpy as np
+from scipy.special import logsumexp
 
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
 from mapfilter.filters.particle import Cloud
@@ -40,6 +41,21 @@ class MeasuredMapModel(BayesModel):
         """Whether timing advances are compared with the distances of sites: not with maps."""
         return self.serving_model is None
 
+    def usual_serving(self, serving: int, timing_advance: float) -> float:
+        """Return the log-likelihood of a serving cell and its timing advance anywhere on a way.
+
+        What is compared with a probability of so many cells at a place has to be one, too.
+        """
+        model = self.serving_model
+        if model is None:
+            return super().usual_serving(serving, timing_advance)
+        found = self._log_serving(model, serving, timing_advance, self._way_pixels)
+        return float(logsumexp(found)) - log(found.size)
+
+    @cached_property
+    def _way_pixels(self) -> Ints32:
+        return np.flatnonzero(self.area.on_way).astype(np.int32)
+
     def rough_db(self) -> Bytes:
         """Return by how much the map's deviation exceeds that of the options."""
         return super().rough_db() if self.level_sd_db is None else self._rough_db
@@ -60,7 +76,13 @@ class MeasuredMapModel(BayesModel):
         if model is None:
             super()._weigh_serving(cloud, pixel, log_weight, reading)
             return
-        found = model.log_serving(reading.serving, pixel)
-        if isfinite(reading.timing_advance):
-            found = found + model.log_advance(reading.serving, pixel, reading.timing_advance)
+        found = self._log_serving(model, reading.serving, reading.timing_advance, pixel)
         log_weight += reading.serving_weight * found
+
+    def _log_serving(
+        self, model: ServingStatistics, serving: int, timing_advance: float, pixel: Ints32
+    ) -> Floats32:
+        found = model.log_serving(serving, pixel)
+        if isfinite(timing_advance):
+            found = found + model.log_advance(serving, pixel, timing_advance)
+        return found

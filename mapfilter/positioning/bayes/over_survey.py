@@ -27,8 +27,11 @@ SURVEYED: Mapping[str, float] = {
     "level_correlation_m": 100.0,
     "device_error_db": 2.0,
     "level_weight": 0.5,
+    "switch_mass": 0.95,
+    "switch_hold_m": 60.0,
 }
-"""Defaults over surveyed levels, where they differ."""
+"""Defaults over surveyed levels, where they differ. Tracks of receivers are as wide as streets with
+their houses, so that a belief in one place is wide, too; it is asked for over a longer way."""
 SURVEYED_WAYS: Mapping[str, float] = {"map_sd_m": 16.0}
 """Defaults where the ways are tracks of receivers, and no street map."""
 

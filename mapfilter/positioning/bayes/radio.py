@@ -7,6 +7,7 @@ distance, because errors of a predicted map last for tens of metres; those of le
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import exp, isfinite, nan, sqrt
 from typing import Annotated, ClassVar
@@ -20,6 +21,7 @@ from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.options import NotNegative, Options, Positive, Share
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import (
+    SERVING_UNDER_NULL,
     Context,
     EvidenceSource,
     EvidenceUpdate,
@@ -77,12 +79,24 @@ class EvidenceOptions(Options):
         return self.beside_db * sqrt(2 * (1 - exp(-particle_spacing_m / self.beside_m)))
 
 
+def _same_everywhere(serving: int, timing_advance: float) -> float:  # noqa: ARG001
+    return SERVING_UNDER_NULL
+
+
 @dataclass(frozen=True)
 class RadioSource(EvidenceSource):
-    """Serving cells and levels, compared with the area's map."""
+    """Serving cells and levels, compared with the area's map.
+
+    Parameters
+    ----------
+    usual_serving : callable
+        Returns the log-likelihood of a serving cell (band) and its timing advance (steps, or NaN)
+        under the null hypothesis.
+    """
 
     area: AreaMap
     options: EvidenceOptions
+    usual_serving: Callable[[int, float], float] = _same_everywhere
     name: ClassVar[str] = "radio"
     kinds: ClassVar[frozenset[Kind]] = frozenset({"serving", "neighbour"})
 
@@ -135,13 +149,15 @@ class RadioSource(EvidenceSource):
         if serving < 0 and levels is None and not bounds and (used is None or not unknown):
             return EvidenceUpdate(used, unused=unused, reason=reason)
         share = 1.0 if levels is None else options.serving_with_levels
+        advance = served.timing_advance if served is not None else nan
         reading = RadioReading(
             serving,
             counted_m * options.serving.weight_per_m * share * (serving >= 0 or unknown),
             levels,
             bounds,
             length_m=length_m,
-            timing_advance=served.timing_advance if served is not None else nan,
+            timing_advance=advance,
+            serving_under_null=self.usual_serving(serving, advance) if serving >= 0 else nan,
         )
         return EvidenceUpdate(reckoning, unused=unused, radio=reading, reason=reason)
 

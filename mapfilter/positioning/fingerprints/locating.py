@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,6 +15,7 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import same_crs, unproject
+from mapfilter.positioning.fingerprints.censoring import OPEN, Bounds, bounded
 from mapfilter.positioning.fingerprints.matches import Position, Received, locator
 from mapfilter.positioning.fingerprints.options import (
     AUTO,
@@ -160,6 +161,8 @@ def fit_locator(
     *,
     strongest: int = STRONGEST,
     validated: int = MOST_VALIDATED,
+    bounds: Bounds = OPEN,
+    timed: float = 0.0,
     progress: Progress | None = None,
 ) -> ReportLocator:
     """Cross-validate a method on a database, calibrate its regions, and prepare it.
@@ -180,6 +183,10 @@ def fit_locator(
         Number of cells in such a report.
     validated : int
         Most reports by which regions are calibrated.
+    bounds : Bounds
+        Ends of the scale of the reports to be located: those of the calibration end there, too.
+    timed : float
+        Share of the reports to be located that have a timing advance.
     progress : callable, optional
         Called with folds done and folds in all.
 
@@ -204,7 +211,9 @@ def fit_locator(
     if placed.predicted:
         blocks = "reports drawn with the stated errors"
         rng = rng if rng is not None else np.random.default_rng(0)
-        some = simulated_reports(placed, validated, strongest, Probabilistic().shared_db, rng)
+        shared_db = Probabilistic().shared_db
+        some = simulated_reports(placed, validated, strongest, shared_db, rng, timed)
+        some = bounded(some, bounds)
         found = [(one, _simulated(placed, one, some)) for one in tried]
     else:
         fold, blocks = folds_of(placed)
@@ -215,7 +224,7 @@ def fit_locator(
                 if progress is not None:
                     progress(begun + done, count * len(tried))
 
-            found.append((one, cross_validate(placed, one, fold, report, validated)))
+            found.append((one, cross_validate(placed, one, fold, report, validated, bounds)))
     found.sort(key=lambda pair: float(np.median(pair[1].error_m)) if len(pair[1]) else np.inf)
     chosen, errors = found[0]
     enough = len(errors) >= _LEAST_VALIDATED
@@ -230,6 +239,12 @@ def usual_readings(reports: Reports) -> int:
     """Return the median number of readings of the reports that have any; at least 1."""
     counts = np.diff(reports.first)
     return int(np.median(counts[counts > 0])) if (counts > 0).any() else 1
+
+
+def timed_share(reports: Reports) -> float:
+    """Return the share of the reports with readings that have a timing advance."""
+    timed = np.isfinite(reports.timing_advance[np.diff(reports.first) > 0])
+    return float(timed.mean()) if timed.size else 0.0
 
 
 def locate_by(fitted: ReportLocator, reports: Reports) -> LocatedReports:
@@ -275,35 +290,82 @@ def cross_validate(
     fold: Ints,
     progress: Progress | None = None,
     most: int = MOST_VALIDATED,
+    bounds: Bounds = OPEN,
 ) -> Errors:
     """Return the errors of a method where each fold is located by the database of the others.
 
     At most ``most`` reports are located, evenly taken; those of which no transmitter was received
-    in the other folds have no error.
+    in the other folds have no error. Their levels end where ``bounds`` does.
     """
     count = min(len(database), most)
     tried = np.linspace(0, max(len(database) - 1, 0), count).astype(np.int64)
-    parts, names = [], np.unique(fold)
-    for done, one in enumerate(names):
-        others = fold != one
-        own = tried[fold[tried] == one]
-        if others.any() and len(own):
-            left, query = database.some(others).compact(), database.some(own)
-            known, _ = query.named_as(left.cell_ids)
-            try:
-                rest = locator(method, left)
-            except InputError:
-                continue
-            positions, located = _positions(rest, known, np.arange(len(query)))
-            off_m = positions[:, :2] - query.places[located]
-            block = np.full(len(positions), one)
-            parts.append(Errors(np.hypot(*off_m.T), positions[:, 2], positions[:, 3], block))
-        if progress is not None:
-            progress(done + 1, len(names))
+    parts = []
+    for left in left_out(database, method, fold, tried, progress, bounds):
+        block = np.full(len(left.positions), left.fold)
+        spread_m, mismatch = left.positions[:, 2], left.positions[:, 3]
+        parts.append(Errors(np.hypot(*left.off_m.T), spread_m, mismatch, block))
     columns = ("error_m", "spread_m", "mismatch", "block")
     empty = Errors(np.empty(0), np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
     every = [empty, *parts]
     return Errors(*(np.concatenate([getattr(part, name) for part in every]) for name in columns))
+
+
+class LeftOut(NamedTuple):
+    """Reports of a fold that were located by the others; L of them have a position.
+
+    Parameters
+    ----------
+    fold : int
+    reports : Reports
+        Those L of them.
+    positions : (L, 4) array
+        East, north, spread and mismatch, see :class:`~.matches.Position`.
+    """
+
+    fold: int
+    reports: Reports
+    positions: Floats
+
+    @property
+    def off_m(self) -> Floats:
+        """Errors east and north, shape (L, 2)."""
+        return self.positions[:, :2] - self.reports.places
+
+
+def left_out(
+    database: Reports,
+    method: Method,
+    fold: Ints,
+    tried: Ints,
+    progress: Progress | None = None,
+    bounds: Bounds = OPEN,
+) -> Iterator[LeftOut]:
+    """Yield some reports of each fold, located by the database of the other folds.
+
+    Parameters
+    ----------
+    fold : (R,) array
+        Of each report.
+    tried : (T,) array
+        Which reports are located.
+    bounds : Bounds
+        Where their levels end.
+    """
+    names = np.unique(fold)
+    for done, one in enumerate(names.tolist()):
+        others = fold != one
+        own = tried[fold[tried] == one]
+        if others.any() and len(own):
+            rest, query = database.some(others).compact(), bounded(database.some(own), bounds)
+            known, _ = query.named_as(rest.cell_ids)
+            try:
+                by = locator(method, rest)
+            except InputError:
+                continue
+            positions, located = _positions(by, known, np.arange(len(query)))
+            yield LeftOut(one, query.some(located), positions)
+        if progress is not None:
+            progress(done + 1, len(names))
 
 
 def _simulated(database: Reports, method: Method, drawn: Reports) -> Errors:
@@ -345,7 +407,9 @@ def _positions(
         cell, level_dbm = reports.readings(int(one))
         if len(cell):
             serving, advance = int(reports.serving[one]), float(reports.timing_advance[one])
-            found.append(by(Received(cell, level_dbm, serving, advance)))
+            censored = reports.censored[reports.first[one] : reports.first[one + 1]]
+            ends = censored if censored.any() else None
+            found.append(by(Received(cell, level_dbm, serving, advance, ends)))
             located[at] = True
     return np.array(found, dtype=np.float64).reshape(-1, 4), located
 

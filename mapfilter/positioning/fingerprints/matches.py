@@ -9,15 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mapfilter._types import Floats, Ints, Ints32
+from mapfilter._types import Floats, Ints, Ints8, Ints32
 from mapfilter.errors import InputError, fail
+from mapfilter.positioning.fingerprints.censoring import likely
 from mapfilter.positioning.fingerprints.matching import (
     ByCell,
     Distances,
     LevelErrors,
     Likelihoods,
     Scale,
-    filled,
     usual_levels,
 )
 from mapfilter.positioning.fingerprints.options import (
@@ -39,12 +39,19 @@ _SOFT_M = 1.0
 
 
 class Received(NamedTuple):
-    """One report to be located: cells by index, levels, serving cell (-1: none), steps (or NaN)."""
+    """One report to be located: cells by index, levels, serving cell (-1: none), steps (or NaN).
+
+    Parameters
+    ----------
+    censored : ndarray of int8 or None
+        -1: the level is below; 1: above; None where no level is a bound.
+    """
 
     cell: Ints32
     level_dbm: Floats
     serving: int
     timing_advance: float
+    censored: Ints8 | None = None
 
 
 class Match(NamedTuple):
@@ -130,12 +137,15 @@ def located_once(
 
     # Arrays are no keys; as bytes missing levels are equal, too.
     @lru_cache(most)
-    def position(cell: bytes, level_dbm: bytes, serving: int, advance: bytes) -> Position:
+    def position(
+        cell: bytes, level_dbm: bytes, serving: int, advance: bytes, censored: bytes
+    ) -> Position:
         received = Received(
             np.frombuffer(cell, np.int32),
             np.frombuffer(level_dbm, np.float64),
             serving,
             float(np.frombuffer(advance, np.float64)[0]),
+            np.frombuffer(censored, np.int8) if censored else None,
         )
         return locate(received)
 
@@ -143,7 +153,9 @@ def located_once(
         cell = received.cell.astype(np.int32, copy=False).tobytes()
         level_dbm = received.level_dbm.astype(np.float64, copy=False).tobytes()
         advance = np.float64(received.timing_advance).tobytes()
-        return position(cell, level_dbm, received.serving, advance)
+        ends = received.censored
+        censored = b"" if ends is None else ends.astype(np.int8, copy=False).tobytes()
+        return position(cell, level_dbm, received.serving, advance, censored)
 
     return once
 
@@ -154,7 +166,7 @@ def _centroid(database: Reports) -> Matcher:
     def match(received: Received) -> Match:
         cell = received.serving
         if cell < 0 or by_cell.first[cell] == by_cell.first[cell + 1]:
-            level_dbm = filled(received.level_dbm, received.cell, usual_dbm)
+            level_dbm = likely(received.level_dbm, received.censored, received.cell, usual_dbm)
             # Of equally strong ones the first of the database, whatever the order of readings.
             cell = int(received.cell[level_dbm == level_dbm.max()].min())
         own = by_cell.report[by_cell.of_cell(cell)]
@@ -168,7 +180,7 @@ def _neighbours(database: Reports, method: Neighbours, scale: Scale) -> Matcher:
     k = min(method.k, len(database))
 
     def match(received: Received) -> Match:
-        distance = distances.of(received.cell, received.level_dbm)
+        distance = distances.of(received.cell, received.level_dbm, received.censored)
         index = np.argpartition(distance, k - 1)[:k]
         near = distance[index]
         weight = (near + _TINY) ** -method.weight_power
@@ -180,13 +192,16 @@ def _neighbours(database: Reports, method: Neighbours, scale: Scale) -> Matcher:
 
 
 def _posterior(database: Reports, method: Probabilistic | SurveyMaps, floor_dbm: float) -> Matcher:
-    errors = LevelErrors(method.level_db, method.shared_db, method.absence_per_db, floor_dbm)
+    shared_db = method.shared_db
+    if database.planned is not None:
+        shared_db = float(np.hypot(shared_db, database.planned.common_db))
+    errors = LevelErrors(method.level_db, shared_db, method.absence_per_db, floor_dbm)
     likelihoods = Likelihoods.at(database, errors)
     out = np.log(max(method.outliers, np.finfo(np.float64).tiny))
     inlier = np.log(max(1 - method.outliers, np.finfo(np.float64).tiny))
 
     def match(received: Received) -> Match:
-        cells, levels = likelihoods.of(received.cell, received.level_dbm)
+        cells, levels = likelihoods.of(received.cell, received.level_dbm, received.censored)
         effective = min(len(received.cell), method.effective_readings)
         share = effective / len(received.cell)
         levels = share * levels + _timing(database, received, method.timing_sd_steps)
@@ -208,6 +223,9 @@ def _timing(database: Reports, received: Received, sd_steps: float) -> Floats:
     found = np.zeros(len(database))
     if received.serving < 0 or np.isnan(received.timing_advance):
         return found
+    if database.planned is not None:
+        own = (received.serving, received.timing_advance)
+        return database.planned.log_timing(database.places, *own)
     apart = received.timing_advance - database.timing_advance
     same = (database.serving == received.serving) & np.isfinite(apart)
     found[same] = -0.5 * (apart[same] / sd_steps) ** 2

@@ -7,13 +7,15 @@ Torres-Sospedra et al., Expert Systems with Applications 42 (2015), 9263-9278.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from mapfilter._types import Floats, Ints, Ints32
+from mapfilter._types import Floats, Ints, Ints8, Ints32
+from mapfilter.positioning.fingerprints.censoring import likely
+from mapfilter.positioning.fingerprints.planned import Planned
 from mapfilter.positioning.fingerprints.reports import Reports
 
 Representation = Literal["positive", "exponential", "powed"]
@@ -124,14 +126,14 @@ class Distances:
     def to(cls, reports: Reports, metric: Metric, scale: Scale) -> Distances:
         """Represent the reports of a database."""
         by_cell, usual_dbm = ByCell.of(reports), usual_levels(reports)
-        level_dbm = filled(reports.level_dbm, reports.cell, usual_dbm)
+        level_dbm = likely(reports.level_dbm, reports.censored, reports.cell, usual_dbm)
         value = scale(level_dbm)[by_cell.order]
         total, total2 = _sums(by_cell, value), _sums(by_cell, value**2)
         return cls(by_cell, scale, metric, usual_dbm, value, total, total2)
 
-    def of(self, cell: Ints32, level_dbm: Floats) -> Floats:
+    def of(self, cell: Ints32, level_dbm: Floats, censored: Ints8 | None = None) -> Floats:
         """Return the distances of one report to all of the database, shape (R,)."""
-        own = self.scale(filled(level_dbm, cell, self.usual_dbm))
+        own = self.scale(likely(level_dbm, censored, cell, self.usual_dbm))
         shared = np.zeros(self.by_cell.count)
         for one, value in zip(cell.tolist(), own.tolist(), strict=True):
             where = self.by_cell.of_cell(one)
@@ -146,11 +148,6 @@ class Distances:
             return apart
         absent = 2 * self.scale.absent * (len(self.by_cell.first) - 1)
         return np.asarray(apart / np.maximum(self.total + own.sum() + absent, _LEAST))
-
-
-def filled(level_dbm: Floats, cell: Ints32, usual_dbm: Floats) -> Floats:
-    """Return levels, those that are missing being the usual ones of their cells."""
-    return np.where(np.isnan(level_dbm), usual_dbm[cell], level_dbm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,12 +201,13 @@ class _Excess:
     report: Ints
 
     @classmethod
-    def of(cls, by_cell: ByCell, level_dbm: Floats) -> _Excess:
+    def of(cls, reports: int, of_level: Ints, level_dbm: Floats) -> _Excess:
+        """Prepare levels, each of the report ``of_level``."""
         whole = np.floor(level_dbm).astype(np.int64)
         first, last = int(whole.min()), int(whole.max())
         order = np.argsort(whole, kind="stable")
         edges = np.searchsorted(whole[order], np.arange(first, last + 2))
-        level, report, reports = level_dbm[order], by_cell.report[order], by_cell.count
+        level, report = level_dbm[order], of_level[order]
         steps = last + 2 - first
         sums, count = np.zeros((steps, reports)), np.zeros((steps, reports), dtype=np.int32)
         for step in range(steps - 2, -1, -1):
@@ -254,6 +252,8 @@ class Likelihoods:
         Least of the variances.
     predicted : bool
         Whether the absence of a cell weaker than all that were reported is no evidence.
+    planned : Planned or None
+        With it, only cells that would have been measured with those of a report can be absent.
     """
 
     by_cell: ByCell
@@ -265,6 +265,8 @@ class Likelihoods:
     usual_dbm: Floats
     least_db2: float
     predicted: bool
+    planned: Planned | None = None
+    _prepared: dict[bytes, _Excess] = field(default_factory=dict)
 
     @classmethod
     def at(cls, reports: Reports, errors: LevelErrors) -> Likelihoods:
@@ -273,7 +275,7 @@ class Likelihoods:
         level_dbm = reports.level_dbm[by_cell.order]
         variance_db2 = errors.level_db**2 + reports.sd_db[by_cell.order] ** 2
         cell = reports.cell[by_cell.order]
-        loss = _absence(filled(level_dbm, cell, usual_dbm), errors)
+        loss = _absence(likely(level_dbm, None, cell, usual_dbm), errors)
         absence = _sums(by_cell, loss)
         least_db2 = float(variance_db2.min()) if variance_db2.size else 1.0
         return cls(
@@ -286,11 +288,21 @@ class Likelihoods:
             usual_dbm,
             least_db2,
             reports.predicted,
+            reports.planned,
         )
 
-    @cached_property
-    def _excess(self) -> _Excess:
-        return _Excess.of(self.by_cell, self.level_dbm)
+    def _excess(self, cell: Ints32) -> _Excess:
+        """Return the levels of cells that would have been reported with some."""
+        cells = len(self.by_cell.first) - 1
+        counts = np.ones(cells, np.bool_)
+        if self.planned is not None:
+            counts = self.planned.measured_with(cell)
+        key = counts.tobytes()
+        if key not in self._prepared:
+            kept = np.repeat(counts, np.diff(self.by_cell.first))
+            report, level_dbm = self.by_cell.report[kept], self.level_dbm[kept]
+            self._prepared[key] = _Excess.of(self.by_cell.count, report, level_dbm)
+        return self._prepared[key]
 
     @cached_property
     def _log_variance(self) -> Floats:
@@ -300,25 +312,30 @@ class Likelihoods:
     def _is_whole(self) -> bool:
         return bool(np.isfinite(self.level_dbm).all())
 
-    def of(self, cell: Ints32, level_dbm: Floats) -> tuple[Floats, Floats]:
+    def of(
+        self, cell: Ints32, level_dbm: Floats, censored: Ints8 | None = None
+    ) -> tuple[Floats, Floats]:
         """Return log-likelihoods of one report: of which cells it has, and of their levels, (R,).
 
         The shared error is integrated out: levels d_i with variances v_i about a common offset of
         variance t have the log-likelihood
         ``-(s2 - s1^2 / (s0 + 1/t)) / 2 - log(1 + t s0) / 2``, with ``s_k = sum d_i^k / v_i``, and a
-        logarithm of each variance relative to the least of the database.
+        logarithm of each variance relative to the least of the database. A bound tells nothing
+        where the level of the database keeps it; elsewhere it counts by what it is off.
         """
-        strength_dbm = filled(level_dbm, cell, self.usual_dbm)
+        strength_dbm = likely(level_dbm, censored, cell, self.usual_dbm)
+        ends = (np.zeros(len(cell)) if censored is None else censored).tolist()
         own = _absence(strength_dbm, self.errors)
         count, lost, absence, errors = self.by_cell.count, self.loss, self.absence, self.errors
         if self.predicted:
             # Phones report the strongest cells: the absence of weaker ones is no evidence.
             least_dbm = max(float(strength_dbm.min()), self.errors.floor_dbm)
             errors = replace(self.errors, floor_dbm=least_dbm)
-            absence = self.errors.absence_per_db * self._excess.above(least_dbm)
+            absence = self.errors.absence_per_db * self._excess(cell).above(least_dbm)
         received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
-        for one, dbm, own_loss in zip(cell.tolist(), level_dbm.tolist(), own.tolist(), strict=True):
+        readings = zip(cell.tolist(), level_dbm.tolist(), ends, own.tolist(), strict=True)
+        for one, dbm, end, own_loss in readings:
             where = self.by_cell.of_cell(one)
             report = self.by_cell.report[where]
             own_lost = _absence(self.level_dbm[where], errors) if self.predicted else lost[where]
@@ -327,8 +344,10 @@ class Likelihoods:
                 continue
             apart_db, variance_db2 = dbm - self.level_dbm[where], self.variance_db2[where]
             log_variance = self._log_variance[where]
-            if not self._is_whole:
+            if end or not self._is_whole:
                 known = np.isfinite(apart_db)
+                if end:
+                    known &= apart_db * end > 0
                 report, apart_db, log_variance = report[known], apart_db[known], log_variance[known]
                 variance_db2 = variance_db2[known]
             s0[report] += 1 / variance_db2

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mapfilter._types import Bools, Floats, Ints, Ints32
+from mapfilter._types import Bools, Floats, Ints, Ints8, Ints32
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import same_crs
+from mapfilter.positioning.fingerprints.planned import Planned
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.scans import SCAN_S, advertised, scan_of_rows
 from mapfilter.tracks.schema import SERVING
@@ -44,6 +45,8 @@ class Reports:
         NaN: received, but the level is missing.
     sd_db : ndarray, shape (N,)
         Standard deviation of the level's error, besides that of a new reading; 0 for measurements.
+    censored : ndarray of int8, shape (N,)
+        -1: the level is below this; 1: it is above; 0: it is this.
     serving : ndarray of int32, shape (R,)
         Index of the serving cell; -1 without one.
     timing_advance : ndarray, shape (R,)
@@ -57,6 +60,8 @@ class Reports:
         What was left out, and why.
     predicted : bool
         Whether the levels are those of a map, of all cells; phones report the strongest only.
+    planned : Planned or None
+        What the plan states of the cells of such a map.
     """
 
     crs: str
@@ -65,6 +70,7 @@ class Reports:
     cell: Ints32
     level_dbm: Floats
     sd_db: Floats
+    censored: Ints8
     serving: Ints32
     timing_advance: Floats
     time_s: Floats
@@ -73,6 +79,7 @@ class Reports:
     block: Ints32
     notes: tuple[str, ...] = ()
     predicted: bool = False
+    planned: Planned | None = None
 
     def __len__(self) -> int:
         return len(self.first) - 1
@@ -113,6 +120,7 @@ class Reports:
             self.cell[own],
             self.level_dbm[own],
             self.sd_db[own],
+            self.censored[own],
             self.serving[chosen],
             self.timing_advance[chosen],
             self.time_s[chosen],
@@ -121,6 +129,7 @@ class Reports:
             self.block[chosen],
             (*self.notes, *notes),
             self.predicted,
+            self.planned,
         )
 
     def placed(self) -> Reports:
@@ -160,6 +169,7 @@ class Reports:
             cell[known],
             self.level_dbm[known],
             self.sd_db[known],
+            self.censored[known],
             new[self.serving],
             self.timing_advance,
             self.time_s,
@@ -169,6 +179,10 @@ class Reports:
             self.notes,
             self.predicted,
         )
+        if self.planned is not None:
+            own = {cell_id: i for i, cell_id in enumerate(self.cell_ids)}
+            kept = np.array([own[cell_id] for cell_id in cell_ids], dtype=np.int64)
+            found = replace(found, planned=self.planned.some(kept))
         return found, unknown
 
 
@@ -185,6 +199,7 @@ def make_reports(
     serving: ArrayLike | None = None,
     timing_advance: ArrayLike | None = None,
     sd_db: ArrayLike | None = None,
+    censored: ArrayLike | None = None,
     notes: Sequence[str] = (),
 ) -> Reports:
     """Make reports of readings in any order.
@@ -205,7 +220,7 @@ def make_reports(
     time_s, block, timing_advance : (count,) array, optional
     serving : sequence of ``count`` str, optional
         Serving cell of each report, empty where there is none.
-    sd_db : (N,) array, optional
+    sd_db, censored : (N,) array, optional
 
     Examples
     --------
@@ -219,15 +234,17 @@ def make_reports(
     index = np.searchsorted(cell_ids, names).astype(np.int32)
     which, level = np.asarray(report, np.int64), np.asarray(level_dbm, np.float64)
     error = np.zeros(len(which)) if sd_db is None else np.asarray(sd_db, np.float64)
+    bound = np.zeros(len(which), np.int8) if censored is None else np.asarray(censored, np.int8)
     order = np.lexsort((-np.where(np.isnan(level), -np.inf, level), index, which))
-    which, index, level, error = which[order], index[order], level[order], error[order]
+    which, index, level = which[order], index[order], level[order]
+    error, bound = error[order], bound[order]
     again = np.zeros(len(which), np.bool_)
     again[1:] = (which[1:] == which[:-1]) & (index[1:] == index[:-1])
     found = list(notes)
     if again.any():
         found.append(f"{int(again.sum())} readings left out: a cell twice in one report")
         which, index = which[~again], index[~again]
-        level, error = level[~again], error[~again]
+        level, error, bound = level[~again], error[~again], bound[~again]
     served_index = np.where(served == "", -1, np.searchsorted(cell_ids, served))
 
     def column(given: ArrayLike | None, otherwise: float) -> Floats:
@@ -243,6 +260,7 @@ def make_reports(
         index,
         level,
         error,
+        bound,
         served_index.astype(np.int32),
         column(timing_advance, np.nan),
         column(time_s, np.nan) if time_s is not None else np.arange(count, dtype=np.float64),
@@ -288,6 +306,7 @@ def reports_of_log(log: TrackLog, block: int = -1) -> Reports:
         block=np.full(count, block),
         serving=serving.astype(str),
         timing_advance=advance,
+        censored=radio["censored"].fillna(0).to_numpy(np.int8)[known],
         notes=notes,
     )
 
@@ -363,6 +382,7 @@ def joined_reports(parts: Sequence[Reports]) -> Reports:
         serving=np.concatenate(serving),
         timing_advance=np.concatenate([part.timing_advance for part in parts]),
         sd_db=np.concatenate([part.sd_db for part in parts]),
+        censored=np.concatenate([part.censored for part in parts]),
         notes=_joined_notes(parts),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, sqrt
@@ -13,6 +14,7 @@ import pandas as pd
 from mapfilter.database.measured import Readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
+from mapfilter.positioning.fingerprints.planned import Planned, level_deviations_db
 from mapfilter.positioning.fingerprints.reports import (
     Reports,
     joined_reports,
@@ -27,6 +29,9 @@ MOST_POINTS = 20_000
 
 STRONGEST = 7
 """Cells in a report of a phone: a serving cell and six neighbours."""
+
+_OTHER_CARRIERS = 0.5
+"""Share of the carriers besides that of the serving cell that a phone measures."""
 
 
 def reports_of_logs(logs: Sequence[TrackLog], plan: CellPlan | None = None) -> Reports:
@@ -56,13 +61,16 @@ def named_neighbours(log: TrackLog, plan: CellPlan) -> TrackLog:
 def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.0) -> Reports:
     """Return the levels of a radio-route database as reports at its points.
 
+    Where usual values stand for what the plan of a cell lacks, its levels err by more
+    (:mod:`mapfilter.positioning.fingerprints.planned`).
+
     Those of a survey are its readings themselves: its rasters tell the level where a cell is
     received, and not where it is not.
 
     Parameters
     ----------
     level_error_db : float
-        Standard deviation of the error of predicted levels.
+        Standard deviation of the error of levels that are predicted with a plan's own values.
 
     Raises
     ------
@@ -89,16 +97,37 @@ def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.
     names = np.repeat(np.array(database.cell_ids, dtype=str), [len(part[0]) for part in parts])
     level_dbm = np.concatenate([part[2] for part in parts]).astype(np.float64)
     east_m, north_m = lattice.east_north(kept // lattice.cols, kept % lattice.cols)
+    place_m = np.column_stack([east_m, north_m])
+    which = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])[there]
+    sd_db = np.full(len(which), float(level_error_db))
+    for index, cell_id in enumerate(database.cell_ids):
+        if database.plan[cell_id].assumes:
+            own = which == index
+            near_m = place_m[at[there][own]]
+            cell = database.plan[cell_id]
+            sd_db[own] = level_deviations_db(cell, lattice.crs, near_m, level_error_db)
     found = make_reports(
         lattice.crs,
         at[there],
         names[there],
         level_dbm[there],
         count=len(kept),
-        places=np.column_stack([east_m, north_m]),
-        sd_db=np.full(int(there.sum()), level_error_db),
+        places=place_m,
+        sd_db=sd_db,
+        notes=_assumed_notes(database.plan),
     )
-    return replace(found, predicted=True)
+    stated = any(cell.technology or cell.assumed for cell in database.plan.cells)
+    planned = Planned.of(database.plan, found.cell_ids) if stated else None
+    return replace(found, predicted=True, planned=planned)
+
+
+def _assumed_notes(plan: CellPlan) -> list[str]:
+    """Return a note of the fields for which the cells of a plan have usual values."""
+    counts = Counter(name for cell in plan.cells for name in cell.assumes)
+    if not counts:
+        return []
+    named = ", ".join(f"{name} of {count}" for name, count in sorted(counts.items()))
+    return [f"usual values for what the plan lacks, so levels err by more: {named} cells"]
 
 
 def _reports_of_survey(readings: Readings, crs: str) -> Reports:
@@ -128,21 +157,46 @@ def _reports_of_survey(readings: Readings, crs: str) -> Reports:
 
 
 def simulated_reports(
-    database: Reports, count: int, strongest: int, shared_db: float, rng: np.random.Generator
+    database: Reports,
+    count: int,
+    strongest: int,
+    shared_db: float,
+    rng: np.random.Generator,
+    timed: float = 0.0,
 ) -> Reports:
     """Draw reports at places of predicted levels, with the errors that are stated for these.
 
-    Each has the strongest cells, with independent errors and one that all share.
+    Each has the strongest cells, with independent errors and one that all share. Where cells share
+    carriers, these are of the serving cell's carrier and, with even odds, of each other one.
+
+    Parameters
+    ----------
+    timed : float
+        Share of the reports that have a timing advance, where its step is known.
     """
     drawn = database.some(rng.choice(len(database), min(count, len(database)), replace=False))
-    report = drawn.report
+    report, planned = drawn.report, drawn.planned
+    if planned is not None:
+        shared_db = float(np.hypot(shared_db, planned.common_db))
     shared = shared_db * rng.standard_normal(len(drawn))
     level_dbm = drawn.level_dbm + shared[report]
     level_dbm = level_dbm + drawn.sd_db * rng.standard_normal(len(level_dbm))
     order = np.lexsort((-level_dbm, report))
-    rank = np.arange(len(order)) - drawn.first[report[order]]
+    best = drawn.cell[order[drawn.first[:-1]]]
+    if planned is not None:
+        measured = rng.random((len(drawn), int(planned.carrier.max()) + 2)) < _OTHER_CARRIERS
+        measured[np.arange(len(drawn)), planned.carrier[best]] = True
+        # The last column is that of -1: cells that count always.
+        measured[:, -1] = True
+        order = order[measured[report[order], planned.carrier[drawn.cell[order]]]]
+    begins = np.searchsorted(report[order], np.arange(len(drawn)))
+    rank = np.arange(len(order)) - begins[report[order]]
     kept = order[rank < strongest]
     names = np.array(drawn.cell_ids, dtype=str)
+    steps = np.full(len(drawn), np.nan)
+    if planned is not None:
+        steps = planned.drawn_timing(drawn.places, best, rng)
+        steps[rng.random(len(drawn)) >= timed] = np.nan
     return make_reports(
         drawn.crs,
         report[kept],
@@ -150,6 +204,8 @@ def simulated_reports(
         level_dbm[kept],
         count=len(drawn),
         places=drawn.places,
+        serving=None if planned is None else names[best],
+        timing_advance=steps,
     )
 
 

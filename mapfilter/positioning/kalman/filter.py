@@ -32,6 +32,14 @@ from mapfilter.positioning.kalman.belief import (
     gaussian_radii_m,
     share_within,
 )
+from mapfilter.positioning.kalman.lasting import (
+    Motion,
+    extended_belief,
+    extended_layout,
+    extended_motion,
+    fix_layout,
+    white_part,
+)
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels, compiled
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -87,7 +95,8 @@ class KalmanState:
     Parameters
     ----------
     layout : StateLayout
-        Position only where there is dead reckoning, else position and velocity.
+        Position only where there is dead reckoning, else position and velocity; with the place that
+        fixes are of, where their errors last.
     belief : SumBelief or None
         None before the first measurement that it can start from.
     time_s : float
@@ -137,7 +146,9 @@ class KalmanTracker(Filter[KalmanState]):
 
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> KalmanState:
         """Return the state before the first epoch."""
-        return KalmanState(POSITION if "motion" in kinds else MOVING)
+        layout = POSITION if "motion" in kinds else MOVING
+        lasts = self.sites.options.fix_lasting_m > 0
+        return KalmanState(extended_layout(layout) if lasts else layout)
 
     def step(
         self,
@@ -196,6 +207,9 @@ class _Step:
     def __init__(self, sites: SiteModels, method: Method, state: KalmanState) -> None:
         self.sites, self.method, self.options = sites, method, sites.options
         self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
+        self.lasts = self.options.fix_lasting_m > 0
+        # With a rate behind each coordinate north is the third component.
+        self.own = MOVING if state.layout.north == MOVING.north else POSITION
         self.where = [self.layout.east, self.layout.north]
         self.moved_m, self.status = state.moved_m, state.status
         self.recent_nis = list(state.recent_nis)
@@ -230,13 +244,13 @@ class _Step:
 
     def _move(self, epoch: Epoch) -> tuple[Floats, Floats, Floats]:
         """Predict; return the transition, the noise and the shift."""
-        size = self.layout.size
+        size = self.own.size
         elapsed_s = max(epoch.time_s - self.time_s, 0.0) if isfinite(self.time_s) else 0.0
         transition, noise, shift = np.eye(size), np.zeros((size, size)), np.zeros(size)
         if self.belief is None:
             self._label(epoch, epoch.motion, Reason.NOT_STARTED)
-            return transition, noise, shift
-        if self.layout is MOVING:
+            return self._extended((transition, noise, shift), elapsed_s)
+        if self.own is MOVING:
             if elapsed_s > 0:
                 root = self.options.acceleration_mps_per_sqrt_s
                 motion = constant_velocity(elapsed_s, root, noise="continuous")
@@ -248,8 +262,17 @@ class _Step:
                 moved, spread = self._step(epoch, step)
                 shift, noise = shift + moved, noise + spread
                 self.moved_m += step.step_m if isfinite(step.step_m) else 0.0
-        self.belief = self.belief.predict(transition, noise, shift)
-        return transition, noise, shift
+        whole = self._extended((transition, noise, shift), elapsed_s)
+        self.belief = self.belief.predict(*whole)
+        return whole
+
+    def _extended(self, motion: Motion, elapsed_s: float) -> Motion:
+        """Return motion with that of the place that fixes are of, where their errors last."""
+        if not self.lasts:
+            return motion
+        options = self.options
+        lasting = options.fix_lasting_m, options.fix_lasting_s
+        return extended_motion(motion, self.own, *lasting, elapsed_s)
 
     def _speed_mps(self) -> float:
         """Return the estimated speed, at least that of a walk."""
@@ -279,7 +302,7 @@ class _Step:
             self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.NO_READING))
             fix = None
         # With a velocity, nothing but fixes tells that one stands: the estimate would coast on.
-        if fix is not None and self.layout is not MOVING and fix.repeats(self.last_fix):
+        if fix is not None and self.own is not MOVING and fix.repeats(self.last_fix):
             self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REPEATED_FIX))
             fix = None
         self.last_fix = fix or self.last_fix
@@ -287,6 +310,8 @@ class _Step:
             return Reason.UNKNOWN_CELL if epoch.radio else Reason.NO_READING
         if self.belief is None:
             self.belief = self._start(fix, given)
+            if self.lasts:
+                self.belief = extended_belief(self.belief, self.own, self.options.fix_lasting_m)
         taken = fix is not None and self._update_fix(fix)
         if given.cells or given.timed:
             model = self.sites.of(self.layout, given.cells, given.timed)
@@ -306,10 +331,8 @@ class _Step:
     def _start(self, fix: GnssFix | None, given: SiteReadings) -> SumBelief:
         """Return the first belief: at a fix, on a timing advance's circle, or about a site."""
         options, east, north = self.options, *self.where
-        mean, deviation = np.zeros(self.layout.size), np.zeros(self.layout.size)
-        deviation[list(self.layout.velocity if self.layout is MOVING else ())] = (
-            options.speed_sd_mps
-        )
+        mean, deviation = np.zeros(self.own.size), np.zeros(self.own.size)
+        deviation[list(self.own.velocity if self.own is MOVING else ())] = options.speed_sd_mps
         if fix is not None:
             mean[self.where] = fix.east_m, fix.north_m
             deviation[self.where] = options.start_sd_m
@@ -336,7 +359,10 @@ class _Step:
         valid = np.isfinite(noise).all() and noise[0, 0] > 0 and np.linalg.det(noise) > 0
         if not valid:
             noise = np.eye(2) * self.options.fix_sd_m**2
-        return self._update(position_fix(self.layout, noise), [fix.east_m, fix.north_m])
+        layout = self.layout
+        if self.lasts:
+            layout, noise = fix_layout(layout), white_part(noise, self.options.fix_lasting_m)
+        return self._update(position_fix(layout, noise), [fix.east_m, fix.north_m])
 
     def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
         """Update with a measurement; return whether that could be done."""

@@ -19,7 +19,7 @@ from mapfilter.models.ranging import GSM_STEP_M, timing_advances
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import measure_kernel
-from mapfilter.options import Options, Positive
+from mapfilter.options import NotNegative, Options, Positive
 from mapfilter.propagation.empirical import cost231_hata_db
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cell_rules import ANTENNAS
@@ -49,6 +49,12 @@ class KalmanOptions(Options):
         Distance for which errors of timing advances last.
     fix_sd_m : float
         Assumed deviation of a GNSS fix without one.
+    fix_lasting_m : float
+        Assumed deviation along one axis of the part of a fix's error that lasts over later fixes, a
+        Gauss-Markov process; 0: fixes are independent of each other, as it is assumed of GNSS.
+        :func:`mapfilter.positioning.fingerprints.lasting.lasting_error` finds that of Wi-Fi.
+    fix_lasting_s : float
+        Time after which the correlation of that part is 1/e.
     step_sd_m : float
         Assumed deviation of a step's length.
     heading_sd_deg : float
@@ -78,6 +84,8 @@ class KalmanOptions(Options):
     timing_sd_m: Positive = 200.0
     timing_memory_m: Positive = 500.0
     fix_sd_m: Positive = 10.0
+    fix_lasting_m: NotNegative = 0.0
+    fix_lasting_s: Positive = 30.0
     step_sd_m: Positive = 0.3
     heading_sd_deg: Positive = 11.459155902616464
     drift_m_per_sqrt_s: Positive = 0.3

@@ -1,11 +1,11 @@
 "use strict";
 // A session of a service: its map, its events, and what to do when the connection is lost.
 (() => {
-  const [AGAIN_MS, LIST_MS] = [5000, 5000];
+  const [AGAIN_MS, REFUSED_MS, SETTLE_MS, LIST_MS] = [5000, 30000, 500, 5000];
   const key = new URLSearchParams(window.location.search).get("key");
 
-  const ask = async (path) => {
-    const answer = await fetch(path, { cache: "no-store", headers: key ? { authorization: `Bearer ${key}` } : {} });
+  const ask = async (path, signal) => {
+    const answer = await fetch(path, { cache: "no-store", signal, headers: key ? { authorization: `Bearer ${key}` } : {} });
     if (answer.ok) return answer;
     const told = await answer.json().catch(() => null);
     throw Object.assign(new Error(told?.error?.message ?? `The service answered ${answer.status}.`), { code: answer.status });
@@ -17,9 +17,9 @@
       live.state = state;
       for (const listener of live.listeners) listener(state);
     };
+    const address = () => `../sessions/${id}/events?${new URLSearchParams({ detail: "1", after: run.last, ...(key ? { key } : {}) })}`;
     const connect = () => {
-      const query = new URLSearchParams({ detail: "1", after: run.last, ...(key ? { key } : {}) });
-      const events = new EventSource(`../sessions/${id}/events?${query}`);
+      const events = new EventSource(address());
       events.addEventListener("open", () => tell("live"));
       events.addEventListener("fix", (event) => { run.push(JSON.parse(event.data)); tell(); });
       events.addEventListener("belief", (event) => { run.pushBelief(JSON.parse(event.data)); tell(); });
@@ -31,21 +31,25 @@
       });
       // The browser comes back by itself after a cut, with the number of its last event; not after a refusal.
       events.addEventListener("error", () => {
-        tell("reconnecting");
-        if (events.readyState === EventSource.CLOSED) again();
+        if (events.readyState !== EventSource.CLOSED) tell("reconnecting");
+        else again();
       });
     };
-    const again = () => {
-      tell("reconnecting");
+    // An event source does not say why it was refused; a request for the same stream does.
+    const again = (state = "reconnecting", wait = AGAIN_MS) => {
+      tell(state);
       setTimeout(async () => {
+        const tried = new AbortController();
         try {
-          await ask(`../sessions/${id}`);
-          connect();
+          await ask(address(), tried.signal);
+          tried.abort();
+          setTimeout(connect, SETTLE_MS);
         } catch (error) {
           if (error.code === 404 || error.code === 401) tell(`ended: ${error.message}`);
+          else if (error.code === 429) again(`refused: ${error.message}`, REFUSED_MS);
           else again();
         }
-      }, AGAIN_MS);
+      }, wait);
     };
     connect();
     return live;

@@ -1,0 +1,133 @@
+"""Single reports over levels that were predicted with a plan that lacks powers and heights."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
+from mapfilter.positioning.fingerprints.planned import (
+    LTE_STEP_M,
+    OWN_DB,
+    Planned,
+    level_deviations_db,
+)
+from mapfilter.positioning.fingerprints.reports import Reports, make_reports
+from mapfilter.radio.cells import Cell, CellPlan
+
+CRS = "EPSG:32635"
+EAST_M, NORTH_M = 385_000.0, 6_672_000.0
+AT_M = np.array([EAST_M, NORTH_M])
+SIDE_M, SPACING_M = 1500.0, 50.0
+
+
+def _cell(name: str, east_m: float, north_m: float, mhz: float, **more: object) -> Cell:
+    place = (EAST_M + east_m, NORTH_M + north_m)
+    return Cell(name, name, *place, 30.0, None, 30.0, mhz, "omni", technology="LTE", **more)
+
+
+def _level_dbm(cell: Cell, places: np.ndarray) -> np.ndarray:
+    away_m = np.hypot(*(places - [cell.east_m, cell.north_m]).T)
+    return cell.eirp_dbm - 40 - 35 * np.log10(np.maximum(away_m, 20.0) / 10)
+
+
+def _map(plan: CellPlan, error_db: float = 6.0) -> Reports:
+    """Return the predicted levels of a plan on a square."""
+    steps = np.arange(-SIDE_M, SIDE_M + 1, SPACING_M)
+    places = np.stack(np.meshgrid(steps, steps), -1).reshape(-1, 2) + AT_M
+    count, cells = len(places), plan.cells
+    found = make_reports(
+        CRS,
+        np.tile(np.arange(count), len(cells)),
+        np.repeat([cell.id for cell in cells], count),
+        np.concatenate([_level_dbm(cell, places) for cell in cells]),
+        count=count,
+        places=places,
+        sd_db=np.concatenate([level_deviations_db(c, CRS, places, error_db) for c in cells]),
+    )
+    return replace(found, predicted=True, planned=Planned.of(plan, found.cell_ids))
+
+
+def _plan(**more: object) -> CellPlan:
+    places = [(-600, -500), (650, -450), (0, 700), (100, 0)]
+    return CellPlan(CRS, tuple(_cell(f"c{i}", *at, 1800.0, **more) for i, at in enumerate(places)))
+
+
+def _received(plan: CellPlan, count: int, rng: np.random.Generator) -> Reports:
+    """Draw reports of a network whose powers and heights are not the usual ones."""
+    places = rng.uniform(-SIDE_M, SIDE_M, (count, 2)) + AT_M
+    # Powers and heights differ from network to network, here from report to report.
+    common_db = 6.5 * rng.standard_normal(count)
+    levels = [
+        _level_dbm(cell, places) + common_db + np.hypot(5.7, 6) * rng.standard_normal(count)
+        for cell in plan.cells
+    ]
+    return make_reports(
+        CRS,
+        np.tile(np.arange(count), len(plan.cells)),
+        np.repeat([cell.id for cell in plan.cells], count),
+        np.concatenate(levels),
+        count=count,
+        places=places,
+        serving=["c0"] * count,
+    )
+
+
+def _share_within_95(plan: CellPlan, reports: Reports) -> float:
+    fitted = fit_locator(_map(plan), "probabilistic", np.random.default_rng(1), strongest=4)
+    located = locate_by(fitted, reports)
+    return float(np.mean(located.error_m <= located.radii_m[:, 2]))
+
+
+def test_regions_hold_where_usual_values_stand_for_powers_and_heights():
+    reports = _received(_plan(), 800, np.random.default_rng(7))
+    assumed = _share_within_95(_plan(assumed="eirp_dbm height_m"), reports)
+    # The same levels, with a plan that claims them for its cells' own.
+    stated = _share_within_95(_plan(), reports)
+    assert 0.93 <= assumed <= 0.98
+    assert stated < 0.91
+
+
+def test_errors_are_those_stated_where_the_plan_lacks_nothing():
+    places = np.array([[EAST_M, NORTH_M], [EAST_M + 900, NORTH_M]])
+    assert level_deviations_db(_plan()["c0"], CRS, places, 6.0).tolist() == [6.0, 6.0]
+    unknown = _plan(assumed="eirp_dbm")["c0"]
+    found = level_deviations_db(unknown, CRS, places, 6.0)
+    assert found == pytest.approx(np.hypot(6.0, OWN_DB["eirp_dbm"]))
+
+
+def test_behind_an_assumed_sector_levels_err_by_more():
+    sector = replace(_cell("c", 0, 0, 800.0, assumed="height_m"), azimuth_deg=90.0, antenna="3gpp")
+    front, behind = level_deviations_db(
+        sector, CRS, np.array([[EAST_M + 500, NORTH_M], [EAST_M - 500, NORTH_M]]), 6.0
+    )
+    assert behind > front + 4
+
+
+def _one(plan: CellPlan, names: list[str], level_dbm: list[float], **more: object) -> np.ndarray:
+    fitted = fit_locator(_map(plan), "probabilistic", np.random.default_rng(1))
+    reports = make_reports(CRS, np.zeros(len(names), int), names, level_dbm, count=1, **more)
+    located = locate_by(fitted, reports)
+    return np.array([located.east_m[0] - EAST_M, located.north_m[0] - NORTH_M])
+
+
+def test_a_cell_of_a_carrier_that_was_not_measured_is_not_absent():
+    near, other = _cell("a", 0, 0, 1800.0), _cell("b", 700, 0, 800.0)
+    same = replace(other, frequency_mhz=1800.0)
+    level = [float(_level_dbm(near, np.array([[EAST_M + 500, NORTH_M]]))[0])]
+    apart = _one(CellPlan(CRS, (near, other)), ["a"], level, serving=["a"])
+    together = _one(CellPlan(CRS, (near, same)), ["a"], level, serving=["a"])
+    # On the carrier of the serving cell a strong cell would have been reported.
+    assert abs(apart[0]) < 30
+    assert together[0] < apart[0] - 50
+
+
+def test_a_timing_advance_counts_by_the_distance_to_the_site():
+    plan = CellPlan(CRS, (_cell("a", 0, 0, 1800.0), _cell("b", 1200, 0, 1800.0)))
+    middle = np.array([[EAST_M + 600, NORTH_M]])
+    levels = [float(_level_dbm(cell, middle)[0]) for cell in plan.cells]
+    east_m = [
+        _one(plan, ["a", "b"], levels, serving=["a"], timing_advance=[steps])[0]
+        for steps in (200 // LTE_STEP_M, 1000 // LTE_STEP_M)
+    ]
+    assert east_m[1] > east_m[0] + 150
