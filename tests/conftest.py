@@ -5,6 +5,10 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+# Before NumPy is loaded. Matrices are small: threads of BLAS only wait for each other, and take the
+# processor from the other worker.
+os.environ["OPENBLAS_NUM_THREADS"] = os.environ.get("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from fuzz import MUTATIONS
 from hypothesis import settings
