@@ -84,6 +84,9 @@ def test_fixes_that_are_off_themselves():
     story = explain(found, truth)
     causes = causes_of(found, truth, story, None, fixes)
     assert "the 6 fixes there are themselves 40 m off (median)" in causes
+    assert "the only fix there is itself 40 m off" in causes_of(
+        found, truth, story, None, fixes[:1]
+    )
     right = fixes - [0.0, 0.0, 30.0]
     assert not any("fixes" in one for one in causes_of(found, truth, story, None, right))
 

@@ -147,6 +147,8 @@ def _wrong_fixes(stretch: _Stretch) -> str:
     off_m = off_m[np.isfinite(off_m)]
     if not off_m.size or not np.median(off_m) >= _FIX_SHARE * own_m:
         return ""
+    if off_m.size == 1:
+        return f"the only fix there is itself {off_m[0]:.0f} m off"
     return f"the {off_m.size} fixes there are themselves {np.median(off_m):.0f} m off (median)"
 
 
