@@ -37,6 +37,7 @@ from mapfilter.models.street_motion import (
     STRETCH,
     TURN,
 )
+from mapfilter.positioning.bayes.model import expected_absent, mean_rough_db2
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench_filter import StepInputs, make_world, step_inputs, whole_step
@@ -137,15 +138,16 @@ class NumpyModel:
         self, now: Floats, rough: Floats, pixel: Ints32, odds: Floats
     ) -> tuple[Floats, Floats]:
         errors, report, area = self.model.evidence.levels, self.levels, self.model.area
+        predicted = self.model.prediction
         memory = LevelMemory.empty(errors, area.site_of)
         kept = memory.start(now.shape[0])
         first = np.array([self.reading.serving], dtype=np.int32)
         memory, kept = memory.with_cells(first, kept)
         memory.fault_odds(self.reading.serving, kept)[:] = odds
-        report = report._replace(absent=self.model._expected(pixel, report))
+        report = report._replace(absent=expected_absent(predicted, pixel, report))
         cells = np.concatenate([report.cell, report.absent])[: memory.slots]
         memory, kept = memory.with_cells(cells, kept)
-        memory, heard = memory.updated(report, self.model._mean_rough_db2(pixel, report.cell))
+        memory, heard = memory.updated(report, mean_rough_db2(predicted, pixel, report.cell))
         absent, total = memory.absence(report), np.zeros(now.shape[0])
         held = kept.astype(np.float64)
         for terms, below in ((heard, False), (absent, True)):

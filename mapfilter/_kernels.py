@@ -70,7 +70,8 @@ def on_demand(
 
 def draw_key(rng: np.random.Generator) -> np.uint64:
     """Draw the key of one kernel call."""
-    return np.uint64(rng.integers(0, 2**64, dtype=np.uint64))
+    key: np.uint64 = rng.integers(0, 2**64, dtype=np.uint64)
+    return key
 
 
 @njit(inline="always")

@@ -1,6 +1,13 @@
 """Fixtures shared by all rooms."""
 
+import gc
+import os
+from collections.abc import Iterator
 from pathlib import Path
+
+# Before NumPy is loaded. Matrices are small: threads of BLAS only wait for each other, and take the
+# processor from the other worker.
+os.environ["OPENBLAS_NUM_THREADS"] = os.environ.get("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from fuzz import MUTATIONS
@@ -19,6 +26,31 @@ _SHARED = Path(__file__).resolve().parents[2] / "shared"
 def pytest_addoption(parser: pytest.Parser) -> None:
     said = "damaged copies of each sample that a reader is fed with"
     parser.addoption("--mutations", type=int, default=MUTATIONS, help=said)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put modules with long tests first, so that no worker ends with one of them alone."""
+    long = {item.path for item in items if item.get_closest_marker("long") is not None}
+    items.sort(key=lambda item: item.path not in long)
+
+
+def pytest_collection_finish() -> None:
+    """Spare the collector what stays until the end anyway: all modules and all tests."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_waiting_for_disks(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Hand files to the system alone: no test cuts the power, and many would wait for disks.
+
+    Tests of writing itself (core), and all processes that a test starts, do flush.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.parent.name != "core":
+            # Of a file that is not open this one fails as well.
+            patch.setattr(os, "fsync", os.fstat)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -24,8 +24,8 @@ from mapfilter.radio.cells import Cell, CellPlan
 
 _SIDE = 40
 _LEAST_SQUARES = 60
-_HARMONICS = 2
 _PLACES = 10
+_AT_ONCE = 1 << 18
 
 
 class MeanLevels(NamedTuple):
@@ -56,28 +56,56 @@ def in_squares(sample: RasterSample) -> MeanLevels | None:
     return MeanLevels(east_m, north_m, level_db, step * sample.lattice.resolution_m)
 
 
-def place_fit(squares: MeanLevels, east_m: float, north_m: float) -> float:
-    """Return how well a place explains levels: the multiple correlation, 0..1.
+def place_fits(squares: MeanLevels, places_m: Floats) -> Floats:
+    """Return how well places explain levels: the multiple correlations, 0..1, shape (P,).
 
     Levels that become stronger with the distance count as not depending on it.
+
+    Parameters
+    ----------
+    places_m : ndarray, shape (P, 2)
+        East and north of each place.
     """
-    east, north = squares.east_m - east_m, squares.north_m - north_m
-    distance_m = np.hypot(east, north)
-    direction_rad = np.arctan2(north, east)
-    # What lies in the place's own square has no direction.
-    near = np.minimum(distance_m / squares.side_m, 1.0)
-    columns = [np.log10(np.maximum(distance_m, squares.side_m / 2))]
-    for order in range(1, _HARMONICS + 1):
-        columns += [near * np.cos(order * direction_rad), near * np.sin(order * direction_rad)]
-    causes = np.column_stack(columns)
-    causes -= causes.mean(axis=0)
     level_db = squares.level_db - squares.level_db.mean()
-    factors = np.linalg.lstsq(causes, level_db, rcond=None)[0]
-    if factors[0] > 0:
-        causes = causes[:, 1:]
-        factors = np.linalg.lstsq(causes, level_db, rcond=None)[0]
-    explained = causes @ factors
-    return float(np.sqrt((explained @ explained) / (level_db @ level_db)))
+    parts = np.array_split(places_m, max(1, -(-len(places_m) * len(level_db) // _AT_ONCE)))
+    return np.concatenate([_fits_of(squares, level_db, part) for part in parts])
+
+
+def _fits_of(squares: MeanLevels, level_db: Floats, places_m: Floats) -> Floats:
+    east = squares.east_m - places_m[:, :1]
+    north = squares.north_m - places_m[:, 1:]
+    distance_m = np.hypot(east, north)
+    # What lies in the place's own square has no direction.
+    reach_m = np.maximum(distance_m, squares.side_m)
+    cos, sin = east / reach_m, north / reach_m
+    beside = np.minimum(distance_m / squares.side_m, 1.0)
+    beside[beside == 0] = 1.0
+    causes = np.stack(
+        [
+            np.log10(np.maximum(distance_m, squares.side_m / 2)),
+            cos,
+            sin,
+            # Of the doubled direction, as long as those.
+            (cos**2 - sin**2) / beside,
+            2 * cos * sin / beside,
+        ],
+        axis=1,
+    )
+    causes -= causes.mean(axis=2, keepdims=True)
+    products, with_levels = causes @ causes.transpose(0, 2, 1), causes @ level_db
+    factors, explained = _solved(products, with_levels)
+    grows = factors[:, 0] > 0
+    if grows.any():
+        rest = products[grows, 1:, 1:], with_levels[grows, 1:]
+        explained[grows] = _solved(*rest)[1]
+    return np.sqrt(np.maximum(explained, 0.0) / (level_db @ level_db))
+
+
+def _solved(products: Floats, with_levels: Floats) -> tuple[Floats, Floats]:
+    """Return the factors of causes by least squares, and the sum of squares that they explain."""
+    inverse = np.linalg.pinv(products, hermitian=True)
+    factors = np.einsum("pij,pj->pi", inverse, with_levels)
+    return factors, np.einsum("pi,pi->p", factors, with_levels)
 
 
 def peak_m(sample: RasterSample) -> tuple[float, float]:
@@ -99,9 +127,9 @@ def best_place(squares: MeanLevels, sample: RasterSample) -> tuple[float, tuple[
         for y in south + along * (north - south)
     ]
     places.append(peak_m(sample))
-    fits = [place_fit(squares, *place) for place in places]
+    fits = place_fits(squares, np.array(places))
     best = int(np.argmax(fits))
-    return fits[best], places[best]
+    return float(fits[best]), places[best]
 
 
 _FAR_PX, _FAR_M = 10.0, 150.0
@@ -166,10 +194,11 @@ def _fits(seen: Sequence[RasterSample], plan: CellPlan) -> dict[str, _Fit]:
         off_m = np.hypot(*(places_m - (east_m, north_m)).T)
         about = [names[index] for index in np.argsort(off_m, kind="stable")[:_SITES]]
         away_m = float(np.hypot(east_m - cell.east_m, north_m - cell.north_m))
-        own = place_fit(squares, cell.east_m, cell.north_m)
+        tried_m = np.array([(cell.east_m, cell.north_m), *(site_at[site] for site in about)])
+        own, *others = place_fits(squares, tried_m).tolist()
         found[cell.id] = _Fit(
             own,
-            {site: place_fit(squares, *site_at[site]) for site in about} | {cell.site: own},
+            dict(zip(about, others, strict=True)) | {cell.site: own},
             best,
             away_m,
             away_m >= max(_FAR_M, _FAR_PX * sample.lattice.resolution_m),

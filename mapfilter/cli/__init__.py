@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Annotated
@@ -89,5 +90,8 @@ def _version(
 
 def main() -> None:
     """Run the command line; a user's error gives one message and exit code 2."""
+    # Work is shared between processes, and matrices are small: threads of BLAS, which read this
+    # when NumPy is loaded, would take several times as long, most of it waiting for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # The command itself, because a Typer app puts its own hook for exceptions in place.
     sys.exit(guarded(get_command(app)))

@@ -159,12 +159,14 @@ def _summarise(
     mass = np.zeros((bins.rows, bins.cols), dtype=np.float32)
     flat, of_bin, count = mass.ravel(), _bin_of(state, bins), 0
     touched = np.empty(weight.size, dtype=np.int32)
+    least = np.float32(1e-30)
     for i in range(weight.size):
-        if flat[of_bin[i]] == 0:
+        at = np.uint32(of_bin[i])
+        if flat[at] == 0:
             touched[count] = of_bin[i]
             count += 1
         # A weight of zero must not make its bin look untouched.
-        flat[of_bin[i]] += max(weight[i], np.float32(1e-30))
+        flat[at] += weight[i] if weight[i] > least else least
     touched, entropy = touched[:count], 0.0
     for k in range(count):
         share = float(flat[touched[k]])

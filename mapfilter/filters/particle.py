@@ -8,7 +8,7 @@ has converged.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite, nan
 from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeVar
@@ -240,8 +240,17 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         key = draw_key(rng)
         state, log_weight = self.model.move(belief.state, belief.log_weight, motion, key)
         travelled_m = belief.travelled_m + abs(motion.step_m)
-        moved = replace(belief, state=state, log_weight=log_weight, travelled_m=travelled_m)
-        return moved, reason
+        return ParticleBelief(
+            state,
+            log_weight,
+            belief.bins,
+            belief.kept,
+            belief.shared,
+            travelled_m,
+            belief.log_evidence,
+            belief.status,
+            belief.agreement_start_m,
+        ), reason
 
     def update(
         self, belief: ParticleBelief, reading: ReadingT, rng: np.random.Generator
@@ -288,15 +297,16 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             log_weight = log_weight[chosen] - np.log(chosen_by)
             state, kept = copies, np.take(kept, chosen, axis=1)
             normalise(log_weight, np.empty(wanted, dtype=np.float32))
-        now = replace(
-            belief,
-            state=state,
-            kept=kept,
-            shared=shared,
-            log_weight=log_weight,
-            log_evidence=belief.log_evidence + log_total + withheld,
-            status=status,
-            agreement_start_m=agreement_start_m,
+        now = ParticleBelief(
+            state,
+            log_weight,
+            belief.bins,
+            kept,
+            shared,
+            belief.travelled_m,
+            belief.log_evidence + log_total + withheld,
+            status,
+            agreement_start_m,
         )
         # The summary before resampling is the better one of the same belief.
         now.__dict__["summary"] = summary

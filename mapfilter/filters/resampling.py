@@ -51,6 +51,20 @@ def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
     return log_total, total * total / squares.sum()
 
 
+def log_sum(log_weight: Floats) -> float:
+    """Return the logarithm of the sum of weights (N,); minus infinity where none is left.
+
+    Examples
+    --------
+    >>> round(log_sum(np.log([0.5, 0.25, 0.0625])), 6) == round(float(np.log(0.8125)), 6)
+    True
+    """
+    highest = log_weight.max(initial=-np.inf)
+    if not np.isfinite(highest):
+        return float(highest)
+    return float(highest + np.log(np.exp(log_weight - highest).sum()))
+
+
 @njit(error_model="numpy", cache=True)
 def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
     """Fill the indices of the particles that M new ones copy, ascending.

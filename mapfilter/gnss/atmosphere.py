@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
+from mapfilter.gnss.earth_rotation import LIGHT_MPS
 
-LIGHT_MPS = 299_792_458.0
 _LEAST_ELEVATION_RAD = 0.05
 _ZENITH_S = 5e-9
 _LOCAL_NOON_S = 50_400.0

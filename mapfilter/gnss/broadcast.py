@@ -10,9 +10,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Ints
+from mapfilter.gnss.earth_rotation import LIGHT_MPS, in_frame_of_reception
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, LEAPS_UTC_S
 
-LIGHT_MPS = 299_792_458.0
 GPS_EPOCH_UTC_S = 315_964_800.0
 _GRAVITY = {"G": 3.986005e14, "J": 3.986005e14, "E": 3.986004418e14, "C": 3.986004418e14}
 _EARTH_RATE = {"C": 7.292115e-5}
@@ -141,12 +141,8 @@ def place_by_broadcast(
     place, clock = satellite_states(sane, nearest[found], sent[found] - clock)
     range_m = rows["pseudorange_m"].to_numpy().copy()
     range_m[found] += LIGHT_MPS * clock
-    angle = EARTH_RATE_RAD_S * range_m[found] / LIGHT_MPS
-    turned = place.copy()
-    turned[:, 0] = place[:, 0] * np.cos(angle) + place[:, 1] * np.sin(angle)
-    turned[:, 1] = place[:, 1] * np.cos(angle) - place[:, 0] * np.sin(angle)
     placed = rows[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64).copy()
-    placed[found] = turned
+    placed[found] = in_frame_of_reception(place, range_m[found])
     notes.append(f"pseudoranges: {len(found)} placed by broadcast ephemerides")
     columns = dict(zip(("x_m", "y_m", "z_m"), placed.T, strict=True))
     return rows.assign(pseudorange_m=range_m, **columns), tuple(notes)

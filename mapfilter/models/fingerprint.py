@@ -186,13 +186,18 @@ def weigh_by_serving(
     per_db, w, half, wrong = _F(_STEPS_PER_DB), _F(weight), _F(0.5), _F(weight * other)
     own, first, second = np.uint32(cell), np.uint32(bands - 2), np.uint32(bands - 1)
     width = np.uint32(bands)
+    right = np.empty(pixel.size, dtype=np.float32)
+    # Loops that look up are apart from the one that computes, which is vectorised.
     for i in range(pixel.size):
         at = np.uint32(np.uint32(pixel[i]) * width)
         level = level_dbm[at + own]
         best = level_dbm[at + first]
-        other = level_dbm[at + second] if level >= best else best
-        place = (level - other) * per_db + middle + half
+        beside = level_dbm[at + second] if level >= best else best
+        place = (level - beside) * per_db + middle + half
         place = place if place > zero else zero
         place = place if place < last else last
-        _, gained, odds[i] = mixed(odds[i], wrong, w * table[np.int32(place)])
+        right[i] = table[np.uint32(np.int32(place))]
+    for i in range(pixel.size):
+        _, gained, after = mixed(odds[i], wrong, w * right[i])
+        odds[i] = after
         log_weight[i] += gained

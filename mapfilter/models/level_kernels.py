@@ -156,6 +156,42 @@ def weigh_by_absence(
             log_weight[first + j] += w * total[j]
 
 
+@njit(error_model="numpy", cache=True)
+def gained(before: Floats, after: Floats, share: float) -> Floats:
+    """Return a share of what log weights (N,) have gained; 0 where there is no weight."""
+    found = np.zeros(after.size)
+    for i in range(after.size):
+        if np.isfinite(after[i]):
+            found[i] = share * (after[i] - before[i])
+    return found
+
+
+@njit(error_model="numpy", cache=True)
+def shares_above(
+    pixel: Ints32, every: int, predicted: Prediction, cell: Ints32, limit_dbm: float
+) -> Floats:
+    """Return the share of hypotheses, one of ``every``, that predict cells (K,) above a level."""
+    limit, bands = _F(limit_dbm), predicted.bands
+    share = np.zeros(cell.size)
+    for i in range(0, pixel.size, every):
+        first = pixel[i] * bands
+        for k in range(cell.size):
+            share[k] += predicted.level_dbm[first + cell[k]] > limit
+    return share / ((pixel.size + every - 1) // every)
+
+
+@njit(error_model="numpy", cache=True)
+def rough_squares(pixel: Ints32, every: int, predicted: Prediction, cell: Ints32) -> Floats:
+    """Return the local variance of predictions at one of ``every`` hypotheses, (K, count)."""
+    found, bands = np.empty((cell.size, (pixel.size + every - 1) // every)), predicted.bands
+    for i in range(found.shape[1]):
+        first = pixel[i * every] * bands
+        for k in range(cell.size):
+            rough_db = 0.1 * predicted.rough_db[first + cell[k]]
+            found[k, i] = rough_db * rough_db
+    return found
+
+
 @njit(inline="always")
 def _look_up(
     predicted: Prediction,

@@ -12,6 +12,11 @@ from math import exp, log
 import numpy as np
 
 from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.models.level_covariance import (
+    absence_gains,
+    aged,
+    sequential_updates,
+)
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.level_kernels import LevelTerms
 
@@ -123,9 +128,9 @@ class LevelMemory:
         """
         slot_of = self.slot_of
         wanted = [band for band in bands.tolist() if band not in slot_of]
-        held = [slot_of[band] for band in bands.tolist() if band in slot_of]
         if not wanted:
             return self, kept
+        held = [slot_of[band] for band in bands.tolist() if band in slot_of]
         order = [slot for slot in np.lexsort((self.band >= 0, self.used)) if slot not in held]
         at = np.array(order[: len(wanted)], dtype=np.intp)
         band = self.band.copy()
@@ -169,20 +174,27 @@ class LevelMemory:
 
     def after(self, length_m: float) -> tuple[LevelMemory, Floats32]:
         """Return the memory after a distance, and the factor of each mean, shape (2S + 1,)."""
-        errors, slots = self.errors, self.slots
-        decay = np.ones(2 * slots + 1)
-        decay[:slots], decay[slots:-1] = (
+        errors, keep = self.errors, exp(-length_m / _OTHER_M)
+        covariance, decay, other_dbm, other_db2 = aged(
+            self.covariance_db2,
+            self.prior_db2,
             exp(-length_m / errors.slow_m),
             exp(-length_m / errors.fast_m),
+            (self.other_dbm, OTHER_DBM, keep),
+            (self.other_db2, OTHER_SD_DB**2, keep**2),
         )
-        both = np.outer(decay, decay)
-        keep = exp(-length_m / _OTHER_M)
-        return replace(
-            self,
-            covariance_db2=self.covariance_db2 * both + self.prior_db2 * (1 - both),
-            other_dbm=OTHER_DBM + (self.other_dbm - OTHER_DBM) * keep,
-            other_db2=OTHER_SD_DB**2 + (self.other_db2 - OTHER_SD_DB**2) * keep**2,
-        ), decay.astype(np.float32)
+        return LevelMemory(
+            errors,
+            self.site,
+            self.band,
+            self.prior_db2,
+            covariance,
+            other_dbm,
+            other_db2,
+            self.used,
+            self.reports,
+            self.other_log_likelihood,
+        ), decay
 
     def updated(
         self, report: LevelReport, rough_db2: Floats | None = None
@@ -193,61 +205,51 @@ class LevelMemory:
         fast and white errors as else, and with ``rough_db2`` (K,), what the roughness of the
         prediction adds to the variance on average.
         """
-        slot_of, slots = self.slot_of, self.slots
+        slot_of = self.slot_of
         slot = np.array([slot_of[band] for band in report.cell.tolist()], dtype=np.int32)
         covariance = self.covariance_db2.copy()
         white_db2 = self.errors.white_db**2 + report.offset_db**2
-        gain = np.zeros((slot.size, 2 * slots + 1))
-        variance, other = np.zeros(slot.size), np.zeros(slot.size)
-        rough_db2 = np.zeros(slot.size) if rough_db2 is None else rough_db2
+        if rough_db2 is None:
+            rough_db2 = np.zeros(slot.size)
         other_white_db2 = white_db2 + 0.5 * self.errors.fast_db**2 + rough_db2
         other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
-        for k, (s, level_dbm) in enumerate(zip(slot, report.level_dbm, strict=True)):
-            column = covariance[:, s] + covariance[:, slots + s] + covariance[:, -1]
-            variance[k] = column[s] + column[slots + s] + column[-1] + white_db2
-            gain[k] = column / variance[k]
-            covariance -= np.outer(gain[k], column)
-            off_dbm, off_db2 = level_dbm - other_dbm[s], other_db2[s] + other_white_db2[k]
-            other[k] = -0.5 * off_dbm**2 / off_db2 - 0.5 * log(off_db2)
-            other_dbm[s] += other_db2[s] / off_db2 * off_dbm
-            other_db2[s] *= 1 - other_db2[s] / off_db2
-        gain[np.abs(gain) < _NEGLIGIBLE / 10] = 0.0
-        used[slot] = self.reports
-        memory = replace(
-            self,
-            covariance_db2=covariance,
-            other_dbm=other_dbm,
-            other_db2=other_db2,
-            used=used,
-            reports=self.reports + 1,
-        )
-        terms = LevelTerms(
-            report.cell,
+        gain, variance, other = sequential_updates(
+            covariance,
             slot,
             report.level_dbm,
-            gain.astype(np.float32),
-            variance.astype(np.float32),
-            other.astype(np.float32),
+            white_db2,
+            other_white_db2,
+            other_dbm,
+            other_db2,
+            _NEGLIGIBLE / 10,
         )
-        return memory, terms
+        used[slot] = self.reports
+        memory = LevelMemory(
+            self.errors,
+            self.site,
+            self.band,
+            self.prior_db2,
+            covariance,
+            other_dbm,
+            other_db2,
+            used,
+            self.reports + 1,
+            self.other_log_likelihood,
+        )
+        return memory, LevelTerms(report.cell, slot, report.level_dbm, gain, variance, other)
 
     def absence(self, report: LevelReport) -> LevelTerms:
         """Return the terms of absent cells that have slots; levels are the limit."""
-        slot_of, slots = self.slot_of, self.slots
+        slot_of = self.slot_of
         held = [(band, slot_of[band]) for band in report.absent.tolist() if band in slot_of]
         cell, slot = np.array(held, dtype=np.int32).reshape(-1, 2).T.copy()
-        covariance = self.covariance_db2
-        column = covariance[:, slot] + covariance[:, slots + slot] + covariance[:, -1:]
-        at = np.arange(slot.size)
-        variance = column[slot, at] + column[slots + slot, at] + column[-1, at]
-        variance += self.errors.white_db**2 + report.offset_db**2 + self.errors.absent_db**2
-        gain = (column / variance).T
-        gain[np.abs(gain) < _NEGLIGIBLE] = 0.0
+        more_db2 = self.errors.white_db**2 + report.offset_db**2 + self.errors.absent_db**2
+        gain, variance = absence_gains(self.covariance_db2, slot, more_db2, _NEGLIGIBLE)
         return LevelTerms(
             cell,
             slot,
             np.full(cell.size, report.limit_dbm, dtype=np.float32),
-            np.ascontiguousarray(gain, dtype=np.float32),
-            variance.astype(np.float32),
+            gain,
+            variance,
             np.full(cell.size, _ABSENT_BY_FAULT, dtype=np.float32),
         )

@@ -181,46 +181,52 @@ def move(
     parts = max(errors.typical_step_m / length, 1.0) ** 0.5 if length > 0 else 1.0
     turned, stretched = exp(-length / errors.heading_m), exp(-length / errors.stretch_m)
     noise = _Noise(
-        _F(errors.step_sd_m * (length / errors.typical_step_m) ** 0.5),
-        _F(length * white_rad * parts),
-        _F(errors.bias_drift_rad_per_sqrt_m * root),
-        _F(errors.scale_drift_per_sqrt_m * root),
-        _F(turned),
-        _F(errors.turn_sd_rad * (1 - turned**2) ** 0.5),
-        _F(stretched),
-        _F(errors.stretch_sd * (1 - stretched**2) ** 0.5),
-        _F(1 - exp(-errors.disturbances_per_m * length)),
-        _F(errors.disturbed_rad),
+        errors.step_sd_m * (length / errors.typical_step_m) ** 0.5,
+        length * white_rad * parts,
+        errors.bias_drift_rad_per_sqrt_m * root,
+        errors.scale_drift_per_sqrt_m * root,
+        turned,
+        errors.turn_sd_rad * (1 - turned**2) ** 0.5,
+        stretched,
+        errors.stretch_sd * (1 - stretched**2) ** 0.5,
+        1 - exp(-errors.disturbances_per_m * length),
+        errors.disturbed_rad,
     )
-    length_m = _F(length)
-    long_m = _F(step_m * exp(0.5 * white_rad**2))
-    return np.asarray(_move(state, long_m, length_m, _F(heading_rad), noise, key))
+    long_m = step_m * exp(0.5 * white_rad**2)
+    moved: Floats32 = _move(state, long_m, length, heading_rad, noise, key)
+    return moved
 
 
 class _Noise(NamedTuple):
     """Standard deviations and factors of one step."""
 
-    along_m: np.float32
-    across_m: np.float32
-    bias_rad: np.float32
-    scale: np.float32
-    turn_keep: np.float32
-    turn_rad: np.float32
-    stretch_keep: np.float32
-    stretch: np.float32
-    jump: np.float32
-    jump_rad: np.float32
+    along_m: float
+    across_m: float
+    bias_rad: float
+    scale: float
+    turn_keep: float
+    turn_rad: float
+    stretch_keep: float
+    stretch: float
+    jump: float
+    jump_rad: float
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def _move(
     state: Floats32,
-    step_m: np.float32,
-    length_m: np.float32,
-    heading_rad: np.float32,
+    step_m: float,
+    length_m: float,
+    heading_rad: float,
     noise: _Noise,
     key: np.uint64,
 ) -> Floats32:
+    long, length, heading = _F(step_m), _F(length_m), _F(heading_rad)
+    along_sd, across_sd = _F(noise.along_m), _F(noise.across_m)
+    bias_sd, scale_sd = _F(noise.bias_rad), _F(noise.scale)
+    turn_keep, turn_sd = _F(noise.turn_keep), _F(noise.turn_rad)
+    stretch_keep, stretch_sd = _F(noise.stretch_keep), _F(noise.stretch)
+    jump, jump_sd = _F(noise.jump), _F(noise.jump_rad)
     moved = np.empty_like(state)
     count = state.shape[1]
     east, north, bias, scale = state[0], state[1], state[2], state[3]
@@ -233,14 +239,14 @@ def _move(
         c, d = normals(hashed(key, np.uint64(4 * i + 1)))
         e, f = normals(hashed(key, np.uint64(4 * i + 2)))
         u, _ = uniforms(hashed(key, np.uint64(4 * i + 3)))
-        lasting = wrap32(bias[i] + rate[i] * length_m + noise.bias_rad * c)
-        steady = scale[i] + noise.scale * d
-        beside = noise.turn_keep * turn[i] + noise.turn_rad * e
-        beside = noise.jump_rad * e if _F(u) < noise.jump else beside
-        longer = noise.stretch_keep * stretch[i] + noise.stretch * f
-        cosine, sine = cos_sin32(wrap32(heading_rad + lasting + beside))
-        along = step_m * exp32(steady + longer) + noise.along_m * a
-        across = noise.across_m * b
+        lasting = wrap32(bias[i] + rate[i] * length + bias_sd * c)
+        steady = scale[i] + scale_sd * d
+        beside = turn_keep * turn[i] + turn_sd * e
+        beside = jump_sd * e if _F(u) < jump else beside
+        longer = stretch_keep * stretch[i] + stretch_sd * f
+        cosine, sine = cos_sin32(wrap32(heading + lasting + beside))
+        along = long * exp32(steady + longer) + along_sd * a
+        across = across_sd * b
         to_bias[i] = lasting
         to_scale[i] = steady
         to_turn[i] = beside
@@ -294,14 +300,17 @@ def interpolate(
     Beyond the raster's edge values are those of the edge.
     """
     rows, cols = raster.shape
-    flat = raster.ravel()
+    flat, count = raster.ravel(), state.shape[1]
     zero, one = _F(0.0), _F(1.0)
     west, top, k = _F(west_m), _F(north_m), _F(per_m)
     last_col, last_row = np.int32(cols - 2), np.int32(rows - 2)
     below, width = np.uint32(cols), np.int32(cols)
     east, north = state[0], state[1]
-    found = np.empty(state.shape[1], dtype=np.float32)
-    for i in range(state.shape[1]):
+    first = np.empty(count, dtype=np.int32)
+    along, down = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
+    found = np.empty(count, dtype=np.float32)
+    # Loops that look up are apart from the one that computes, which is vectorised.
+    for i in range(count):
         # Plain comparisons vectorise; min and max, which care for NaN, do not.
         x = (east[i] - west) * k
         y = (top - north[i]) * k
@@ -311,12 +320,14 @@ def interpolate(
         col = col if col < last_col else last_col
         row = row if row < last_row else last_row
         u, v = x - _F(col), y - _F(row)
-        u = u if u < one else one
-        v = v if v < one else one
-        at = np.uint32(np.int32(row * width) + col)
+        along[i] = u if u < one else one
+        down[i] = v if v < one else one
+        first[i] = np.int32(row * width) + col
+    for i in range(count):
+        at, u = np.uint32(first[i]), along[i]
         upper = flat[at] + u * (flat[at + np.uint32(1)] - flat[at])
         under = flat[at + below] + u * (flat[at + below + np.uint32(1)] - flat[at + below])
-        found[i] = upper + v * (under - upper)
+        found[i] = upper + down[i] * (under - upper)
     return found
 
 

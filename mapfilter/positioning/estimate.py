@@ -131,9 +131,19 @@ class StepOutput:
         """
         if tail is None:
             return self
-        wide_m = max(tail.radius_m(0.99), float(self.fix.radii_m[-1]))
-        fix = replace(self.fix, radius_99_m=wide_m, protection_m=tail.protection_m(risk))
+        wide_m, protection_m = protected_m(tail, self.fix.radii_m, risk)
+        fix = replace(self.fix, radius_99_m=wide_m, protection_m=protection_m)
         return StepOutput(fix, self.evidence, self.unused, tail)
+
+
+def protected_m(
+    tail: RadialTail, radii_m: Floats, risk: float = DEFAULT_RISK
+) -> tuple[float, float]:
+    """Return the radius that holds 99 % of a belief, and its protection level for a risk.
+
+    The former is at least the largest of the other radii, ``radii_m``.
+    """
+    return max(tail.radius_m(0.99), float(radii_m[-1])), tail.protection_m(risk)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -293,24 +303,6 @@ class TrackEstimate:
         table = table[np.isfinite(table["east_m"])].reset_index(drop=True)
         points = gpd.points_from_xy(table["east_m"], table["north_m"])
         return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
-
-    @classmethod
-    def of_outputs(
-        cls,
-        crs: str,
-        filter_name: str,
-        outputs: Sequence[StepOutput],
-        *,
-        start_utc_s: float = float("nan"),
-        unused: Sequence[UnusedReading] = (),
-    ) -> TrackEstimate:
-        """Put the outputs of a track's steps together; unused readings are given apart."""
-        fixes = [output.fix for output in outputs]
-        estimate = cls.of_fixes(crs, filter_name, fixes, start_utc_s=start_utc_s, unused=unused)
-        if not outputs or outputs[0].evidence is None:
-            return estimate
-        columns = np.array([output.evidence for output in outputs], dtype=np.float64).T
-        return replace(estimate, evidence=TrackEvidence(*columns))
 
     @classmethod
     def of_fixes(

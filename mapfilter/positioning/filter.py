@@ -30,6 +30,7 @@ from mapfilter.positioning.estimate import (
     TrackEstimate,
     UnusedReading,
 )
+from mapfilter.positioning.estimate_columns import EstimateColumns
 from mapfilter.positioning.integrity import DEFAULT_RISK, check_risk
 from mapfilter.tracks.log import TrackLog, rows_by_kind
 from mapfilter.tracks.schema import ALL_KINDS as ALL_KINDS
@@ -191,7 +192,7 @@ def locate(
     filter_.warm_up(merged)
     smoother = filter_.smoother()
     album = _Album(filter_)
-    outputs: list[StepOutput] = []
+    columns = EstimateColumns()
     began_s = time.process_time()
     state = filter_.begin(kinds_of(log))
     for epoch in merged:
@@ -200,8 +201,7 @@ def locate(
         state, output = filter_.step(before, epoch, rng)
         if risk != DEFAULT_RISK:
             output = output.protected(output.tail, risk)
-        # A tail is as large as a belief.
-        outputs.append(StepOutput(output.fix, output.evidence, output.unused))
+        columns.add(output)
         if recorder is not None:
             paused_s = time.process_time()
             recorder.record(before, epoch, drawn, state, output)
@@ -210,7 +210,7 @@ def locate(
             smoother.add(before, state)
         if snapshots:
             album.add(state, epoch, output)
-    estimate = estimate_of(filter_, outputs, unused, log.start_utc_s)
+    estimate = columns.estimate(filter_.crs, filter_.name, log.start_utc_s, tuple(unused))
     if smoother is not None:
         unknown = np.full(len(estimate), nan)
         estimate = replace(estimate, radius_99_m=unknown, protection_m=unknown)
@@ -263,14 +263,10 @@ def estimate_of(
     start_utc_s : float
         UTC seconds of time 0.
     """
-    labelled = [*unused, *(reading for output in outputs for reading in output.unused)]
-    return TrackEstimate.of_outputs(
-        filter_.crs,
-        filter_.name,
-        outputs,
-        start_utc_s=start_utc_s,
-        unused=sorted(labelled, key=lambda reading: reading.time_s),
-    )
+    columns = EstimateColumns()
+    for output in outputs:
+        columns.add(output)
+    return columns.estimate(filter_.crs, filter_.name, start_utc_s, tuple(unused))
 
 
 class _Album:

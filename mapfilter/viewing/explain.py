@@ -25,9 +25,10 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import pixels
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, RadioReading
-from mapfilter.positioning.bayes.filter import BayesPositioner, weighed_by
+from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.bayes.weighing import weighed_by
 
 TERMS = (
     "streets", "serving", "level", "absent", "bound", "timing", "fix", "gnss", "map", "other",

@@ -25,7 +25,8 @@ from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate

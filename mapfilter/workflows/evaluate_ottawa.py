@@ -16,6 +16,7 @@ from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, StoreError, fail
+from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.accuracy_row import Row
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,
@@ -24,6 +25,7 @@ from mapfilter.experiments.benchmarks.ottawa import (
     OttawaOptions,
     centroid_errors_m,
     find_session,
+    locate_session,
 )
 from mapfilter.experiments.benchmarks.ottawa_sessions import (
     Session,
@@ -36,15 +38,19 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     part_rows,
     read_left_out,
     session_rows,
+    worst_session,
     write_left_out,
 )
+from mapfilter.experiments.recorded.benchmark import Journey
 from mapfilter.report.canvas import BLUE, GREEN, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
+from mapfilter.workflows.recorded_pictures import WorstUnit, draw_journey
 from mapfilter.workflows.survey import run_survey
 from mapfilter.workflows.terminal import to_jsonable
 
-HEAD, TABLE, FOUND, PICTURE = "benchmark.json", "table.json", "found.json", "errors.png"
+HEAD, TABLE, FOUND = "benchmark.json", "table.json", "found.json"
+PICTURE, WORST, DATABASE = "errors.png", "worst.png", "database"
 RUNS = 3
 _VERSION = 1
 _FLOOR_DBM = -140.0
@@ -55,12 +61,13 @@ _COLOURS = {"bayes": BLUE, "smoothed": GREEN, "centroid": GREY}
 
 @dataclass(frozen=True)
 class OttawaResult:
-    """Results of all sessions: seed and draws of the noise, tables, wall time."""
+    """Results of all sessions: seed and draws of the noise, tables, worst runs, wall time."""
 
     seed: int
     runs: int
     rows: tuple[Row, ...]
     sessions: tuple[SessionRow, ...]
+    worst: tuple[WorstUnit, ...]
     seconds: float
     out: Path
 
@@ -164,8 +171,10 @@ def run_ottawa(
             deque(results, maxlen=0)
     rows: list[Row] = []
     sessions: list[SessionRow] = []
+    worst: list[WorstUnit] = []
     for part in parts:
-        every = [read_left_out(task.result) for task in tasks if task.part == part]
+        own = [task for task in tasks if task.part == part]
+        every = [read_left_out(task.result) for task in own]
         found = [one for left_out in every for one in left_out.found]
         centroid_m = {left_out.session: left_out.centroid_m for left_out in every}
         rows += part_rows(part, found, centroid_m)
@@ -173,8 +182,9 @@ def run_ottawa(
         title = f"Ottawa, {part}: real phones, each session on the map of the others"
         picture = out / part / PICTURE
         save(plot_cumulative(_curves(every), title=title, most_m=_MOST_M, share=0.95), picture)
+        worst += _worst_of(own, every)
     seconds = time.perf_counter() - began_s
-    result = OttawaResult(seed, runs, tuple(rows), tuple(sessions), seconds, out)
+    result = OttawaResult(seed, runs, tuple(rows), tuple(sessions), tuple(worst), seconds, out)
     write_json(out / TABLE, to_jsonable(result))
     return result
 
@@ -194,6 +204,28 @@ def find_left_out(task: Task) -> None:
     ]
     errors_m = centroid_errors_m(session, others, crs)
     write_left_out(LeftOut(session.name, errors_m, tuple(found)), task.result)
+
+
+def _worst_of(tasks: Sequence[Task], every: Sequence[LeftOut]) -> list[WorstUnit]:
+    """Locate the worst run of a part once more, and draw it."""
+    found = worst_session(every)
+    if found is None:
+        return []
+    task, draw = tasks[found[0]], found[1]
+    session, others = read_session(task.session), [read_session(file) for file in task.others]
+    path = task.folder / DATABASE
+    if not path.is_dir():
+        return []
+    positioner = task.options.filter.over(open_database(path))
+    factor = step_factor_of(others, positioner.area.lattice.crs)
+    log, estimate = locate_session(session, positioner, task.options, task.seed, draw, factor)
+    truth = Truth.of_table(log.truth)
+    if truth is None:
+        return []
+    file = task.folder.parent / WORST
+    label = f"{task.part}, bayes, {session.name} draw {draw}"
+    drawn = draw_journey(Journey(estimate, truth, path), label, file)
+    return [WorstUnit(task.part, "bayes", session.name, draw, *drawn, file)] if drawn else []
 
 
 def session_files(data: Path, part: str) -> list[Path]:

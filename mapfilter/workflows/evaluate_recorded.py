@@ -35,7 +35,7 @@ from mapfilter.experiments.recorded.rows import (
     unit_rows,
 )
 from mapfilter.workflows.evaluate_ottawa import run_ottawa
-from mapfilter.workflows.recorded_pictures import draw_worst
+from mapfilter.workflows.recorded_pictures import WorstUnit, draw_worst
 from mapfilter.workflows.terminal import to_jsonable
 
 OTTAWA = "ottawa"
@@ -55,13 +55,17 @@ _MOST_TOGETHER = 5
 
 @dataclass(frozen=True)
 class RecordedResult:
-    """Results of one benchmark: seed of what is drawn, tables, pictures, wall time."""
+    """Results of one benchmark: seed of what is drawn, tables, pictures, wall time.
+
+    ``worst`` names the worst run of each part and method, the reason and its picture.
+    """
 
     name: str
     seed: int
     rows: tuple[Row, ...]
     units: tuple[UnitRow, ...]
     pictures: tuple[Path, ...]
+    worst: tuple[WorstUnit, ...]
     seconds: float
     out: Path
 
@@ -159,13 +163,14 @@ def run_recorded(
     by_task = {task: read_scores(finished, task) or () for task in tasks}
     found = [one for each in by_task.values() for one in each]
     rows = table_rows(found, benchmark.published_m, baseline=benchmark.baseline)
-    pictures = draw_worst(by_task, finished, out / PICTURES)
+    worst = draw_worst(by_task, finished, out / PICTURES)
     result = RecordedResult(
         name,
         seed,
         tuple(rows),
         tuple(unit_rows(found)),
-        tuple(pictures),
+        tuple(one.picture for one in worst),
+        tuple(worst),
         time.perf_counter() - began_s,
         out,
     )

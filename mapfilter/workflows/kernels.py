@@ -26,10 +26,12 @@ from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.models.street_motion import STATES, weigh_by_map
+from mapfilter.models.street_motion import STATES
+from mapfilter.models.way_map import weighed_by_ways
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.estimate import protected_m
 from mapfilter.positioning.integrity import sample_tail
 
 _WORKERS = 2
@@ -61,12 +63,13 @@ def compile_evidence() -> None:
     # What is kept of a first report decays until the second.
     cloud, _ = model.weigh(cloud, log_weight, plain)
     bounds = (BoundReading(none, -60.0, 1, 8.0, 1.0),)
-    model.weigh(cloud, log_weight, RadioReading(0, 1.0, levels, bounds))
+    model.weigh(cloud, log_weight, RadioReading(0, 1.0, levels, bounds, tracked=True))
 
 
 def compile_motion() -> None:
     """Compile steps, and the weighing by the map."""
     model, cloud, log_weight = _made()
+    model.area.clear_of_edge(cloud.state)
     model.move(cloud.state, log_weight, MotionStep(1.0, 0.0), draw_key(np.random.default_rng(0)))
 
 
@@ -84,7 +87,8 @@ def compile_resampling() -> None:
     weight, chosen = np.empty(_PARTICLES, dtype=np.float32), np.empty(_PARTICLES, dtype=np.int32)
     normalise(log_weight, weight)
     model.area.matched_way(cloud.state[0], cloud.state[1], weight)
-    sample_tail(cloud.state[0], cloud.state[1], weight, np.zeros(STATES), 0.0).protection_m(1e-3)
+    tail = sample_tail(cloud.state[0], cloud.state[1], weight, np.zeros(STATES), 0.0)
+    protected_m(tail, np.zeros(3))
     systematic(weight, 0.5, chosen)
     jitter, copies = np.ones(STATES, dtype=np.float32), np.empty_like(cloud.state)
     copy_with_jitter(cloud.state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
@@ -92,7 +96,7 @@ def compile_resampling() -> None:
 
 # The longest first; what each compiles last shows that it has ended.
 _TASKS = (compile_motion, compile_evidence, compile_summaries, compile_resampling)
-_LAST: tuple[Any, ...] = (weigh_by_map, weigh_by_bound, flattened, copy_with_jitter)
+_LAST: tuple[Any, ...] = (weighed_by_ways, weigh_by_bound, flattened, copy_with_jitter)
 
 
 def _is_kept(kernel: Any) -> bool:

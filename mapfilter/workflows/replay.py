@@ -39,6 +39,7 @@ from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
+from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log
 from mapfilter.viewing.bundle import replay_bundle
 from mapfilter.viewing.page import write_page
@@ -63,18 +64,27 @@ from mapfilter.workflows.world import filter_choice, plan_antennas, planned_cell
 
 
 class _Logs:
-    """The logs of a configuration; recordings are kept, as reading them may take long."""
+    """The logs of a configuration, which are read for checks first.
+
+    They are kept for what follows: recordings, as reading them may take long, and of others so many
+    that they need little memory.
+    """
 
     def __init__(self, config: Config, database: RadioRouteDatabase | None) -> None:
         self.config, self.paths = config, journeys_of(config)
         self._crs = "" if database is None else database.lattice.crs
         self._kept: dict[Path, OpenedLog] = {}
+        self._left_rows = _MOST_KEPT_ROWS
 
     def open(self, path: Path) -> OpenedLog:
-        opened = self._kept.get(path) or open_journey(self.config, path, self._crs)
+        if path in self._kept:
+            return self._kept[path]
+        opened = open_journey(self.config, path, self._crs)
         if self._crs:
             opened = replace(opened, log=in_frame(opened.log, self._crs))
-        if opened.recordings:
+        tables = [getattr(opened.log, table) for table in TABLES]
+        self._left_rows -= sum(map(len, (*tables, *opened.sensors.values())))
+        if opened.recordings or self._left_rows >= 0:
             self._kept[path] = opened
         return opened
 
@@ -106,6 +116,7 @@ class _Logs:
 
 
 _NAMED = 3
+_MOST_KEPT_ROWS = 1_000_000
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,7 @@ from mapfilter.positioning.fingerprints.locating import (
     timed_share,
     usual_readings,
 )
+from mapfilter.positioning.fingerprints.matches import located_once
 from mapfilter.positioning.fingerprints.options import Probabilistic, method_name
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
@@ -130,7 +131,7 @@ class Baselines:
         if key not in self._fitted:
             assert self._known is not None
             rng = named_rng(self._seed, "replay", "single reports")
-            self._fitted[key] = fit_locator(
+            fitted = fit_locator(
                 self._known,
                 Probabilistic(),
                 rng,
@@ -139,4 +140,6 @@ class Baselines:
                 bounds=bounds,
                 timed=timed,
             )
+            # Draws of one journey receive the same.
+            self._fitted[key] = replace(fitted, locator=located_once(fitted.locator))
         return self._fitted[key]

@@ -56,6 +56,7 @@ def test_the_quickstart_has_examples():
     assert len(parser.get_examples(page("conventions.rst"))) > 10
 
 
+@pytest.mark.long
 def test_quickstart_commands_run(tmp_path, monkeypatch):
     """All but the demo, which is these same steps, one after another in an empty folder."""
     text = page("quickstart.rst")

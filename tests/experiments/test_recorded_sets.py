@@ -5,6 +5,7 @@ import io
 import json
 import tarfile
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -211,6 +212,31 @@ def test_walks_are_unpacked_by_their_names_alone(tmp_path):
     (tmp_path / "b.tar.xz").write_bytes((tmp_path / "a.tar.xz").read_bytes()[:40])
     with pytest.raises(InputError, match="an archive of walks"):
         mall.unpack(tmp_path / "b.tar.xz", tmp_path / "in" / "walks")
+
+
+def test_walks_are_read_once_for_all_parts(tmp_path, monkeypatch):
+    folder, work = tmp_path / "data", tmp_path / "work"
+    folder.mkdir()
+    work.mkdir()
+    _archive(folder / "a_paths.tar.xz", {f"{name}.txt": b"walk" for name in "dbca"})
+    opened = []
+
+    def open_walk(file, options):  # noqa: ARG001
+        opened.append(file.stem)
+        log = replace(_walk(), start_utc_s=1e9 - ord(file.stem))
+        return SimpleNamespace(log=log)
+
+    monkeypatch.setattr(mall, "open_log", open_walk)
+    monkeypatch.setattr(mall, "walkable", lambda *_: None)
+    monkeypatch.setattr(mall, "roads_alone", lambda *_: None)
+    monkeypatch.setattr(mall.OpenMap, "open", lambda path: path)
+    mall.prepare(folder, work)
+    for unit in ("fold-1", "fold-2"):
+        logs, _ = mall.read(Task("floor", unit, 0, folder, work))
+        assert list(logs) == ["d", "c", "b", "a"]
+        pd.testing.assert_frame_equal(logs["a"].truth, _walk().truth)
+    assert sorted(opened) == ["a", "b", "c", "d"]
+    assert [path.name for path in work.iterdir()] == ["walks"]
 
 
 def test_the_floor_is_what_the_shops_leave(tmp_path):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter._kernels import draw_key
-from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+from mapfilter.filters.resampling import copy_with_jitter, log_sum, normalise, systematic
 
 
 def test_log_weights_are_brought_to_sum_to_one():
@@ -71,3 +71,12 @@ def test_rows_beyond_the_jitter_are_copied_as_they_are():
     copy_with_jitter(state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
     np.testing.assert_array_equal(copies[5:], state[5:, chosen])
     assert not np.any(copies[:5] == state[:5, chosen])
+
+
+def test_a_log_sum_is_that_of_each_after_the_other():
+    log_weight = np.random.default_rng(3).normal(-900.0, 4.0, 3000)
+    assert log_sum(log_weight) == pytest.approx(np.logaddexp.reduce(log_weight), abs=1e-9)
+    log_weight[5] = -np.inf
+    assert log_sum(log_weight) == pytest.approx(np.logaddexp.reduce(log_weight), abs=1e-9)
+    assert log_sum(np.full(3, -np.inf)) == -np.inf
+    assert log_sum(np.empty(0)) == -np.inf

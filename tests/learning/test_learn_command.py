@@ -89,6 +89,7 @@ def test_tables_and_patch_say_the_same(taught):
     assert (journeys["trust"] > 0.9).all()
 
 
+@pytest.mark.long
 def test_without_truth_and_interrupted_it_goes_on_where_it_was(faulty, tmp_path, monkeypatch):
     config, out = configured(*faulty), tmp_path / "out"
     locate, calls = learn_study.locate, []

@@ -15,8 +15,9 @@ from mapfilter.filters.grid import GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import epochs

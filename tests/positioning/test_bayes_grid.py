@@ -106,6 +106,7 @@ def test_particles_agree_with_the_grid(area, log, change):
         assert variation(sampled, summed) <= 0.02
 
 
+@pytest.mark.long
 def test_the_error_falls_with_the_root_of_the_number(area, log):
     reference = beliefs(positioner(area, grid=False, count=1_000_000), log, FINE_M)[-1]
 

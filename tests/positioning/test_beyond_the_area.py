@@ -14,7 +14,8 @@ from mapfilter.geodesy import Lattice
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MapWeights, MotionErrors
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.filter import locate

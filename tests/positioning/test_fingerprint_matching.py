@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_fingerprints import CRS, reports_at
 from scipy.stats import multivariate_normal
+from sklearn.metrics import pairwise_distances
 from sklearn.neighbors import NearestNeighbors
 
-from mapfilter.positioning.fingerprints.matches import Received, locator
+from mapfilter.positioning.fingerprints.matches import Received, located_once, locator
 from mapfilter.positioning.fingerprints.matching import (
     Distances,
     LevelErrors,
@@ -53,10 +54,7 @@ def test_distances_are_those_of_sklearn(metric, representation, seed):
     found = Distances.to(reports, metric, scale)
     own = np.array([found.of(*reports.readings(i)) for i in range(len(reports))])
     table = dense(level[:, used], representation, floor_dbm, 1.7)
-    search = NearestNeighbors(metric=SKLEARN[metric], algorithm="brute").fit(table)
-    distance, index = search.kneighbors(table, n_neighbors=len(table))
-    expected = np.empty_like(own)
-    np.put_along_axis(expected, index, distance, axis=1)
+    expected = pairwise_distances(table, metric=SKLEARN[metric])
     np.testing.assert_allclose(own, expected, atol=2e-7)
 
 
@@ -235,3 +233,32 @@ def test_a_bound_is_no_evidence_where_it_is_kept_and_counts_where_it_is_not(cens
     _, levels = by.of(np.array([0]), np.array([dbm]), np.array([censored], np.int8))
     assert levels[0] == levels[1] == 0.0
     assert levels[2] == pytest.approx(-0.5 * (off_db / 4.0) ** 2)
+
+
+def test_equal_reports_are_located_once():
+    places, level, names = made(4)
+    reports = reports_at(places, level, names=names).placed()
+    plain, asked = locator(Probabilistic(), reports), []
+
+    def counted(received):
+        asked.append(received)
+        return plain(received)
+
+    once = located_once(counted)
+    cell, dbm = reports.readings(0)
+    unknown = np.where(np.arange(len(dbm)) == 0, np.nan, dbm)
+    different = [
+        Received(cell, dbm, -1, np.nan),
+        Received(cell, dbm, int(cell[0]), np.nan),
+        Received(cell, dbm, int(cell[0]), 1.0),
+        Received(cell, dbm + 1.0, -1, np.nan),
+        Received(cell, unknown, -1, np.nan),
+        Received(*reports.readings(1), -1, np.nan),
+        Received(cell, dbm, -1, np.nan, np.ones(len(cell), np.int8)),
+        Received(cell, dbm, -1, np.nan, -np.ones(len(cell), np.int8)),
+    ]
+    for _ in range(2):
+        for one in different:
+            copy = one._replace(cell=one.cell.copy(), level_dbm=one.level_dbm.copy())
+            assert once(copy) == plain(one)
+    assert len(asked) == len(different)

@@ -38,8 +38,9 @@ from mapfilter.models.street_motion import (
     MapWeights,
     MotionErrors,
 )
+from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 

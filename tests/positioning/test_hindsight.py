@@ -12,6 +12,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import STATES, STRETCH, TURN, MotionErrors
 from mapfilter.positioning.bayes.smoothing import BayesSmoother, Kept
 from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
+from mapfilter.positioning.estimate_columns import EstimateColumns
 
 AREA = make_area()
 ERRORS = MotionErrors(
@@ -249,6 +250,9 @@ def test_evidence_is_kept_by_epoch():
         )
         for k, (radius_m, status) in enumerate(cases)
     ]  # fmt: skip
-    found = TrackEstimate.of_outputs("EPSG:32629", "bayes", outputs).evidence
+    columns = EstimateColumns()
+    for output in outputs:
+        columns.add(output)
+    found = columns.estimate("EPSG:32629", "bayes").evidence
     assert found.log_evidence.tolist() == [-1.0] * 5
     assert found.entropy_bits.tolist() == [1.0] * 5

@@ -81,6 +81,7 @@ def test_a_drive_of_another_town_never_converges(vehicle, seed):
     assert not found.any()
 
 
+@pytest.mark.long
 def test_a_road_raster_gives_the_result_of_its_ways(town, vehicle, tmp_path):
     side_m = 1.0
     fine = replace(LATTICE, resolution_m=side_m, rows=5 * LATTICE.rows, cols=5 * LATTICE.cols)
@@ -161,7 +162,7 @@ def test_the_rules_of_the_map_alone_hold_again_after_the_last_position(vehicle):
     alone = []
     for epoch in epochs(fixed):
         state, _ = vehicle.step(state, epoch, rng)
-        alone.append((state.reckoning.travelled_m, vehicle._by_map_alone(state)))
+        alone.append((state.reckoning.travelled_m, vehicle.beliefs.by_map_alone(state)))
     assert all(by_map == (travelled_m > 200.0) for travelled_m, by_map in alone)
 
 

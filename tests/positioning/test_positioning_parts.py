@@ -16,8 +16,9 @@ from mapfilter.models.motion import random_walk
 from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
 from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.radio import name_of
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, headed
@@ -349,3 +350,14 @@ def test_a_fix_refutes_nothing_but_by_agreeing_with_a_narrow_belief(sd_m):
     expected = np.log(2 * np.pi * sd_m**2 / side_m**2) + 0.5 * (20 / sd_m) ** 2
     assert refuted(narrow) == pytest.approx(min(max(expected, -5.0), 0.0), abs=0.01)
     assert refuted(narrow) < -2.0 or sd_m >= 100.0
+
+
+def test_hypotheses_that_are_clear_of_the_edge_have_their_mean_there():
+    small = small_area.make_area()
+    clear = np.array([[45.0, 30.0], [35.0, 20.0]], dtype=np.float32)
+    assert small.clear_of_edge(clear)
+    # One of them within the 3.5 m of the edge and a metre for rounding.
+    for place in ((4.4, 35.0), (85.6, 35.0), (45.0, 4.4), (45.0, 65.6), (np.nan, 35.0)):
+        near = np.column_stack([clear, np.array(place, dtype=np.float32)]).astype(np.float32)
+        assert not small.clear_of_edge(near)
+        assert small.clear_of_edge(clear)

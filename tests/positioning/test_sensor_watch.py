@@ -9,9 +9,10 @@ from made_town import CRS, Town, walk_log
 from scipy.stats import multivariate_normal
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.positioning.bayes import sensors
+from mapfilter.positioning.bayes import rest
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.sensors import Rest, SensorWatch, watched
+from mapfilter.positioning.bayes.rest import Rest
+from mapfilter.positioning.bayes.sensors import SensorWatch, watched
 from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
 from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import make_log
@@ -215,8 +216,8 @@ def test_likelihoods_of_changes_are_those_of_normal_vectors(changes):
         )
 
     expected = log_density(9.0) - log_density(4.0)
-    assert sensors._carried(first, now) == pytest.approx(expected)
-    assert sensors._carried(first, {"Z": (-80.0, 1)}) == 0.0
+    assert rest._carried(first, now) == pytest.approx(expected)
+    assert rest._carried(first, {"Z": (-80.0, 1)}) == 0.0
 
 
 @pytest.mark.parametrize(("levels", "least_m", "most_m"), [(1, 60, 70), (3, 20, 26), (7, 20, 26)])

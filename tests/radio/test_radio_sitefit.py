@@ -5,7 +5,7 @@ import pytest
 from test_radio_lobes import LATTICE, SITE, sector
 
 from mapfilter.check.raster_checks import RasterSample
-from mapfilter.check.site_checks import best_place, in_squares, place_fit
+from mapfilter.check.site_checks import MeanLevels, best_place, in_squares, place_fits
 
 
 def test_squares_are_means_at_their_middles():
@@ -33,9 +33,9 @@ def test_the_own_place_explains_best(azimuth_deg):
     sample = sector(azimuth_deg)
     squares = in_squares(sample)
     assert squares is not None
-    own = place_fit(squares, *SITE)
+    own, beside = place_fits(squares, np.array([SITE, (SITE[0] + 500, SITE[1] - 400)]))
     assert own > 0.95
-    assert place_fit(squares, SITE[0] + 500, SITE[1] - 400) < own - 0.1
+    assert beside < own - 0.1
     best, place = best_place(squares, sample)
     assert best <= own + 0.01
     assert np.hypot(place[0] - SITE[0], place[1] - SITE[1]) < 150
@@ -46,4 +46,45 @@ def test_levels_that_grow_with_distance_are_not_explained_by_it():
     turned = RasterSample("A", LATTICE, -sample.values, "")
     squares = in_squares(turned)
     assert squares is not None
-    assert place_fit(squares, *SITE) < 0.5
+    assert place_fits(squares, np.array([SITE]))[0] < 0.5
+
+
+def least_squares(squares, place):
+    """The definition for one place, without products of causes."""
+    east, north = squares.east_m - place[0], squares.north_m - place[1]
+    distance_m, direction = np.hypot(east, north), np.arctan2(north, east)
+    near = np.minimum(distance_m / squares.side_m, 1.0)
+    columns = [np.log10(np.maximum(distance_m, squares.side_m / 2))]
+    for order in (1, 2):
+        columns += [near * np.cos(order * direction), near * np.sin(order * direction)]
+    causes = np.column_stack(columns)
+    causes -= causes.mean(axis=0)
+    level = squares.level_db - squares.level_db.mean()
+    factors = np.linalg.lstsq(causes, level, rcond=None)[0]
+    if factors[0] > 0:
+        causes = causes[:, 1:]
+        factors = np.linalg.lstsq(causes, level, rcond=None)[0]
+    return np.linalg.norm(causes @ factors) / np.linalg.norm(level)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_many_places_fit_as_each_by_least_squares(sign):
+    rng = np.random.default_rng(3)
+    row, col = np.divmod(rng.permutation(1600)[:900], 40)
+    east, north = 20.0 * col, 20.0 * row
+    away = np.hypot(east - 300, north - 500)
+    level = -60 - sign * 30 * np.log10(away + 5) + 0.01 * east + rng.normal(0, 6, 900)
+    squares = MeanLevels(east, north, level, 20.0)
+    # More places than are fitted at once; one in the middle of a square.
+    places = np.vstack([rng.uniform(-200, 1000, (600, 2)), [east[0], north[0]]])
+    expected = [least_squares(squares, place) for place in places]
+    np.testing.assert_allclose(place_fits(squares, places), expected, atol=1e-9)
+
+
+def test_squares_in_a_row_do_not_tell_all_causes_apart():
+    along = 10.0 * np.arange(80)
+    level = -60 - 20 * np.log10(along + 30) + 0.3 * np.random.default_rng(1).standard_normal(80)
+    squares = MeanLevels(along, np.zeros(80), level, 10.0)
+    places = np.array([[-30.0, 0.0], [400.0, 0.0]])
+    expected = [least_squares(squares, place) for place in places]
+    np.testing.assert_allclose(place_fits(squares, places), expected, atol=1e-6)

@@ -251,3 +251,38 @@ def test_of_a_large_map_the_part_in_the_box_is_read(make_map, monkeypatch, share
     monkeypatch.setattr(maps, "_LARGEST_IN_MEMORY_BYTES", 0)
     assert read() == whole
     assert not list(shared_temporary.iterdir())
+
+
+def test_a_map_is_read_again_when_it_was_written_anew(make_map):
+    road = {"highway": "residential"}
+    made = make_map([(5, road, [(10, 10), (60, 10)])])
+    first = read_ways(made, "walking", *AREA)
+    again = read_ways(made, "walking", *AREA)
+    assert first.way_id.tolist() == again.way_id.tolist() == [5]
+    assert shapely.equals_exact(first.geometry, again.geometry).all()
+    before = made.stat()
+    make_map([(6, road, [(10, 10), (60, 10)])])
+    os.utime(made, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert made.stat().st_size == before.st_size
+    assert read_ways(made, "walking", *AREA).way_id.tolist() == [6]
+
+
+def test_a_small_map_is_read_once_for_each_part(make_map, monkeypatch):
+    made = make_map([(5, {"highway": "residential"}, [(10, 10), (60, 10)])])
+    read, read_anew = [], maps._read_anew
+
+    def counted(*given):
+        read.append(given)
+        return read_anew(*given)
+
+    monkeypatch.setattr(maps, "_read_anew", counted)
+    for profile in ("walking", "driving"):
+        read_ways(made, profile, *AREA)
+    assert len(read) == 1
+    (crs, (west, south, east, north)) = AREA
+    read_ways(made, "walking", crs, (west + 5, south, east, north))
+    assert len(read) == 2
+    monkeypatch.setattr(maps, "_LARGEST_KEPT_BYTES", 1)
+    for _ in range(2):
+        read_ways(made, "walking", *AREA)
+    assert len(read) == 4

@@ -227,6 +227,20 @@ def test_plain_times_are_those_of_the_slow_reader(texts, zone, tmp_path):
     assert found.clock.absolute == zoned
 
 
+def test_places_of_satellites_are_those_at_the_moment_of_reception(written):
+    rows = read_recording(written("smartloc")).tables["satellites"]
+    sent = np.array([float(x) for x in MADE["smartloc"][1].splitlines()[1].split()[4:7]])
+    first = rows.iloc[0]
+    place = first[["x_m", "y_m", "z_m"]].to_numpy(dtype=float)
+    receiver = np.array([2884500.0, 1341500.0, 5509900.0])
+    # The effect of the earth's turn on the range, as receivers add it to the plain distance.
+    sagnac_m = 7.2921151467e-5 * (sent[0] * receiver[1] - sent[1] * receiver[0]) / 299_792_458
+    plain_m = np.linalg.norm(sent - receiver)
+    assert np.linalg.norm(place - receiver) == pytest.approx(plain_m + sagnac_m, abs=0.3)
+    assert abs(sagnac_m) > 5
+    assert np.linalg.norm(place) == pytest.approx(np.linalg.norm(sent))
+
+
 def test_a_quoted_separator_in_a_file_of_blanks(written):
     lines = MADE["smartloc"][1].splitlines()
     at = next(i for i, line in enumerate(lines) if line.startswith("point3"))

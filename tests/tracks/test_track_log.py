@@ -52,6 +52,16 @@ def test_absent_tables_are_empty_and_absent_fields_missing():
     assert log.truth_length_m == 0.0
 
 
+def test_absent_tables_of_two_logs_are_not_one():
+    first, second = make_log(CRS, motion=motion()), make_log(CRS, motion=motion())
+    first.truth.loc[0, "east_m"] = 1.0
+    assert second.truth.empty
+    assert make_log(CRS, motion=motion()).truth.empty
+    assert list(second.truth.columns) == list(first.truth.columns)
+    given = make_log(CRS, motion=motion(), truth=second.truth).truth
+    pd.testing.assert_frame_equal(given, second.truth)
+
+
 def test_duration_and_truth_length_by_hand():
     track = truth(east_m=[0.0, 30.0, 30.0], north_m=[1000.0, 1040.0, 1050.0])
     log = make_log(CRS, truth=track, motion=motion())

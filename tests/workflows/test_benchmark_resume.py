@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter._io import sealed
@@ -47,6 +48,7 @@ def test_a_length_is_refused_where_cases_have_their_own(world, tmp_path):
     assert_refused(told, "journeys.length_m", "recovery-cell", "--case")
 
 
+@pytest.mark.long
 def test_two_workers_find_what_one_finds(world, tmp_path):
     found = {}
     for workers in (1, 2):

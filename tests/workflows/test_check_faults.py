@@ -8,7 +8,7 @@ from command_line import mapfilter
 from rasterio.transform import Affine
 
 from mapfilter.check import site_checks as check_peaks
-from mapfilter.check.site_checks import place_fit
+from mapfilter.check.site_checks import place_fits
 from mapfilter.geodesy import Lattice
 
 
@@ -190,7 +190,9 @@ def test_of_many_sites_only_those_about_the_best_place_are_tried(world, monkeypa
     tried = []
     monkeypatch.setattr(check_peaks, "_SITES", 1)
     monkeypatch.setattr(
-        check_peaks, "place_fit", lambda *given: tried.append(given) or place_fit(*given)
+        check_peaks,
+        "place_fits",
+        lambda squares, places_m: tried.extend(places_m) or place_fits(squares, places_m),
     )
     exchange_sites(world)
     assert [f["code"] for f in check(world)] == ["site-labels-swapped"]

@@ -249,3 +249,13 @@ def test_help_is_quick_to_import(command):
 def test_version_and_no_command():
     assert assert_done(mapfilter("--version")).out.startswith("mapfilter 0")
     assert "Usage" in mapfilter().out + mapfilter().err
+
+
+def test_blas_has_one_thread_unless_another_number_is_given(monkeypatch):
+    name = "OPENBLAS_NUM_THREADS"
+    monkeypatch.delenv(name, raising=False)
+    assert_done(mapfilter("--version"))
+    assert os.environ[name] == "1"
+    monkeypatch.setenv(name, "3")
+    assert_done(mapfilter("--version"))
+    assert os.environ[name] == "3"

@@ -156,6 +156,7 @@ def test_faults_of_a_road_raster_are_named_by_check_and_build(roads, setting, ex
     assert expected in checked.out + checked.err
 
 
+@pytest.mark.long
 def test_real_odometry_is_located_on_real_streets(tmp_path, shared_data):
     data = shared_data / "kitti-osm"
     if not data.exists():

@@ -10,15 +10,16 @@ _CHECK = """
 import numpy as np
 from mapfilter.filters import hypotheses, particle, resampling
 from mapfilter.filters.contract import MotionStep
-from mapfilter.models import fingerprint, level_kernels, street_motion
-from mapfilter.positioning import integrity
+from mapfilter.models import fingerprint, level_covariance, level_kernels, street_motion, way_map
+from mapfilter.positioning import estimate, integrity
 from mapfilter.positioning.bayes import area_map, evidence, model
 from mapfilter.workflows import kernels
 
 compiled = {
     f"{module.__name__}.{name}": found
     for module in (
-        area_map, fingerprint, hypotheses, integrity, level_kernels, resampling, street_motion
+        area_map, fingerprint, hypotheses, integrity, level_covariance, level_kernels, resampling,
+        street_motion, way_map,
     )
     for name, found in vars(module).items()
     if hasattr(found, "signatures") and found.py_func.__module__ == module.__name__
@@ -36,13 +37,14 @@ levels = kernels.LevelReport(none, np.full(1, -60, np.float32), none, -100.0, 1.
 bound = fingerprint.BoundReading(none, -60.0, 1, 8.0, 1.0)
 for _ in range(3):
     belief, _ = filter_.predict(belief, MotionStep(1.0, 0.3), rng)
-    reading = evidence.RadioReading(0, 1.0, levels, (bound,), length_m=1.0)
+    reading = evidence.RadioReading(0, 1.0, levels, (bound,), length_m=1.0, tracked=True)
     belief, _ = filter_.update(belief, reading, rng)
     belief.summary, made.area.matched_way(*belief.state[:2], belief.weight)
     tail = integrity.sample_tail(*belief.state[:2], belief.weight, belief.summary.mean, 0.0)
-    tail.protection_m(1e-3)
+    estimate.protected_m(tail, belief.summary.radii_m)
+    made.area.holds(*belief.state[:2], belief.weight), made.area.clear_of_edge(belief.state)
 assert called() == before, set(called().items()) - set(before.items())
-assert sum(map(len, before.values())) >= 14, before
+assert sum(map(len, before.values())) >= 22, before
 """
 
 
@@ -61,8 +63,8 @@ def test_nothing_is_started_where_all_is_kept(monkeypatch):
 def test_a_kernel_is_kept_by_its_line():
     class Elsewhere:
         py_func = test_nothing_is_started_where_all_is_kept
-        stats = kernels.weigh_by_map.stats
+        stats = kernels.weighed_by_ways.stats
 
     kernels.compile_motion()
-    assert kernels._is_kept(kernels.weigh_by_map)
+    assert kernels._is_kept(kernels.weighed_by_ways)
     assert not kernels._is_kept(Elsewhere)

@@ -77,6 +77,13 @@ def test_rows_table_and_pictures(tmp_path):
         "two-bayes-worst.png",
     ]
     assert all(path.stat().st_size > 10_000 for path in result.pictures)
+    worst = table["worst"]
+    assert [(one["part"], one["method"], one["run"]) for one in worst] == [
+        ("one", "bayes", 1),
+        ("two", "bayes", 1),
+    ]
+    assert worst[0]["what"] == "no claim is more than 50 m off"
+    assert worst[0]["picture"].endswith("one-bayes-worst.png")
 
 
 def test_finished_runs_are_kept_and_damaged_ones_done_again(fake, tmp_path):
@@ -267,3 +274,6 @@ def test_wifi_sets_by_the_command(tmp_path):
     assert all(row["mean_m"] < 15 and row["success"] is None for row in rows)
     by = {(row["part"], row["method"]): row for row in rows}
     assert by["TUT1", "locate"]["baseline_m"] == by["TUT1", "3-nn"]["mean_m"]
+    worst = done.json["worst"]
+    assert len(worst) == len(rows) == len(list((out / "pictures").glob("*.png")))
+    assert all(" m off; the 95 % radius of " in one["what"] for one in worst)

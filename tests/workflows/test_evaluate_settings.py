@@ -75,13 +75,6 @@ def is_refused(key):
     return key in REFUSED or key.startswith(REFUSED_SECTIONS)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _no_waiting_for_the_disk():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("os.fsync", lambda _: None)
-        yield
-
-
 @pytest.fixture(scope="module")
 def world_of(tmp_path_factory):
     """Return the benchmark's world for settings; each is made once."""

@@ -1,6 +1,7 @@
 """The exact filter on a grid on the full chain."""
 
 import numpy as np
+import pytest
 from command_line import assert_done, mapfilter, settings
 
 from mapfilter.positioning.estimate_store import read_estimate
@@ -38,6 +39,7 @@ def test_a_replay_by_the_grid(world, tmp_path):
     assert estimate.way_probability[-1] > 0.2
 
 
+@pytest.mark.long
 def test_a_benchmark_of_the_grid(world, tmp_path):
     given = [
         *settings(area__resolution_m=10),

@@ -138,6 +138,7 @@ def as_anybody():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="gives up capabilities")
+@pytest.mark.long
 def test_folders_that_nobody_may_write_to_are_read_and_refused_as_outputs(own_world):
     places = [own_world.folder, *own_world.folder.rglob("*")]
     for path in places:

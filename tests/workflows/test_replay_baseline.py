@@ -11,6 +11,7 @@ import mapfilter as mf
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by, usual_readings
 from mapfilter.positioning.fingerprints.options import Probabilistic
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
+from mapfilter.workflows import replay as workflow
 from mapfilter.workflows.replay_baseline import MOST_REPORTS, Baselines, SingleReports, together
 
 
@@ -82,6 +83,24 @@ def test_reports_of_several_logs_are_put_together():
     assert together([None]) is None
     none = SingleReports(1, 1, np.empty(0), np.empty(0, bool)).figures
     assert np.isnan([none["error_median_m"], none["within_95"]]).all()
+
+
+@pytest.mark.parametrize(("kept_rows", "times"), [(1_000_000, 1), (0, 2)])
+def test_small_logs_are_read_once_and_large_ones_again(
+    kept_rows, times, log, replay, tmp_path, monkeypatch
+):
+    read, open_journey = [], workflow.open_journey
+
+    def counted(config, path, crs):
+        read.append(path)
+        return open_journey(config, path, crs)
+
+    monkeypatch.setattr(workflow, "open_journey", counted)
+    monkeypatch.setattr(workflow, "_MOST_KEPT_ROWS", kept_rows)
+    assert_done(replay(log))
+    assert read == [log] * times
+    figures = json.loads((tmp_path / "out" / "figures.json").read_text())
+    assert figures["baseline"]["scored"] > 0
 
 
 def test_several_logs_have_one_baseline(world, tmp_path):

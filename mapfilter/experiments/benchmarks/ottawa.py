@@ -91,16 +91,32 @@ def find_session(
     step_factor: float = 1.0,
 ) -> list[FoundSession]:
     """Find a session from an unknown start, with one draw of the noise, by both methods."""
-    crs = positioner.area.lattice.crs
-    rng = named_rng(seed, "noise", session.name, str(draw))
-    log = session_log(session, crs, options.errors, rng, step_factor=step_factor)
     found = []
     for method in METHODS:
-        # The same stream of numbers: the filter below the smoother is the filter itself.
-        own = named_rng(seed, "filter", session.name, str(draw))
-        located = locate(log, replace(positioner, smooth=method == "smoothed"), own)
-        found.append(_scored(part, session, method, log, located.estimate, positioner))
+        log, estimate = locate_session(
+            session, positioner, options, seed, draw, step_factor, smooth=method == "smoothed"
+        )
+        found.append(_scored(part, session, method, log, estimate, positioner))
     return found
+
+
+def locate_session(
+    session: Session,
+    positioner: BayesPositioner,
+    options: OttawaOptions,
+    seed: int,
+    draw: int,
+    step_factor: float = 1.0,
+    *,
+    smooth: bool = False,
+) -> tuple[TrackLog, TrackEstimate]:
+    """Return the log of a session with one draw of the noise, and its estimate."""
+    rng = named_rng(seed, "noise", session.name, str(draw))
+    crs = positioner.area.lattice.crs
+    log = session_log(session, crs, options.errors, rng, step_factor=step_factor)
+    # The same stream of numbers: the filter below the smoother is the filter itself.
+    own = named_rng(seed, "filter", session.name, str(draw))
+    return log, locate(log, replace(positioner, smooth=smooth), own).estimate
 
 
 def centroid_errors_m(session: Session, others: Sequence[Session], crs: str) -> Floats:

@@ -142,6 +142,25 @@ class LeftOut:
     found: tuple[FoundSession, ...]
 
 
+def worst_session(every: Sequence[LeftOut]) -> tuple[int, int] | None:
+    """Return the worst run by ``bayes``: index of its session, and its draw; None without any.
+
+    A wrong claim is worse than the largest median error of a whole smoothed track.
+    """
+    runs = []
+    for i, one in enumerate(every):
+        filtered = [found for found in one.found if found.method == METHODS[0]]
+        smoothed = [found for found in one.found if found.method == METHODS[1]]
+        for draw, (found, track) in enumerate(zip(filtered, smoothed, strict=True)):
+            wrong = found.converged and not found.success
+            error_m = median_of(track.error_m)
+            runs.append((wrong, error_m if isfinite(error_m) else 0.0, -i, -draw))
+    if not runs:
+        return None
+    _, _, session, draw = max(runs)
+    return -session, -draw
+
+
 def write_left_out(left_out: LeftOut, file: Path) -> None:
     """Write the results of a session."""
     rows = [

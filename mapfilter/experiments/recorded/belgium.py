@@ -35,6 +35,7 @@ from mapfilter.experiments.recorded.ground import (
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
+from mapfilter.experiments.recorded.worst_report import WorstReport, worst_report
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import TrackEstimate
@@ -127,8 +128,9 @@ def judge(task: Task, shared: Place) -> Judged:
     named_in_time = bool(delay_s <= LEAST_S) and not claimed_wrongly(located.estimate, truth)
     note = f"stale radio named after {delay_s:.0f} s. {live.note}"
     live = replace(live, success=named_in_time, seconds=located.filter_s, note=note)
-    alone = _fresh_reports(task, named, shared)
-    return Judged((live, alone), {"live": Journey(located.estimate, truth, folder / "corridor")})
+    alone, worst = _fresh_reports(task, named, shared)
+    journeys = {"live": Journey(located.estimate, truth, folder / "corridor")}
+    return Judged((live, alone), journeys, {} if worst is None else {alone.method: worst})
 
 
 def read_walk(file: Path) -> TrackLog:
@@ -190,7 +192,7 @@ def _place_of(folder: Path, place: str) -> tuple[dict[str, TrackLog], CellPlan]:
     return logs, _near(plan, [positions_of(log.truth) for log in logs.values()])
 
 
-def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
+def _fresh_reports(task: Task, log: TrackLog, place: Place) -> tuple[Found, WorstReport | None]:
     """Locate each report that was measured by itself, anywhere around the towers."""
     # Without a position by GNSS at its time a report is not scored.
     reports = reports_of_logs([log], place.plan)
@@ -198,7 +200,7 @@ def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
     known = np.isfinite(located.error_m)
     sites = _site_errors_m(log, place.plan)
     held = (located.error_m <= located.radii_m[:, 2])[known]
-    return Found(
+    found = Found(
         task.part,
         "locate",
         task.unit,
@@ -210,6 +212,7 @@ def _fresh_reports(task: Task, log: TrackLog, place: Place) -> Found:
         sites,
         note=f"{int(known.sum())} reports were measured",
     )
+    return found, worst_report(reports, located, place.locator.database)
 
 
 def _site_errors_m(log: TrackLog, plan: CellPlan) -> np.ndarray:

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.rows import Found
+from mapfilter.experiments.recorded.worst_report import WorstReport
 from mapfilter.positioning.estimate import TrackEstimate
 
 
@@ -45,19 +47,32 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Journey:
-    """A located journey and its truth, for pictures; and the database it was located over."""
+    """A located journey and its truth, for pictures; and what it was located by.
+
+    Parameters
+    ----------
+    database : Path, optional
+        Its map.
+    fixes : (K, 3) array, optional
+        Time, east and north of the fixes that the filter was given.
+    """
 
     estimate: TrackEstimate
     truth: Truth
     database: Path | None = None
+    fixes: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Results of one task by all methods, and the journeys of some of them, by method."""
+    """Results of one task by all methods, and of some of them, by method, what pictures show.
+
+    That is a journey, or the worst of many single reports.
+    """
 
     found: tuple[Found, ...]
     journeys: Mapping[str, Journey] = field(default_factory=dict)
+    reports: Mapping[str, WorstReport] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

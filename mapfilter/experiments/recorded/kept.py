@@ -11,6 +11,11 @@ from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.benchmark import Journey, Judged, Task
 from mapfilter.experiments.recorded.rows import Found, read_found, write_found
+from mapfilter.experiments.recorded.worst_report import (
+    WorstReport,
+    read_worst_report,
+    write_worst_report,
+)
 from mapfilter.positioning.estimate_store import read_estimate, write_estimate
 
 _TRUTH = ("time_s", "east_m", "north_m")
@@ -22,13 +27,17 @@ def scores_file(folder: Path, task: Task) -> Path:
 
 
 def write_judged(judged: Judged, folder: Path, task: Task) -> None:
-    """Write journeys, then scores."""
+    """Write journeys and reports, then scores."""
     folder.mkdir(parents=True, exist_ok=True)
     for method, journey in judged.journeys.items():
         write_estimate(journey.estimate, _estimate_file(folder, task, method))
         truth = {name: getattr(journey.truth, name).tolist() for name in _TRUTH}
         database = None if journey.database is None else str(journey.database)
-        write_sealed(_truth_file(folder, task, method), {"truth": truth, "database": database})
+        fixes = None if journey.fixes is None else journey.fixes.tolist()
+        kept = {"truth": truth, "database": database, "fixes": fixes}
+        write_sealed(_truth_file(folder, task, method), kept)
+    for method, report in judged.reports.items():
+        write_worst_report(report, _report_file(folder, task, method))
     write_found(judged.found, scores_file(folder, task))
 
 
@@ -49,9 +58,20 @@ def read_journey(folder: Path, task: Task, method: str) -> Journey | None:
     try:
         truth = Truth(*(np.array(read["truth"][name], dtype=np.float64) for name in _TRUTH))
         database = None if read["database"] is None else Path(read["database"])
+        fixes = read.get("fixes")
+        given = None if fixes is None else np.array(fixes, dtype=np.float64).reshape(-1, 3)
     except (KeyError, TypeError, ValueError) as error:
         raise fail(StoreError, str(file), "a true track", error, "cut off") from error
-    return Journey(read_estimate(_estimate_file(folder, task, method)), truth, database)
+    return Journey(read_estimate(_estimate_file(folder, task, method)), truth, database, given)
+
+
+def read_report(folder: Path, task: Task, method: str) -> WorstReport | None:
+    """Return the worst report of a finished task; None where none was kept."""
+    return read_worst_report(_report_file(folder, task, method))
+
+
+def _report_file(folder: Path, task: Task, method: str) -> Path:
+    return folder / f"{task.name}-{method}-report.json"
 
 
 def _estimate_file(folder: Path, task: Task, method: str) -> Path:

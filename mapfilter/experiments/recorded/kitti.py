@@ -3,7 +3,8 @@
 Odometry is that of a SLAM program where there is one; else true steps and turns with an error that
 drifts: of the scale and of the heading, between 1 and 4 % of the way, drawn anew for each run. The
 filter is not told how large it is. The runs of a drive begin at different places of its first
-third.
+third. The first run of each winding drive is located by oracles, too: one that is given the true
+positions of the first 30 m, and one that knows how large the errors of its motion are.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ from mapfilter.database.sources import LayerRoutes
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
+from mapfilter.experiments.recorded.oracles import NOISE, START, motion_errors, with_start
+from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import wrap_rad
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.raster import raster_lattice, read_raster_ways
@@ -91,7 +95,28 @@ def judge(task: Task, over: OpenMap) -> Judged:
         seconds=located.filter_s,
         asked=(lambda claimed, _: not claimed) if task.part in STRAIGHT else None,
     )
-    return Judged((found,), {"bayes": Journey(located.estimate, known, over.path)})
+    oracles = []
+    if task.run == 0 and task.part not in STRAIGHT:
+        scale, drift_deg = motion_errors(log.motion, perfect_motion(truth.iloc[first:]))
+        oracles = [
+            (START, with_start(log, known), BayesFilter()),
+            (NOISE, log, BayesFilter(scale=scale, drift_deg_per_sqrt_m=drift_deg)),
+        ]
+    return Judged(
+        (found, *(_by_oracle(task, over, known, *one) for one in oracles)),
+        {"bayes": Journey(located.estimate, known, over.path)},
+    )
+
+
+def _by_oracle(
+    task: Task, over: OpenMap, truth: Truth, method: str, log: TrackLog, options: BayesFilter
+) -> Found:
+    """Locate a run that is given the start, or the errors of its motion."""
+    rng = named_rng(task.seed, "kitti", task.part, task.unit, str(task.run), method)
+    located = locate_log(log, over, rng, options)
+    return score_journey(
+        task.part, method, task.unit, located.estimate, truth, seconds=located.filter_s
+    )
 
 
 def read_truth(path: Path) -> pd.DataFrame:

@@ -4,10 +4,12 @@ The whole chain: the access points of the other walks are the radio map, each sc
 itself (``wifi``), and the positions with their radii go as fixes into the Bayes map filter over
 the walkable part of the plan (``bayes``), and into a Kalman filter without a map (``ekf`` and
 ``ekf-smoothed``), with steps and headings made of the raw sensors. How much of the fixes' errors
-lasts, and for how long, is found where walks of the radio map are left out in turn. Walks are
-judged at their surveyed waypoints, from the first scan on, claimed or not: most walks end before
-the map filter claims one. The later half of the walks is judged, in two parts, each by all other
-walks: parameters of steps and headings were chosen on walks of the first half.
+lasts, and for how long, is found where walks of the radio map are left out in turn. Two oracles
+show what these positions allow, smoothed: one is given the true first waypoint, one the true size
+of each fix's error. Walks are judged at their surveyed waypoints, from the first scan on, claimed
+or not: most walks end before the map filter claims one. The later half of the walks is judged, in
+two parts, each by all other walks: parameters of steps and headings were chosen on walks of the
+first half.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -32,6 +35,7 @@ from mapfilter.experiments.benchmarks.single_reports import BASELINE, METHODS
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import open_ground, roads_alone
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
+from mapfilter.experiments.recorded.oracles import NOISE, START, with_fix_errors, with_true_fixes
 from mapfilter.experiments.recorded.outages import errors_at
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
@@ -51,6 +55,7 @@ from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenOptions, open_log
 from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.store import read_log, write_log
 
 PARTS = 2
 DECLINATION_DEG = -5.4
@@ -70,9 +75,13 @@ def units(_: Path) -> list[tuple[str, str, int]]:
 
 
 def prepare(folder: Path, work: Path) -> None:
-    """Unpack the walks, and build a database of the walkable part of the floor."""
-    unpack(_first(folder, _ARCHIVE), work / _WALKS)
-    crs = open_log(_walks(work)[0], options=_OPEN).log.crs
+    """Read the walks once for all parts, and build a database of the floor that one can walk on."""
+    with TemporaryDirectory(dir=work) as text:
+        unpack(_first(folder, _ARCHIVE), Path(text))
+        for file in _walks(Path(text)):
+            log = open_log(file, options=_OPEN).log
+            write_log(log, work / _WALKS / file.stem)
+            crs = log.crs
     roads_alone(walkable(folder, crs), work / _MAP)
 
 
@@ -109,7 +118,7 @@ def judge(task: Task, shared: tuple[dict[str, TrackLog], OpenMap]) -> Judged:
         found.append(Found("floor", "wifi", name, *none, *wifi, note=note))
         fixed = with_fixes(log, alone)
         first_s = float(fixed.gnss["time_s"].min()) if len(fixed.gnss) else inf
-        for method, located in _located(fixed, task, over, lasting).items():
+        for method, located in _located(fixed, truth, task, over, lasting).items():
             scored = score_journey(
                 "floor", method, name, located.estimate, truth, seconds=located.filter_s
             )
@@ -129,26 +138,38 @@ def judge(task: Task, shared: tuple[dict[str, TrackLog], OpenMap]) -> Judged:
             located_m = errors_m[np.isfinite(errors_m)]
             if located_m.size and located_m.max() > worst_m.get(method, -1.0):
                 worst_m[method] = float(located_m.max())
-                journeys[method] = Journey(located.estimate, truth, over.path)
+                given = fixed.gnss[["time_s", "east_m", "north_m"]].to_numpy()
+                journeys[method] = Journey(located.estimate, truth, over.path, given)
     return Judged(tuple(found), journeys)
 
 
 def _located(
-    log: TrackLog, task: Task, over: OpenMap, lasting: LastingError | None
+    log: TrackLog, truth: Truth, task: Task, over: OpenMap, lasting: LastingError | None
 ) -> dict[str, PositionedTrack]:
     """Locate a walk with fixes, of whose errors a part lasts, by all filters."""
-    kalman = KalmanFilter()
+    plain = KalmanFilter()
+    kalman = plain
     if lasting is not None:
-        kalman = replace(kalman, fix_lasting_m=lasting.sd_m, fix_lasting_s=lasting.memory_s)
+        kalman = replace(plain, fix_lasting_m=lasting.sd_m, fix_lasting_s=lasting.memory_s)
 
     def rng() -> np.random.Generator:
         return named_rng(task.seed, "mall", task.unit, str(log.start_utc_s))
 
     found = {"bayes": locate_log(log, over, rng())}
     for name, smooth in (("ekf", False), ("ekf-smoothed", True)):
-        options, _ = fitted_to_log(replace(kalman, smooth=smooth), log)
-        found[name] = locate(log, options.over_sites(CellPlan(log.crs, ())), rng())
+        found[name] = _without_map(log, replace(kalman, smooth=smooth), rng())
+    if len(log.gnss):
+        started = with_true_fixes(log, truth, truth.time_s <= truth.time_s[0])
+        found[START] = _without_map(started, replace(kalman, smooth=True), rng())
+        known = with_fix_errors(log, truth)
+        found[NOISE] = _without_map(known, replace(plain, smooth=True), rng())
     return found
+
+
+def _without_map(log: TrackLog, kalman: KalmanFilter, rng: np.random.Generator) -> PositionedTrack:
+    """Locate a walk by a Kalman filter."""
+    options, _ = fitted_to_log(kalman, log)
+    return locate(log, options.over_sites(CellPlan(log.crs, ())), rng)
 
 
 def unpack(archive: Path, target: Path) -> None:
@@ -220,14 +241,14 @@ def with_fixes(log: TrackLog, located: LocatedReports) -> TrackLog:
 
 def _logs(work: Path) -> dict[str, TrackLog]:
     """Return the walks by name, in the order of time."""
-    logs = {file.stem: open_log(file, options=_OPEN).log for file in _walks(work)}
+    logs = {path.name: read_log(path) for path in sorted((work / _WALKS).iterdir())}
     return dict(sorted(logs.items(), key=lambda item: item[1].start_utc_s))
 
 
-def _walks(work: Path) -> list[Path]:
-    files = sorted((work / _WALKS).glob("*.txt"))
+def _walks(folder: Path) -> list[Path]:
+    files = sorted(folder.glob("*.txt"))
     if len(files) < 2 * PARTS:
-        raise fail(InputError, str(work / _WALKS), f"{2 * PARTS} walks or more", len(files))
+        raise fail(InputError, str(folder), f"{2 * PARTS} walks or more", len(files))
     return files
 
 

@@ -3,11 +3,13 @@
 The other drives of the data set are in other streets, so the map is open ground about the
 receiver's least-squares positions of the first minute. All satellites are used for the first
 minute; afterwards none, one, two or three of the highest ones, or all. ``outages`` takes all of
-them away for 60 s, again and again.
+them away for 60 s, again and again. Where a figure is asked for, two oracles locate the same drive:
+one knows the true positions before (in place of satellites), one the true size of each error.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -22,6 +24,12 @@ from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged,
 from mapfilter.experiments.recorded.ground import lattice_about, open_ground, roads_alone
 from mapfilter.experiments.recorded.least_squares import least_squares_positions
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
+from mapfilter.experiments.recorded.oracles import (
+    NOISE,
+    START,
+    with_range_errors,
+    with_true_fixes,
+)
 from mapfilter.experiments.recorded.outages import (
     Outages,
     coasted_errors_m,
@@ -80,42 +88,67 @@ def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
     log, over = shared
     truth = Truth.of_table(log.truth)
     assert truth is not None, "the ground truth has more than one position"
-    rng = named_rng(task.seed, "smartloc", task.part, str(task.run))
     end_s = float(truth.time_s[-1])
     spans: list[tuple[float, float]] = []
     if task.part == OUTAGES:
         first_s = FIRST_S + task.run * (OUTAGE_S + PAUSE_S) / RUNS
         spans = Outages(first_s, OUTAGE_S, PAUSE_S).within(end_s)
         given = log_without(log, spans)
+        baseline_m = coasted_errors_m(log.motion, truth, spans)
     else:
         most = SATELLITES.get(task.part)
         kept = log.pseudoranges if most is None else highest(log, most, FIRST_S)
         given = replace(log, pseudoranges=kept)
-    located = locate_log(given, over, rng)
-    found = score_journey(
-        task.part, "bayes", task.unit, located.estimate, truth, seconds=located.filter_s
-    )
-    if task.part == OUTAGES:
-        ends = [end for _, end in spans]
-        errors_m, held = errors_at(located.estimate, truth, ends)
-        baseline_m = coasted_errors_m(log.motion, truth, spans)
-    else:
-        errors_m, held = errors_between(located.estimate, truth, FIRST_S, end_s)
         if task.part == ALL:
             baseline_m = _least_squares_errors_m(log, truth)
         else:
             baseline_m = _reckoned_errors_m(log, truth)
-    missing = int(np.isinf(errors_m).sum())
-    right_m = RIGHT_M.get(task.part, inf)
-    found = replace(
-        found,
-        error_m=errors_m,
-        covered=held,
-        baseline_m=baseline_m,
-        success=bool(np.median(errors_m) <= right_m) if np.isfinite(right_m) else found.success,
-        note=f"{missing} of {len(errors_m)} without a position. {found.note}",
-    )
-    return Judged((found,), {"bayes": Journey(located.estimate, truth, over.path)})
+    found, journeys = [], {}
+    for method, one in {"bayes": given, **by_oracles(task.part, given, truth, spans)}.items():
+        words = (task.part, str(task.run), *(() if method == "bayes" else (method,)))
+        located = locate_log(one, over, named_rng(task.seed, "smartloc", *words))
+        scored = score_journey(
+            task.part, method, task.unit, located.estimate, truth, seconds=located.filter_s
+        )
+        if task.part == OUTAGES:
+            errors_m, held = errors_at(located.estimate, truth, [end for _, end in spans])
+        else:
+            errors_m, held = errors_between(located.estimate, truth, FIRST_S, end_s)
+        missing = int(np.isinf(errors_m).sum())
+        right_m = RIGHT_M.get(task.part, inf)
+        right = bool(np.median(errors_m) <= right_m) if np.isfinite(right_m) else scored.success
+        found.append(
+            replace(
+                scored,
+                error_m=errors_m,
+                covered=held,
+                baseline_m=baseline_m,
+                success=right,
+                note=f"{missing} of {len(errors_m)} without a position. {scored.note}",
+            )
+        )
+        journeys[method] = Journey(located.estimate, truth, over.path)
+    return Judged(tuple(found), journeys)
+
+
+def by_oracles(
+    part: str, log: TrackLog, truth: Truth, spans: Sequence[tuple[float, float]]
+) -> dict[str, TrackLog]:
+    """Return what the oracles of a part are given, by method; nothing where no figure is asked for.
+
+    The start is known by true positions: of the first minute, with outages until each of them. The
+    noise is known by the true size of each pseudorange's error.
+    """
+    if part not in RIGHT_M:
+        return {}
+    which = truth.time_s <= FIRST_S
+    if spans:
+        inside = [(truth.time_s > begin) & (truth.time_s <= end) for begin, end in spans]
+        which = ~np.any(inside, axis=0)
+    kept = log.pseudoranges if not spans else log.pseudoranges.iloc[:0]
+    later = kept[kept["time_s"] > FIRST_S].reset_index(drop=True)
+    started = with_true_fixes(replace(log, pseudoranges=later), truth, which)
+    return {START: started, NOISE: with_range_errors(log, truth)}
 
 
 def highest(log: TrackLog, most: int, after_s: float) -> pd.DataFrame:

@@ -15,6 +15,7 @@ from mapfilter.experiments.benchmarks.single_reports import (
 )
 from mapfilter.experiments.recorded.benchmark import Benchmark, Judged, Task
 from mapfilter.experiments.recorded.rows import Found
+from mapfilter.experiments.recorded.worst_report import worst_report
 from mapfilter.positioning.fingerprints.options import AUTO
 
 
@@ -26,8 +27,8 @@ def units(_: Path) -> list[tuple[str, str, int]]:
 def judge(task: Task, _: None = None) -> Judged:
     """Locate the test reports of a set by all methods, beside three nearest neighbours."""
     training, test = read_wifi(task.data, task.part)
-    names = (AUTO, "probabilistic", BASELINE)
-    located = {name: locate_wifi(training, test, name)[0] for name in names}
+    methods = {"locate": AUTO, "probabilistic": "probabilistic", BASELINE: BASELINE}
+    located = {name: locate_wifi(training, test, one)[0] for name, one in methods.items()}
     baseline_m = located[BASELINE].error_m
     found = []
     for name, result in located.items():
@@ -35,7 +36,7 @@ def judge(task: Task, _: None = None) -> Judged:
         found.append(
             Found(
                 task.part,
-                "locate" if name == AUTO else name,
+                name,
                 task.unit,
                 None,
                 None,
@@ -46,7 +47,9 @@ def judge(task: Task, _: None = None) -> Judged:
                 count=len(result.error_m),
             )
         )
-    return Judged(tuple(found))
+    worst = {name: worst_report(test, result, training) for name, result in located.items()}
+    reports = {name: one for name, one in worst.items() if one is not None}
+    return Judged(tuple(found), reports=reports)
 
 
 BENCHMARK = Benchmark(

@@ -15,11 +15,13 @@ from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.level_errors import roughness
 from mapfilter.models.street_motion import map_log_likelihood
+from mapfilter.models.way_map import all_inside, places_beyond
 from mapfilter.radio.cells import CellPlan
 
 BELOW_FLOOR_DB = 6.0
 """How far below the floor a level is assumed to be that the database does not hold."""
-_EDGE_M, _EDGE_SHARE = 60.0, 0.05
+_EDGE_M, _EDGE_SHARE, _ROUNDING_M = 60.0, 0.05, 1.0
+_F = np.float32
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,18 +159,33 @@ class AreaMap:
 
     def at_edge(self, place_m: Floats) -> bool:
         """Return whether a place in the local frame is near the edge of the area, or beyond."""
-        inside = [min(place_m[i], self.size_m[i] - place_m[i]) for i in range(2)]
-        return bool(min(inside) < min(_EDGE_M, _EDGE_SHARE * min(self.size_m)))
+        (width_m, height_m), east_m, north_m = self.size_m, float(place_m[0]), float(place_m[1])
+        inside_m = min(east_m, width_m - east_m, north_m, height_m - north_m)
+        return inside_m < self._edge_m
+
+    def clear_of_edge(self, state: Floats32) -> bool:
+        """Return whether all hypotheses, by their first two rows, lie well away from the edge.
+
+        Then so does their mean.
+        """
+        (width_m, height_m), away_m = self.size_m, self._edge_m + _ROUNDING_M
+        shape = width_m - 2 * away_m, height_m - 2 * away_m
+        return bool(all_inside(state[0] - _F(away_m), state[1] - _F(away_m), *shape))
+
+    @property
+    def _edge_m(self) -> float:
+        return min(_EDGE_M, _EDGE_SHARE * min(self.size_m))
 
     def beyond(self, state: Floats32) -> Bools:
         """Return whether each hypothesis, by its first two rows, lies beyond the area, (N,)."""
-        (width_m, height_m), east_m, north_m = self.size_m, state[0], state[1]
-        found: Bools = (east_m < 0) | (east_m > width_m) | (north_m < 0) | (north_m > height_m)
+        found: Bools = places_beyond(state, *self.size_m)
         return found
 
     def holds(self, east_m: Floats32, north_m: Floats32, weight: Floats32) -> bool:
         """Return whether most of a belief in the local frame lies in the area."""
         width_m, height_m = self.size_m
+        if all_inside(east_m, north_m, width_m, height_m):
+            return bool(weight.size)
         inside = (east_m >= 0) & (east_m <= width_m) & (north_m >= 0) & (north_m <= height_m)
         return bool(np.sum(weight[inside]) > 0.5)
 
@@ -219,10 +236,18 @@ def _heaviest(
     per_m: float,
 ) -> tuple[int, float]:
     rows, cols = way_rank.shape
+    count, last_col, last_row = weight.size, np.int32(cols - 1), np.int32(rows - 1)
+    pixel, flat = np.empty(count, dtype=np.int32), way_rank.ravel()
+    zero = np.int32(0)
+    for i in range(count):
+        col, row = np.int32(east_m[i] * per_m), np.int32(north_m[i] * per_m)
+        col = col if col > zero else zero
+        row = row if row > zero else zero
+        col = col if col < last_col else last_col
+        row = row if row < last_row else last_row
+        pixel[i] = np.int32(np.int32(last_row - row) * np.int32(cols)) + col
     mass = np.zeros(ways, dtype=np.float32)
-    for i in range(weight.size):
-        col = min(max(int(east_m[i] * per_m), 0), cols - 1)
-        row = rows - 1 - min(max(int(north_m[i] * per_m), 0), rows - 1)
-        mass[way_rank[row, col]] += weight[i]
+    for i in range(count):
+        mass[np.uint32(flat[np.uint32(pixel[i])])] += weight[i]
     best = int(np.argmax(mass))
     return best, mass[best]

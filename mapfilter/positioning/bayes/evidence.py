@@ -182,11 +182,12 @@ def joined(updates: Sequence[EvidenceUpdate], *, alternative: bool = False) -> R
 
     Terms are added in the reverse order of the sources: radio first, satellites last.
     """
-    radio = next((one.radio for one in updates if one.radio is not None), None)
-    terms: list[Term] = []
-    for one in reversed(updates):
+    radio: RadioReading | None = None
+    terms: tuple[Term, ...] = ()
+    for one in updates:
+        radio = one.radio if radio is None else radio
         other = alternative and one.alternative_terms is not None
-        terms += (one.alternative_terms or ()) if other else one.terms
+        terms = ((one.alternative_terms or ()) if other else one.terms) + terms
     if radio is None and not terms:
         return None
     radio = radio or RadioReading()
@@ -194,4 +195,4 @@ def joined(updates: Sequence[EvidenceUpdate], *, alternative: bool = False) -> R
     for one in updates:
         other = alternative and one.alternative_under_null is not None
         under_null += (one.alternative_under_null or 0.0) if other else one.under_null
-    return replace(radio, terms=tuple(terms), under_null=under_null)
+    return replace(radio, terms=terms, under_null=under_null)

@@ -17,7 +17,8 @@ from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.path_start import OFF_AT_START
 
 _CIRCLE_BINS = 72

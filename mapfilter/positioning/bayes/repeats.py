@@ -23,7 +23,7 @@ _FINE_ROWS = 30
 _COARSE_PER_DEG, _COARSE_PER_RAD = 100.0, 1000.0
 _PAIRS, _SOONER = 8, 0.8
 """Pairs of equal rows, and the interval within a pair relative to that between two of them."""
-_TURNS_RAD = 1e-9
+_TURNS_RAD, _ROUNDING = 1e-9, 1e-4
 _STRAIGHT_M = 84.0
 """Distance after which the direction of an unmeasured way is forgotten by 1/e."""
 
@@ -161,8 +161,11 @@ def _followed(repeats: MotionRepeats, time_s: float, step: MotionStep) -> Motion
 
 def _is_fine(heading_rad: float) -> bool:
     """Return whether a heading is no multiple of a hundredth degree or a thousandth radian."""
-    in_units = (degrees(heading_rad) * _COARSE_PER_DEG, heading_rad * _COARSE_PER_RAD)
-    return all(isfinite(value) and abs(value - round(value)) > 1e-4 for value in in_units)
+    if not isfinite(heading_rad):
+        return False
+    hundredths, thousandths = degrees(heading_rad) * _COARSE_PER_DEG, heading_rad * _COARSE_PER_RAD
+    fine = abs(hundredths - round(hundredths)) > _ROUNDING
+    return fine and abs(thousandths - round(thousandths)) > _ROUNDING
 
 
 def _equal(value: float, other: float) -> bool:

@@ -7,21 +7,19 @@ sides into the epoch, as long as one goes in that time, so the belief grows as i
 that stands still while the phone moves is taken out.
 
 Rows that are missing, or lengths of zero, can also be those of a phone that rests, so levels
-decide: at rest they change by fading alone. Each block of a rest is compared with its first one, by
-the likelihoods of "still there" and "carried elsewhere", and their ratio is added up from zero (a
-CUSUM; Page, 1954).
+decide (:mod:`mapfilter.positioning.bayes.rest`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import exp, isfinite, log, nan, sqrt
+from math import exp, isfinite, nan, sqrt
+from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
+from mapfilter.positioning.bayes.rest import Rest, levels_of
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.tracks.schema import SERVING
 
 _GAP_S, _GAP_INTERVALS, _REGULAR = 5.0, 3.0, 0.02
 """After so long, in seconds and in intervals of the log, motion rows are missing; intervals of rows
@@ -33,85 +31,10 @@ _WALK_MPS = 1.4
 _STRAIGHT_S = 60.0
 """Time after which the direction of an unmeasured way is forgotten by 1/e."""
 
-_BLOCK_S = 10.0
-_AT_REST_DB, _ELSEWHERE_DB, _ALL_DB = 4.0, 9.0, 6.0
-"""Deviations of a level from an earlier one at rest, and elsewhere; of all levels together, as a
-phone is put into a pocket."""
-_BLOCK_SHARE = 0.5
-"""Power of a block's likelihoods: blocks near each other repeat the same deviation."""
-_CELLS_AT_REST, _NATS_PER_CELL, _CELLS_S = 3, 2.5, 600.0
-_NATS_PER_S = 1 / 300
-"""Serving cells that are usual at rest, gain from each further one that has not served for so long,
-and what is forgotten with time: now and then others serve, also at rest."""
-_CARRIED_NATS = 6.0
-
 _NATS_PER_M, _NATS_PER_REPEAT, _MOST_ROWS = 0.12, 0.9, 3
 """Gain, for each level of at most three, from a report that repeats the last one: by the metres
 between them, and at most."""
 _STALE_NATS = 8.0
-
-
-@dataclass(frozen=True, slots=True)
-class Rest:
-    """Reports since motion stands still.
-
-    Parameters
-    ----------
-    since_s : float
-        Time of the last step.
-    block_s : float
-        When the present block began.
-    first, present : mapping of str to tuple of float
-        Sum and number of each cell's levels, in the first and the present block.
-    served : mapping of str to float
-        When each cell has served last.
-    heard_s : float
-        Time of the last report.
-    carried_nats : float
-        How much the levels speak for being carried on.
-    """
-
-    since_s: float
-    block_s: float = nan
-    first: Mapping[str, tuple[float, int]] = field(default_factory=dict)
-    present: Mapping[str, tuple[float, int]] = field(default_factory=dict)
-    served: Mapping[str, float] = field(default_factory=dict)
-    heard_s: float = nan
-    carried_nats: float = 0.0
-
-    def heard(self, time_s: float, rows: tuple[ReportRow, ...]) -> Rest:
-        """Add a report; a phone that was carried on stays so until a step is measured."""
-        if self.is_carried:
-            return self
-        cells = {row.cell for row in rows if row.role == SERVING and row.cell is not None}
-        recent = {cell: at_s for cell, at_s in self.served.items() if time_s - at_s <= _CELLS_S}
-        known, all_cells = max(len(recent), _CELLS_AT_REST), len(cells | recent.keys())
-        gone_s = time_s - self.heard_s if isfinite(self.heard_s) else 0.0
-        kept = max(self.carried_nats - _NATS_PER_S * gone_s, 0.0)
-        nats = min(kept + _NATS_PER_CELL * max(all_cells - known, 0), _CARRIED_NATS)
-        served = recent | dict.fromkeys(cells, time_s)
-        rest = replace(self, served=served, heard_s=time_s, carried_nats=nats)
-        if not isfinite(rest.block_s):
-            rest = replace(rest, block_s=time_s)
-        elif time_s - rest.block_s >= _BLOCK_S:
-            nats = rest.carried_nats + _BLOCK_SHARE * _carried(rest.first, rest.present)
-            rest = replace(
-                rest,
-                block_s=time_s,
-                first={**rest.present, **rest.first},
-                present={},
-                carried_nats=min(max(nats, 0.0), _CARRIED_NATS),
-            )
-        present = dict(rest.present)
-        for name, level_dbm in _levels(rows):
-            total, count = present.get(name, (0.0, 0))
-            present[name] = (total + level_dbm, count + 1)
-        return replace(rest, present=present)
-
-    @property
-    def is_carried(self) -> bool:
-        """Whether the phone is carried on though no motion is reported."""
-        return self.carried_nats >= _CARRIED_NATS
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,64 +113,71 @@ def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple
         ``MOTION_STUCK``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``, and ``STALE_RADIO``.
     """
     repeats, motion, repeated = without_repeats(watch.repeats, epoch.time_s, epoch.motion)
-    watch = replace(watch, repeats=repeats)
     if motion is not epoch.motion:
         epoch = replace(epoch, motion=motion)
-    watch, epoch, why = _moved(watch, epoch)
+    way, epoch, why = _followed(watch, epoch)
     why = repeated if why is Reason.USED else why
-    watch, is_stale = _repeated(watch, epoch)
-    if is_stale:
-        epoch = replace(epoch, radio=())
-    return watch, epoch, (why, Reason.STALE_RADIO if is_stale else Reason.USED)
+    report, moved_m, nats = watch.report, way.moved_m, watch.repeated_nats
+    if epoch.radio:
+        nats = _repeated(watch, moved_m, epoch.radio)
+        report, moved_m = epoch.radio, 0.0
+    watch = SensorWatch(*way[:-1], report, moved_m, nats, repeats)
+    if epoch.radio and nats >= _STALE_NATS:
+        return watch, replace(epoch, radio=()), (why, Reason.STALE_RADIO)
+    return watch, epoch, (why, Reason.USED)
 
 
-def _moved(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, Reason]:
+class _Way(NamedTuple):
+    """What a watch holds of motion, in the order of its fields."""
+
+    motion_s: float
+    rows: int
+    interval_s: float
+    irregular_s: float
+    rests: bool
+    speed_mps: float
+    moving_s: float
+    known_s: float
+    rest: Rest | None
+    unmeasured_s: float
+    moved_m: float
+
+
+def _followed(watch: SensorWatch, epoch: Epoch) -> tuple[_Way, Epoch, Reason]:
     """Follow the motion rows; add the way that they lack."""
     time_s, why = epoch.time_s, Reason.USED
     steps = [abs(step.step_m) for step in epoch.motion]
     measured = [step_m for step_m in steps if isfinite(step_m)]
-    dt_s = time_s - watch.motion_s
-    moves = sum(measured) > _REST_MPS * (_usual_s(watch, dt_s) if isfinite(dt_s) else 0.0)
-    if steps:
-        watch = _timed(watch, time_s, dt_s, sum(measured), moves=moves, rests=bool(measured))
-    if not isfinite(watch.moving_s):
-        return watch, epoch, why
+    gone_m, dt_s = sum(measured), time_s - watch.motion_s
+    moves = gone_m > _REST_MPS * (_usual_s(watch, dt_s) if isfinite(dt_s) else 0.0)
+    way = _timed(
+        watch, time_s, dt_s, gone_m, moves=moves, rests=bool(measured), any_rows=bool(steps)
+    )
     if moves:
-        moved_m = watch.moved_m + sum(measured)
-        return (
-            replace(
-                watch,
-                moving_s=time_s,
-                known_s=time_s,
-                rest=None,
-                unmeasured_s=0.0,
-                moved_m=moved_m,
-            ),
-            epoch,
-            why,
-        )
-    rest = (watch.rest or Rest(watch.moving_s)).heard(time_s, epoch.radio)
+        moved_m = way.moved_m + gone_m
+        return _Way(*way[:6], time_s, time_s, None, 0.0, moved_m), epoch, why
+    if not isfinite(way.moving_s):
+        return way, epoch, why
+    rest = (way.rest or Rest(way.moving_s)).heard(time_s, epoch.radio)
     # A measured rest is none of the way, unless it was a counter that stood still.
-    unmeasured_s = watch.unmeasured_s + time_s - watch.known_s
+    unmeasured_s = way.unmeasured_s + time_s - way.known_s
     if rest.is_carried:
-        unmeasured_s = time_s - watch.moving_s
+        unmeasured_s = time_s - way.moving_s
     if steps and not measured:
         why = Reason.NO_STEP
     elif not steps and watch.reports_always:
-        longest_s = max(_GAP_S, _GAP_INTERVALS * watch.interval_s)
-        why = Reason.MOTION_MISSING if time_s - watch.motion_s > longest_s else Reason.USED
+        longest_s = max(_GAP_S, _GAP_INTERVALS * way.interval_s)
+        why = Reason.MOTION_MISSING if time_s - way.motion_s > longest_s else Reason.USED
     if why is Reason.USED and rest.is_carried:
         why = Reason.MOTION_STUCK if steps else Reason.MOTION_MISSING
-    watch = replace(watch, rest=rest)
     if why is Reason.USED:
-        return replace(watch, known_s=time_s) if measured else watch, epoch, why
-    way = _unmeasured(watch.speed_mps, watch.unmeasured_s, unmeasured_s)
+        return way._replace(rest=rest, known_s=time_s if measured else way.known_s), epoch, why
+    step = _unmeasured(way.speed_mps, way.unmeasured_s, unmeasured_s)
     # Turns count though the length of their step is unknown.
     turned = (step for step in epoch.motion if isfinite(step.step_m) or isfinite(step.turn_rad))
-    motion = (*turned, way)
-    moved_m = watch.moved_m + way.step_m
-    watch = replace(watch, known_s=time_s, unmeasured_s=unmeasured_s, moved_m=moved_m)
-    return watch, replace(epoch, motion=motion), why
+    moved_m = way.moved_m + step.step_m
+    way = _Way(*way[:7], time_s, rest, unmeasured_s, moved_m)
+    return way, replace(epoch, motion=(*turned, step)), why
 
 
 def _usual_s(watch: SensorWatch, dt_s: float) -> float:
@@ -256,29 +186,43 @@ def _usual_s(watch: SensorWatch, dt_s: float) -> float:
 
 
 def _timed(
-    watch: SensorWatch, time_s: float, dt_s: float, moved_m: float, *, moves: bool, rests: bool
-) -> SensorWatch:
+    watch: SensorWatch,
+    time_s: float,
+    dt_s: float,
+    moved_m: float,
+    *,
+    moves: bool,
+    rests: bool,
+    any_rows: bool,
+) -> _Way:
     """Learn from an epoch's motion rows how often they come, and how fast one moves."""
+    motion_s, rows, moving_s, known_s = watch.motion_s, watch.rows, watch.moving_s, watch.known_s
     interval_s, irregular_s, speed_mps = watch.interval_s, watch.irregular_s, watch.speed_mps
-    if isfinite(dt_s) and dt_s > 0:
-        new = 1 / min(watch.rows, 20)
-        # What a gap says of the usual interval is bounded.
-        dt_s = min(dt_s, 5 * interval_s) if watch.rows > _KNOWN_ROWS else dt_s
-        interval_s += new * (dt_s - interval_s)
-        irregular_s += new * (abs(dt_s - interval_s) - irregular_s)
-        if moves:
-            # By time: of two rows at almost the same one, the speed would be any.
-            speed_mps += 0.05 * (moved_m - speed_mps * dt_s) / interval_s
-    return replace(
-        watch,
-        motion_s=time_s,
-        rows=watch.rows + 1,
-        interval_s=interval_s,
-        irregular_s=irregular_s,
-        rests=watch.rests or (rests and not moves),
-        speed_mps=speed_mps,
-        moving_s=time_s if not isfinite(watch.moving_s) else watch.moving_s,
-        known_s=time_s if not isfinite(watch.known_s) else watch.known_s,
+    if any_rows:
+        if isfinite(dt_s) and dt_s > 0:
+            new = 1 / min(rows, 20)
+            # What a gap says of the usual interval is bounded.
+            dt_s = min(dt_s, 5 * interval_s) if rows > _KNOWN_ROWS else dt_s
+            interval_s += new * (dt_s - interval_s)
+            irregular_s += new * (abs(dt_s - interval_s) - irregular_s)
+            if moves:
+                # By time: of two rows at almost the same one, the speed would be any.
+                speed_mps += 0.05 * (moved_m - speed_mps * dt_s) / interval_s
+        motion_s, rows = time_s, rows + 1
+        moving_s = moving_s if isfinite(moving_s) else time_s
+        known_s = known_s if isfinite(known_s) else time_s
+    return _Way(
+        motion_s,
+        rows,
+        interval_s,
+        irregular_s,
+        watch.rests or (rests and not moves),
+        speed_mps,
+        moving_s,
+        known_s,
+        watch.rest,
+        watch.unmeasured_s,
+        watch.moved_m,
     )
 
 
@@ -294,58 +238,29 @@ def _spread_m2(speed_mps: float, time_s: float) -> float:
     return 2 * speed_mps**2 * lasts_s * (time_s - lasts_s * (1 - exp(-time_s / lasts_s)))
 
 
-def _repeated(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, bool]:
-    """Return whether the report repeats what was heard elsewhere."""
-    if not epoch.radio:
-        return watch, False
+def _repeated(watch: SensorWatch, moved_m: float, radio: tuple[ReportRow, ...]) -> float:
+    """Return how much reports speak for a radio that stands still, some way after the last one."""
+    if not _equal(radio, watch.report):
+        return 0.0
     # Beyond the end of its scale a level stays the same anywhere.
-    levels = min(len(_levels(epoch.radio)), _MOST_ROWS)
-    nats = 0.0
-    # Rows without a level compare as NaN, which equals nothing: their cells are compared.
-    if levels and _equal(epoch.radio, watch.report):
-        each = min(_NATS_PER_M * watch.moved_m, _NATS_PER_REPEAT)
-        nats = watch.repeated_nats + levels * each
-    watch = replace(watch, report=epoch.radio, moved_m=0.0, repeated_nats=nats)
-    return watch, nats >= _STALE_NATS
+    levels = min(len(levels_of(radio)), _MOST_ROWS)
+    each = min(_NATS_PER_M * moved_m, _NATS_PER_REPEAT)
+    return watch.repeated_nats + levels * each if levels else 0.0
 
 
 def _equal(report: tuple[ReportRow, ...], before: tuple[ReportRow, ...]) -> bool:
-    # Nearly all pairs differ in their first rows.
-    return len(report) == len(before) and all(
-        _key(row) == _key(other) for row, other in zip(report, before, strict=True)
-    )
+    if len(report) != len(before):
+        return False
+    for row, other in zip(report, before, strict=True):
+        level_dbm, other_dbm = row.level_dbm, other.level_dbm
+        # Nearly all pairs differ in the level of their first rows.
+        if level_dbm != other_dbm and (isfinite(level_dbm) or isfinite(other_dbm)):
+            return False
+        if row is not other and _key(row) != _key(other):
+            return False
+    return True
 
 
 def _key(row: ReportRow) -> tuple[object, ...]:
     measured = [x if isfinite(x) else None for x in (row.level_dbm, row.timing_advance)]
     return row.role, row.cell, row.arfcn, row.bsic, row.censored, *measured
-
-
-def _levels(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:
-    """Return the levels of a report by their cells."""
-    return [
-        (row.cell if row.cell is not None else f"{row.arfcn}/{row.bsic}", row.level_dbm)
-        for row in rows
-        if isfinite(row.level_dbm) and row.censored == 0
-    ]
-
-
-def _carried(first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[float, int]]) -> float:
-    """Return the log-likelihood ratio of "elsewhere" to "still there", by the levels of both."""
-    changes = [
-        now[name][0] / now[name][1] - first[name][0] / first[name][1]
-        for name in now
-        if name in first
-    ]
-    if not changes:
-        return 0.0
-    return _log_density(changes, _ELSEWHERE_DB) - _log_density(changes, _AT_REST_DB)
-
-
-def _log_density(changes_db: list[float], sd_db: float) -> float:
-    """Return the log density of changes that share an error, up to a constant."""
-    count, mean = len(changes_db), sum(changes_db) / len(changes_db)
-    apart = sum((change - mean) ** 2 for change in changes_db)
-    shared_db2 = sd_db**2 + count * _ALL_DB**2
-    exponent = apart / sd_db**2 + count * mean**2 / shared_db2
-    return -0.5 * exponent - (count - 1) * log(sd_db) - 0.5 * log(shared_db2)

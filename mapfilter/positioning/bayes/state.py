@@ -16,7 +16,7 @@ from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.epochs import GnssFix
-from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
+from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading, protected_m
 from mapfilter.positioning.integrity import sample_tail
 
 FIRST_SPACING_M = 5.0
@@ -77,6 +77,25 @@ class BayesState:
     watch: SensorWatch = field(default_factory=SensorWatch)
     last_fix: GnssFix | None = None
 
+    def with_output(self, reported: Reported) -> BayesState:
+        """Return the state with its output."""
+        return BayesState(
+            self.belief,
+            self.status,
+            self.unclear,
+            self.sources,
+            self.reckoning,
+            self.heading_rad,
+            self.compass,
+            self.null,
+            self.alternative,
+            self.takeovers,
+            self.path,
+            reported,
+            self.watch,
+            self.last_fix,
+        )
+
     @property
     def particle_spacing_m(self) -> float:
         """Distance between hypotheses along the streets that the belief covers."""
@@ -113,7 +132,7 @@ def step_output(
         fix = replace(known.output.fix, time_s=time_s, reason=reason)
         return state, StepOutput(fix, known.output.evidence, unused, known.output.tail)
     output = _output(area, state, time_s, reason, unused)
-    return replace(state, reported=Reported(*made_of, output)), output
+    return state.with_output(Reported(*made_of, output)), output
 
 
 def _output(
@@ -124,11 +143,17 @@ def _output(
     unused: tuple[UnusedReading, ...],
 ) -> StepOutput:
     belief, (west, south) = state.belief, area.origin_m
+    count, way, tail = 0, (0, nan), None
+    wide_m = protection_m = nan
     if belief is None or state.status is Status.OUTSIDE:
-        summary, count, way = empty_summary(STATES), 0, (0, nan)
+        summary = empty_summary(STATES)
     else:
         summary, count = belief.summary, belief.log_weight.size
-        way = area.matched_way(belief.state[0], belief.state[1], belief.weight)
+        places = belief.state[0], belief.state[1], belief.weight
+        way = area.matched_way(*places)
+        if count:
+            tail = sample_tail(*places, summary.mean, p_none=state.null.probability)
+            wide_m, protection_m = protected_m(tail, summary.radii_m)
     fix = Fix(
         time_s,
         float(summary.mean[0]) + west,
@@ -140,6 +165,8 @@ def _output(
         summary.mass_50m if count else nan,
         *way,
         reason,
+        wide_m,
+        protection_m,
     )
     east_m = north_m = nan
     mass = 0.0 if isfinite(summary.entropy_bits) else nan
@@ -147,8 +174,4 @@ def _output(
         east_m, north_m, mass = summary.runners_up[0].tolist()
     log_evidence = belief.log_evidence if belief else nan
     evidence = (east_m + west, north_m + south, mass, summary.entropy_bits, log_evidence)
-    output = StepOutput(fix, evidence, unused)
-    if belief is None or not count:
-        return output
-    places = belief.state[0], belief.state[1], belief.weight
-    return output.protected(sample_tail(*places, summary.mean, p_none=state.null.probability))
+    return StepOutput(fix, evidence, unused, tail)

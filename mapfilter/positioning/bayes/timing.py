@@ -99,6 +99,8 @@ class TimingSource(EvidenceSource):
         """Return the terms of an epoch, each weighted by the share of its error that is new."""
         unused: list[UnusedReading] = []
         terms: list[TimingTerm] = []
+        if not epoch.differences and not any(isfinite(row.timing_advance) for row in epoch.radio):
+            return EvidenceUpdate(state, unused=unused)
         share = _new_share(travelled_m - state.advance_m, self.options.advance_memory_m)
         if self.advances and share > 0 and self._add_advances(epoch, share, terms, unused):
             state = state._replace(advance_m=travelled_m)

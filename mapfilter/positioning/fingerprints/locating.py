@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import same_crs, unproject
 from mapfilter.positioning.fingerprints.censoring import OPEN, Bounds, bounded
-from mapfilter.positioning.fingerprints.matches import Locator, Position, Received, locator
+from mapfilter.positioning.fingerprints.matches import Position, Received, locator
 from mapfilter.positioning.fingerprints.options import (
     AUTO,
     CANDIDATES,
@@ -85,7 +85,7 @@ class ReportLocator:
 
     method: Method
     database: Reports
-    locator: Locator
+    locator: Callable[[Received], Position]
     regions: Regions | None
     validations: tuple[Validation, ...]
 
@@ -397,7 +397,9 @@ def folds_of(database: Reports) -> tuple[Ints, str]:
     return scattered, f"squares of {side_m:.3g} m"
 
 
-def _positions(by: Locator, reports: Reports, index: Sequence[int] | Ints) -> tuple[Floats, Bools]:
+def _positions(
+    by: Callable[[Received], Position], reports: Reports, index: Sequence[int] | Ints
+) -> tuple[Floats, Bools]:
     """Return the positions of reports, shape (L, 4), and which of the reports have one."""
     found: list[Position] = []
     located = np.zeros(len(index), dtype=np.bool_)

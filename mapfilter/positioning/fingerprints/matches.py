@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -126,6 +127,39 @@ def locator(method: Method, database: Reports) -> Locator:
     return Locator(places, _posterior(database, method, floor_dbm), median=True)
 
 
+def located_once(
+    locate: Callable[[Received], Position], most: int = 1 << 14
+) -> Callable[[Received], Position]:
+    """Return a function that locates equal reports once; the latest ``most`` are kept.
+
+    Journeys that differ in their dead reckoning alone have the same reports.
+    """
+
+    # Arrays are no keys; as bytes missing levels are equal, too.
+    @lru_cache(most)
+    def position(
+        cell: bytes, level_dbm: bytes, serving: int, advance: bytes, censored: bytes
+    ) -> Position:
+        received = Received(
+            np.frombuffer(cell, np.int32),
+            np.frombuffer(level_dbm, np.float64),
+            serving,
+            float(np.frombuffer(advance, np.float64)[0]),
+            np.frombuffer(censored, np.int8) if censored else None,
+        )
+        return locate(received)
+
+    def once(received: Received) -> Position:
+        cell = received.cell.astype(np.int32, copy=False).tobytes()
+        level_dbm = received.level_dbm.astype(np.float64, copy=False).tobytes()
+        advance = np.float64(received.timing_advance).tobytes()
+        ends = received.censored
+        censored = b"" if ends is None else ends.astype(np.int8, copy=False).tobytes()
+        return position(cell, level_dbm, received.serving, advance, censored)
+
+    return once
+
+
 def _centroid(database: Reports) -> Matcher:
     by_cell, usual_dbm = ByCell.of(database), usual_levels(database)
 
@@ -203,8 +237,10 @@ def _timing(database: Reports, received: Received, sd_steps: float) -> Floats:
 def _geometric_median(places: Floats, weight: Floats, start: Floats) -> Floats:
     """Return the place with the least mean distance to weighted places (Weiszfeld 1937)."""
     at = start
+    # Sums over an axis of two are slow.
+    east_m, north_m = np.ascontiguousarray(places.T)
     for _ in range(_ROUNDS):
-        distance_m = np.sqrt(np.sum((places - at) ** 2, axis=1) + _SOFT_M**2)
+        distance_m = np.sqrt((east_m - at[0]) ** 2 + (north_m - at[1]) ** 2 + _SOFT_M**2)
         pull = weight / distance_m
         new = pull @ places / pull.sum()
         if np.abs(new - at).max() < _SOFT_M / 100:

@@ -8,6 +8,7 @@ Torres-Sospedra et al., Expert Systems with Applications 42 (2015), 9263-9278.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -303,6 +304,14 @@ class Likelihoods:
             self._prepared[key] = _Excess.of(self.by_cell.count, report, level_dbm)
         return self._prepared[key]
 
+    @cached_property
+    def _log_variance(self) -> Floats:
+        return np.asarray(np.log(self.variance_db2 / self.least_db2))
+
+    @cached_property
+    def _is_whole(self) -> bool:
+        return bool(np.isfinite(self.level_dbm).all())
+
     def of(
         self, cell: Ints32, level_dbm: Floats, censored: Ints8 | None = None
     ) -> tuple[Floats, Floats]:
@@ -325,7 +334,6 @@ class Likelihoods:
             absence = self.errors.absence_per_db * self._excess(cell).above(least_dbm)
         received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
-        least_db2 = self.least_db2
         readings = zip(cell.tolist(), level_dbm.tolist(), ends, own.tolist(), strict=True)
         for one, dbm, end, own_loss in readings:
             where = self.by_cell.of_cell(one)
@@ -335,14 +343,17 @@ class Likelihoods:
             if np.isnan(dbm):
                 continue
             apart_db, variance_db2 = dbm - self.level_dbm[where], self.variance_db2[where]
-            known = np.isfinite(apart_db)
-            if end:
-                known &= apart_db * end > 0
-            report, apart_db, variance_db2 = report[known], apart_db[known], variance_db2[known]
+            log_variance = self._log_variance[where]
+            if end or not self._is_whole:
+                known = np.isfinite(apart_db)
+                if end:
+                    known &= apart_db * end > 0
+                report, apart_db, log_variance = report[known], apart_db[known], log_variance[known]
+                variance_db2 = variance_db2[known]
             s0[report] += 1 / variance_db2
             s1[report] += apart_db / variance_db2
             s2[report] += apart_db**2 / variance_db2
-            logs[report] += np.log(variance_db2 / least_db2)
+            logs[report] += log_variance
         shared_db2 = self.errors.shared_db**2
         explained = s1**2 * shared_db2 / (1 + shared_db2 * s0)
         return received, -0.5 * (s2 - explained + np.log1p(shared_db2 * s0) + logs)

@@ -126,9 +126,11 @@ class GnssSource(EvidenceSource):
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:
         """Compare the epoch's fix and pseudoranges with the belief and the alternative."""
         own: GnssState = state.sources[self.name]
+        if epoch.fix is None and not epoch.ranges:
+            return EvidenceUpdate(own)
         travelled_m, belief = state.reckoning.travelled_m, state.belief
         due = context.report_due or own.due(self.options, epoch.time_s, travelled_m)
-        if belief is None or not due or (epoch.fix is None and not epoch.ranges):
+        if belief is None or not due:
             return EvidenceUpdate(own)
         spacing_m = context.particle_spacing_m
         main = self.gate.compare(belief, own, epoch, travelled_m, spacing_m)

@@ -8,6 +8,7 @@ import numpy as np
 from pyproj import Transformer
 
 from mapfilter._types import Floats
+from mapfilter.gnss.earth_rotation import in_frame_of_reception
 from mapfilter.tracks.readers.columns import header_columns, split_blanks
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.grouped import columns_of, group_lines
@@ -38,6 +39,9 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
         rows = columns_of(groups, kind, names, " ", reading)
         if rows is not None:
             variance = rows.number("variance")
+            sent_m = np.stack([rows.number(axis) for axis in "xyz"], axis=1)
+            # The files give places in the frame of the moment of sending (as libRSF takes them).
+            place_m = in_frame_of_reception(sent_m, rows.number("range"))
             columns = {
                 "time_s": rows.number("time"),
                 "satellite": _satellites(rows.number("system"), rows.number("id")),
@@ -45,7 +49,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
                 "pseudorange_m": rows.number("range"),
                 "sigma_m": np.sqrt(np.where(variance > 0, variance, np.nan)),
                 "cn0_dbhz": rows.number("cn0"),
-                **{f"{axis}_m": rows.number(axis) for axis in ("x", "y", "z")},
+                **{f"{axis}_m": place_m[:, i] for i, axis in enumerate("xyz")},
             }
             reading.add("satellites", columns, rows.line)
     names = "kind time vx vy vz wx wy wz vvx vvy vvz vwx vwy vwz"

@@ -1,0 +1,74 @@
+"""The map of ways as hypotheses are weighed by it after a step, in one compiled call."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mapfilter._types import Bools, Floats, Floats32
+from mapfilter.models.street_motion import OFF, MapFactors, interpolate, weigh_by_map
+
+_F = np.float32
+
+
+class WayMap(NamedTuple):
+    """The map's log-likelihood over an area, in a frame with its south-western corner at 0.
+
+    Parameters
+    ----------
+    log_likelihood : ndarray of float32, shape (rows, cols)
+        Of each pixel.
+    pixel_m : float
+        Side of a pixel.
+    width_m, height_m : float
+        Extent of the area.
+    """
+
+    log_likelihood: Floats32
+    pixel_m: float
+    width_m: float
+    height_m: float
+
+
+@njit(error_model="numpy", cache=True)
+def places_beyond(state: Floats32, width_m: float, height_m: float) -> Bools:
+    """Return whether each hypothesis, by its first two rows, lies beyond an area, (N,)."""
+    east, north, zero = state[0], state[1], _F(0.0)
+    wide, high = _F(width_m), _F(height_m)
+    found = np.empty(state.shape[1], dtype=np.bool_)
+    for i in range(found.size):
+        aside = (east[i] < zero) | (east[i] > wide)
+        found[i] = aside | (north[i] < zero) | (north[i] > high)
+    return found
+
+
+@njit(error_model="numpy", cache=True)
+def all_inside(east_m: Floats32, north_m: Floats32, width_m: float, height_m: float) -> bool:
+    """Return whether all places (N,) lie in an area; those without a position do not."""
+    wide, high, zero, inside = _F(width_m), _F(height_m), _F(0.0), True
+    for i in range(east_m.size):
+        along = (east_m[i] >= zero) & (east_m[i] <= wide)
+        inside &= along & (north_m[i] >= zero) & (north_m[i] <= high)
+    return inside
+
+
+@njit(error_model="numpy", cache=True)
+def weighed_by_ways(
+    moved: Floats32, ways: WayMap, factors: MapFactors, beyond: float, log_weight: Floats
+) -> Floats:
+    """Return log weights (N,) after a step, and update the probability of being off in ``moved``.
+
+    ``beyond`` is the map's log-likelihood beyond the area; NaN for that of the area's edge.
+    """
+    rows, pixel_m = ways.log_likelihood.shape[0], ways.pixel_m
+    first_m, north_m = pixel_m / 2, (rows - 0.5) * pixel_m
+    found = interpolate(moved, ways.log_likelihood, first_m, north_m, 1 / pixel_m)
+    if not np.isnan(beyond):
+        outside, instead = places_beyond(moved, ways.width_m, ways.height_m), _F(beyond)
+        for i in range(found.size):
+            found[i] = instead if outside[i] else found[i]
+    weighed = log_weight.copy()
+    weigh_by_map(found, moved[OFF], factors, weighed)
+    return weighed

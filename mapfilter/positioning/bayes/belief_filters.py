@@ -1,0 +1,125 @@
+"""The filters and rules of single beliefs, by the evidence that there is at an epoch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mapfilter.filters.contract import BeliefFilter, Status
+from mapfilter.filters.grid import GridBelief, GridFilter
+from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.models.street_motion import remounted
+from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
+from mapfilter.positioning.bayes.grid import StreetGrid
+from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.gnss.gate import GnssState
+from mapfilter.positioning.gnss.source import GnssSource
+
+MapFilter = BeliefFilter[Start, Any, RadioReading]
+
+_MORE_PARTICLES, _MORE_SEARCHING = 6, 3
+"""Factors of the numbers of particles where headings are unknown."""
+_POSITIONED_M = 200.0
+"""Distance from the last position that was measured after which the map is the evidence again."""
+
+
+@dataclass(frozen=True)
+class BeliefFilters:
+    """Filters of a single belief over an area.
+
+    Parameters
+    ----------
+    model : BayesModel
+    options, rules : ParticleOptions and AlternativeRules
+        Where the map is the evidence, or there are cells.
+    grid : bool
+        Whether beliefs are masses on a grid in place of particles.
+    positioned : tuple or None
+        Options and rules that take the place of the others as long as positions are measured.
+    """
+
+    model: BayesModel
+    options: ParticleOptions = field(default_factory=ParticleOptions)
+    rules: AlternativeRules = field(default_factory=AlternativeRules)
+    grid: bool = False
+    positioned: tuple[ParticleOptions, AlternativeRules] | None = None
+
+    @cached_property
+    def map_may_start(self) -> bool:
+        """Whether the map alone may start a belief: there are no cells; a grid needs a start."""
+        return not self.model.area.cell_ids and not self.grid
+
+    def by_map_alone(self, state: BayesState) -> bool:
+        """Return whether the map alone is the evidence: no position was measured for some way."""
+        if not self.map_may_start:
+            return False
+        gnss: GnssState = state.sources[GnssSource.name]
+        return state.reckoning.travelled_m - gnss.used_at_m > _POSITIONED_M
+
+    def rules_of(self, state: BayesState) -> AlternativeRules:
+        """Return the rules for the evidence that there is."""
+        if self.positioned is None or self.by_map_alone(state):
+            return self.rules
+        return self.positioned[1]
+
+    def filter_of(self, state: BayesState) -> MapFilter:
+        """Return the filter of a single belief for the evidence that there is."""
+        if self.positioned is None or self.by_map_alone(state):
+            return self.by_compass[state.compass]
+        return self._positioned_by_compass[state.compass]
+
+    @cached_property
+    def by_compass(self) -> dict[bool, MapFilter]:
+        """The filters of a single belief, for headings with and without a compass."""
+        if self.grid:
+            model = replace(self.model, remember=False)
+            grids = {compass: StreetGrid(model, compass) for compass in (True, False)}
+            return {compass: GridFilter(grid, self.options) for compass, grid in grids.items()}
+        return self._particle_filters(self.options)
+
+    @cached_property
+    def _positioned_by_compass(self) -> dict[bool, MapFilter]:
+        return self._particle_filters(self.positioned[0] if self.positioned else self.options)
+
+    def _particle_filters(self, known: ParticleOptions) -> dict[bool, MapFilter]:
+        # Every place times every heading: most of them die out after a few steps.
+        most = _MORE_PARTICLES * known.max_particles
+        searching = _MORE_SEARCHING * known.min_search_particles
+        unknown = replace(known, max_particles=most, min_search_particles=searching)
+        return {
+            True: ParticleFilter(self.model, known),
+            False: ParticleFilter(self.model, unknown),
+        }
+
+    def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
+        """Spread a belief over all headings."""
+        if isinstance(belief, GridBelief):
+            grid = StreetGrid(replace(self.model, remember=False), compass=False)
+            count = grid.bias_rad.size
+            on, off = (
+                np.repeat(mass.sum(axis=0, keepdims=True) / count, count, axis=0)
+                for mass in (belief.on, belief.off)
+            )
+            return replace(belief, on=on, off=off, model=grid)
+        state = any_heading(self.model, belief.state, _MORE_PARTICLES, rng)
+        log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
+        kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
+        return replace(belief, state=state, log_weight=log_weight, kept=kept)
+
+    def remounted(self, belief: MapBelief, length_m: float, rng: np.random.Generator) -> MapBelief:
+        """Turn the phone of some hypotheses, once a position is tracked.
+
+        A search would find more places that fit.
+        """
+        if isinstance(belief, GridBelief) or belief.status is not Status.TRACKING:
+            return belief
+        if not (length_m > 0 and self.model.motion.remounts_per_m > 0):
+            return belief
+        state = remounted(belief.state, length_m, self.model.motion, rng)
+        return belief if state is belief.state else replace(belief, state=state)

@@ -1,0 +1,88 @@
+"""The motion of an epoch: beliefs, dead reckoning and the recent path moved by its steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.sensors import SensorWatch
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.epochs import Epoch, headed
+from mapfilter.positioning.estimate import UnusedReading
+
+
+def moved(
+    beliefs: BeliefFilters,
+    state: BayesState,
+    watch: SensorWatch,
+    epoch: Epoch,
+    rng: np.random.Generator,
+) -> tuple[BayesState, list[UnusedReading]]:
+    """Move the beliefs by an epoch's dead reckoning.
+
+    Parameters
+    ----------
+    beliefs : BeliefFilters
+        Filters of single beliefs.
+    state : BayesState
+        After the epoch before.
+    watch : SensorWatch
+        After this epoch's readings.
+    epoch : Epoch
+        With a step to all sides for motion that was not measured.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    state : BayesState
+    unused : list of UnusedReading
+        Motion that was not used.
+    """
+    unused: list[UnusedReading] = []
+    belief, compass, alternative = state.belief, state.compass, state.alternative
+    reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
+    for raw in epoch.motion:
+        step, heading_rad = headed(raw, heading_rad)
+        why = Reason.NOT_STARTED
+        if beliefs.map_may_start:
+            known = isfinite(raw.heading_rad) == compass or not path.here.travelled_m
+            path = (path if known else RecentPath()).moved(step)
+            why = Reason.USED if isfinite(step.step_m) else Reason.NO_STEP
+        if belief is None:
+            # An unmeasured way says nothing of the compass.
+            compass = compass if isfinite(raw.spread_m) else isfinite(raw.heading_rad)
+        else:
+            turned = isfinite(raw.heading_rad) or isfinite(raw.spread_m)
+            if compass and not turned and reckoning.travelled_m == 0:
+                # Nothing has moved yet, so headings can still be relative to the first one.
+                compass, belief = False, beliefs.without_compass(belief, rng)
+            predict = beliefs.by_compass[compass].predict
+            belief, why = predict(belief, step, rng)
+            belief = beliefs.remounted(belief, abs(step.step_m), rng)
+            reckoning = reckoning.moved(step)
+            if alternative is not None:
+                other, _ = predict(alternative.belief, step, rng)
+                alternative = replace(alternative, belief=other)
+        if why is not Reason.USED:
+            unused.append(UnusedReading(epoch.time_s, "motion", "", why))
+    return BayesState(
+        belief,
+        state.status,
+        state.unclear,
+        state.sources,
+        reckoning,
+        heading_rad,
+        compass,
+        state.null,
+        alternative,
+        state.takeovers,
+        path,
+        state.reported,
+        watch,
+        state.last_fix,
+    ), unused

@@ -1,0 +1,251 @@
+"""The evidence of an epoch: collected from its sources, then beliefs started or weighed by it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.positioning.bayes.alternative import (
+    AlternativeHypothesis,
+    AlternativeRules,
+    MapBelief,
+    NullHypothesis,
+    doubted,
+    resolve_alternative,
+)
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.evidence import (
+    Context,
+    EvidenceSource,
+    EvidenceUpdate,
+    RadioReading,
+    joined,
+)
+from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.epochs import Epoch
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """Sources of evidence, and the beliefs that are weighed by them.
+
+    Parameters
+    ----------
+    beliefs : BeliefFilters
+    radio : RadioSource
+        One of the sources: it decides when a report is due.
+    sources : tuple of EvidenceSource
+        In the order in which their unused readings are reported.
+    """
+
+    beliefs: BeliefFilters
+    radio: RadioSource
+    sources: tuple[EvidenceSource, ...]
+
+    def collected(
+        self, state: BayesState, epoch: Epoch, particle_spacing_m: float
+    ) -> tuple[BayesState, list[EvidenceUpdate]]:
+        """Ask all sources for their evidence; return the state with theirs, and the evidence."""
+        history = state.sources[self.radio.name]
+        due = bool(epoch.radio) and self.radio.due(history, state.reckoning.travelled_m)
+        context, updates, states = Context(particle_spacing_m, due), [], {}
+        for source in self.sources:
+            if state.belief is None:
+                update = source.first_after(state, epoch)
+            else:
+                update = source.update(state, epoch, context)
+            updates.append(update)
+            if update.state is not state.sources[source.name]:
+                states[source.name] = update.state
+            if update.belief or update.alternative:
+                state = replace(
+                    state,
+                    belief=update.belief or state.belief,
+                    alternative=update.alternative or state.alternative,
+                )
+        if states:
+            state = replace(state, sources={**state.sources, **states})
+        return state, updates
+
+    def started(
+        self,
+        updates: list[EvidenceUpdate],
+        state: BayesState,
+        epoch: Epoch,
+        rng: np.random.Generator,
+    ) -> tuple[MapBelief, dict[str, Any]] | None:
+        """Start a belief from evidence; also return the states of sources that depend on it."""
+        reading = joined(updates)
+        if reading is None:
+            return None
+        path = next((one.path for one in updates if one.path is not None), None)
+        prior = Start(reading, state.compass, path=path)
+        belief = self.beliefs.by_compass[state.compass].init(prior, rng)
+        states = {}
+        for source in self.sources:
+            belief, own = source.start(belief, epoch, state.reckoning.travelled_m)
+            if own is not None:
+                states[source.name] = own
+        return belief, states
+
+    def weighed(
+        self,
+        state: BayesState,
+        before: MapBelief,
+        updates: list[EvidenceUpdate],
+        epoch: Epoch,
+        rng: np.random.Generator,
+        *,
+        measured: bool,
+    ) -> tuple[BayesState, Reason]:
+        """Weigh the belief and its alternative; start, prefer or drop the alternative.
+
+        ``measured`` is whether motion was.
+        """
+        reading = joined(updates)
+        if reading is None:
+            return state, Reason.USED
+        beliefs, area = self.beliefs, self.beliefs.model.area
+        update, rules = beliefs.filter_of(state).update, beliefs.rules_of(state)
+        by_map_alone = beliefs.by_map_alone(state)
+        plain = by_map_alone and not state.path.is_distinctive
+        doubt = plain or doubted(rules, before, state.null, state.alternative)
+        doubt = doubt or _at_edge(area, before)
+        tracked = measured and before.status is Status.TRACKING
+        reading = replace(reading, tracked=tracked, doubted=doubt)
+        belief, info = update(before, reading, rng)
+        if info.reason is not Reason.USED:
+            return replace(state, belief=belief), info.reason
+        null = _challenged(rules, state.null, reading, before, belief)
+        sources, alternative = state.sources, state.alternative
+        if alternative is not None:
+            own_reading = weighed_by(
+                alternative.belief, updates, measured=measured, alternative=True
+            )
+            terms = own_reading or RadioReading()
+            doubt = plain or alternative.null.log_odds > rules.converge_log_odds
+            terms = replace(terms, doubted=doubt)
+            other, _ = update(alternative.belief, terms, rng)
+            own = _challenged(rules, alternative.null, terms, alternative.belief, other)
+            alternative = replace(alternative, belief=other, null=own)
+        gone = not area.holds(belief.state[0], belief.state[1], belief.weight)
+        now = resolve_alternative(
+            rules,
+            state.status,
+            belief,
+            null,
+            alternative,
+            state.reckoning.travelled_m,
+            at_edge=area.at_edge(belief.summary.mean),
+            gone=gone,
+        )
+        if now.taken_over and alternative is not None:
+            sources = {**sources, **alternative.sources}
+        alternative = now.alternative
+        disputed = any(one.disputed for one in updates)
+        if (
+            state.alternative is None
+            and now.status is not Status.CONVERGED
+            and (now.null.log_odds >= rules.start_log_odds or disputed or gone)
+        ):
+            alternative = self._alternative(state, now.belief, epoch, rng)
+        after = replace(
+            state,
+            belief=now.belief,
+            status=now.status,
+            sources=sources,
+            null=null if by_map_alone and not now.taken_over else now.null,
+            alternative=alternative,
+            takeovers=state.takeovers + now.taken_over,
+        )
+        return after, Reason.USED
+
+    def in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
+        """Return a state that is LOST while its belief is spread over more than one place.
+
+        Below the mass at which it searches again, it has to converge anew. Motion that is not
+        measured spreads it to all sides, so it is LOST earlier, but kept as found: it is clear
+        again when it has gathered.
+        """
+        belief = state.belief
+        if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
+            return state
+        mass = belief.summary.mass_50m
+        if mass < self.beliefs.options.split_mass:
+            belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
+            return replace(state, belief=belief, status=Status.LOST)
+        rules = self.beliefs.rules_of(state)
+        least = 0.0 if measured else rules.unclear_below_mass
+        if was_unclear:
+            least = rules.clear_from_mass
+        return state if mass >= least else replace(state, status=Status.LOST, unclear=True)
+
+    def _alternative(
+        self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
+    ) -> AlternativeHypothesis | None:
+        """Start an alternative from this epoch's evidence alone, as if it were the first."""
+        updates = [source.first_after(state, epoch) for source in self.sources]
+        started = self.started(updates, state, epoch, rng)
+        if started is None:
+            return None
+        belief, sources = started
+        null = NullHypothesis()
+        if self.beliefs.by_map_alone(state):
+            # Many alternatives may follow each other, and each begins with the streets that fit
+            # best: what speaks for a position off the map must not be forgotten with each.
+            null = NullHypothesis(max(state.null.log_odds, null.log_odds))
+        return AlternativeHypothesis(
+            belief,
+            state.reckoning.travelled_m,
+            main.log_evidence,
+            epoch.time_s,
+            sources,
+            null=null,
+        )
+
+
+def weighed_by(
+    belief: MapBelief,
+    updates: Sequence[EvidenceUpdate],
+    *,
+    measured: bool,
+    alternative: bool = False,
+) -> RadioReading | None:
+    """Return the evidence as a belief is weighed by it; None without any."""
+    reading = joined(updates, alternative=alternative)
+    tracked = measured and belief.status is Status.TRACKING
+    return reading if reading is None else replace(reading, tracked=tracked)
+
+
+def _at_edge(area: AreaMap, belief: MapBelief) -> bool:
+    """Return whether a belief lies at the edge of the area."""
+    if isinstance(belief, ParticleBelief) and area.clear_of_edge(belief.state):
+        # A summary takes longer.
+        return False
+    return area.at_edge(belief.summary.mean)
+
+
+def _challenged(
+    rules: AlternativeRules,
+    null: NullHypothesis,
+    reading: RadioReading,
+    before: MapBelief,
+    after: MapBelief,
+) -> NullHypothesis:
+    """Return the null hypothesis beside a belief after a reading."""
+    other = 0.0
+    if reading.levels is not None and after.shared is not None:
+        other = after.shared.other_log_likelihood
+    gained = after.log_evidence - before.log_evidence
+    searching = before.status is Status.SEARCHING
+    least = rules.least_log_odds(searching=searching)
+    return null.after(reading, other, gained, after.travelled_m, rules.map_nats_per_m, least)
