@@ -22,7 +22,7 @@ from mapfilter.config.fields import (
     with_columns,
     with_options,
 )
-from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX
+from mapfilter.database.build import MARGIN_DB, TILE_PX
 from mapfilter.options import NotNegative, Positive, Seed
 from mapfilter.propagation.models import GroundTruthErrors, ModelName, PredictionModel
 from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
@@ -422,8 +422,9 @@ class Database(Section):
         and dead reckoning.
     margin_db : float
         A point belongs to its best server and to cells at most this much weaker.
-    floor_dbm : float
-        Weaker levels are left out.
+    floor_dbm : float, optional
+        Weaker levels are left out. By default -104, -115 where the plan has UMTS cells, -125 where
+        it has LTE or NR cells.
     tile_px : int
         Side of the tiles that a build works through.
     """
@@ -431,5 +432,5 @@ class Database(Section):
     path: FilePath | None = None
     cells: bool = True
     margin_db: NotNegative = MARGIN_DB
-    floor_dbm: Annotated[float, Ge(-150), Le(0)] = FLOOR_DBM
+    floor_dbm: Annotated[float, Ge(-150), Le(0)] | None = None
     tile_px: Annotated[int, Ge(16), Le(8192)] = TILE_PX

@@ -17,6 +17,7 @@ import numpy as np
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
+from mapfilter.database.floor import FLOOR_DBM, floor_of
 from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.measured import MeasuredParts, Readings, deviations_at_points
 from mapfilter.database.parquet import Window
@@ -33,7 +34,6 @@ from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
 
 MARGIN_DB = 6.0
-FLOOR_DBM = -104.0
 TILE_PX = 256
 
 
@@ -61,7 +61,7 @@ def build(
     out: Path | str,
     *,
     margin_db: float = MARGIN_DB,
-    floor_dbm: float = FLOOR_DBM,
+    floor_dbm: float | None = None,
     tile_px: int = TILE_PX,
     inputs: Sequence[InputFile] = (),
     attribution: str = "",
@@ -92,8 +92,9 @@ def build(
         The folder; an older database is replaced once the new one is complete.
     margin_db : float
         Default margin of readers (dB, >= 0).
-    floor_dbm : float
-        Weakest level that is kept (dBm).
+    floor_dbm : float, optional
+        Weakest level that is kept (dBm); by default that of the plan's technologies
+        (:func:`mapfilter.database.floor.floor_of`).
     tile_px : int
         Side of the tiles that are processed at a time. Points are stored tile by tile along the
         Z-order curve, and along it within each tile.
@@ -124,11 +125,12 @@ def build(
     OutputError
         The folder cannot be written, or holds other files than a database.
     """
+    floor_dbm = floor_of(plan, floor_dbm)
     check_parameters(margin_db, floor_dbm, tile_px)
     job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
     out = Path(out)
     check_database_replaceable(out)
-    parameters = {"margin_db": float(margin_db), "floor_dbm": float(floor_dbm), "tile_px": tile_px}
+    parameters = {"margin_db": float(margin_db), "floor_dbm": floor_dbm, "tile_px": tile_px}
     with ExitStack() as stack:
         # The rasters are hashed while the first tiles are made.
         digest = _aside(rasters.sha256)

@@ -13,7 +13,8 @@ import numpy as np
 import pyarrow as pa
 
 from mapfilter._types import Floats
-from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX, BuildJob, check_parameters
+from mapfilter.database.build import MARGIN_DB, TILE_PX, BuildJob, check_parameters
+from mapfilter.database.floor import floor_of
 from mapfilter.database.parquet import geo_metadata, write_columns
 from mapfilter.database.parts import (
     ROWS_IN_MEMORY,
@@ -66,7 +67,7 @@ def dry_run(
     routes: RouteLattice | Routes,
     *,
     margin_db: float = MARGIN_DB,
-    floor_dbm: float = FLOOR_DBM,
+    floor_dbm: float | None = None,
     tile_px: int = TILE_PX,
 ) -> BuildEstimate:
     """Estimate a build from up to sixteen of its tiles, writing nothing.
@@ -77,6 +78,7 @@ def dry_run(
 
     Parameters and errors are those of :func:`mapfilter.database.build.build`.
     """
+    floor_dbm = floor_of(plan, floor_dbm)
     check_parameters(margin_db, floor_dbm, tile_px)
     job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
     # Some weight for each, as a way outside a tile may reach points in it.

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from mapfilter.errors import Faults, InputError
-from mapfilter.radio.cell_rules import TECHNOLOGIES
+from mapfilter.radio.cell_rules import TECHNOLOGIES, technology_faults
 from mapfilter.radio.identities import parse_cgi, technology
 from mapfilter.radio.reported_power import ASSUMABLE, REPORTED_SHARE_DB, reported_eirp_dbm
 from mapfilter.radio.tables import Table
@@ -143,15 +143,20 @@ def arrange(
         fields.append("assumed")
     names = (*fields, "cell") if composed else tuple(fields)
     filled: Counter[str] = Counter()
-    lowered, found = 0, []
+    lowered, beyond, found = Counter[str](), list[str](), []
     for line, texts in table.whole_rows(len(header), faults):
         values = {name: _first(texts, at) for name, at in picked.items()}
         _by_technology(
             values, [header[i] for at in picked.values() for i in at if texts[i].strip()]
         )
         if layout == "opencellid":
-            known = technology(values.get("technology", "")) or ""
-            values["technology"] = known if known in TECHNOLOGIES else ""
+            known = technology(values.get("technology", ""))
+            known = known if known in TECHNOLOGIES else None
+            values["technology"] = known or ""
+            if wrong := _beyond_limits(known, values, table):
+                # One row of a list whose columns are right, so the technology is more likely wrong.
+                values["technology"] = ""
+                beyond.append(f"row {line}, {wrong}")
         unknown = layout == "opencellid" and not values.get("azimuth_deg")
         assumed = {"azimuth_deg"} if unknown else set[str]()
         for name, default in defaults.items():
@@ -161,7 +166,8 @@ def arrange(
                 assumed.add(name)
         if not values.get("assumed"):
             values["assumed"] = " ".join(name for name in ASSUMABLE if name in assumed)
-        lowered += "eirp_dbm" in assumed and float(values["eirp_dbm"]) != defaults["eirp_dbm"]
+        if "eirp_dbm" in assumed and float(values["eirp_dbm"]) != defaults["eirp_dbm"]:
+            lowered[technology(values["technology"]) or ""] += 1
         if composed:
             parts = (values[name] for name in _IDENTITY)
             values["cell"] = "-".join(part for part in parts if part)
@@ -171,10 +177,14 @@ def arrange(
         for name, count in sorted(filled.items())
     )
     if lowered:
-        shares = ", ".join(f"{name} {db:g}" for name, db in REPORTED_SHARE_DB.items() if db)
+        shares = ", ".join(f"{name} {REPORTED_SHARE_DB[name]:g} dB" for name in sorted(lowered))
         notes += (
-            f"eirp_dbm of {lowered} cells lowered to what phones report (dB: {shares}), which they "
-            f"do down to -125 dBm or less: database.floor_dbm",
+            f"eirp_dbm of {lowered.total()} cells is lowered to the reported power ({shares})",
+        )
+    if beyond:
+        notes += (
+            f"technology of {len(beyond)} cells left out, as their identities are beyond its "
+            f"limits, such as {beyond[0]}",
         )
     shown = {
         name: f"{header[at[0]]} ({name})" for name, at in picked.items() if header[at[0]] != name
@@ -195,6 +205,15 @@ def _usual(name: str, default: float, stated: str) -> float:
     if name != "eirp_dbm" or family not in REPORTED_SHARE_DB:
         return default
     return reported_eirp_dbm(default, family)
+
+
+def _beyond_limits(known: str | None, values: Mapping[str, str], table: Table) -> str:
+    """Return what of an identity its technology does not have, or ""."""
+    for name, expected, got in technology_faults(
+        known, lambda name: table.number(values.get(name, ""))
+    ):
+        return f"{name}: expected {expected}, found {got:.12g}"
+    return ""
 
 
 def _first(texts: list[str], places: tuple[int, ...]) -> str:

@@ -12,6 +12,7 @@ from mapfilter._parallel import Progress, executor_of
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.estimate import BuildEstimate, dry_run
+from mapfilter.database.floor import floor_notes
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.measured import Readings, read_checked_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -99,6 +100,7 @@ def run_build(
             progress=progress,
         )
     counts: dict[str, Any] = database.manifest["counts"]
+    floor = floor_notes(plan, section.floor_dbm)
     cover = (*raster_cover(config.area, world.lattice), *map_cover(world))
     return BuildResult(
         points=int(counts["points"]),
@@ -106,7 +108,7 @@ def run_build(
         routable_points=sum(map(int, counts.values())),
         database=target,
         seconds=time.perf_counter() - began_s,
-        notes=(*rasters.notes, *plan.notes, *cover, *world.streets.notes),
+        notes=(*rasters.notes, *plan.notes, *floor, *cover, *world.streets.notes),
         pictures=_draw(config, rasters, database, world),
     )
 
@@ -146,8 +148,14 @@ def run_dry_build(config: Config) -> BuildEstimate:
     section, routes = config.database, world.route_tiles
     _inputs(world)
     reading_s = time.perf_counter() - began_s
-    limits = {"margin_db": section.margin_db, "floor_dbm": section.floor_dbm}
-    estimate = dry_run(rasters, plan, routes, **limits, tile_px=section.tile_px)
+    estimate = dry_run(
+        rasters,
+        plan,
+        routes,
+        margin_db=section.margin_db,
+        floor_dbm=section.floor_dbm,
+        tile_px=section.tile_px,
+    )
     # A build reads the same map, plan and headers first.
     return replace(estimate, seconds=estimate.seconds + reading_s)
 

@@ -13,6 +13,7 @@ import numpy as np
 from mapfilter._io import VERSION, atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
+from mapfilter.database.floor import floor_of
 from mapfilter.database.measured import Readings, readings_parquet
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
@@ -212,6 +213,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         rasters = open_rasters(target), open_rasters(deviation)
         evidence = SurveyEvidence(measurements, options.reach_m, *rasters, left_out)
         pictures = draw_survey(evidence, config.pictures_path)
+    floor_dbm = floor_of(cells, config.database.floor_dbm)
     return SurveyResult(
         cells=len(ids),
         rows=lattice.rows,
@@ -223,7 +225,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         ground_truth=None,
         plan=plan_path,
         validation=validation,
-        notes=(*measurements.notes, *survey.notes, *_advice(config, survey, factor)),
+        notes=(*measurements.notes, *survey.notes, *_advice(survey, factor, floor_dbm)),
         pictures=pictures,
     )
 
@@ -333,14 +335,14 @@ def _predicted(
     return predicted_levels(rasters, plan)
 
 
-def _advice(config: Config, survey: Survey, factor: float) -> list[str]:
+def _advice(survey: Survey, factor: float, floor_dbm: float) -> list[str]:
     weakest_dbm = min(float(cell.points.level_dbm.min()) for cell in survey.cells.values())
     notes = []
     if factor != 1.0:
         notes.append(f"deviations multiplied by {factor:.2f}, as left-out sessions showed")
-    if weakest_dbm < config.database.floor_dbm:
+    if weakest_dbm < floor_dbm:
         notes.append(
             f"levels down to {weakest_dbm:.0f} dBm were measured, below database.floor_dbm = "
-            f"{config.database.floor_dbm:g}: build leaves out what is weaker than that"
+            f"{floor_dbm:g}: build leaves out what is weaker than that"
         )
     return notes

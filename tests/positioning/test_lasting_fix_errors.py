@@ -1,5 +1,8 @@
 """Fixes that err to the same side for a while, as positions from Wi-Fi scans do."""
 
+import tracemalloc
+from itertools import permutations
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,7 +11,8 @@ import mapfilter as mf
 from mapfilter.evaluation.accuracy import Truth, position_errors_m
 from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.filter import locate
-from mapfilter.positioning.fingerprints.lasting import fit_lasting
+from mapfilter.positioning.fingerprints.lasting import _lag_sums, _stretches, fit_lasting
+from mapfilter.positioning.fingerprints.reports import make_reports
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.lasting import (
@@ -135,3 +139,65 @@ def test_independent_errors_do_not_last():
 def test_few_errors_tell_nothing():
     assert fit_lasting(np.zeros(3, int), np.arange(3.0), np.ones((3, 2))) is None
     assert fit_lasting(np.zeros(0, int), np.zeros(0), np.zeros((0, 2))) is None
+
+
+def test_pairs_within_the_longest_time_are_those_of_all_readings():
+    """Against every pair of a log; times are uneven, unsorted and partly equal."""
+    rng = np.random.default_rng(8)
+    log = rng.integers(0, 3, 600)
+    time_s = np.round(rng.uniform(0, 900, 600))
+    off_m = rng.normal(0, 5, (600, 2)) + 6 * np.sin(time_s / 40)[:, None]
+    order = np.lexsort((time_s, log))
+    total, pairs = 0.0, 0
+    for i, j in permutations(range(600), 2):
+        if log[i] == log[j] and 0 < time_s[i] - time_s[j] < 60:
+            total, pairs = total + off_m[i] @ off_m[j] / 2, pairs + 1
+    sums = _lag_sums(log, time_s, off_m)
+    assert int(sums.counts.sum()) == pairs
+    assert sums.products.sum() == pytest.approx(total)
+    again = _lag_sums(log[order], time_s[order], off_m[order])
+    for one, other in zip(sums, again, strict=True):
+        np.testing.assert_allclose(one, other)
+
+
+def test_a_long_log_needs_no_table_of_all_pairs():
+    count = 6000
+    off_m = np.random.default_rng(1).normal(0, 5, (count, 2))
+    tracemalloc.start()
+    try:
+        fit_lasting(np.zeros(count, int), 2.0 * np.arange(count), off_m)
+        peak_bytes = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak_bytes < 5e6
+
+
+def _logs(*lengths):
+    """Return a database of logs, a report each second, in no order."""
+    block = np.repeat(np.arange(len(lengths)), lengths)
+    time_s = np.concatenate([np.arange(length) for length in lengths])
+    shuffled = np.random.default_rng(4).permutation(len(block))
+    return make_reports(
+        "EPSG:32635", [], [], [], count=len(block), block=block[shuffled], time_s=time_s[shuffled]
+    )
+
+
+@pytest.mark.parametrize(
+    ("lengths", "expected"),
+    [
+        ((50, 60), {0: 50, 1: 60}),
+        ((9000,), {0: 2000}),
+        ((9000, 100, 100, 100), {0: 500, 1: 100, 2: 100, 3: 100}),
+        ((150,) * 60, {3 * i: 100 for i in range(20)}),
+    ],
+)
+def test_a_stretch_of_each_log_is_taken_from_its_middle(lengths, expected):
+    database = _logs(*lengths)
+    taken = database.some(_stretches(database, 2000))
+    logs, counts = np.unique(taken.block, return_counts=True)
+    assert dict(zip(logs.tolist(), counts.tolist(), strict=True)) == expected
+    for one, count in expected.items():
+        time_s = np.sort(taken.time_s[taken.block == one])
+        # Neighbours stay neighbours, and as much is left out before as after.
+        assert np.diff(time_s).tolist() == [1.0] * (count - 1)
+        assert abs(time_s[0] - (lengths[one] - 1 - time_s[-1])) <= 1

@@ -126,6 +126,30 @@ def test_bad_rows_of_public_lists_are_told_and_lose_nothing_else(tmp_path: Path)
     assert "cell (ci): expected a whole number" in said
 
 
+def test_one_identity_beyond_its_technology_costs_no_list(tmp_path: Path) -> None:
+    rows = [f"LTE,262,1,33,{70_000 + i},,24.95,60.17,9,9,1,1,1,0" for i in range(50)]
+    rows += ["GSM,262,1,100,123456,,24.95,60.17,9,9,1,1,1,0"]
+    rows += ["GSM,262,1,100,x,,24.95,60.17,9,9,1,1,1,0"]
+    plan = _read(tmp_path, "\n".join([MLS.splitlines()[0], *rows, ""]), layout="opencellid")
+    assert len(plan) == 51
+    odd = plan["262-1-100-123456"]
+    # Neither what it is nor which part of its power phones report is known.
+    assert (odd.technology, odd.ci, odd.eirp_dbm) == (None, 123456, 52.0)
+    assert {cell.technology for cell in plan.cells} == {"LTE", None}
+    assert any(
+        note.startswith("technology of 1 cells left out")
+        and note.endswith("such as row 52, ci: expected 0..65535 in GSM, found 123456")
+        for note in plan.notes
+    )
+    write_cell_plan(plan, tmp_path / "again.csv")
+    assert len(read_cell_plan(tmp_path / "again.csv", CRS)) == 51
+
+
+def test_an_identity_beyond_its_technology_is_a_fault_of_an_own_plan(tmp_path: Path) -> None:
+    own = PLAN.replace("bsic\n", "bsic,ci,technology\n").replace(",17\n", ",17,123456,GSM\n")
+    assert "row 2, ci: expected 0..65535 in GSM, found 123456" in _complaint(tmp_path, own)
+
+
 def test_cells_far_from_the_area_are_left_out_and_told(tmp_path: Path) -> None:
     east_m, north_m = (float(value) for value in project(CRS, 24.943, 60.1669))
     box = (east_m - 10, north_m - 10, east_m + 10, north_m + 10)
@@ -158,7 +182,7 @@ def test_usual_values_of_public_lists_are_marked(tmp_path: Path) -> None:
     # RSRP is the power of one subcarrier.
     assert (gsm.eirp_dbm, lte.eirp_dbm) == (52.0, 22.5)
     assert gsm.assumes == lte.assumes == {"height_m", "azimuth_deg", "eirp_dbm"}
-    assert any("eirp_dbm of 1 cells lowered to what phones report" in note for note in plan.notes)
+    assert "eirp_dbm of 1 cells is lowered to the reported power (LTE 29.5 dB)" in plan.notes
     write_cell_plan(plan, tmp_path / "again.csv")
     assert read_cell_plan(tmp_path / "again.csv", CRS).cells[1].assumes == lte.assumes
 

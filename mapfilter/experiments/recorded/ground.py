@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from mapfilter.database.build import FLOOR_DBM, build, build_roads
+from mapfilter.database.build import build, build_roads
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes
 from mapfilter.geodesy import Lattice
@@ -81,7 +81,7 @@ def predicted(
     folder: Path,
     model: PredictionModel | None = None,
     *,
-    floor_dbm: float = FLOOR_DBM,
+    floor_dbm: float | None = None,
 ) -> RadioRouteDatabase:
     """Predict the levels of a plan without buildings, and build a database of them."""
     folder.parent.mkdir(parents=True, exist_ok=True)

@@ -28,15 +28,24 @@ class Bounds(NamedTuple):
 OPEN = Bounds()
 """No end."""
 
+_BEYOND = 0.05
+"""Most readings beyond the end of a scale, as a share: more, and it is not the end of all."""
+
 
 def bounds_of(reports: Reports) -> Bounds:
     """Return the narrowest ends of the scales by which reports were made.
 
-    Technologies have scales of their own; where the weakest of one is stronger than the strongest
-    of another, the lower end is left open.
+    An end counts where at most 5 % of the readings that are no bounds lie beyond it: an odd row
+    such as "above -105 dBm" is not the end of a scale. Technologies have scales of their own; where
+    the weakest of one is stronger than the strongest of another, the lower end is left open.
     """
-    low = reports.level_dbm[reports.censored < 0].max(initial=-inf)
-    high = reports.level_dbm[reports.censored > 0].min(initial=inf)
+    level_dbm, censored = reports.level_dbm, reports.censored
+    plain_dbm = np.sort(level_dbm[(censored == 0) & np.isfinite(level_dbm)])
+    most = _BEYOND * len(plain_dbm)
+    lows, highs = level_dbm[censored < 0], level_dbm[censored > 0]
+    low = lows[np.searchsorted(plain_dbm, lows) <= most].max(initial=-inf)
+    above = len(plain_dbm) - np.searchsorted(plain_dbm, highs, "right")
+    high = highs[above <= most].min(initial=inf)
     return Bounds(float(low) if low < high else -inf, float(high))
 
 

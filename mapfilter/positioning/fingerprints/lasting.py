@@ -24,6 +24,7 @@ from mapfilter.positioning.fingerprints.reports import Reports
 
 _BIN_S, _LONGEST_S = 2.0, 60.0
 _LEAST_PAIRS, _LEAST_BINS = 30, 4
+_LEAST_STRETCH = 100
 _TIMES_S = np.geomspace(2.0, 200.0, 60)
 
 
@@ -59,7 +60,7 @@ def lasting_error(fitted: ReportLocator) -> LastingError | None:
     fold, blocks = folds_of(database)
     if database.predicted or blocks != "logs":
         return None
-    tried = _whole_logs(database, MOST_VALIDATED)
+    tried = _stretches(database, MOST_VALIDATED)
     parts = list(left_out(database, fitted.method, fold, tried))
     if not parts:
         return None
@@ -90,19 +91,7 @@ def fit_lasting(log: Ints, time_s: Floats, off_m: Floats) -> LastingError | None
     >>> 4 < found.sd_m < 6, 12 < found.memory_s < 30
     (True, True)
     """
-    if not len(log):
-        return None
-    bins = int(_LONGEST_S / _BIN_S)
-    products, counts, lags = np.zeros(bins), np.zeros(bins), np.zeros(bins)
-    for one in np.unique(log):
-        own = np.flatnonzero(log == one)
-        apart_s = time_s[own][:, None] - time_s[own][None, :]
-        pairs = (apart_s > 0) & (apart_s < _LONGEST_S)
-        at = (apart_s[pairs] / _BIN_S).astype(np.int64)
-        product = (off_m[own] @ off_m[own].T / 2)[pairs]
-        products += np.bincount(at, product, bins)
-        lags += np.bincount(at, apart_s[pairs], bins)
-        counts += np.bincount(at, minlength=bins)
+    products, counts, lags = _lag_sums(log, time_s, off_m)
     enough = counts >= _LEAST_PAIRS
     if enough.sum() < _LEAST_BINS:
         return None
@@ -115,9 +104,56 @@ def fit_lasting(log: Ints, time_s: Floats, off_m: Floats) -> LastingError | None
     return LastingError(float(np.sqrt(lasting_m2[best])), float(_TIMES_S[best]))
 
 
-def _whole_logs(database: Reports, most: int) -> Ints:
-    """Return the reports of evenly taken logs, until there are so many."""
-    names, counts = np.unique(database.block, return_counts=True)
-    share = min(1.0, most / int(counts.sum()))
-    taken = names[np.unique((np.arange(len(names)) * share).astype(np.int64), return_index=True)[1]]
-    return np.flatnonzero(np.isin(database.block, taken))
+class _LagSums(NamedTuple):
+    """Sums over pairs of errors, by the time between them: bins of 2 s up to 60 s."""
+
+    products: Floats
+    counts: Ints
+    lags: Floats
+
+
+def _lag_sums(log: Ints, time_s: Floats, off_m: Floats) -> _LagSums:
+    """Return the sums over all pairs of errors of one log, the later one's times the earlier's.
+
+    One error is paired with the next, then with the one after that, and so on: there is never a
+    table of all pairs.
+    """
+    bins = int(_LONGEST_S / _BIN_S)
+    products, counts, lags = np.zeros(bins), np.zeros(bins, np.int64), np.zeros(bins)
+    for one in np.unique(log):
+        own = np.flatnonzero(log == one)
+        own = own[np.argsort(time_s[own], kind="stable")]
+        earlier, own_s, own_m = np.arange(len(own) - 1), time_s[own], off_m[own]
+        for step in range(1, len(own)):
+            # Those farther apart than the bins reach are so with any later reading, too.
+            earlier = earlier[earlier + step < len(own)]
+            apart_s = own_s[earlier + step] - own_s[earlier]
+            near = apart_s < _LONGEST_S
+            earlier, apart_s = earlier[near], apart_s[near]
+            if not len(earlier):
+                break
+            pairs = apart_s > 0
+            at = (apart_s[pairs] / _BIN_S).astype(np.int64)
+            product = np.sum(own_m[earlier[pairs]] * own_m[earlier[pairs] + step], axis=1) / 2
+            products += np.bincount(at, product, bins)
+            lags += np.bincount(at, apart_s[pairs], bins)
+            counts += np.bincount(at, minlength=bins)
+    return _LagSums(products, counts, lags)
+
+
+def _stretches(database: Reports, most: int) -> Ints:
+    """Return at most so many reports: of evenly taken logs an even share each, from the middle.
+
+    A stretch of a log is at least 100 reports, or the whole log, so that it holds errors as far
+    apart as are compared; of many logs only some are taken.
+    """
+    logs = np.unique(database.block)
+    share = max(most // len(logs), min(_LEAST_STRETCH, most))
+    count = min(len(logs), most // share)
+    stretches = []
+    for one in logs[np.arange(count) * len(logs) // count].tolist():
+        own = np.flatnonzero(database.block == one)
+        own = own[np.argsort(database.time_s[own], kind="stable")]
+        first = max(len(own) - share, 0) // 2
+        stretches.append(own[first : first + share])
+    return np.sort(np.concatenate(stretches))

@@ -203,6 +203,9 @@ class _Excess:
     @classmethod
     def of(cls, reports: int, of_level: Ints, level_dbm: Floats) -> _Excess:
         """Prepare levels, each of the report ``of_level``."""
+        if not len(level_dbm):
+            none = np.zeros((1, reports))
+            return cls(0, none, none.astype(np.int32), np.zeros(2, np.int64), level_dbm, of_level)
         whole = np.floor(level_dbm).astype(np.int64)
         first, last = int(whole.min()), int(whole.max())
         order = np.argsort(whole, kind="stable")
@@ -266,7 +269,7 @@ class Likelihoods:
     least_db2: float
     predicted: bool
     planned: Planned | None = None
-    _prepared: dict[bytes, _Excess] = field(default_factory=dict)
+    _prepared: dict[int, _Excess] = field(default_factory=dict)
 
     @classmethod
     def at(cls, reports: Reports, errors: LevelErrors) -> Likelihoods:
@@ -291,18 +294,26 @@ class Likelihoods:
             reports.planned,
         )
 
-    def _excess(self, cell: Ints32) -> _Excess:
-        """Return the levels of cells that would have been reported with some."""
-        cells = len(self.by_cell.first) - 1
-        counts = np.ones(cells, np.bool_)
+    def _above(self, cell: Ints32, threshold_dbm: float) -> Floats:
+        """Return the sums above a threshold of cells that would be reported with some, (R,)."""
+        found, carriers = np.zeros(self.by_cell.count), self._carrier
         if self.planned is not None:
-            counts = self.planned.measured_with(cell)
-        key = counts.tobytes()
-        if key not in self._prepared:
-            kept = np.repeat(counts, np.diff(self.by_cell.first))
-            report, level_dbm = self.by_cell.report[kept], self.level_dbm[kept]
-            self._prepared[key] = _Excess.of(self.by_cell.count, report, level_dbm)
-        return self._prepared[key]
+            carriers = carriers[self.planned.measured_with(cell)]
+        # Sums are kept by carrier: there are few carriers, but 2^carriers sets of them in reports.
+        for carrier in np.unique(carriers).tolist():
+            if carrier not in self._prepared:
+                own = np.repeat(self._carrier == carrier, np.diff(self.by_cell.first))
+                report, level_dbm = self.by_cell.report[own], self.level_dbm[own]
+                self._prepared[carrier] = _Excess.of(self.by_cell.count, report, level_dbm)
+            found += self._prepared[carrier].above(threshold_dbm)
+        return found
+
+    @cached_property
+    def _carrier(self) -> Ints:
+        """Number of each cell's carrier, (C,); -1 of all cells where no plan tells them apart."""
+        if self.planned is None:
+            return np.full(len(self.by_cell.first) - 1, -1)
+        return self.planned.carrier
 
     @cached_property
     def _log_variance(self) -> Floats:
@@ -331,7 +342,7 @@ class Likelihoods:
             # Phones report the strongest cells: the absence of weaker ones is no evidence.
             least_dbm = max(float(strength_dbm.min()), self.errors.floor_dbm)
             errors = replace(self.errors, floor_dbm=least_dbm)
-            absence = self.errors.absence_per_db * self._excess(cell).above(least_dbm)
+            absence = self.errors.absence_per_db * self._above(cell, least_dbm)
         received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
         readings = zip(cell.tolist(), level_dbm.tolist(), ends, own.tolist(), strict=True)

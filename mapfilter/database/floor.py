@@ -1,0 +1,52 @@
+"""The weakest level that a database keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from mapfilter.radio.cells import CellPlan
+
+FLOOR_DBM: Final = -104.0
+"""Sensitivity in GSM; it holds for cells of unknown technology, too."""
+
+FLOORS_DBM: Final[Mapping[str, float]] = {
+    "GSM": FLOOR_DBM,
+    "UMTS": -115.0,
+    "LTE": -125.0,
+    "NR": -125.0,
+}
+"""By technology, of what phones report: RxLev, RSCP, RSRP and SS-RSRP.
+
+The latter three are of a part of the carrier (:mod:`mapfilter.radio.reported_power`), and as much
+weaker where the carrier is as strong.
+"""
+
+
+def floor_of(plan: CellPlan, floor_dbm: float | None = None) -> float:
+    """Return the floor of a database: the one that is given, or the usual one of its cells (dBm).
+
+    A database has one floor; of several technologies the lowest counts.
+
+    Examples
+    --------
+    >>> floor_of(CellPlan("EPSG:32635", ())), floor_of(CellPlan("EPSG:32635", ()), -110)
+    (-104.0, -110.0)
+    """
+    if floor_dbm is not None:
+        return float(floor_dbm)
+    return min((FLOORS_DBM[name] for name in _technologies(plan)), default=FLOOR_DBM)
+
+
+def floor_notes(plan: CellPlan, floor_dbm: float | None = None) -> tuple[str, ...]:
+    """Return a note on the floor that was taken, where it is neither given nor that of GSM."""
+    taken_dbm = floor_of(plan, floor_dbm)
+    if floor_dbm is not None or taken_dbm == FLOOR_DBM:
+        return ()
+    names = (name for name in _technologies(plan) if FLOORS_DBM[name] == taken_dbm)
+    reason = f"the usual one of {' and '.join(sorted(names))} cells"
+    return (f"database.floor_dbm = {taken_dbm:g} is taken, {reason}",)
+
+
+def _technologies(plan: CellPlan) -> set[str]:
+    return {cell.technology for cell in plan.cells if cell.technology is not None}

@@ -1,0 +1,65 @@
+"""The floor of a database that is not told: that of the technologies of its plan."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_world import CRS, make_plan, make_world
+
+from mapfilter.config.sections import Config
+from mapfilter.database.build import build
+from mapfilter.database.estimate import dry_run
+from mapfilter.database.floor import floor_notes, floor_of
+from mapfilter.radio.cells import CellPlan
+
+
+def _plan(*technologies):
+    plan = make_plan()
+    cells = (replace(cell, technology=t) for cell, t in zip(plan.cells, technologies, strict=True))
+    return CellPlan(CRS, tuple(cells))
+
+
+@pytest.mark.parametrize(
+    ("technologies", "floor_dbm", "named"),
+    [
+        ((None, None, None), -104.0, None),
+        (("GSM", None, "GSM"), -104.0, None),
+        (("UMTS", "GSM", None), -115.0, "UMTS"),
+        (("GSM", "UMTS", "LTE"), -125.0, "LTE"),
+        (("NR", None, "LTE"), -125.0, "LTE and NR"),
+    ],
+)
+def test_the_lowest_of_the_technologies_counts(technologies, floor_dbm, named):
+    plan = _plan(*technologies)
+    assert floor_of(plan) == floor_dbm
+    note = f"database.floor_dbm = {floor_dbm:g} is taken, the usual one of {named} cells"
+    assert floor_notes(plan) == ((note,) if named else ())
+
+
+def test_a_given_floor_stays_as_it_is():
+    for plan in (_plan("LTE", "LTE", "NR"), CellPlan(CRS, ())):
+        assert floor_of(plan, -104.0) == -104.0
+        assert floor_of(plan, 0) == 0.0
+        assert floor_notes(plan, -104.0) == ()
+
+
+def test_a_configuration_states_none():
+    assert Config().database.floor_dbm is None
+
+
+def test_a_build_takes_and_records_the_floor(tmp_path):
+    world, lte = make_world(tmp_path), _plan("LTE", "GSM", None)
+    weak = replace(world.rasters, factor=1.3)
+    levels = {}
+    for name, plan, given in [
+        ("unknown", world.plan, {}),
+        ("lte", lte, {}),
+        ("stated", lte, {"floor_dbm": -104.0}),
+    ]:
+        made = build(weak, plan, world.routes, tmp_path / name, tile_px=16, **given)
+        assert made.manifest["parameters"]["floor_dbm"] == made.floor_dbm
+        levels[name] = made.floor_dbm, int(np.isfinite(made.field().level_dbm).sum())
+        estimate = dry_run(weak, plan, world.routes, tile_px=16, **given)
+        assert estimate.levels == levels[name][1]
+    assert [floor_dbm for floor_dbm, _ in levels.values()] == [-104.0, -125.0, -104.0]
+    assert levels["lte"][1] > levels["unknown"][1] == levels["stated"][1]
