@@ -32,3 +32,16 @@ def test_defaults_are_noted(command, world, plain, tmp_path):
 def test_a_whole_plan_needs_no_note(world, tmp_path):
     done = mapfilter("predict", "-c", world.toml, "--out", tmp_path / "out", "--json")
     assert not [note for note in assert_done(done).json["notes"] if "without one" in note]
+
+
+@pytest.mark.parametrize(("stated", "floor_dbm"), [(None, -125.0), (-104, -104.0)])
+def test_the_floor_of_lte_is_noted_unless_it_is_given(stated, floor_dbm, world, tmp_path):
+    pd.read_csv(world.plan).assign(technology="LTE").to_csv(tmp_path / "plan.csv", index=False)
+    given = {"cells__plan": tmp_path / "plan.csv", "rasters__path": world.rasters}
+    given |= {} if stated is None else {"database__floor_dbm": stated}
+    done = mapfilter("build", "-c", world.toml, "--out", tmp_path, "--json", *settings(**given))
+    notes = [note for note in assert_done(done).json["notes"] if "floor_dbm" in note]
+    note = "database.floor_dbm = -125 is taken, the usual one of LTE cells"
+    assert notes == ([note] if stated is None else [])
+    told = assert_done(mapfilter("info", tmp_path / "database", "--json")).json
+    assert told["floor_dbm"] == floor_dbm
