@@ -15,7 +15,7 @@ def in_frame_of_reception(sent_m: ArrayLike, range_m: ArrayLike) -> Floats:
     """Return places of satellites in the frame of the moment of reception (Sagnac effect).
 
     Programs that compute a satellite's place at the moment of sending give it in the frame of that
-    moment. Without the turn the ranges are up to 40 m off, and positions some 25 m too far east.
+    moment. Without the turn the ranges are up to 40 m off, and positions some 20 m too far east.
 
     Parameters
     ----------

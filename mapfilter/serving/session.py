@@ -80,6 +80,7 @@ class Session:
     bytes: int = 0
     waiting: int = 0
     ended: bool = False
+    fault_told: bool = False
     lock: asyncio.Lock = field(default_factory=asyncio.Lock)
     channel: Channel = field(default_factory=Channel)
 

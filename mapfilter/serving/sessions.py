@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import sys
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +20,7 @@ from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.serving.documents import RequestError
 from mapfilter.serving.limits import ServiceLimits
 from mapfilter.serving.session import Progress, Session
-from mapfilter.serving.steps import SEED_BITS, first, stepped, wanted
+from mapfilter.serving.steps import SEED_BITS, first, shown_or, stepped, wanted
 from mapfilter.serving.store import SessionStore
 from mapfilter.serving.watching import Watcher
 from mapfilter.tracks.identify import PlanNames
@@ -130,6 +131,7 @@ class Sessions:
                 after = await asyncio.shield(self._run(step))
                 _refuse_ended(session)
                 session.take(after.progress)
+                _tell(session, after.fault)
                 session.used_s = time.monotonic()
                 channel.publish(before.epochs + 1, after.fixes, after.details, after.belief)
                 return after.fixes
@@ -155,8 +157,10 @@ class Sessions:
         async with session.lock:
             _refuse_ended(session)
             progress = await self._loaded(session)
-            work = partial(self.watcher.belief, progress.state, progress.epochs)
-            session.channel.show(await self._run(work))
+            faults = [""]
+            belief = partial(self.watcher.belief, progress.state, progress.epochs)
+            session.channel.show(await self._run(partial(shown_or, b"", belief, faults)))
+            _tell(session, faults[-1])
 
     async def end(self, session: Session, reason: str) -> None:
         """End a session, and remove what was saved of it."""
@@ -263,6 +267,13 @@ class Sessions:
         """End the threads, after what they are doing."""
         self.pool.shutdown()
         self.saver.shutdown()
+
+
+def _tell(session: Session, fault: str) -> None:
+    """Report a fault in what a page shows, once for each session: it may come with each epoch."""
+    if fault and not session.fault_told:
+        session.fault_told = True
+        sys.stderr.write(fault)
 
 
 def _refuse_ended(session: Session) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import sys
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -45,12 +44,15 @@ class Stepped:
         The same for a page that shows the session; empty where nobody watches.
     belief : bytes
         Of the last epoch; empty where nobody watches.
+    fault : str
+        Traceback of the last fault in what a page shows; empty without one.
     """
 
     progress: Progress
     fixes: list[bytes]
     details: list[bytes]
     belief: bytes
+    fault: str = ""
 
 
 def first(
@@ -84,7 +86,7 @@ def stepped(
     epochs = read_epochs(document, names, before.time_s)
     rng = np.random.default_rng()
     rng.bit_generator.state = before.rng
-    state, fixes, details = before.state, [], []
+    state, fixes, details, faults = before.state, [], [], [""]
     count, explained_from = before.epochs + len(epochs), len(epochs) - _MOST_WATCHED
     for index, epoch in enumerate(epochs):
         held = state
@@ -94,12 +96,12 @@ def stepped(
         fixes.append(json_bytes(fix_document(output, number_, positioner.crs)))
         if watcher is not None:
             make = partial(_detail, watcher, held, epoch, drawn, state, output)
-            details.append(_shown(make, b"{}"))
+            details.append(shown_or(b"{}", make, faults))
     progress = Progress(state, rng.bit_generator.state, count, epochs[-1].time_s, fixes[-1])
     belief = b""
     if watcher is not None:
-        belief = _shown(partial(watcher.belief, state, count), b"")
-    return Stepped(progress, fixes, details, belief)
+        belief = shown_or(b"", partial(watcher.belief, state, count), faults)
+    return Stepped(progress, fixes, details, belief, faults[-1])
 
 
 def _detail(
@@ -113,12 +115,17 @@ def _detail(
     return json_bytes(watcher.detail(before, epoch, rng, after, output))
 
 
-def _shown(make: Callable[[], bytes], nothing: bytes) -> bytes:
-    """Return what a page shows; a fault there costs the page this part, and the device nothing."""
+def shown_or(nothing: bytes, make: Callable[[], bytes], faults: list[str]) -> bytes:
+    """Return what a page shows; a fault there costs the page this part, and the device nothing.
+
+    Its traceback is added to ``faults``. MemoryError is no fault of the page.
+    """
     try:
         return make()
+    except MemoryError:
+        raise
     except Exception:
-        traceback.print_exc(file=sys.stderr)
+        faults.append(traceback.format_exc())
         return nothing
 
 

@@ -21,6 +21,7 @@ from mapfilter.propagation.predict import (
     simulate_ground_truth,
 )
 from mapfilter.radio.cells import write_cell_plan
+from mapfilter.radio.plan_notes import carrier_notes
 from mapfilter.rasters.geotiff import is_as_written, write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.apart import check_no_input_replaced
@@ -141,6 +142,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         *map_cover(world),
         world.buildings.height_sources,
         *plan.notes,
+        *carrier_notes(plan),
         *(note for antenna in antennas.values() for note in antenna.notes),
         *outside_validity(plan, lattice, model),
         *off_frequency(plan, antennas),

@@ -33,6 +33,7 @@ from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.plan_notes import assumed_notes
 from mapfilter.report.canvas import save
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.identify import name_by_plan
@@ -83,9 +84,10 @@ class _Logs:
         if self._crs:
             opened = replace(opened, log=in_frame(opened.log, self._crs))
         tables = [getattr(opened.log, table) for table in TABLES]
-        self._left_rows -= sum(map(len, (*tables, *opened.sensors.values())))
-        if opened.recordings or self._left_rows >= 0:
+        rows = sum(map(len, (*tables, *opened.sensors.values())))
+        if opened.recordings or rows <= self._left_rows:
             self._kept[path] = opened
+            self._left_rows -= rows
         return opened
 
     def check(self, lattice: Lattice) -> None:
@@ -342,8 +344,7 @@ def run_replay(
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         fitted, notes = fitted_to_log(options, log)
-        if database is None:
-            notes = (*notes, *sites(crs).notes)
+        notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))
         if database is not None and by_streets_alone(fitted, log, database):
             notes = (*notes, STREETS_ALONE)
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)

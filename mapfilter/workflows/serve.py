@@ -112,7 +112,7 @@ def run_serve(
     made = listen(options.host, options.port, token)
     with made, ExitStack() as held:
         if options.state is not None:
-            store = SessionStore.in_folder(options.state, _binding(config, opened))
+            store = SessionStore.in_folder(options.state, _binding(config, opened, positioner))
             held.enter_context(closing(store))
             found, lost = store.read_all()
             for line in lost:
@@ -182,9 +182,11 @@ def _positioner(config: Config, database: RadioRouteDatabase) -> BayesPositioner
     return found
 
 
-def _binding(config: Config, database: RadioRouteDatabase) -> str:
-    """Return what states depend on: the database and the filter's options."""
-    made_of = f"{database.generation} {filter_choice(config.filter)!r} {VERSION}"
+def _binding(config: Config, database: RadioRouteDatabase, positioner: BayesPositioner) -> str:
+    """Return what states depend on: the database and the filter's options, given and taken."""
+    model = positioner.model
+    taken = positioner.options, positioner.rules, model.motion, model.weights, model.evidence
+    made_of = f"{database.generation} {filter_choice(config.filter)!r} {taken!r} {VERSION}"
     return hashlib.sha256(made_of.encode()).hexdigest()
 
 

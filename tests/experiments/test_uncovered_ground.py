@@ -1,16 +1,20 @@
 """Ground that a road raster does not cover (255) is not forbidden to the filter."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import rasterio
 
 from mapfilter.experiments.recorded import kitti
 from mapfilter.experiments.recorded.locating import OpenMap
-from mapfilter.models.street_motion import EAST, NORTH, OFF, interpolate, weigh_by_map
+from mapfilter.filters.contract import MotionStep
+from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.options import BayesFilter
 
 WEST, NORTH_EDGE, SIZE = 455_000.0, 5_430_000.0, 400
 CRS = "EPSG:32632"
+STEP_M = 5.0
 
 
 def _raster(folder, rest):
@@ -34,19 +38,21 @@ def _raster(folder, rest):
 
 
 def _cost_nats(folder, tmp_path, last_m):
-    """The log weight of a hypothesis that drives on beyond the road's end."""
+    """The log weight of a hypothesis that drives on, without errors, beyond the road's end."""
     kitti.prepare(folder, tmp_path)
     options = BayesFilter(vehicle=True)
     model = OpenMap.open(tmp_path / "map").filter_of(options, alone=False).model
-    state = np.zeros((8, 1), dtype=np.float32)
-    log_map, weight = model.log_map, np.zeros(1)
-    rows, step = model.area.lattice.rows, model.area.lattice.resolution_m
-    for along_m in np.arange(100.0, last_m, 5.0):
-        state[EAST], state[NORTH] = along_m, SIZE - 200.5
-        found = interpolate(state, log_map, step / 2, (rows - 0.5) * step, 1 / step)
-        state[OFF] = 1 - (1 - state[OFF]) * np.exp(-model.weights.leave_per_m * 5.0)
-        weigh_by_map(found, state[OFF], model.weights.over(5.0), weight)
-    return float(-weight[0])
+    names = ("step_sd_m", "heading_sd_rad", "stretch_sd", "disturbances_per_m")
+    drifts = ("bias_drift_rad_per_sqrt_m", "scale_drift_per_sqrt_m", "rate_rad_per_m")
+    exact = replace(model.motion, **dict.fromkeys((*names, *drifts), 0.0))
+    model = replace(model, motion=exact)
+    state, log_weight = np.zeros((STATES, 1), dtype=np.float32), np.zeros(1)
+    state[EAST], state[NORTH] = 100.0, SIZE - 200.5
+    for key in range(int((last_m - 100.0) / STEP_M)):
+        step = MotionStep(STEP_M, 0.0, np.nan)
+        state, log_weight = model.move(state, log_weight, step, np.uint64(key))
+    assert state[EAST, 0] == pytest.approx(last_m, abs=STEP_M)
+    return float(-log_weight[0])
 
 
 @pytest.mark.parametrize("rest", [255, 0])

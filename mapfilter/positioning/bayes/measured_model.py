@@ -42,15 +42,26 @@ class MeasuredMapModel(BayesModel):
         return self.serving_model is None
 
     def usual_serving(self, serving: int, timing_advance: float) -> float:
-        """Return the log-likelihood of a serving cell and its timing advance anywhere on a way.
+        """Return the log-likelihood (nats) of a cell (band) and its advance (steps) on any way.
 
         What is compared with a probability of so many cells at a place has to be one, too.
         """
         model = self.serving_model
         if model is None:
             return super().usual_serving(serving, timing_advance)
-        found = self._log_serving(model, serving, timing_advance, self._way_pixels)
-        return float(logsumexp(found)) - log(found.size)
+        if not self._way_pixels.size:
+            return super().usual_serving(serving, timing_advance)
+        # NaN is no key that is found again.
+        key = serving, timing_advance if isfinite(timing_advance) else None
+        if key not in self._usual_serving:
+            found = self._log_serving(model, serving, timing_advance, self._way_pixels)
+            self._usual_serving[key] = float(logsumexp(found)) - log(found.size)
+        return self._usual_serving[key]
+
+    @cached_property
+    def _usual_serving(self) -> dict[tuple[int, float | None], float]:
+        """As many values as cells have timing advances."""
+        return {}
 
     @cached_property
     def _way_pixels(self) -> Ints32:

@@ -69,7 +69,10 @@ class BayesModel:
         return True
 
     def usual_serving(self, serving: int, timing_advance: float) -> float:  # noqa: ARG002
-        """Return the log-likelihood of a serving cell (band) under the null hypothesis."""
+        """Return the log-likelihood (nats) of a serving cell (band) under the null hypothesis.
+
+        ``timing_advance`` is in steps, NaN where none was reported.
+        """
         return SERVING_UNDER_NULL
 
     @cached_property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, sqrt
@@ -22,7 +21,7 @@ from mapfilter.positioning.fingerprints.reports import (
     reports_of_log,
 )
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.reported_power import MOST_SUBCARRIER_DBM
+from mapfilter.radio.plan_notes import assumed_notes, carrier_notes
 from mapfilter.tracks.log import TrackLog
 
 MOST_POINTS = 20_000
@@ -31,7 +30,6 @@ MOST_POINTS = 20_000
 STRONGEST = 7
 """Cells in a report of a phone: a serving cell and six neighbours."""
 
-_SUBCARRIERS = ("LTE", "NR")
 _OTHER_CARRIERS = 0.5
 """Share of the carriers besides that of the serving cell that a phone measures."""
 
@@ -116,32 +114,11 @@ def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.
         count=len(kept),
         places=place_m,
         sd_db=sd_db,
-        notes=_plan_notes(database.plan),
+        notes=(*assumed_notes(database.plan), *carrier_notes(database.plan)),
     )
     stated = any(cell.technology or cell.assumed for cell in database.plan.cells)
     planned = Planned.of(database.plan, found.cell_ids) if stated else None
     return replace(found, predicted=True, planned=planned)
-
-
-def _plan_notes(plan: CellPlan) -> list[str]:
-    """Return notes of the fields with usual values, and of powers that phones do not report."""
-    notes = []
-    counts = Counter(name for cell in plan.cells for name in cell.assumes)
-    if counts:
-        named = ", ".join(f"{name} of {count}" for name, count in sorted(counts.items()))
-        notes.append(f"usual values for what the plan lacks, so levels err by more: {named} cells")
-    carriers = [
-        cell
-        for cell in plan.cells
-        if cell.technology in _SUBCARRIERS and cell.eirp_dbm > MOST_SUBCARRIER_DBM
-    ]
-    if carriers:
-        notes.append(
-            f"eirp_dbm of {len(carriers)} cells is that of a carrier: more than "
-            f"{MOST_SUBCARRIER_DBM:g} dBm. Phones report one subcarrier of LTE and NR, "
-            "28 to 35 dB less, and the levels of the database are too high by that"
-        )
-    return notes
 
 
 def _reports_of_survey(readings: Readings, crs: str) -> Reports:

@@ -17,9 +17,10 @@
       live.state = state;
       for (const listener of live.listeners) listener(state);
     };
-    const address = () => `../sessions/${id}/events?${new URLSearchParams({ detail: "1", after: run.last, ...(key ? { key } : {}) })}`;
+    const address = (more = {}) => `../sessions/${id}/events?${new URLSearchParams({ detail: "1", after: run.last, ...more })}`;
     const connect = () => {
-      const events = new EventSource(address());
+      // An event source has no headers for a token.
+      const events = new EventSource(address(key ? { key } : {}));
       events.addEventListener("open", () => tell("live"));
       events.addEventListener("fix", (event) => { run.push(JSON.parse(event.data)); tell(); });
       events.addEventListener("belief", (event) => { run.pushBelief(JSON.parse(event.data)); tell(); });

@@ -1,0 +1,38 @@
+"""Notes on plans: fields that hold usual values, and powers that phones do not report."""
+
+from dataclasses import replace
+
+import pytest
+
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.plan_notes import assumed_notes, carrier_notes
+
+CRS = "EPSG:32632"
+GSM = Cell("a", "s", 500_000.0, 5_000_000.0, 30.0, 90.0, 58.0, 900.0, "sector", technology="GSM")
+LTE = replace(GSM, id="b", technology="LTE", frequency_mhz=1800.0)
+
+
+@pytest.mark.parametrize(
+    ("cells", "told"),
+    [
+        ([GSM], 0),
+        ([replace(LTE, eirp_dbm=46.0)], 0),
+        ([GSM, LTE, replace(LTE, id="c", technology="NR")], 2),
+        ([replace(GSM, technology=None)], 0),
+    ],
+)
+def test_powers_of_whole_carriers_are_noted(cells, told):
+    notes = carrier_notes(CellPlan(CRS, tuple(cells)))
+    assert len(notes) == bool(told)
+    assert all(note.startswith(f"eirp_dbm of {told} cells is that of a carrier") for note in notes)
+
+
+def test_usual_values_are_counted():
+    cells = (
+        GSM,
+        replace(LTE, assumed="height_m eirp_dbm", eirp_dbm=28.5),
+        replace(LTE, id="c", assumed="height_m", eirp_dbm=28.5),
+    )
+    (note,) = assumed_notes(CellPlan(CRS, cells))
+    assert "eirp_dbm of 1, height_m of 2 cells" in note
+    assert assumed_notes(CellPlan(CRS, (GSM,))) == ()
