@@ -154,7 +154,7 @@ def arrange(
             known = known if known in TECHNOLOGIES else None
             values["technology"] = known or ""
             if wrong := _beyond_limits(known, values, table):
-                # One row of a list whose columns are right, so the technology is more likely wrong.
+                # The identity names the cell; its technology is more likely wrong.
                 values["technology"] = ""
                 beyond.append(f"row {line}, {wrong}")
         unknown = layout == "opencellid" and not values.get("azimuth_deg")

@@ -51,4 +51,5 @@ def test_readings_at_an_end_are_not_beyond_it():
 def test_bounds_alone_and_missing_levels():
     assert _bounds([], [(-85.0, 1), (-115.0, -1)]) == Bounds(-115.0, -85.0)
     assert _bounds([np.nan] * 9, [(-85.0, 1)]) == Bounds(high_dbm=-85.0)
+    assert _bounds([], [(np.nan, 1), (np.nan, -1), (-85.0, 1)]) == Bounds(high_dbm=-85.0)
     assert _bounds([]) == OPEN

@@ -39,8 +39,9 @@ def bounds_of(reports: Reports) -> Bounds:
     such as "above -105 dBm" is not the end of a scale. Technologies have scales of their own; where
     the weakest of one is stronger than the strongest of another, the lower end is left open.
     """
-    level_dbm, censored = reports.level_dbm, reports.censored
-    plain_dbm = np.sort(level_dbm[(censored == 0) & np.isfinite(level_dbm)])
+    known = np.isfinite(reports.level_dbm)
+    level_dbm, censored = reports.level_dbm[known], reports.censored[known]
+    plain_dbm = np.sort(level_dbm[censored == 0])
     most = _BEYOND * len(plain_dbm)
     lows, highs = level_dbm[censored < 0], level_dbm[censored > 0]
     low = lows[np.searchsorted(plain_dbm, lows) <= most].max(initial=-inf)

@@ -299,7 +299,7 @@ class Likelihoods:
         found, carriers = np.zeros(self.by_cell.count), self._carrier
         if self.planned is not None:
             carriers = carriers[self.planned.measured_with(cell)]
-        # Sums are kept by carrier: there are few carriers, but 2^carriers sets of them in reports.
+        # Sums are kept by carrier, of which there are few; reports may have any set of carriers.
         for carrier in np.unique(carriers).tolist():
             if carrier not in self._prepared:
                 own = np.repeat(self._carrier == carrier, np.diff(self.by_cell.first))
