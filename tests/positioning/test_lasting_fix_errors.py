@@ -189,6 +189,8 @@ def _logs(*lengths):
         ((9000,), {0: 2000}),
         ((9000, 100, 100, 100), {0: 500, 1: 100, 2: 100, 3: 100}),
         ((150,) * 60, {3 * i: 100 for i in range(20)}),
+        ((50,) * 80, {2 * i: 50 for i in range(40)}),
+        ((9000,) * 3, dict.fromkeys(range(3), 666)),
     ],
 )
 def test_a_stretch_of_each_log_is_taken_from_its_middle(lengths, expected):

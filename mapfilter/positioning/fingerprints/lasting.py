@@ -142,16 +142,21 @@ def _lag_sums(log: Ints, time_s: Floats, off_m: Floats) -> _LagSums:
 
 
 def _stretches(database: Reports, most: int) -> Ints:
-    """Return at most so many reports: of evenly taken logs an even share each, from the middle.
+    """Return at most so many reports, of evenly taken logs: of each a stretch from its middle.
 
-    A stretch of a log is at least 100 reports, or the whole log, so that it holds errors as far
-    apart as are compared; of many logs only some are taken.
+    A stretch is an even share of ``most``, but at least 100 reports, so that it holds errors as far
+    apart as are compared, or the whole log where that is shorter. Of logs that are too many for
+    that only some are taken.
     """
-    logs = np.unique(database.block)
+    logs, counts = np.unique(database.block, return_counts=True)
     share = max(most // len(logs), min(_LEAST_STRETCH, most))
-    count = min(len(logs), most // share)
+    lengths = np.minimum(counts, share)
+    total = int(lengths.sum())
+    places = np.arange(len(logs))
+    taken = np.unique(places * min(most, total) // total, return_index=True)[1]
+    taken = taken[np.cumsum(lengths[taken]) <= most]
     stretches = []
-    for one in logs[np.arange(count) * len(logs) // count].tolist():
+    for one in logs[taken].tolist():
         own = np.flatnonzero(database.block == one)
         own = own[np.argsort(database.time_s[own], kind="stable")]
         first = max(len(own) - share, 0) // 2
