@@ -4,6 +4,8 @@ import pandas as pd
 import pytest
 from command_line import assert_done, mapfilter, settings
 
+from mapfilter.database.store import open_database
+
 NOTES = [
     "eirp_dbm = 47 for 3 of 3 cells without one",
     "frequency_mhz = 2100 for 3 of 3 cells without one",
@@ -43,5 +45,4 @@ def test_the_floor_of_lte_is_noted_unless_it_is_given(stated, floor_dbm, world, 
     notes = [note for note in assert_done(done).json["notes"] if "floor_dbm" in note]
     note = "database.floor_dbm = -125 is taken, the usual one of LTE cells"
     assert notes == ([note] if stated is None else [])
-    told = assert_done(mapfilter("info", tmp_path / "database", "--json")).json
-    assert told["floor_dbm"] == floor_dbm
+    assert open_database(tmp_path / "database").floor_dbm == floor_dbm
