@@ -80,20 +80,20 @@ class BayesState:
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
         return BayesState(
-            self.belief,
-            self.status,
-            self.unclear,
-            self.sources,
-            self.reckoning,
-            self.heading_rad,
-            self.compass,
-            self.null,
-            self.alternative,
-            self.takeovers,
-            self.path,
-            reported,
-            self.watch,
-            self.last_fix,
+            belief=self.belief,
+            status=self.status,
+            unclear=self.unclear,
+            sources=self.sources,
+            reckoning=self.reckoning,
+            heading_rad=self.heading_rad,
+            compass=self.compass,
+            null=self.null,
+            alternative=self.alternative,
+            takeovers=self.takeovers,
+            path=self.path,
+            reported=reported,
+            watch=self.watch,
+            last_fix=self.last_fix,
         )
 
     @property

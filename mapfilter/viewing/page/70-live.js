@@ -1,7 +1,7 @@
 "use strict";
 // A session of a service: its map, its events, and what to do when the connection is lost.
 (() => {
-  const [AGAIN_MS, REFUSED_MS, SETTLE_MS, LIST_MS] = [5000, 30000, 500, 5000];
+  const [AGAIN_MS, REFUSED_MS, SETTLE_MS, LIST_MS] = [5000, 10000, 500, 5000];
   const key = new URLSearchParams(window.location.search).get("key");
 
   const ask = async (path, signal) => {
