@@ -73,6 +73,8 @@ def _as_frame(table: pa.Table) -> pd.DataFrame:
     What pandas wrote about its index and its types is left out: the columns hold everything, and
     damaged, it is a fault in no column.
     """
+    # Texts that are no UTF-8 are read like others, and fail only when they are used.
+    table.validate(full=True)
     plain = table.replace_schema_metadata(None)
     for i, column in enumerate(plain.schema):
         if pa.types.is_decimal(column.type):

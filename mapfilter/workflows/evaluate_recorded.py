@@ -220,9 +220,23 @@ def run_all(
     result = AllResult(seed, tuple(rows), tuple(missing), tuple(failed), seconds, out)
     write_json(out / TABLE, to_jsonable(result))
     if not rows:
-        expected = "folders of the data sets"
-        raise fail(InputError, str(data), expected, "; ".join([*missing, *failed]))
+        raise fail(InputError, str(data), *_nothing_judged(names, missing, failed))
     return result
+
+
+def _nothing_judged(
+    names: Sequence[str], missing: Sequence[str], failed: Sequence[str]
+) -> tuple[str, str, str]:
+    """Return what was expected, what was found, and the likely mistake."""
+    if failed:
+        return "data sets that can be judged", "; ".join([*missing, *failed]), ""
+    folders = ", ".join(_folder(name) for name in names)
+    hint = f"--data is the folder that holds {folders}, or some of them"
+    return "folders of the data sets", "none that holds what it needs", hint
+
+
+def _folder(name: str) -> str:
+    return OTTAWA_FOLDER if name == OTTAWA else BENCHMARKS[name].folder
 
 
 def _check_there(name: str, data: Path) -> None:
@@ -230,7 +244,7 @@ def _check_there(name: str, data: Path) -> None:
     if name == OTTAWA:
         check_there(data / OTTAWA_FOLDER, tuple(f"{part}/*.csv" for part in OTTAWA_PARTS))
     else:
-        check_there(data / BENCHMARKS[name].folder, BENCHMARKS[name].needs)
+        check_there(data / _folder(name), BENCHMARKS[name].needs)
 
 
 def _rows_of(

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -143,6 +145,16 @@ def test_unreadable_csv(tmp_path, content):
     (tmp_path / "log.json").write_text('{"crs": "EPSG:32629"}')
     (tmp_path / "motion.csv").write_bytes(content)
     with pytest.raises(InputError, match=r"motion\.csv"):
+        read_log(tmp_path)
+
+
+def test_parquet_texts_that_are_no_utf8_are_refused(tmp_path):
+    table = pa.table({"time_s": [0.0], "cell": ["abcdef"], "level_dbm": [-80.0]})
+    (tmp_path / "log.json").write_text('{"crs": "EPSG:32635"}')
+    path = tmp_path / "radio.parquet"
+    pq.write_table(table, path, compression="none", use_dictionary=False)
+    path.write_bytes(path.read_bytes().replace(b"abcdef", b"\xbcbcdef"))
+    with pytest.raises(InputError, match=r"radio\.parquet.*readable table.*UTF8"):
         read_log(tmp_path)
 
 

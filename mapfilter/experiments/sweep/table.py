@@ -151,6 +151,7 @@ def read_runs(path: Path) -> pd.DataFrame:
                 hint += "is not finished: go on with --resume"
                 raise fail(StoreError, str(path), f"the table of {HEAD}", "another", hint)
             table = pq.read_table(stream)
+            table.validate(full=True)
     except (OSError, pa.ArrowInvalid) as error:
         raise fail(StoreError, str(path), "the table of a sweep", error, "cut off") from error
     lacking = set(SCHEMA.names) - set(table.column_names)
