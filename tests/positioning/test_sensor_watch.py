@@ -231,6 +231,19 @@ def test_a_report_that_repeats_itself_on_the_way_is_stale(levels, least_m, most_
     assert found[stale[0] - 1][0].radio == rows
 
 
+def test_one_level_that_repeats_every_seven_seconds_of_a_walk_is_stale_within_a_minute():
+    step = MotionStep(9.8, 0.0)
+    _, found = told([Epoch(7.0 * k, (step,), report([-90])) for k in range(20)])
+    stale = [7.0 * k for k, (_, _, why) in enumerate(found) if why is Reason.STALE_RADIO]
+    assert 40.0 < stale[0] < 60.0
+
+
+def test_a_pair_of_equal_reports_far_apart_is_not_stale_yet():
+    step = MotionStep(150.0, 0.0)
+    _, found = told([Epoch(10.0 * k, (step,), report([-90])) for k in range(4)])
+    assert {why for _, _, why in found} == {Reason.USED}
+
+
 def test_another_level_makes_it_fresh_again_and_rest_never_makes_it_stale():
     rows, other = report([-80, -85, -90]), report([-80, -85, -91])
     moving = [Epoch(float(k), STEP, rows) for k in range(40)]

@@ -31,9 +31,13 @@ _WALK_MPS = 1.4
 _STRAIGHT_S = 60.0
 """Time after which the direction of an unmeasured way is forgotten by 1/e."""
 
-_NATS_PER_M, _NATS_PER_REPEAT, _MOST_ROWS = 0.12, 0.9, 3
+_NATS_PER_M, _MOST_ROWS = 0.12, 3
 """Gain, for each level of at most three, from a report that repeats the last one: by the metres
-between them, and at most."""
+between them."""
+_NATS_PER_REPORT, _NATS_PER_LEVEL = 1.9, 0.9
+"""The most that a repeated report gains: of a single level, which a modem that works repeats in one
+of seven to ten reports 10 to 20 m apart; several levels may repeat together, as slow modems renew
+them together."""
 _STALE_NATS = 8.0
 
 
@@ -244,8 +248,8 @@ def _repeated(watch: SensorWatch, moved_m: float, radio: tuple[ReportRow, ...]) 
         return 0.0
     # Beyond the end of its scale a level stays the same anywhere.
     levels = min(len(levels_of(radio)), _MOST_ROWS)
-    each = min(_NATS_PER_M * moved_m, _NATS_PER_REPEAT)
-    return watch.repeated_nats + levels * each if levels else 0.0
+    most = max(_NATS_PER_REPORT, _NATS_PER_LEVEL * levels)
+    return watch.repeated_nats + min(levels * _NATS_PER_M * moved_m, most) if levels else 0.0
 
 
 def _equal(report: tuple[ReportRow, ...], before: tuple[ReportRow, ...]) -> bool:
