@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from mapfilter.positioning.estimate import StepOutput as StepOutput
     from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
     from mapfilter.positioning.filter import Filter as Filter
-    from mapfilter.positioning.fingerprints.locating import LocatedReports as LocatedReports
+    from mapfilter.positioning.fingerprints.located import LocatedReports as LocatedReports
     from mapfilter.positioning.fingerprints.reports import Reports as Reports
     from mapfilter.positioning.fingerprints.tables import (
         read_fingerprint_table as read_fingerprint_table,
@@ -80,7 +80,7 @@ _NAMES = {
     "positioning.epochs": "Epoch epochs",
     "positioning.estimate": "Fix StepOutput TrackEstimate",
     "positioning.filter": "Filter",
-    "positioning.fingerprints.locating": "LocatedReports",
+    "positioning.fingerprints.located": "LocatedReports",
     "positioning.fingerprints.reports": "Reports",
     "positioning.fingerprints.tables": "read_fingerprint_table",
     "positioning.kalman.filter": "KalmanFilter",

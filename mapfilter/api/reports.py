@@ -8,8 +8,8 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.fingerprints.censoring import bounds_of
+from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.locating import (
-    LocatedReports,
     fit_locator,
     locate_by,
     timed_share,

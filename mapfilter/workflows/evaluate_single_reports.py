@@ -25,7 +25,7 @@ from mapfilter.experiments.benchmarks.single_reports import (
     row_of,
 )
 from mapfilter.geodesy import utm_crs
-from mapfilter.positioning.fingerprints.locating import LocatedReports
+from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.report.canvas import BLACK, GREEN, GREY, ORANGE, PURPLE, SKY, save
 from mapfilter.report.curves import Distribution, plot_cumulative

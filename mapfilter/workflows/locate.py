@@ -15,10 +15,9 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
 from mapfilter.positioning.fingerprints.censoring import bounds_of
+from mapfilter.positioning.fingerprints.located import LocatedReports, figures_of
 from mapfilter.positioning.fingerprints.locating import (
-    LocatedReports,
     ReportLocator,
-    figures_of,
     fit_locator,
     locate_by,
     timed_share,
@@ -45,7 +44,7 @@ class LocateResult:
     database_reports, transmitters : int
         Places of the database, and what was received there.
     figures : mapping
-        Counts and scores, see :func:`mapfilter.positioning.fingerprints.locating.figures_of`.
+        Counts and scores, see :func:`mapfilter.positioning.fingerprints.located.figures_of`.
     centroid_mean_m, centroid_median_m : float
         Errors of the mean place of the serving, or strongest, cell; NaN without ground truth.
     """

@@ -12,7 +12,7 @@ from mapfilter.experiments.recorded.worst_report import (
     worst_report,
     write_worst_report,
 )
-from mapfilter.positioning.fingerprints.locating import LocatedReports
+from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.options import Neighbours
 from mapfilter.positioning.fingerprints.reports import make_reports
 from mapfilter.workflows.recorded_pictures import draw_report

@@ -9,15 +9,9 @@ from made_fingerprints import CRS, NAMES, levels_at, reports_at, survey
 import mapfilter as mf
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.positioning.fingerprints.censoring import Bounds, bounded, bounds_of
-from mapfilter.positioning.fingerprints.locating import (
-    NOTHING,
-    UNKNOWN,
-    cross_validate,
-    figures_of,
-    fit_locator,
-    folds_of,
-    locate_by,
-)
+from mapfilter.positioning.fingerprints.cross_validation import cross_validate, folds_of
+from mapfilter.positioning.fingerprints.located import NOTHING, UNKNOWN, figures_of
+from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
 from mapfilter.positioning.fingerprints.matches import Received, locator
 from mapfilter.positioning.fingerprints.options import METHODS, Neighbours, Probabilistic
 from mapfilter.positioning.fingerprints.reports import make_reports

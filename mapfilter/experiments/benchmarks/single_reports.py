@@ -20,11 +20,8 @@ from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.intervals import share_interval
 from mapfilter.experiments.benchmarks.ottawa import GOOD_M, MAP_M
 from mapfilter.experiments.benchmarks.ottawa_sessions import Session
-from mapfilter.positioning.fingerprints.locating import (
-    LocatedReports,
-    fit_locator,
-    locate_by,
-)
+from mapfilter.positioning.fingerprints.located import LocatedReports
+from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
 from mapfilter.positioning.fingerprints.options import (
     AUTO,
     Centroid,

@@ -43,7 +43,8 @@ from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.fingerprints.lasting import LastingError, lasting_error
-from mapfilter.positioning.fingerprints.locating import LocatedReports, fit_locator, locate_by
+from mapfilter.positioning.fingerprints.located import LocatedReports
+from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
 from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.positioning.fingerprints.sources import reports_of_logs
 from mapfilter.positioning.kalman.filter import KalmanFilter

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from mapfilter._io import read_sealed, write_sealed
 from mapfilter._types import Floats
 from mapfilter.errors import StoreError, fail
-from mapfilter.positioning.fingerprints.locating import LocatedReports
+from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.reports import Reports
 
 MOST_PLACES = 4000

@@ -14,12 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mapfilter._types import Floats, Ints
-from mapfilter.positioning.fingerprints.locating import (
-    MOST_VALIDATED,
-    ReportLocator,
-    folds_of,
-    left_out,
-)
+from mapfilter.positioning.fingerprints.cross_validation import MOST_VALIDATED, folds_of, left_out
+from mapfilter.positioning.fingerprints.locating import ReportLocator
 from mapfilter.positioning.fingerprints.reports import Reports
 
 _BIN_S, _LONGEST_S = 2.0, 60.0
