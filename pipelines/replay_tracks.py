@@ -8,7 +8,8 @@ Run ``build_database.py`` first, with the same area; the settings are in ``repla
 import sys
 from pathlib import Path
 
-from mapfilter.workflows.replay import replay_figures, run_replay
+from mapfilter.workflows.replay import run_replay
+from mapfilter.workflows.replayed import replay_figures
 from mapfilter.workflows.simulate import run_simulate
 from mapfilter.workflows.terminal import Stage, run_pipeline
 

@@ -360,7 +360,8 @@ def replay(
 ) -> None:
     """Locate one log, or every log of a folder; exit code 3 if done in part."""
     from mapfilter.config.load import load_config
-    from mapfilter.workflows.replay import replay_figures, run_replay
+    from mapfilter.workflows.replay import run_replay
+    from mapfilter.workflows.replayed import replay_figures
 
     given = seeded(settings, seed, "journeys.seed")
     paths = {"database.path": database, "track.path": log[0] if log else None}

@@ -14,7 +14,8 @@ from mapfilter.config.load import load_config
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.predict import run_predict
-from mapfilter.workflows.replay import ReplayedLog, run_replay
+from mapfilter.workflows.replay import run_replay
+from mapfilter.workflows.replayed import ReplayedLog
 from mapfilter.workflows.simulate import run_simulate
 from mapfilter.workflows.views import run_view
 
