@@ -12,9 +12,10 @@ from mapfilter.filters.gaussian import EKF
 from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanState, _Step
+from mapfilter.positioning.kalman.filter import KalmanSmoother
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
+from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32629"
@@ -37,7 +38,7 @@ NOTHING = SiteReadings((), (), (), (), ())
 
 
 def walk(*, reckoned=True, sites=SITES):
-    return _Step(sites, EKF, KalmanState(POSITION if reckoned else MOVING))
+    return KalmanStep(sites, EKF, KalmanState(POSITION if reckoned else MOVING))
 
 
 def started(reckoned=True, **more):

@@ -1,0 +1,292 @@
+"""One epoch of a Kalman-type filter over sites: first move, then measure, then the status."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import cos, inf, isfinite, nan, pi, radians, sin
+from typing import Any
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.gaussian import Gaussian, Method
+from mapfilter.models.gaussian import GaussianTerms
+from mapfilter.models.motion import constant_velocity
+from mapfilter.models.ranging import position_fix
+from mapfilter.models.state import MOVING, POSITION, StateLayout
+from mapfilter.positioning.epochs import Epoch, GnssFix
+from mapfilter.positioning.estimate import Fix, UnusedReading
+from mapfilter.positioning.integrity import GaussianTail
+from mapfilter.positioning.kalman.belief import (
+    SumBelief,
+    gaussian_radii_m,
+    share_within,
+)
+from mapfilter.positioning.kalman.lasting import (
+    Motion,
+    extended_belief,
+    extended_motion,
+    fix_layout,
+    white_part,
+)
+from mapfilter.positioning.kalman.models import SiteModels, compiled
+from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
+
+_LOST_NIS, _WINDOW = 5.0, 10
+_WITHIN_M = 50.0
+_MOST_PARTS = 64
+_LEAST_MOVED_M = 0.1
+_WALK_MPS = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class KalmanState:
+    """State of a journey.
+
+    Parameters
+    ----------
+    layout : StateLayout
+        Position only where there is dead reckoning, else position and velocity; with the place that
+        fixes are of, where their errors last.
+    belief : SumBelief or None
+        None before the first measurement that it can start from.
+    time_s : float
+        Time of the last epoch.
+    moved_m : float
+        Distance travelled since levels or timing advances were last used.
+    recent_nis : tuple of float
+        Normalised innovations squared of the last measurements, per component.
+    motion : tuple of arrays
+        Transition, noise and shift that led to the last epoch.
+    last_fix : GnssFix or None
+        The last one with a position.
+    """
+
+    layout: StateLayout
+    belief: SumBelief | None = None
+    time_s: float = nan
+    moved_m: float = inf
+    status: Status = Status.SEARCHING
+    recent_nis: tuple[float, ...] = ()
+    motion: tuple[Floats, Floats, Floats] | None = None
+    last_fix: GnssFix | None = None
+
+
+class KalmanStep:
+    """One epoch in work: the state is replaced by parts."""
+
+    def __init__(self, sites: SiteModels, method: Method, state: KalmanState) -> None:
+        self.sites, self.method, self.options = sites, method, sites.options
+        self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
+        self.lasts = self.options.fix_lasting_m > 0
+        # With a rate behind each coordinate north is the third component.
+        self.own = MOVING if state.layout.north == MOVING.north else POSITION
+        self.where = [self.layout.east, self.layout.north]
+        self.moved_m, self.status = state.moved_m, state.status
+        self.recent_nis = list(state.recent_nis)
+        self.motion, self.last_fix = state.motion, state.last_fix
+        self.unused: list[UnusedReading] = []
+
+    @property
+    def state(self) -> KalmanState:
+        """The state after the epoch."""
+        return KalmanState(
+            self.layout,
+            self.belief,
+            self.time_s,
+            self.moved_m,
+            self.status,
+            tuple(self.recent_nis),
+            self.motion,
+            self.last_fix,
+        )
+
+    @property
+    def tail(self) -> GaussianTail | None:
+        """The belief's tail about its mean."""
+        return None if self.belief is None else belief_tail(self.belief, self.where)
+
+    def take(self, epoch: Epoch) -> Fix:
+        """Move, then measure; return the epoch's fix."""
+        self.motion = self._move(epoch)
+        reason = self._measure(epoch, site_readings(self.sites, epoch))
+        self.time_s = epoch.time_s
+        return self._fix(epoch.time_s, reason)
+
+    def _move(self, epoch: Epoch) -> tuple[Floats, Floats, Floats]:
+        """Predict; return the transition, the noise and the shift."""
+        size = self.own.size
+        elapsed_s = max(epoch.time_s - self.time_s, 0.0) if isfinite(self.time_s) else 0.0
+        transition, noise, shift = np.eye(size), np.zeros((size, size)), np.zeros(size)
+        if self.belief is None:
+            self._label(epoch, epoch.motion, Reason.NOT_STARTED)
+            return self._extended((transition, noise, shift), elapsed_s)
+        if self.own is MOVING:
+            if elapsed_s > 0:
+                root = self.options.acceleration_mps_per_sqrt_s
+                motion = constant_velocity(elapsed_s, root, noise="continuous")
+                transition, noise = motion.transition, motion.noise
+                self.moved_m += self._speed_mps() * elapsed_s
+        else:
+            noise = self.options.drift_m_per_sqrt_s**2 * elapsed_s * np.eye(2)
+            for step in epoch.motion:
+                moved, spread = self._step(epoch, step)
+                shift, noise = shift + moved, noise + spread
+                self.moved_m += step.step_m if isfinite(step.step_m) else 0.0
+        whole = self._extended((transition, noise, shift), elapsed_s)
+        self.belief = self.belief.predict(*whole)
+        return whole
+
+    def _extended(self, motion: Motion, elapsed_s: float) -> Motion:
+        """Return motion with that of the place that fixes are of, where their errors last."""
+        if not self.lasts:
+            return motion
+        options = self.options
+        lasting = options.fix_lasting_m, options.fix_lasting_s
+        return extended_motion(motion, self.own, *lasting, elapsed_s)
+
+    def _speed_mps(self) -> float:
+        """Return the estimated speed, at least that of a walk."""
+        if self.belief is None:
+            raise AssertionError("asked once started")
+        mean = self.belief.moments.mean
+        return max(float(np.hypot(*mean[list(self.layout.velocity)])), _WALK_MPS)
+
+    def _step(self, epoch: Epoch, step: MotionStep) -> tuple[Floats, Floats]:
+        """Return a step's displacement and covariance; without a heading, zero and isotropic."""
+        if not isfinite(step.step_m):
+            self._label(epoch, (step,), Reason.NO_STEP)
+            return np.zeros(2), np.zeros((2, 2))
+        if not isfinite(step.heading_rad):
+            self._label(epoch, (step,), Reason.NO_HEADING)
+            return np.zeros(2), step.step_m**2 * np.eye(2)
+        along = np.array([cos(step.heading_rad), sin(step.heading_rad)])
+        across = np.array([-along[1], along[0]])
+        cross_m = step.step_m * radians(self.options.heading_sd_deg)
+        noise = self.options.step_sd_m**2 * np.outer(along, along)
+        return step.step_m * along, noise + cross_m**2 * np.outer(across, across)
+
+    def _measure(self, epoch: Epoch, given: SiteReadings) -> Reason:
+        self.unused += given.unused
+        fix = epoch.fix
+        if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
+            self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.NO_READING))
+            fix = None
+        # With a velocity, nothing but fixes tells that one stands: the estimate would coast on.
+        if fix is not None and self.own is not MOVING and fix.repeats(self.last_fix):
+            self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REPEATED_FIX))
+            fix = None
+        self.last_fix = fix or self.last_fix
+        if fix is None and not given.cells and not given.timed:
+            return Reason.UNKNOWN_CELL if epoch.radio else Reason.NO_READING
+        if self.belief is None:
+            self.belief = self._start(fix, given)
+            if self.lasts:
+                self.belief = extended_belief(self.belief, self.own, self.options.fix_lasting_m)
+        taken = fix is not None and self._update_fix(fix)
+        if given.cells or given.timed:
+            model = self.sites.of(self.layout, given.cells, given.timed)
+            step_m = self.options.timing_step_m
+            reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
+            kept_m = [self.options.level_memory_m] * len(given.cells)
+            kept_m += [self.options.timing_memory_m] * len(given.timed)
+            if self._update(self._aged(model, kept_m), reading):
+                self.moved_m, taken = 0.0, True
+        return Reason.USED if taken else Reason.UPDATE_FAILED
+
+    def _aged(self, model: GaussianTerms, kept_m: Sequence[float]) -> GaussianTerms:
+        """Return a model with noise for errors that last: reports in a row count once."""
+        growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, _LEAST_MOVED_M)))
+        return replace(model, noise=model.noise * np.outer(growth, growth))
+
+    def _start(self, fix: GnssFix | None, given: SiteReadings) -> SumBelief:
+        """Return the first belief: at a fix, on a timing advance's circle, or about a site."""
+        options, east, north = self.options, *self.where
+        mean, deviation = np.zeros(self.own.size), np.zeros(self.own.size)
+        deviation[list(self.own.velocity if self.own is MOVING else ())] = options.speed_sd_mps
+        if fix is not None:
+            mean[self.where] = fix.east_m, fix.north_m
+            deviation[self.where] = options.start_sd_m
+            return SumBelief.start(mean, np.diag(deviation**2))
+        cell = self.sites.cells[(given.timed or given.cells)[0]]
+        mean[self.where] = cell.east_m, cell.north_m
+        if not given.timed:
+            deviation[self.where] = options.start_sd_m
+            parts = {east: options.start_parts, north: options.start_parts}
+            return SumBelief.start(mean, np.diag(deviation**2), parts)
+        radius_m = (given.steps[0] + 0.5) * options.timing_step_m
+        count = min(max(round(2 * pi * radius_m / options.start_spacing_m), 8), _MOST_PARTS)
+        deviation[self.where] = max(options.start_spacing_m, 0.7 * 2 * pi * radius_m / count)
+        angle = 2 * pi * np.arange(count) / count
+        places = {
+            east: cell.east_m + radius_m * np.cos(angle),
+            north: cell.north_m + radius_m * np.sin(angle),
+        }
+        return SumBelief.around(mean, np.diag(deviation**2), places)
+
+    def _update_fix(self, fix: GnssFix) -> bool:
+        cross_m2 = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
+        noise = np.array([[fix.var_east_m2, cross_m2], [cross_m2, fix.var_north_m2]])
+        valid = np.isfinite(noise).all() and noise[0, 0] > 0 and np.linalg.det(noise) > 0
+        if not valid:
+            noise = np.eye(2) * self.options.fix_sd_m**2
+        layout = self.layout
+        if self.lasts:
+            layout, noise = fix_layout(layout), white_part(noise, self.options.fix_lasting_m)
+        return self._update(position_fix(layout, noise), [fix.east_m, fix.north_m])
+
+    def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
+        """Update with a measurement; return whether that could be done."""
+        if self.belief is None:
+            raise AssertionError("started before it measures")
+        self.belief, info = self.belief.update(compiled(model), reading, self.method)
+        if info.used:
+            self.recent_nis = [*self.recent_nis, info.nis / len(reading)][-_WINDOW:]
+        return info.used
+
+    def _label(self, epoch: Epoch, steps: Sequence[MotionStep], reason: Reason) -> None:
+        self.unused += [UnusedReading(epoch.time_s, "motion", "", reason) for _ in steps]
+
+    def _fix(self, time_s: float, reason: Reason) -> Fix:
+        if self.belief is None:
+            return Fix.nowhere(time_s, self.status, reason)
+        place = place_of(self.belief.moments, self.where)
+        self._set_status(float(place["radii_m"][2]))
+        count = self.belief.weights.size
+        if count > 1:
+            lead = self.belief.leading.covariance[np.ix_(self.where, self.where)]
+            place["mass_50m"] = share_within(lead, _WITHIN_M) * float(self.belief.weights.max())
+        return Fix(time_s, **place, status=self.status, hypotheses=count, reason=reason)
+
+    def _set_status(self, radius_m: float) -> None:
+        """Update the status: converged by the radius, lost by the innovations."""
+        lost = len(self.recent_nis) == _WINDOW and float(np.mean(self.recent_nis)) > _LOST_NIS
+        if self.status is Status.SEARCHING:
+            if radius_m <= self.options.converged_radius_m:
+                self.status = Status.CONVERGED
+        else:
+            self.status = Status.LOST if lost else Status.TRACKING
+
+
+def belief_tail(belief: SumBelief, where: list[int]) -> GaussianTail:
+    """Return the tail of a Gaussian sum about its mean; ``where`` are east and north."""
+    offsets_m = belief.means[:, where] - belief.moments.mean[where]
+    return GaussianTail(belief.weights, offsets_m, belief.covariances[:, where][:, :, where])
+
+
+def place_of(belief: Gaussian, where: list[int]) -> dict[str, Any]:
+    """Return the position of a belief as fields of a fix."""
+    covariance = belief.covariance[np.ix_(where, where)]
+    radii, mass = gaussian_radii_m(covariance, _WITHIN_M)
+    east_m, north_m = (float(value) for value in belief.mean[where])
+    return {
+        "east_m": east_m,
+        "north_m": north_m,
+        "covariance_m2": covariance,
+        "radii_m": radii,
+        "mass_50m": mass,
+        "way_id": 0,
+        "way_probability": nan,
+    }
