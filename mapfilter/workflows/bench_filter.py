@@ -21,7 +21,7 @@ from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.particle import Cloud, ParticleBelief, ParticleFilter, ParticleOptions
-from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
@@ -205,7 +205,7 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
 
 def whole_step(
     given: StepInputs, belief: ParticleBelief, jitter: Floats32, rng: np.random.Generator
-) -> Floats32:
+) -> tuple[Floats32, Floats32]:
     """Return the particles after a step that always resamples: state and what they keep."""
     model, count = given.model, belief.log_weight.size
     state, log_weight = model.move(belief.state, belief.log_weight, given.motion, draw_key(rng))
@@ -216,7 +216,9 @@ def whole_step(
     systematic(weight, rng.random(), chosen)
     copies = np.empty_like(state)
     copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
-    return np.concatenate([copies, cloud.kept[:, chosen]])
+    kept = np.empty_like(cloud.kept)
+    copied(cloud.kept, chosen, kept)
+    return copies, kept
 
 
 def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:
