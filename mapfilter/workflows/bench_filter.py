@@ -38,7 +38,7 @@ from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.simulate import run_simulate
 
 _LEVELS, _PER_ROW = 7, 20
-_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4)
+JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4)
 _TRACKS, _LENGTH_M, _CUT_M = 5, 1940.0, 300.0
 
 
@@ -188,8 +188,10 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
     # As in a filter under way, particles know of the errors of levels by an earlier report.
     cloud, _ = model.weigh(first.cloud, first.log_weight.copy(), given.reading)
     belief = replace(first, kept=cloud.kept, shared=cloud.shared)
-    rng, jitter = np.random.default_rng(1), np.array(_JITTER, np.float32)
-    always = ParticleOptions(count, count, count, resample_below=0.999999, mass_exponent=1.0)
+    rng, jitter = np.random.default_rng(1), np.array(JITTER, np.float32)
+    always = ParticleOptions(
+        count, count, count, narrow_share=1.0, resample_below=0.999999, mass_exponent=1.0
+    )
     filter_ = ParticleFilter(model, always)
 
     def by_filter() -> object:
