@@ -78,7 +78,6 @@ def weigh_by_levels(
 ) -> None:
     """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
     means = terms.gain.shape[1]
-    slots = (means - 1) // 2
     w = _F(weight)
     steps, more = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
     total, upon = np.empty(_BLOCK, np.float32), _gain_of_sums(terms)
@@ -123,7 +122,6 @@ def weigh_by_absence(
     the truncated normal distribution.
     """
     means = terms.gain.shape[1]
-    slots = (means - 1) // 2
     w = _F(weight)
     middle, last = _F(REACH_SD * STEPS_PER_SD) + _HALF, _F(2 * REACH_SD * STEPS_PER_SD)
     steps, per_sd = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
@@ -219,7 +217,6 @@ def _look_up(
 def _gain_of_sums(terms: LevelTerms) -> Floats32:
     """Return by how much the error of a term's level (row) moves with each step (column)."""
     count, means = terms.gain.shape
-    slots = (means - 1) // 2
     found = np.zeros((count, count), dtype=np.float32)
     for k in range(count):
         for m in range(k):
