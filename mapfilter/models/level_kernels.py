@@ -217,6 +217,7 @@ def _look_up(
 def _gain_of_sums(terms: LevelTerms) -> Floats32:
     """Return by how much the error of a term's level (row) moves with each step (column)."""
     count, means = terms.gain.shape
+    slots = (means - 1) // 2
     found = np.zeros((count, count), dtype=np.float32)
     for k in range(count):
         for m in range(k):
