@@ -180,14 +180,14 @@ def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInput
     absent = np.setdiff1d(np.arange(len(area.cell_ids), dtype=np.int32), cell)
     levels = LevelReport(cell, level[cell] + np.float32(3.0), absent, float(level[cell].min()), 3.0)
     reading = RadioReading(int(cell[0]), 5 / 40, levels, length_m=5.0)
+    # As in a filter under way, particles know of the errors of levels by an earlier report.
+    cloud, _ = model.weigh(belief.cloud, belief.log_weight.copy(), reading)
+    belief = replace(belief, kept=cloud.kept, shared=cloud.shared)
     return StepInputs(model, MotionStep(1.4, radians(37.0)), reading, levels), belief
 
 
 def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
-    given, first = step_inputs(model, log, count)
-    # As in a filter under way, particles know of the errors of levels by an earlier report.
-    cloud, _ = model.weigh(first.cloud, first.log_weight.copy(), given.reading)
-    belief = replace(first, kept=cloud.kept, shared=cloud.shared)
+    given, belief = step_inputs(model, log, count)
     rng, jitter = np.random.default_rng(1), np.array(JITTER, np.float32)
     always = ParticleOptions(
         count, count, count, narrow_share=1.0, resample_below=0.999999, mass_exponent=1.0

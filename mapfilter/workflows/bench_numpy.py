@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from mapfilter._types import Floats, Ints, Ints32
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import log_serving
 from mapfilter.models.level_kernels import LevelTerms
 from mapfilter.models.level_memory import LevelMemory
@@ -47,12 +48,14 @@ _TABLE_SD, _PER_SD = 8, 32
 class NumpyModel:
     """One step of the Bayes map filter's model, by whole arrays.
 
-    What all particles share of the errors of levels is prepared by the package itself.
+    What all particles share of the errors of levels is prepared by the package itself; what each
+    keeps of them is that of a belief before the step.
     """
 
-    def __init__(self, inputs: StepInputs) -> None:
+    def __init__(self, inputs: StepInputs, belief: ParticleBelief) -> None:
         self.model, self.motion = inputs.model, inputs.motion
         self.reading, self.levels = inputs.reading, inputs.levels
+        self.kept, self.shared = belief.kept.astype(np.float64), belief.shared
 
     @cached_property
     def _serving(self) -> Floats:
@@ -110,35 +113,38 @@ class NumpyModel:
         right = reading.serving_weight * self._serving[place]
         rough = 0.1 * area.flat_rough_db.reshape(area.level_dbm.shape)[pixel].astype(np.float64)
         flat = np.asarray(pixel[0] * area.lattice.cols + pixel[1], dtype=np.int32)
-        served, odds = self._served(right)
-        matched, kept = self._levels(now, rough, flat, odds)
+        memory, kept = self._aged()
+        served, after = self._served(right, memory.fault_odds(reading.serving, kept))
+        memory.fault_odds(reading.serving, kept)[:] = after
+        matched, kept = self._levels(now, rough, flat, memory, kept)
         return np.asarray(state[MAP] + served + matched), kept
 
-    def _served(self, right: Floats) -> tuple[Floats, Floats]:
+    def _aged(self) -> tuple[LevelMemory, Floats]:
+        """Return what is known of the errors of levels as the report finds it, with its cells."""
+        errors, length_m = self.model.evidence.levels, self.reading.length_m
+        memory, decay = self.shared.after(length_m)
+        kept, usual = self.kept.copy(), errors.fault_log_odds
+        kept[: decay.size] *= decay[:, None]
+        kept[decay.size :] = usual + exp(-length_m / errors.fault_m) * (kept[decay.size :] - usual)
+        first = np.array([self.reading.serving], dtype=np.int32)
+        return memory.with_cells(first, kept, in_place=True)
+
+    def _served(self, right: Floats, before: Floats) -> tuple[Floats, Floats]:
         """Return the log-likelihood of the serving cell, and the log odds of its fault."""
-        evidence = self.model.evidence
-        other = -evidence.serving.fault_nats * self.reading.serving_weight
-        before = evidence.levels.fault_log_odds
+        other = -self.model.evidence.serving.fault_nats * self.reading.serving_weight
         odds = before + other - right
         served = right + np.logaddexp(0, odds) - np.logaddexp(0, before)
         return served, np.clip(odds, -_KEPT_ODDS, _KEPT_ODDS)
 
     def _levels(
-        self, now: Floats, rough: Floats, pixel: Ints32, odds: Floats
+        self, now: Floats, rough: Floats, pixel: Ints32, memory: LevelMemory, held: Floats
     ) -> tuple[Floats, Floats]:
-        errors, report, area = self.model.evidence.levels, self.levels, self.model.area
-        predicted = self.model.prediction
-        memory = LevelMemory.empty(errors, area.site_of)
-        kept = memory.start(now.shape[0])
-        first = np.array([self.reading.serving], dtype=np.int32)
-        memory, kept = memory.with_cells(first, kept)
-        memory.fault_odds(self.reading.serving, kept)[:] = odds
+        errors, report, predicted = self.model.evidence.levels, self.levels, self.model.prediction
         report = report._replace(absent=expected_absent(predicted, pixel, report))
         cells = np.concatenate([report.cell, report.absent])[: memory.slots]
-        memory, kept = memory.with_cells(cells, kept)
+        memory, held = memory.with_cells(cells, held, in_place=True)
         memory, heard = memory.updated(report, mean_rough_db2(predicted, pixel, report.cell))
         absent, total = memory.absence(report), np.zeros(now.shape[0])
-        held = kept.astype(np.float64)
         for terms, below in ((heard, False), (absent, True)):
             for k in range(terms.cell.size):
                 total += self._one(terms, k, now, rough, held, below=below)

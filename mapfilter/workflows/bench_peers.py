@@ -1,7 +1,8 @@
 """``mapfilter bench filter --peers``: a step of the filter beside NumPy and other packages.
 
 All take the same step of the same model: motion, map, serving cell, seven levels, normalise,
-resample. Packages that are not installed are left out, and named.
+resample. What particles keep of the errors of levels is used by all; NumPy, filterpy and the filter
+also update and copy it. Packages that are not installed are left out, and named.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.database.store import open_database
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench import median_seconds
@@ -108,7 +108,7 @@ def compare(inputs: StepInputs, belief: ParticleBelief, runs: int) -> dict[str, 
     """Return nanoseconds per particle of a whole step, by package, mapfilter first."""
     count = belief.log_weight.size
     rng, jitter = np.random.default_rng(1), np.array(JITTER)
-    peer = NumpyModel(inputs)
+    peer = NumpyModel(inputs, belief)
     wide = np.vstack([belief.state.astype(np.float64), np.zeros(count)])
     steps: dict[str, tuple[Step | None, int]] = {
         NUMPY: (numpy_step(peer, jitter, rng), 1),
@@ -148,10 +148,10 @@ def memory_limit(rows: int, kept: int, count: int, runs: int) -> tuple[float, in
 
 
 def _compared(inputs: StepInputs, belief: ParticleBelief, runs: int) -> PeerStep:
-    count, model = belief.log_weight.size, inputs.model
+    count = belief.log_weight.size
     ns = compare(inputs, belief, runs)
-    kept = LevelMemory.empty(model.evidence.levels, model.area.site_of).width
-    limit_ns, limit_bytes = memory_limit(belief.state.shape[0], kept, count, runs)
+    rows, kept = belief.state.shape[0], belief.kept.shape[0]
+    limit_ns, limit_bytes = memory_limit(rows, kept, count, runs)
     ratio = {name: took / ns[OWN] for name, took in ns.items()}
     return PeerStep(count, ns, ratio, limit_ns, limit_bytes)
 

@@ -44,7 +44,7 @@ def world(tmp_path_factory):
 def test_numpy_weighs_like_the_filter(world):
     model, log = world
     inputs, belief = bench_filter.step_inputs(model, log, 4000)
-    peer = NumpyModel(inputs)
+    peer = NumpyModel(inputs, belief)
     log_weight = np.zeros(4000)
     cloud, _ = model.weigh(belief.cloud, log_weight, peer.reading)
     state = np.vstack([belief.state.astype(np.float64), np.zeros(4000)])
@@ -59,7 +59,7 @@ def test_numpy_weighs_like_the_filter(world):
 def test_numpy_moves_like_the_filter(world):
     model, log = world
     inputs, belief = bench_filter.step_inputs(model, log, 40_000)
-    peer = NumpyModel(inputs)
+    peer = NumpyModel(inputs, belief)
     moved, weighed = model.move(belief.state, np.zeros(40_000), peer.motion, np.uint64(7))
     state = np.vstack([belief.state.astype(np.float64), np.zeros(40_000)])
     other = peer.move(state, np.random.default_rng(3))
@@ -74,7 +74,7 @@ def test_numpy_moves_like_the_filter(world):
 def test_all_that_take_the_step_agree(world):
     model, log = world
     inputs, belief = bench_filter.step_inputs(model, log, 20_000)
-    peer = NumpyModel(inputs)
+    peer = NumpyModel(inputs, belief)
     state = np.vstack([belief.state.astype(np.float64), np.zeros(20_000)])
     rng = np.random.default_rng(4)
     jitter = np.array([0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4])
