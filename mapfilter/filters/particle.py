@@ -70,7 +70,7 @@ class ParticleOptions(Options):
     max_particles: _Count = 20_000
     min_search_particles: _Count = 12_000
     min_particles: _Count = 3000
-    narrow_share: Annotated[float, Gt(0), Le(1)] = 1 / 3
+    narrow_share: Annotated[float, Gt(0), Le(1)] = 1.0
     full_search_bins: Positive = 24.0
     full_bins: Positive = 12.0
     particles_per_bin: Positive = 60.0
@@ -94,17 +94,17 @@ class ParticleOptions(Options):
 
         Examples
         --------
-        >>> options = ParticleOptions()
+        >>> options = ParticleOptions(narrow_share=0.5)
         >>> [options.wanted(bins, searching=True) for bins in (2.0, 12.0, 40.0, 300.0)]
-        [4000, 6000, 12000, 18000]
+        [6000, 6000, 12000, 18000]
         >>> [options.wanted(bins, searching=False) for bins in (2.0, 6.0, 40.0, 300.0)]
-        [1000, 1500, 3000, 18000]
+        [1500, 1500, 3000, 18000]
         """
         least = self.min_search_particles if searching else self.min_particles
         full_bins = self.full_search_bins if searching else self.full_bins
         share = min(max(effective_bins / full_bins, self.narrow_share), 1.0)
         by_bins = self.particles_per_bin * effective_bins
-        return round(min(max(by_bins, share * least), self.max_particles))
+        return int(min(max(by_bins, share * least), self.max_particles))
 
 
 def switched(

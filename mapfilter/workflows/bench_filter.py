@@ -189,9 +189,7 @@ def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInput
 def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
     given, belief = step_inputs(model, log, count)
     rng, jitter = np.random.default_rng(1), np.array(JITTER, np.float32)
-    always = ParticleOptions(
-        count, count, count, narrow_share=1.0, resample_below=0.999999, mass_exponent=1.0
-    )
+    always = ParticleOptions(count, count, count, resample_below=0.999999, mass_exponent=1.0)
     filter_ = ParticleFilter(model, always)
 
     def by_filter() -> object:

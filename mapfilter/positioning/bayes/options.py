@@ -48,6 +48,9 @@ _VEHICLE_MOTION: Mapping[str, float] = {
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
 
+_NARROW_SHARE = 0.5
+"""Share of the least numbers of particles that is enough for a narrow belief."""
+
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
 _CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
@@ -111,9 +114,10 @@ class BayesFilter(Options):
     max_particles : int
         Most particles.
     min_search_particles : int
-        Least number of particles until the filter has converged.
+        Least number of particles until the filter has converged; down to half of it while few
+        places are left.
     min_particles : int
-        Least number of particles afterwards.
+        Least number of particles afterwards; down to half of it while the belief is narrow.
     switch_mass : float
         Share of the belief within 50 m of the leading hypothesis from which on the filter has
         converged.
@@ -240,6 +244,7 @@ class BayesFilter(Options):
             max_particles=self.max_particles,
             min_search_particles=self.min_search_particles,
             min_particles=self.min_particles,
+            narrow_share=_NARROW_SHARE,
             switch_mass=self.switch_mass,
             switch_hold_m=self.switch_hold_m,
         )
