@@ -51,10 +51,18 @@ class Prediction(NamedTuple):
     share: float
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def decayed(kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float) -> Floats32:
     """Return what hypotheses keep, (W, N), after a distance."""
+    # NumPy asks for large pages, numba for many small ones.
     now = np.empty_like(kept)
+    _decay(kept, decay, fault_keep, fault_log_odds, now)
+    return now
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def _decay(
+    kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float, now: Floats32
+) -> None:
     means = decay.size
     keep, usual = _F(fault_keep), _F(fault_log_odds)
     for d in range(means):
@@ -64,7 +72,6 @@ def decayed(kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: 
     for d in range(means, kept.shape[0]):
         for i in range(kept.shape[1]):
             now[d, i] = usual + (kept[d, i] - usual) * keep
-    return now
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
