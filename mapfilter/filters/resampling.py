@@ -92,7 +92,7 @@ def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
         passed += weight[i]
         end = passed * most - offset
         end = end if end < most else most
-        begin = max(np.int64(np.ceil(end)), begin)
+        begin = max(int(np.ceil(end)), begin)
         if begin == count:
             break
     if begin < count:

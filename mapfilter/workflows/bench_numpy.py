@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from math import exp
+from typing import Any
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -55,7 +56,8 @@ class NumpyModel:
     def __init__(self, inputs: StepInputs, belief: ParticleBelief) -> None:
         self.model, self.motion = inputs.model, inputs.motion
         self.reading, self.levels = inputs.reading, inputs.levels
-        self.kept, self.shared = belief.kept.astype(np.float64), belief.shared
+        self.kept: Floats = belief.kept.astype(np.float64)
+        self.shared: LevelMemory = belief.shared
 
     @cached_property
     def _serving(self) -> Floats:
@@ -116,20 +118,22 @@ class NumpyModel:
         memory, kept = self._aged()
         served, after = self._served(right, memory.fault_odds(reading.serving, kept))
         memory.fault_odds(reading.serving, kept)[:] = after
-        matched, kept = self._levels(now, rough, flat, memory, kept)
-        return np.asarray(state[MAP] + served + matched), kept
+        matched, held = self._levels(now, rough, flat, memory, kept)
+        return np.asarray(state[MAP] + served + matched), held
 
-    def _aged(self) -> tuple[LevelMemory, Floats]:
+    def _aged(self) -> tuple[LevelMemory, Any]:
         """Return what is known of the errors of levels as the report finds it, with its cells."""
         errors, length_m = self.model.evidence.levels, self.reading.length_m
         memory, decay = self.shared.after(length_m)
-        kept, usual = self.kept.copy(), errors.fault_log_odds
+        # The memory takes single precision or double alike.
+        kept: Any = self.kept.copy()
+        usual = errors.fault_log_odds
         kept[: decay.size] *= decay[:, None]
         kept[decay.size :] = usual + exp(-length_m / errors.fault_m) * (kept[decay.size :] - usual)
         first = np.array([self.reading.serving], dtype=np.int32)
         return memory.with_cells(first, kept, in_place=True)
 
-    def _served(self, right: Floats, before: Floats) -> tuple[Floats, Floats]:
+    def _served(self, right: Floats, before: Any) -> tuple[Floats, Floats]:
         """Return the log-likelihood of the serving cell, and the log odds of its fault."""
         other = -self.model.evidence.serving.fault_nats * self.reading.serving_weight
         odds = before + other - right
@@ -137,7 +141,7 @@ class NumpyModel:
         return served, np.clip(odds, -_KEPT_ODDS, _KEPT_ODDS)
 
     def _levels(
-        self, now: Floats, rough: Floats, pixel: Ints32, memory: LevelMemory, held: Floats
+        self, now: Floats, rough: Floats, pixel: Ints32, memory: LevelMemory, held: Any
     ) -> tuple[Floats, Floats]:
         errors, report, predicted = self.model.evidence.levels, self.levels, self.model.prediction
         report = report._replace(absent=expected_absent(predicted, pixel, report))
