@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.special import log_ndtr
 
-from mapfilter._types import Floats, Ints, Ints32
+from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import log_serving
 from mapfilter.models.level_kernels import LevelTerms
@@ -141,7 +141,7 @@ class NumpyModel:
         return served, np.clip(odds, -_KEPT_ODDS, _KEPT_ODDS)
 
     def _levels(
-        self, now: Floats, rough: Floats, pixel: Ints32, memory: LevelMemory, held: Any
+        self, now: Floats32, rough: Floats, pixel: Ints32, memory: LevelMemory, held: Any
     ) -> tuple[Floats, Floats]:
         errors, report, predicted = self.model.evidence.levels, self.levels, self.model.prediction
         report = report._replace(absent=expected_absent(predicted, pixel, report))
@@ -155,7 +155,7 @@ class NumpyModel:
         return errors.weight * total, held
 
     def _one(
-        self, terms: LevelTerms, k: int, now: Floats, rough: Floats, kept: Floats, *, below: bool
+        self, terms: LevelTerms, k: int, now: Floats32, rough: Floats, kept: Floats, *, below: bool
     ) -> Floats:
         """Return the log-likelihood of one level or absence, and update what particles keep."""
         means = terms.gain.shape[1]
