@@ -41,10 +41,9 @@ class ParticleOptions(Options):
         Lower limit until the filter has converged: a place that is improbable at first must keep
         enough of them to be followed.
     narrow_share : float
-        Share of these lower limits that is enough for the narrowest belief,
-    full_search_bins, full_bins : float
-        and from how many bins of 25 m on they are needed in full, until it has converged and
-        afterwards; in between they follow the number of bins.
+        Share of ``min_particles`` that is enough for the narrowest belief once it has converged.
+    full_bins : float
+        From so many bins of 25 m on all of them are needed; below, they follow the number of bins.
     particles_per_bin : float
         Particles for each bin of 25 m that the belief covers (two to the power of its entropy).
     resample_below : float
@@ -71,7 +70,6 @@ class ParticleOptions(Options):
     min_search_particles: _Count = 12_000
     min_particles: _Count = 3000
     narrow_share: Annotated[float, Gt(0), Le(1)] = 1.0
-    full_search_bins: Positive = 24.0
     full_bins: Positive = 12.0
     particles_per_bin: Positive = 60.0
     resample_below: Probability = 0.5
@@ -95,16 +93,19 @@ class ParticleOptions(Options):
         Examples
         --------
         >>> options = ParticleOptions(narrow_share=0.5)
-        >>> [options.wanted(bins, searching=True) for bins in (2.0, 12.0, 40.0, 300.0)]
-        [6000, 6000, 12000, 18000]
+        >>> [options.wanted(bins, searching=True) for bins in (2.0, 40.0, 300.0)]
+        [12000, 12000, 18000]
         >>> [options.wanted(bins, searching=False) for bins in (2.0, 6.0, 40.0, 300.0)]
         [1500, 1500, 3000, 18000]
         """
-        least = self.min_search_particles if searching else self.min_particles
-        full_bins = self.full_search_bins if searching else self.full_bins
-        share = min(max(effective_bins / full_bins, self.narrow_share), 1.0)
+        # A search needs all of them, however few places are left: each place has errors of headings
+        # of its own.
+        least: float = self.min_search_particles
+        if not searching:
+            share = min(max(effective_bins / self.full_bins, self.narrow_share), 1.0)
+            least = share * self.min_particles
         by_bins = self.particles_per_bin * effective_bins
-        return int(min(max(by_bins, share * least), self.max_particles))
+        return int(min(max(by_bins, least), self.max_particles))
 
 
 def switched(

@@ -49,7 +49,7 @@ _VEHICLE_MOTION: Mapping[str, float] = {
 _VEHICLE_LEAVES_PER_M = 3e-4
 
 _NARROW_SHARE = 0.5
-"""Share of the least numbers of particles that is enough for a narrow belief."""
+"""Share of the least number of particles that is enough for a narrow belief."""
 
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
@@ -114,8 +114,7 @@ class BayesFilter(Options):
     max_particles : int
         Most particles.
     min_search_particles : int
-        Least number of particles until the filter has converged; down to half of it while few
-        places are left.
+        Least number of particles until the filter has converged.
     min_particles : int
         Least number of particles afterwards; down to half of it while the belief is narrow.
     switch_mass : float
