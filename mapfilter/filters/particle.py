@@ -40,10 +40,6 @@ class ParticleOptions(Options):
     min_search_particles : int
         Lower limit until the filter has converged: a place that is improbable at first must keep
         enough of them to be followed.
-    narrow_share : float
-        Share of ``min_particles`` that is enough for the narrowest belief once it has converged.
-    full_bins : float
-        From so many bins of 25 m on all of them are needed; below, they follow the number of bins.
     particles_per_bin : float
         Particles for each bin of 25 m that the belief covers (two to the power of its entropy).
     resample_below : float
@@ -69,8 +65,6 @@ class ParticleOptions(Options):
     max_particles: _Count = 20_000
     min_search_particles: _Count = 12_000
     min_particles: _Count = 3000
-    narrow_share: Annotated[float, Gt(0), Le(1)] = 1.0
-    full_bins: Positive = 12.0
     particles_per_bin: Positive = 60.0
     resample_below: Probability = 0.5
     mass_exponent: Annotated[float, Gt(0), Le(1)] = 0.5
@@ -86,26 +80,6 @@ class ParticleOptions(Options):
             found = f"{self.min_particles} and {self.max_particles}"
             where = "ParticleOptions, min_particles and max_particles"
             faults.add(where, "min_particles <= max_particles", found)
-
-    def wanted(self, effective_bins: float, *, searching: bool) -> int:
-        """Return the number of particles for a belief that covers so many bins.
-
-        Examples
-        --------
-        >>> options = ParticleOptions(narrow_share=0.5)
-        >>> [options.wanted(bins, searching=True) for bins in (2.0, 40.0, 300.0)]
-        [12000, 12000, 18000]
-        >>> [options.wanted(bins, searching=False) for bins in (2.0, 6.0, 40.0, 300.0)]
-        [1500, 1500, 3000, 18000]
-        """
-        # A search needs all of them, however few places are left: each place has errors of headings
-        # of its own.
-        least: float = self.min_search_particles
-        if not searching:
-            share = min(max(effective_bins / self.full_bins, self.narrow_share), 1.0)
-            least = share * self.min_particles
-        by_bins = self.particles_per_bin * effective_bins
-        return int(min(max(by_bins, least), self.max_particles))
 
 
 def switched(
@@ -308,7 +282,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         if searching and options.mass_exponent < 1:
             weight = flattened(state, weight, belief.bins, options.mass_exponent)
             effective = 1.0 / float(np.dot(weight, weight))
-        wanted = options.wanted(summary.effective_bins, searching=searching)
+        least = options.min_search_particles if searching else options.min_particles
+        by_bins = options.particles_per_bin * summary.effective_bins
+        wanted = int(min(max(by_bins, least), options.max_particles))
         if effective < options.resample_below * weight.size or 2 * wanted < weight.size:
             chosen = np.empty(wanted, dtype=np.int32)
             systematic(weight, rng.random(), chosen)

@@ -117,16 +117,6 @@ def test_which_jitter_parts_copies():
     assert found.state[1].std() > 0.6
 
 
-def test_a_narrow_belief_takes_a_share_of_the_least_number():
-    # Two bins of one half each; none less until it has converged.
-    options = {"mass_exponent": 1.0, "min_search_particles": 20, "particles_per_bin": 0.1}
-    assert updated(0.0, **options, narrow_share=0.1, full_bins=8.0)[1].hypotheses == 20
-    options |= {"switch_mass": 0.4, "switch_hold_m": 0.0, "min_particles": 12}
-    for share, full_bins, count in ((1.0, 8.0, 12), (0.5, 8.0, 6), (0.1, 8.0, 3), (0.1, 1.0, 12)):
-        _, info = updated(0.0, **options, narrow_share=share, full_bins=full_bins)
-        assert (info.status, info.hypotheses) == (Status.CONVERGED, count)
-
-
 class Remembering(Two):
     """Keeps where each particle stands, and counts readings for all of them."""
 

@@ -48,9 +48,6 @@ _VEHICLE_MOTION: Mapping[str, float] = {
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
 
-_NARROW_SHARE = 0.5
-"""Share of the least number of particles that is enough for a narrow belief."""
-
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
 _CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
@@ -116,7 +113,7 @@ class BayesFilter(Options):
     min_search_particles : int
         Least number of particles until the filter has converged.
     min_particles : int
-        Least number of particles afterwards; down to half of it while the belief is narrow.
+        Least number of particles afterwards.
     switch_mass : float
         Share of the belief within 50 m of the leading hypothesis from which on the filter has
         converged.
@@ -243,7 +240,6 @@ class BayesFilter(Options):
             max_particles=self.max_particles,
             min_search_particles=self.min_search_particles,
             min_particles=self.min_particles,
-            narrow_share=_NARROW_SHARE,
             switch_mass=self.switch_mass,
             switch_hold_m=self.switch_hold_m,
         )
