@@ -11,6 +11,7 @@ import typer
 from typer.main import get_command
 
 from mapfilter._io import VERSION
+from mapfilter._memory import keep_freed_memory
 from mapfilter.cli.chain import (
     bound,
     build,
@@ -93,5 +94,6 @@ def main() -> None:
     # Work is shared between processes, and matrices are small: threads of BLAS, which read this
     # when NumPy is loaded, would take several times as long, most of it waiting for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    keep_freed_memory()
     # The command itself, because a Typer app puts its own hook for exceptions in place.
     sys.exit(guarded(get_command(app)))

@@ -124,12 +124,18 @@ def bench(
         str, typer.Argument(metavar="[NAME]", help="build, filter, fusion or sweep.")
     ] = "build",
     runs: Annotated[int, typer.Option("--runs", min=1, help="Runs; medians are reported.")] = 5,
+    peers: Annotated[
+        bool,
+        typer.Option(
+            "--peers", help="Filter: a step beside NumPy, particles, Stone Soup and filterpy."
+        ),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure how fast a stage is on this machine."""
     from mapfilter.workflows.bench import run_bench
 
-    print_result(run_bench(stage, runs=runs), as_json)
+    print_result(run_bench(stage, runs=runs, peers=peers), as_json)
 
 
 def evaluate(

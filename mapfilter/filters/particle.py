@@ -21,7 +21,7 @@ from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
-from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
 from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 _Count = Annotated[int, Ge(1)]
@@ -295,7 +295,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             # the last one though its weight is none.
             chosen_by = np.maximum(weight[chosen], np.finfo(np.float32).tiny)
             log_weight = log_weight[chosen] - np.log(chosen_by)
-            state, kept = copies, np.take(kept, chosen, axis=1)
+            state, before = copies, kept
+            kept = np.empty((before.shape[0], wanted), dtype=np.float32)
+            copied(before, chosen, kept)
             normalise(log_weight, np.empty(wanted, dtype=np.float32))
         now = ParticleBelief(
             state,

@@ -12,6 +12,8 @@ from numba import njit
 from mapfilter._kernels import exp32, hashed, normals
 from mapfilter._types import Floats, Floats32, Ints32
 
+_BLOCK = 1024
+
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
@@ -79,13 +81,48 @@ def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
     [0, 0, 2, 2]
     """
     count, last = chosen.size, weight.size - 1
-    passed, i = float(weight[0]), 0
-    for j in range(count):
-        place = (j + offset) / count
-        while passed <= place and i < last:
-            i += 1
-            passed += weight[i]
-        chosen[j] = i
+    if not count:
+        return
+    chosen[:] = 0
+    # Each particle is written where its copies begin, over those before it that have none: nothing
+    # depends on a comparison that is hard to foresee.
+    passed, begin, most = 0.0, 0, np.float64(count)
+    for i in range(last):
+        chosen[begin] = i
+        passed += weight[i]
+        end = passed * most - offset
+        end = end if end < most else most
+        begin = max(int(np.ceil(end)), begin)
+        if begin == count:
+            break
+    if begin < count:
+        chosen[begin] = last
+    for j in range(1, count):
+        chosen[j] = max(chosen[j], chosen[j - 1])
+
+
+@njit(error_model="numpy", cache=True)
+def copied(kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
+    """Copy the chosen columns of ``kept`` (W, N) to ``copies`` (W, M)."""
+    rows = kept.shape[0]
+    fours = rows // 4 * 4
+    # A block of indices stays in the cache; each is loaded once for four rows.
+    for first in range(0, chosen.size, _BLOCK):
+        at = chosen[first : first + _BLOCK]
+        for r in range(0, fours, 4):
+            a, b, c, d = kept[r], kept[r + 1], kept[r + 2], kept[r + 3]
+            to_a, to_b = copies[r, first:], copies[r + 1, first:]
+            to_c, to_d = copies[r + 2, first:], copies[r + 3, first:]
+            for j in range(at.size):
+                i = np.uint32(at[j])
+                to_a[j] = a[i]
+                to_b[j] = b[i]
+                to_c[j] = c[i]
+                to_d[j] = d[i]
+        for r in range(fours, rows):
+            row, to = kept[r], copies[r, first:]
+            for j in range(at.size):
+                to[j] = row[np.uint32(at[j])]
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)

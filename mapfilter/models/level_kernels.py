@@ -18,7 +18,8 @@ from mapfilter.models.cell_faults import mixed
 from mapfilter.models.fingerprint import REACH_SD, STEPS_PER_SD
 
 _F = np.float32
-_BLOCK = 256
+_BLOCK = 128
+"""Hypotheses of a block: what they keep, and the steps of a report, fit into the first cache."""
 _HALF, _ONE, _ZERO = _F(0.5), _F(1.0), _F(0.0)
 _LOG_ROOT_TWO_PI = _F(0.9189385)
 
@@ -50,10 +51,18 @@ class Prediction(NamedTuple):
     share: float
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def decayed(kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float) -> Floats32:
     """Return what hypotheses keep, (W, N), after a distance."""
+    # NumPy asks for large pages, numba for many small ones.
     now = np.empty_like(kept)
+    _decay(kept, decay, fault_keep, fault_log_odds, now)
+    return now
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def _decay(
+    kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float, now: Floats32
+) -> None:
     means = decay.size
     keep, usual = _F(fault_keep), _F(fault_log_odds)
     for d in range(means):
@@ -63,7 +72,6 @@ def decayed(kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: 
     for d in range(means, kept.shape[0]):
         for i in range(kept.shape[1]):
             now[d, i] = usual + (kept[d, i] - usual) * keep
-    return now
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -77,28 +85,30 @@ def weigh_by_levels(
 ) -> None:
     """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
     means = terms.gain.shape[1]
-    slots = (means - 1) // 2
     w = _F(weight)
-    innovation, more = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
-    total = np.empty(_BLOCK, np.float32)
+    steps, more = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
+    total, upon = np.empty(_BLOCK, np.float32), _gain_of_sums(terms)
     for first in range(0, pixel.size, _BLOCK):
         count = min(_BLOCK, pixel.size - first)
         total[:] = _ZERO
         for k in range(terms.cell.size):
-            s, cell = terms.slot[k], terms.cell[k]
+            s, cell, innovation = terms.slot[k], terms.cell[k], steps[k]
             _look_up(predicted, pixel[first:], count, cell, innovation, more)
-            slow, fast = kept[s, first:], kept[slots + s, first:]
-            device, odds = kept[means - 1, first:], kept[means + s, first:]
-            level, own, other = terms.level_dbm[k], terms.variance_db2[k], terms.other[k]
+            _less_errors(kept, first, count, s, terms.level_dbm[k], innovation)
+            _less_steps(upon[k], steps, k, count, innovation)
+            odds = kept[means + s, first:]
+            own, other = terms.variance_db2[k], terms.other[k]
+            # Two loops of half the length: more hypotheses are under way at a time.
             for j in range(count):
-                v = level - innovation[j] - slow[j] - fast[j] - device[j]
-                variance = own + more[j]
+                v, variance = innovation[j], own + more[j]
                 per = _ONE / variance
-                right = -_HALF * (v * v * per + log32(variance))
-                fine, gained, odds[j] = mixed(odds[j], other, right)
+                more[j] = -_HALF * (v * v * per + log32(variance))
+                innovation[j] = v * own * per
+            for j in range(count):
+                fine, gained, odds[j] = mixed(odds[j], other, more[j])
                 total[j] += gained
-                innovation[j] = fine * v * own * per
-            _corrected(kept, first, count, terms.gain[k], innovation)
+                innovation[j] = fine * innovation[j]
+        _corrected(kept, first, count, terms.gain, steps)
         for j in range(count):
             log_weight[first + j] += w * total[j]
 
@@ -119,24 +129,24 @@ def weigh_by_absence(
     the truncated normal distribution.
     """
     means = terms.gain.shape[1]
-    slots = (means - 1) // 2
     w = _F(weight)
     middle, last = _F(REACH_SD * STEPS_PER_SD) + _HALF, _F(2 * REACH_SD * STEPS_PER_SD)
-    below, per_sd = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
+    steps, per_sd = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
     right, total = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
-    place = np.empty(_BLOCK, np.int32)
+    place, upon = np.empty(_BLOCK, np.int32), _gain_of_sums(terms)
     for first in range(0, pixel.size, _BLOCK):
         count = min(_BLOCK, pixel.size - first)
         total[:] = _ZERO
         for k in range(terms.cell.size):
-            s, cell = terms.slot[k], terms.cell[k]
+            s, cell, below = terms.slot[k], terms.cell[k], steps[k]
             _look_up(predicted, pixel[first:], count, cell, below, per_sd)
-            slow, fast = kept[s, first:], kept[slots + s, first:]
-            device, odds = kept[means - 1, first:], kept[means + s, first:]
-            limit, own, other = terms.level_dbm[k], terms.variance_db2[k], terms.other[k]
+            _less_errors(kept, first, count, s, terms.level_dbm[k], below)
+            _less_steps(upon[k], steps, k, count, below)
+            odds = kept[means + s, first:]
+            own, other = terms.variance_db2[k], terms.other[k]
             for j in range(count):
                 per = _ONE / np.sqrt(own + per_sd[j])
-                z = (limit - below[j] - slow[j] - fast[j] - device[j]) * per
+                z = below[j] * per
                 at_step = z * _F(STEPS_PER_SD) + middle
                 at_step = at_step if at_step > _ZERO else _ZERO
                 at_step = at_step if at_step < last else last
@@ -151,7 +161,7 @@ def weigh_by_absence(
                 hazard = exp32(-_HALF * z * z - _LOG_ROOT_TWO_PI - right[j])
                 hazard = hazard if z < _F(6.0) else _ZERO
                 below[j] = -fine * hazard * own * per_sd[j]
-            _corrected(kept, first, count, terms.gain[k], below)
+        _corrected(kept, first, count, terms.gain, steps)
         for j in range(count):
             log_weight[first + j] += w * total[j]
 
@@ -211,11 +221,70 @@ def _look_up(
 
 
 @njit(inline="always")
-def _corrected(kept: Floats32, first: int, count: int, gain: Floats32, step: Floats32) -> None:
-    """Add the gains times the steps of a block of hypotheses to the means, in place."""
-    for d in range(gain.size):
-        by = gain[d]
+def _gain_of_sums(terms: LevelTerms) -> Floats32:
+    """Return by how much the error of a term's level (row) moves with each step (column)."""
+    count, means = terms.gain.shape
+    slots = (means - 1) // 2
+    found = np.zeros((count, count), dtype=np.float32)
+    for k in range(count):
+        for m in range(k):
+            gain, s = terms.gain[m], terms.slot[k]
+            found[k, m] = gain[s] + gain[slots + s] + gain[means - 1]
+    return found
+
+
+@njit(inline="always")
+def _less_errors(
+    kept: Floats32, first: int, count: int, slot: int, level_dbm: np.float32, predicted: Floats32
+) -> None:
+    """Replace predicted levels of a block by how far a level is above them and their errors."""
+    slots = (kept.shape[0] - 1) // 3
+    slow, fast = kept[slot, first:], kept[slots + slot, first:]
+    device = kept[2 * slots, first:]
+    for j in range(count):
+        predicted[j] = level_dbm - predicted[j] - slow[j] - fast[j] - device[j]
+
+
+@njit(inline="always")
+def _less_steps(
+    gain: Floats32, steps: Floats32, known: int, count: int, innovation: Floats32
+) -> None:
+    """Take from innovations what the known steps have moved the errors by, in place."""
+    for m in range(known):
+        by, step = gain[m], steps[m]
+        for j in range(count):
+            innovation[j] -= by * step[j]
+
+
+@njit(inline="always")
+def _corrected(kept: Floats32, first: int, count: int, gain: Floats32, steps: Floats32) -> None:
+    """Add the gains (K, D) times the steps (K, block) to the means of a block, in place."""
+    terms = gain.shape[0]
+    fours = terms // 4 * 4
+    half = (gain.shape[1] - 1) // 2
+    # Slow and fast errors take the same steps, four of which are added at a time.
+    for d in range(half):
+        row, other = kept[d, first:], kept[half + d, first:]
+        for k in range(0, fours, 4):
+            a, b, c, e = gain[k, d], gain[k + 1, d], gain[k + 2, d], gain[k + 3, d]
+            m = half + d
+            f, g, h, i = gain[k, m], gain[k + 1, m], gain[k + 2, m], gain[k + 3, m]
+            one, two, three, four = steps[k], steps[k + 1], steps[k + 2], steps[k + 3]
+            none = (a == _ZERO) & (b == _ZERO) & (c == _ZERO) & (e == _ZERO)
+            if not (none & (f == _ZERO) & (g == _ZERO) & (h == _ZERO) & (i == _ZERO)):
+                for j in range(count):
+                    p, q, r, s = one[j], two[j], three[j], four[j]
+                    row[j] += (a * p + b * q) + (c * r + e * s)
+                    other[j] += (f * p + g * q) + (h * r + i * s)
+        for k in range(fours, terms):
+            a, b, step = gain[k, d], gain[k, half + d], steps[k]
+            if (a != _ZERO) | (b != _ZERO):
+                for j in range(count):
+                    row[j] += a * step[j]
+                    other[j] += b * step[j]
+    row = kept[2 * half, first:]
+    for k in range(terms):
+        by, step = gain[k, 2 * half], steps[k]
         if by != _ZERO:
-            row = kept[d, first:]
             for j in range(count):
                 row[j] += by * step[j]

@@ -120,11 +120,13 @@ class LevelMemory:
         found = self.errors.common_share + self.errors.site_share * same_site + own * same
         return np.asarray(found, dtype=np.float64)
 
-    def with_cells(self, bands: Ints32, kept: Floats32) -> tuple[LevelMemory, Floats32]:
+    def with_cells(
+        self, bands: Ints32, kept: Floats32, *, in_place: bool = False
+    ) -> tuple[LevelMemory, Floats32]:
         """Give cells slots; those unused for longest lose theirs.
 
         The errors of new cells are expected from those of the others, by their correlation. Returns
-        the memory and what the hypotheses keep, (width, N).
+        the memory and what the hypotheses keep, (width, N), which ``in_place`` is ``kept`` itself.
         """
         slot_of = self.slot_of
         wanted = [band for band in bands.tolist() if band not in slot_of]
@@ -156,9 +158,10 @@ class LevelMemory:
         prior[np.ix_(held_now, held_now)] = self.errors.slow_db**2 * correlation
         prior[np.ix_(slots + held_now, slots + held_now)] = self.errors.fast_db**2 * correlation
         prior[-1, -1] = self.errors.device_db**2
-        kept = kept.copy()
+        if not in_place:
+            kept = kept.copy()
         for part in (0, slots):
-            kept[part + at] = by.astype(np.float32) @ kept[part + rest]
+            kept[part + at] = by.astype(np.float32) @ kept[part + rest] if rest.size else 0.0
         kept[2 * slots + 1 + at] = self.errors.fault_log_odds
         other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
         other_dbm[at], other_db2[at], used[at] = OTHER_DBM, OTHER_SD_DB**2, self.reports

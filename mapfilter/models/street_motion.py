@@ -193,7 +193,8 @@ def move(
         errors.disturbed_rad,
     )
     long_m = step_m * exp(0.5 * white_rad**2)
-    moved: Floats32 = _move(state, long_m, length, heading_rad, noise, key)
+    moved = np.empty_like(state)
+    _move(state, long_m, length, heading_rad, noise, key, moved)
     return moved
 
 
@@ -220,14 +221,14 @@ def _move(
     heading_rad: float,
     noise: _Noise,
     key: np.uint64,
-) -> Floats32:
+    moved: Floats32,
+) -> None:
     long, length, heading = _F(step_m), _F(length_m), _F(heading_rad)
     along_sd, across_sd = _F(noise.along_m), _F(noise.across_m)
     bias_sd, scale_sd = _F(noise.bias_rad), _F(noise.scale)
     turn_keep, turn_sd = _F(noise.turn_keep), _F(noise.turn_rad)
     stretch_keep, stretch_sd = _F(noise.stretch_keep), _F(noise.stretch)
     jump, jump_sd = _F(noise.jump), _F(noise.jump_rad)
-    moved = np.empty_like(state)
     count = state.shape[1]
     east, north, bias, scale = state[0], state[1], state[2], state[3]
     turn, stretch, rate = state[5], state[6], state[7]
@@ -254,7 +255,6 @@ def _move(
         to_east[i] = east[i] + (along * cosine - across * sine)
         to_north[i] = north[i] + (along * sine + across * cosine)
     moved[7:] = state[7:]
-    return moved
 
 
 def remounted(

@@ -40,6 +40,7 @@ from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:
     from mapfilter.workflows.bench_filter import FilterBench
+    from mapfilter.workflows.bench_peers import PeersBench
     from mapfilter.workflows.bench_sweep import SweepBench
 
 CRS = "EPSG:32629"
@@ -90,11 +91,26 @@ class BuildBench:
 
 
 def run_bench(
-    stage: str, *, rasters: int = 10, side_px: int = 3000, points: int = 100_000, runs: int = 5
-) -> BuildBench | FilterBench | FusionBench | SweepBench:
-    """Measure a stage on generated inputs; a filter and a sweep on the embedded map."""
+    stage: str,
+    *,
+    rasters: int = 10,
+    side_px: int = 3000,
+    points: int = 100_000,
+    runs: int = 5,
+    peers: bool = False,
+) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench:
+    """Measure a stage on generated inputs; a filter and a sweep on the embedded map.
+
+    ``peers`` is whether a step of the filter is compared with other packages instead.
+    """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
+    if peers:
+        if stage != "filter":
+            raise fail(ConfigError, "bench --peers", "the stage filter", stage)
+        from mapfilter.workflows.bench_peers import bench_peers
+
+        return bench_peers(runs=runs)
     if stage == "filter":
         from mapfilter.workflows.bench_filter import bench_filter
 

@@ -22,7 +22,7 @@ from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import flattened, summarise
 from mapfilter.filters.particle import Cloud
-from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
 from mapfilter.models.level_errors import LevelReport
@@ -91,6 +91,7 @@ def compile_resampling() -> None:
     protected_m(tail, np.zeros(3))
     systematic(weight, 0.5, chosen)
     jitter, copies = np.ones(STATES, dtype=np.float32), np.empty_like(cloud.state)
+    copied(cloud.state, chosen, copies)
     copy_with_jitter(cloud.state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
 
 

@@ -48,6 +48,14 @@ def test_same_key_same_numbers(drawn):
     assert again.tobytes() == drawn.tobytes()
 
 
+@pytest.mark.parametrize("bits", [np.random.PCG64, np.random.PCG64DXSM, np.random.MT19937])
+def test_a_key_is_a_whole_number_of_64_bits_whatever_the_generator(bits):
+    one, other = np.random.Generator(bits(3)), np.random.Generator(bits(3))
+    for _ in range(5):
+        assert draw_key(one) == other.integers(0, 2**64, dtype=np.uint64)
+    assert one.random() == other.random()
+
+
 def test_functions_agree_with_numpy():
     x = np.linspace(1e-3, 20.0, 5001).astype(np.float32)
     out = np.empty((5, x.size), dtype=np.float32)

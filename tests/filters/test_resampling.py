@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter._kernels import draw_key
-from mapfilter.filters.resampling import copy_with_jitter, log_sum, normalise, systematic
+from mapfilter.filters.resampling import copied, copy_with_jitter, log_sum, normalise, systematic
 
 
 def test_log_weights_are_brought_to_sum_to_one():
@@ -37,6 +37,43 @@ def test_copies_differ_by_less_than_one_from_their_due(shares, offset, count):
     copies = np.bincount(chosen, minlength=weight.size)
     assert np.all(np.abs(copies - count * weight.astype(np.float64)) < 1 + 1e-3)
     assert np.all(np.diff(chosen) >= 0)
+
+
+def one_after_another(weight, offset, count):
+    """Systematic resampling as it is defined: each place is looked up in the sums of weights."""
+    found, passed, i = [], float(weight[0]), 0
+    for j in range(count):
+        while passed <= (j + offset) / count and i < weight.size - 1:
+            i += 1
+            passed += float(weight[i])
+        found.append(i)
+    return found
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 1e-6, 0.03, 0.5, 1.0]), min_size=1, max_size=40),
+    st.floats(0, 1, exclude_max=True),
+    st.integers(0, 70),
+)
+@settings(max_examples=300, deadline=None)
+def test_copies_are_those_of_a_search_for_each(shares, offset, count):
+    weight = np.array([*shares, 0.25], dtype=np.float32)
+    weight /= weight.sum()
+    # Away from ties, which rounding decides.
+    offset = round(offset, 3) + 1.7e-4
+    chosen = np.empty(count, dtype=np.int32)
+    systematic(weight, offset, chosen)
+    assert chosen.tolist() == one_after_another(weight, offset, count)
+
+
+@pytest.mark.parametrize(("rows", "count"), [(0, 5), (1, 3), (4, 2500), (7, 1024), (31, 1025)])
+def test_copies_of_what_is_kept_are_the_chosen_columns(rows, count):
+    rng = np.random.default_rng(rows)
+    kept = rng.standard_normal((rows, 900)).astype(np.float32)
+    chosen = np.sort(rng.integers(900, size=count)).astype(np.int32)
+    copies = np.full((rows, count), np.nan, dtype=np.float32)
+    copied(kept, chosen, copies)
+    np.testing.assert_array_equal(copies, kept[:, chosen])
 
 
 def test_resampling_is_unbiased():

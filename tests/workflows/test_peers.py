@@ -1,4 +1,4 @@
-"""The scripts in benchmarks/ compare the same models: peers agree with mapfilter."""
+"""What is compared with other packages is the same model: peers agree with mapfilter."""
 
 import sys
 from pathlib import Path
@@ -7,15 +7,27 @@ import numpy as np
 import pytest
 
 from mapfilter.database.store import open_database
+from mapfilter.errors import ConfigError
+from mapfilter.filters.resampling import systematic
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows import bench_filter
+from mapfilter.workflows.bench import run_bench
+from mapfilter.workflows.bench_numpy import MAP, NumpyModel, numpy_step, systematic_indices
+from mapfilter.workflows.bench_peers import (
+    PACKAGES,
+    bench_peers,
+    compare,
+    filterpy_step,
+    memory_limit,
+    particles_step,
+    stone_soup_step,
+)
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 import kalman_peers
-from bayes_peers import MAP, NumpyModel, compare, numpy_step, particles_step, stone_soup_step
 
 SMALL = (
     "area.bbox=24.9420,60.1660,24.9495,60.1697", "area.resolution_m=10", "journeys.length_m=400",
@@ -32,7 +44,7 @@ def world(tmp_path_factory):
 def test_numpy_weighs_like_the_filter(world):
     model, log = world
     inputs, belief = bench_filter.step_inputs(model, log, 4000)
-    peer = NumpyModel(inputs)
+    peer = NumpyModel(inputs, belief)
     log_weight = np.zeros(4000)
     cloud, _ = model.weigh(belief.cloud, log_weight, peer.reading)
     state = np.vstack([belief.state.astype(np.float64), np.zeros(4000)])
@@ -47,7 +59,7 @@ def test_numpy_weighs_like_the_filter(world):
 def test_numpy_moves_like_the_filter(world):
     model, log = world
     inputs, belief = bench_filter.step_inputs(model, log, 40_000)
-    peer = NumpyModel(inputs)
+    peer = NumpyModel(inputs, belief)
     moved, weighed = model.move(belief.state, np.zeros(40_000), peer.motion, np.uint64(7))
     state = np.vstack([belief.state.astype(np.float64), np.zeros(40_000)])
     other = peer.move(state, np.random.default_rng(3))
@@ -62,19 +74,23 @@ def test_numpy_moves_like_the_filter(world):
 def test_all_that_take_the_step_agree(world):
     model, log = world
     inputs, belief = bench_filter.step_inputs(model, log, 20_000)
-    peer = NumpyModel(inputs)
+    peer = NumpyModel(inputs, belief)
     state = np.vstack([belief.state.astype(np.float64), np.zeros(20_000)])
     rng = np.random.default_rng(4)
     jitter = np.array([0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4])
     own = bench_filter.whole_step(inputs, belief, jitter.astype(np.float32), rng)
     width = LevelMemory.empty(model.evidence.levels, model.area.site_of).width
-    assert own.shape == (STATES + width, 20_000)
-    others = [numpy_step(peer, jitter, rng), stone_soup_step(peer, rng)]
+    assert [one.shape for one in own] == [(STATES, 20_000), (width, 20_000)]
+    others = [
+        numpy_step(peer, jitter, rng),
+        stone_soup_step(peer, rng),
+        filterpy_step(peer, jitter, rng),
+    ]
     for step in others:
         if step is not None:
             found = step(state)
             assert found.shape[0] in (MAP + 1, MAP + 1 + width)
-            assert found[:2].mean(axis=1) == pytest.approx(own[:2].mean(axis=1), abs=1.5)
+            assert found[:2].mean(axis=1) == pytest.approx(own[0][:2].mean(axis=1), abs=1.5)
     several = particles_step(peer, rng, 3)
     if several is not None:
         assert several(state).shape == (MAP + 1, 20_000)
@@ -86,6 +102,40 @@ def test_packages_are_compared_with_the_step(world):
     found = compare(*bench_filter.step_inputs(model, log, 500), runs=1)
     assert {"mapfilter", "numpy"} <= set(found)
     assert min(found.values()) > 0
+
+
+@pytest.mark.filterwarnings("default")
+def test_one_run_has_all_peers_their_ratios_and_the_limit():
+    found = bench_peers(runs=1, particles=(400, 600), settings=SMALL)
+    assert (found.runs, [one.particles for one in found.steps]) == (1, [400, 600])
+    for one in found.steps:
+        assert one.ns.keys() == one.ratio.keys()
+        # A package is measured or named as one that is not installed.
+        assert {*one.ns, *found.not_installed} == {"mapfilter", "numpy", *PACKAGES}
+        assert one.ratio["mapfilter"] == 1.0
+        for name, ratio in one.ratio.items():
+            assert ratio == pytest.approx(one.ns[name] / one.ns["mapfilter"])
+        assert one.limit_ns > 0
+        assert one.limit_bytes % 16 == 0
+
+
+def test_the_limit_counts_what_is_kept_of_each_particle():
+    assert memory_limit(8, 31, 1000, 1)[1] == 4 * 4 * 39
+    assert memory_limit(8, 0, 1000, 1)[1] == 4 * 4 * 8
+
+
+def test_copies_by_numpy_are_those_of_the_filter():
+    weight = np.random.default_rng(2).random(300)
+    weight /= weight.sum()
+    chosen = np.empty(300, dtype=np.int32)
+    systematic(weight.astype(np.float32), np.random.default_rng(5).random(), chosen)
+    found = systematic_indices(weight, np.random.default_rng(5))
+    assert np.mean(found == chosen) > 0.99
+
+
+def test_peers_are_those_of_the_filter_only():
+    with pytest.raises(ConfigError, match="bench --peers: expected the stage filter, found build"):
+        run_bench("build", peers=True)
 
 
 def test_filterpys_ekf_is_the_same_filter():

@@ -208,7 +208,7 @@ class BayesModel:
             keep = exp(-length_m / errors.fault_m)
             kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds)
         served = [reading.serving] if reading.serving >= 0 else []
-        memory, kept = memory.with_cells(np.array(served, dtype=np.int32), kept)
+        memory, kept = memory.with_cells(np.array(served, dtype=np.int32), kept, in_place=True)
         return Cloud(cloud.state, kept, memory)
 
     def _weigh_serving(
@@ -235,7 +235,8 @@ class BayesModel:
         # Cells that nobody expects say nothing, neither for the belief nor against it.
         report = report._replace(absent=expected_absent(predicted, pixel, report))
         cells = np.concatenate([report.cell, report.absent])
-        memory, kept = memory.with_cells(cells[: memory.slots], kept)
+        # What they keep has been copied as it was aged.
+        memory, kept = memory.with_cells(cells[: memory.slots], kept, in_place=True)
         if report.cell.size > memory.slots:
             slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])

@@ -1,28 +1,20 @@
-"""A step of the Bayes map filter against NumPy, particles and Stone Soup, with the same model.
+"""A step of the Bayes map filter's model by whole arrays of NumPy: the reference of its speed.
 
-Run by hand, after ``pip install particles stonesoup``: ``python benchmarks/bayes_peers.py``.
-Nanoseconds per particle are medians over repetitions that take turns; packages that are not
-installed are left out.
+State rows are those of :mod:`mapfilter.models.street_motion`, in double precision.
 """
 
 from __future__ import annotations
 
-import importlib.util
-import tempfile
-import time
 from collections.abc import Callable
-from datetime import datetime, timedelta
 from functools import cached_property
 from math import exp
-from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
 from scipy.special import log_ndtr
 
-from mapfilter._types import Floats, Ints, Ints32
-from mapfilter.database.store import open_database
+from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import log_serving
 from mapfilter.models.level_kernels import LevelTerms
 from mapfilter.models.level_memory import LevelMemory
@@ -38,9 +30,7 @@ from mapfilter.models.street_motion import (
     TURN,
 )
 from mapfilter.positioning.bayes.model import expected_absent, mean_rough_db2
-from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.tracks.store import read_log
-from mapfilter.workflows.bench_filter import StepInputs, make_world, step_inputs, whole_step
+from mapfilter.workflows.bench_filter import StepInputs
 
 Step = Callable[[Floats], Floats]
 """From equally weighted particles, shape (9, N), to those after a whole step."""
@@ -48,9 +38,10 @@ Step = Callable[[Floats], Floats]
 MAP = STATES
 """Row of a step's log-likelihood of the map, after the rows of the model's own state."""
 
+Resample = Callable[[Floats, np.random.Generator], Ints]
+"""From weights that sum to one to the indices of the particles that as many new ones copy."""
+
 _MOST_ODDS, _KEPT_ODDS = 20.0, 8.0
-_RUNS, _PACKAGE_STEPS = 5, 10
-_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4)
 _TABLE_DB, _PER_DB = 64, 4
 _TABLE_SD, _PER_SD = 8, 32
 
@@ -58,12 +49,15 @@ _TABLE_SD, _PER_SD = 8, 32
 class NumpyModel:
     """One step of the Bayes map filter's model, by whole arrays.
 
-    What all particles share of the errors of levels is prepared by the package itself.
+    What all particles share of the errors of levels is prepared by the package itself; what each
+    keeps of them is that of a belief before the step.
     """
 
-    def __init__(self, inputs: StepInputs) -> None:
+    def __init__(self, inputs: StepInputs, belief: ParticleBelief) -> None:
         self.model, self.motion = inputs.model, inputs.motion
         self.reading, self.levels = inputs.reading, inputs.levels
+        self.kept: Floats = belief.kept.astype(np.float64)
+        self.shared: LevelMemory = belief.shared
 
     @cached_property
     def _serving(self) -> Floats:
@@ -121,42 +115,47 @@ class NumpyModel:
         right = reading.serving_weight * self._serving[place]
         rough = 0.1 * area.flat_rough_db.reshape(area.level_dbm.shape)[pixel].astype(np.float64)
         flat = np.asarray(pixel[0] * area.lattice.cols + pixel[1], dtype=np.int32)
-        served, odds = self._served(right)
-        matched, kept = self._levels(now, rough, flat, odds)
-        return np.asarray(state[MAP] + served + matched), kept
+        memory, kept = self._aged()
+        served, after = self._served(right, memory.fault_odds(reading.serving, kept))
+        memory.fault_odds(reading.serving, kept)[:] = after
+        matched, held = self._levels(now, rough, flat, memory, kept)
+        return np.asarray(state[MAP] + served + matched), held
 
-    def _served(self, right: Floats) -> tuple[Floats, Floats]:
+    def _aged(self) -> tuple[LevelMemory, Any]:
+        """Return what is known of the errors of levels as the report finds it, with its cells."""
+        errors, length_m = self.model.evidence.levels, self.reading.length_m
+        memory, decay = self.shared.after(length_m)
+        # The memory takes single precision or double alike.
+        kept: Any = self.kept.copy()
+        usual = errors.fault_log_odds
+        kept[: decay.size] *= decay[:, None]
+        kept[decay.size :] = usual + exp(-length_m / errors.fault_m) * (kept[decay.size :] - usual)
+        first = np.array([self.reading.serving], dtype=np.int32)
+        return memory.with_cells(first, kept, in_place=True)
+
+    def _served(self, right: Floats, before: Any) -> tuple[Floats, Floats]:
         """Return the log-likelihood of the serving cell, and the log odds of its fault."""
-        evidence = self.model.evidence
-        other = -evidence.serving.fault_nats * self.reading.serving_weight
-        before = evidence.levels.fault_log_odds
+        other = -self.model.evidence.serving.fault_nats * self.reading.serving_weight
         odds = before + other - right
         served = right + np.logaddexp(0, odds) - np.logaddexp(0, before)
         return served, np.clip(odds, -_KEPT_ODDS, _KEPT_ODDS)
 
     def _levels(
-        self, now: Floats, rough: Floats, pixel: Ints32, odds: Floats
+        self, now: Floats32, rough: Floats, pixel: Ints32, memory: LevelMemory, held: Any
     ) -> tuple[Floats, Floats]:
-        errors, report, area = self.model.evidence.levels, self.levels, self.model.area
-        predicted = self.model.prediction
-        memory = LevelMemory.empty(errors, area.site_of)
-        kept = memory.start(now.shape[0])
-        first = np.array([self.reading.serving], dtype=np.int32)
-        memory, kept = memory.with_cells(first, kept)
-        memory.fault_odds(self.reading.serving, kept)[:] = odds
+        errors, report, predicted = self.model.evidence.levels, self.levels, self.model.prediction
         report = report._replace(absent=expected_absent(predicted, pixel, report))
         cells = np.concatenate([report.cell, report.absent])[: memory.slots]
-        memory, kept = memory.with_cells(cells, kept)
+        memory, held = memory.with_cells(cells, held, in_place=True)
         memory, heard = memory.updated(report, mean_rough_db2(predicted, pixel, report.cell))
         absent, total = memory.absence(report), np.zeros(now.shape[0])
-        held = kept.astype(np.float64)
         for terms, below in ((heard, False), (absent, True)):
             for k in range(terms.cell.size):
                 total += self._one(terms, k, now, rough, held, below=below)
         return errors.weight * total, held
 
     def _one(
-        self, terms: LevelTerms, k: int, now: Floats, rough: Floats, kept: Floats, *, below: bool
+        self, terms: LevelTerms, k: int, now: Floats32, rough: Floats, kept: Floats, *, below: bool
     ) -> Floats:
         """Return the log-likelihood of one level or absence, and update what particles keep."""
         means = terms.gain.shape[1]
@@ -206,7 +205,20 @@ class NumpyModel:
         return row, col
 
 
-def numpy_step(model: NumpyModel, jitter: Floats, rng: np.random.Generator) -> Step:
+def systematic_indices(weight: Floats, rng: np.random.Generator) -> Ints:
+    """Return the indices that systematic resampling chooses, by a search among sums."""
+    count = weight.size
+    places = (np.arange(count) + rng.random()) / count
+    found: Ints = np.minimum(np.searchsorted(np.cumsum(weight), places), count - 1)
+    return found
+
+
+def numpy_step(
+    model: NumpyModel,
+    jitter: Floats,
+    rng: np.random.Generator,
+    resample: Resample = systematic_indices,
+) -> Step:
     """Return a whole step in NumPy: move, weigh, normalise, resample, jitter the copies."""
 
     def step(state: Floats) -> Floats:
@@ -214,148 +226,9 @@ def numpy_step(model: NumpyModel, jitter: Floats, rng: np.random.Generator) -> S
         log_weight, kept = model.weigh(moved)
         weight = np.exp(log_weight - log_weight.max())
         weight /= weight.sum()
-        count = weight.size
-        places = (np.arange(count) + rng.random()) / count
-        chosen = np.minimum(np.searchsorted(np.cumsum(weight), places), count - 1)
+        chosen = resample(weight, rng)
         copies = moved[:, chosen]
-        copies[:STATES] += jitter[:, None] * rng.standard_normal((STATES, count))
+        copies[:STATES] += jitter[:, None] * rng.standard_normal((STATES, weight.size))
         return np.concatenate([copies, kept[:, chosen]])
 
     return step
-
-
-def particles_step(model: NumpyModel, rng: np.random.Generator, steps: int) -> Step | None:
-    """Return some steps by the package ``particles``, or None without it."""
-    if importlib.util.find_spec("particles") is None:
-        return None
-    import particles
-    from particles.core import FeynmanKac
-
-    class Walk(FeynmanKac):  # type: ignore[misc]
-        first: Floats
-
-        def M0(self, N: int) -> Floats:  # noqa: N802, N803
-            return self.first[:N]
-
-        def M(self, t: int, xp: Floats) -> Floats:  # noqa: ARG002, N802
-            return model.move(xp.T, rng).T
-
-        def logG(self, t: int, xp: Floats, x: Floats) -> Floats:  # noqa: ARG002, N802
-            return model.log_likelihood(x.T)
-
-    def step(state: Floats) -> Floats:
-        walk = Walk(T=steps)
-        walk.first = np.ascontiguousarray(state.T)
-        run = particles.SMC(fk=walk, N=state.shape[1], resampling="systematic", ESSrmin=1.0)
-        run.run()
-        return np.asarray(run.X).T
-
-    return step
-
-
-def stone_soup_step(model: NumpyModel, rng: np.random.Generator) -> Step | None:
-    """Return a whole step by Stone Soup, or None without it."""
-    if importlib.util.find_spec("stonesoup") is None:
-        return None
-    from stonesoup.models.measurement import MeasurementModel
-    from stonesoup.models.transition import TransitionModel
-    from stonesoup.predictor.particle import ParticlePredictor
-    from stonesoup.resampler.particle import SystematicResampler
-    from stonesoup.types.array import StateVectors
-    from stonesoup.types.detection import Detection
-    from stonesoup.types.hypothesis import SingleHypothesis
-    from stonesoup.types.state import ParticleState
-    from stonesoup.updater.particle import ParticleUpdater
-
-    class Walk(TransitionModel):  # type: ignore[misc]
-        ndim_state = MAP + 1
-
-        def function(self, state: Any, **_: Any) -> Any:
-            return StateVectors(model.move(np.asarray(state.state_vector), rng))
-
-        def rvs(self, *_: Any, **__: Any) -> Any:
-            raise NotImplementedError
-
-        def pdf(self, *_: Any, **__: Any) -> Any:
-            raise NotImplementedError
-
-    class ReportRow(MeasurementModel):  # type: ignore[misc]
-        ndim_state = MAP + 1
-        ndim_meas = 1
-        mapping = (0,)
-
-        def function(self, state: Any, **_: Any) -> Any:
-            return state.state_vector[:1]
-
-        def rvs(self, *_: Any, **__: Any) -> Any:
-            raise NotImplementedError
-
-        def pdf(self, *_: Any, **__: Any) -> Any:
-            raise NotImplementedError
-
-        def logpdf(self, _: Any, state: Any, **__: Any) -> Floats:
-            return model.log_likelihood(np.asarray(state.state_vector))
-
-    began = datetime(2000, 1, 1)
-    later = began + timedelta(seconds=1)
-    predictor = ParticlePredictor(Walk())
-    updater = ParticleUpdater(measurement_model=ReportRow(), resampler=SystematicResampler())
-    report = Detection(np.zeros((1, 1)), timestamp=later)
-
-    def step(state: Floats) -> Floats:
-        count = state.shape[1]
-        known = ParticleState(
-            StateVectors(state), weight=np.full(count, 1 / count), timestamp=began
-        )
-        predicted = predictor.predict(known, timestamp=later)
-        found = updater.update(SingleHypothesis(predicted, report))
-        return np.asarray(found.state_vector)
-
-    return step
-
-
-def compare(inputs: StepInputs, belief: Any, runs: int = _RUNS) -> dict[str, float]:
-    """Return nanoseconds per particle of a whole step, by package."""
-    count = belief.log_weight.size
-    rng, jitter = np.random.default_rng(1), np.array(_JITTER)
-    peer = NumpyModel(inputs)
-    wide = np.vstack([belief.state.astype(np.float64), np.zeros(count)])
-    steps = {
-        "numpy": (numpy_step(peer, jitter, rng), 1),
-        "particles": (particles_step(peer, rng, _PACKAGE_STEPS), _PACKAGE_STEPS),
-        "stonesoup": (stone_soup_step(peer, rng), 1),
-    }
-    tasks: dict[str, tuple[Callable[[], object], int]] = {
-        name: (lambda step=step: step(wide), times)
-        for name, (step, times) in steps.items()
-        if step is not None
-    }
-    tasks["mapfilter"] = (
-        lambda: whole_step(inputs, belief, jitter.astype(np.float32), rng),
-        1,
-    )
-    took_ns: dict[str, list[float]] = {name: [] for name in tasks}
-    for run in range(runs + 1):
-        for name, (task, times) in tasks.items():
-            began_s = time.process_time()
-            task()
-            # The first loads what is compiled.
-            if run > 0:
-                took_ns[name].append(1e9 * (time.process_time() - began_s) / (times * count))
-    return {name: median(values) for name, values in took_ns.items()}
-
-
-def main() -> None:
-    """Print a line for each number of particles and package."""
-    with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
-        database, folders = make_world(Path(name), ["journeys.count=1"])
-        model = BayesFilter().over(open_database(database)).model
-        for count in (10_000, 100_000):
-            found = compare(*step_inputs(model, read_log(folders[0]), count))
-            for package, ns in found.items():
-                ratio = ns / found["mapfilter"]
-                print(f"{count} particles, {package}: {ns:.0f} ns per particle, {ratio:.1f} times")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,25 @@
+"""Memory that is freed and soon needed again."""
+
+from __future__ import annotations
+
+import ctypes
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+"""Parameters of glibc's ``mallopt``."""
+_KEPT_BYTES, _LEAST_BYTES = 256 * 2**20, 32 * 2**20
+
+
+def keep_freed_memory() -> bool:
+    """Let this process keep up to 256 MiB that it has freed, and return whether it does.
+
+    By default glibc gives large arrays back to the system when they are freed. A filter of many
+    hypotheses frees and asks for the same arrays each step, and fresh ones are filled in page by
+    page, which takes longer than the arithmetic. Other libraries of C have no such setting.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is None:
+        return False
+    mallopt.argtypes, mallopt.restype = (ctypes.c_int, ctypes.c_int), ctypes.c_int
+    # Older versions take no threshold above 32 MiB.
+    large = any(mallopt(_MMAP_THRESHOLD, size) for size in (_KEPT_BYTES, _LEAST_BYTES))
+    return bool(large and mallopt(_TRIM_THRESHOLD, _KEPT_BYTES))

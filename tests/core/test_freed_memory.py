@@ -1,0 +1,38 @@
+"""Freed memory that is kept, by the pages that a process asks for."""
+
+import subprocess
+import sys
+
+import pytest
+
+from mapfilter._memory import keep_freed_memory
+
+AGAIN = """
+import resource, sys
+from mapfilter._memory import keep_freed_memory
+if sys.argv[1] == "kept" and not keep_freed_memory():
+    raise SystemExit(3)
+for _ in range(20):
+    some = [bytearray(3_000_000) for _ in range(12)]
+    del some
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
+"""
+
+
+def faults(how):
+    done = subprocess.run([sys.executable, "-c", AGAIN, how], capture_output=True, text=True)
+    if done.returncode == 3:
+        pytest.skip("not glibc")
+    assert done.returncode == 0, done.stderr
+    return int(done.stdout)
+
+
+def test_memory_that_is_freed_is_used_again():
+    given_back, kept = faults("given back"), faults("kept")
+    # Twenty times 36 MB are 176 000 pages.
+    assert given_back > 100_000
+    assert kept < given_back / 4
+
+
+def test_it_may_be_asked_for_twice():
+    assert keep_freed_memory() == keep_freed_memory()
