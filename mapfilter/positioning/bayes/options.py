@@ -17,6 +17,7 @@ from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.over_survey import (
@@ -249,7 +250,8 @@ class BayesFilter(Options):
             unclear_below_mass=min(rules.unclear_below_mass, self.switch_mass),
             clear_from_mass=min(rules.clear_from_mass, self.switch_mass),
         )
-        positioned = None
+        positioned, carriageways = None, None
+        model = BayesModel(area, motion, weights, evidence)
         if not area.cell_ids:
             positioned = particles, rules
             rules = replace(
@@ -266,13 +268,16 @@ class BayesFilter(Options):
                 switch_mass=max(self.switch_mass, _LEAST_MASS_BY_MAP),
                 switch_hold_m=max(self.switch_hold_m, _LEAST_HOLD_BY_MAP_M),
             )
+            if self.vehicle:
+                asked = self.switch_mass, self.switch_hold_m
+                carriageways = carriageway_filters(model, particles, rules, asked)
         satellites = GnssOptions(
             zenith_m=self.satellite_sd_m,
             height_m=self.antenna_height_m,
             height_sd_m=self.antenna_height_sd_m,
         )
         return BayesPositioner(
-            BayesModel(area, motion, weights, evidence),
+            model,
             particles,
             rules,
             grid=self.name == "grid",
@@ -280,6 +285,7 @@ class BayesFilter(Options):
             timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
             smooth=self.smooth,
             positioned=positioned,
+            carriageways=carriageways,
         )
 
 
