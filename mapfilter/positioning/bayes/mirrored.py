@@ -7,9 +7,9 @@ belief, the *twin*, locates it on the same map. Where the motion lies on the roa
 of the belief leaves that of the twin behind; where it does not, the two differ by chance alone,
 either way.
 
-On paths that fit badly the chance difference grows with the way. So the belief also has to fit as
-well as a path on its own roads does: no worse than the log number of places that it was drawn from,
-and the usual cost of each metre.
+On paths that fit badly the chance difference grows with the way. So either the belief also fits as
+well as a path on its own roads usually does, no worse than the log number of places that it was
+drawn from and the usual cost of each metre; or its lead has to grow with what the twin has lost.
 """
 
 from __future__ import annotations
@@ -33,6 +33,9 @@ class MirrorRules(Options):
     ----------
     least_lead : float
         Lead of its log evidence over that of the mirrored twin, in nats.
+    lead_share : float
+        What a belief that fits worse than usual must lead by in addition, as a share of the twin's
+        negative log evidence.
     usual_nats_per_m : float
         Negative log-likelihood of a metre at the true position.
     margin_nats : float
@@ -42,6 +45,7 @@ class MirrorRules(Options):
     """
 
     least_lead: float = 6.0
+    lead_share: NotNegative = 0.3
     usual_nats_per_m: NotNegative = 0.03
     margin_nats: NotNegative = 4.0
     least_turned_rad: NotNegative = pi / 2
@@ -65,7 +69,8 @@ class MirrorRules(Options):
             return False
         usual = -log(max(places, 1)) - self.usual_nats_per_m * belief.travelled_m
         fits = belief.log_evidence >= usual - self.margin_nats
-        return fits and twin.lead_of(belief) >= self.least_lead
+        more = 0.0 if fits else -self.lead_share * twin.belief.log_evidence
+        return twin.lead_of(belief) >= self.least_lead + more
 
 
 @dataclass(frozen=True, eq=False)
