@@ -45,7 +45,7 @@ class MirrorRules(Options):
     """
 
     least_lead: float = 6.0
-    lead_share: NotNegative = 0.3
+    lead_share: NotNegative = 0.4
     usual_nats_per_m: NotNegative = 0.03
     margin_nats: NotNegative = 4.0
     least_turned_rad: NotNegative = pi / 2
