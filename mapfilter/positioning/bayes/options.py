@@ -52,10 +52,8 @@ _VEHICLE_LEAVES_PER_M = 3e-4
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
 _CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
-"""Where the map alone is the evidence: factor of the numbers of particles, as many places stay
-possible for long; least mass and distance of the switch rule; largest log odds of the null
-hypothesis, and its cost of a metre, as a path fits streets of another place for some hundred
-metres."""
+"""Where the map alone is the evidence: factor of the numbers of particles; least mass and distance
+of the switch rule; largest log odds of the null hypothesis, its cost of a metre."""
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
