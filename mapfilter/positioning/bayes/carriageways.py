@@ -44,7 +44,7 @@ def carriageway_filters(
     model: BayesModel,
     options: ParticleOptions,
     rules: AlternativeRules,
-    mass: tuple[float, float],
+    asked: ParticleOptions,
 ) -> CarriagewayFilters | None:
     """Return the filters of a vehicle; None where an area holds no carriageways.
 
@@ -52,9 +52,9 @@ def carriageway_filters(
     ----------
     model, options, rules : BayesModel, ParticleOptions and AlternativeRules
         Those where the map alone is the evidence.
-    mass : tuple of float
-        Share of the belief in one place, and distance for which that must hold, that a user asks
-        for.
+    asked : ParticleOptions
+        Those of other evidence, with the share of a belief in one place, and the distance for which
+        that must hold, that a user asks for.
     """
     area = model.area.of_carriageways()
     if area is None:
@@ -64,8 +64,8 @@ def carriageway_filters(
         replace(model, area=area, weights=weights),
         replace(
             options,
-            switch_mass=max(mass[0], _LEAST_MASS),
-            switch_hold_m=max(mass[1], _LEAST_HOLD_M),
+            switch_mass=max(asked.switch_mass, _LEAST_MASS),
+            switch_hold_m=max(asked.switch_hold_m, _LEAST_HOLD_M),
         ),
         replace(
             rules,

@@ -267,8 +267,7 @@ class BayesFilter(Options):
                 switch_hold_m=max(self.switch_hold_m, _LEAST_HOLD_BY_MAP_M),
             )
             if self.vehicle:
-                asked = self.switch_mass, self.switch_hold_m
-                carriageways = carriageway_filters(model, particles, rules, asked)
+                carriageways = carriageway_filters(model, particles, rules, positioned[0])
         satellites = GnssOptions(
             zenith_m=self.satellite_sd_m,
             height_m=self.antenna_height_m,
