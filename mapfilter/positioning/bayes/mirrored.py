@@ -48,7 +48,7 @@ class MirrorRules(Options):
     lead_share: NotNegative = 0.4
     usual_nats_per_m: NotNegative = 0.03
     margin_nats: NotNegative = 4.0
-    least_turned_rad: NotNegative = pi / 2
+    least_turned_rad: NotNegative = pi
 
     def proven(
         self, belief: MapBelief, twin: MirroredTwin | None, turned_rad: float, places: int
