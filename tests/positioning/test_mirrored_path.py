@@ -174,6 +174,6 @@ def test_carriageways_are_narrower_than_ways(town):
     lanes = area.of_carriageways()
     assert np.all(lanes.distance_m >= area.distance_m)
     assert np.array_equal(lanes.on_way, area.on_way)
-    # Half a way is 6 m wide, its carriageways 1.8 m: what lies between is beside them.
-    assert lanes.distance_m[area.on_way].max() == pytest.approx(6.0 - 1.8, abs=1.0)
+    # Half a way is 6 m wide, its carriageways 2 m: what lies between is beside them.
+    assert lanes.distance_m[area.on_way].max() == pytest.approx(4.0, abs=1.0)
     assert replace(area, carriageway_m=None).of_carriageways() is None

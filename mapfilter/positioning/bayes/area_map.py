@@ -21,8 +21,9 @@ from mapfilter.radio.cells import CellPlan
 BELOW_FLOOR_DB = 6.0
 """How far below the floor a level is assumed to be that the database does not hold."""
 _EDGE_M, _EDGE_SHARE, _ROUNDING_M = 60.0, 0.05, 1.0
-_CARRIAGEWAY_SHARE = 0.3
-"""Of a way's width, pavements included: the middles of the lanes beside its centre line."""
+_CARRIAGEWAY_SHARE, _LEAST_CARRIAGEWAY_M = 0.3, 2.0
+"""Of half a way's width, pavements included, and at least: the middles of the lanes beside its
+centre line."""
 _F = np.float32
 
 
@@ -90,7 +91,8 @@ class AreaMap:
             level[..., count] = received[..., 0]
         lane_m = None
         if not field.cell_ids:
-            edge_m = np.float32(_CARRIAGEWAY_SHARE) * field.half_width_m
+            share_m = np.float32(_CARRIAGEWAY_SHARE) * field.half_width_m
+            edge_m = np.maximum(share_m, np.float32(_LEAST_CARRIAGEWAY_M))
             lane_m = np.maximum(field.distance_to_way_m - edge_m, 0)
         return cls(
             field.lattice,
