@@ -61,20 +61,19 @@ def weigh_path(
     east_m[count], north_m[count] = _F(0.0), _F(0.0)
     one, off_cost = _F(1.0), _F(factors.off)
     leave, come_back = _F(factors.leave), _F(factors.come_back)
+    stay, keep = one - leave, one - come_back
+    zero, last_col, last_row = np.int32(0), np.int32(cols - 1), np.int32(rows - 1)
     for i in range(ends_m.shape[1]):
-        away, product = off[i], one
-        total = _F(0.0)
+        # Likelihoods of both modes, not normalised before the end.
+        away, on = off[i], one - off[i]
         for k in range(count + 1):
-            col = int((ends_m[0, i] + east_m[k]) * per_m)
-            row = rows - 1 - int((ends_m[1, i] + north_m[k]) * per_m)
-            col = min(max(col, 0), cols - 1)
-            row = min(max(row, 0), rows - 1)
-            away = away * (one - come_back) + (one - away) * leave
-            likely = away * off_cost + (one - away) * on_map[row, col]
-            away = away * off_cost / likely
-            product *= likely
-            if product < _F(1e-20):
-                total += log32(product)
-                product = one
-        log_likelihood[i] = total + log32(product)
-        off[i] = away
+            col = np.int32((ends_m[0, i] + east_m[k]) * per_m)
+            row = last_row - np.int32((ends_m[1, i] + north_m[k]) * per_m)
+            col = min(max(col, zero), last_col)
+            row = min(max(row, zero), last_row)
+            left = away * keep + on * leave
+            on = (away * come_back + on * stay) * on_map[row, col]
+            away = left * off_cost
+        total = on + away
+        log_likelihood[i] = log32(total)
+        off[i] = away / total

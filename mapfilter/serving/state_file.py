@@ -27,6 +27,7 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.repeats import MotionRepeats
 from mapfilter.positioning.bayes.rest import Rest
@@ -57,6 +58,7 @@ _CLASSES: dict[str, type] = {
         GnssState,
         LevelErrors,
         LevelMemory,
+        MirroredTwin,
         MotionRepeats,
         NullHypothesis,
         ParticleBelief,

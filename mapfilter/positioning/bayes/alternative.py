@@ -97,6 +97,9 @@ class AlternativeRules(Options):
     unclear_below_mass, clear_from_mass : float
         Share of a belief within 50 m of its leading position below which one that had converged is
         reported as LOST while motion is not measured, and from which it is not any more.
+    takes_over_searching : bool
+        An alternative that is ahead of a belief that had converged replaces it at once, and has to
+        converge anew.
     """
 
     start_log_odds: float = -1.0
@@ -110,6 +113,7 @@ class AlternativeRules(Options):
     map_nats_per_m: NotNegative = MAP_NATS_PER_M
     unclear_below_mass: Share = 0.8
     clear_from_mass: Share = 0.95
+    takes_over_searching: bool = False
 
     def least_log_odds(self, *, searching: bool) -> float:
         """Return the bound of the null hypothesis, lower while a belief has to refute it."""
@@ -351,7 +355,7 @@ def judge(
         converged = alternative.belief.status in (_CONVERGED, _TRACKING)
         if converged and alternative.null.log_odds <= rules.converge_log_odds:
             return Outcome.WON
-        suspect = alternative.null.log_odds > 0
+        suspect = alternative.null.log_odds > 0 or rules.takes_over_searching
         return Outcome.SUSPECT if suspect else Outcome.AHEAD
     gone_m = travelled_m - alternative.start_m
     if log_bayes_factor <= rules.abandon_threshold or gone_m >= rules.abandon_after_m:

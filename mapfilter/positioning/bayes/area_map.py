@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,9 @@ from mapfilter.radio.cells import CellPlan
 BELOW_FLOOR_DB = 6.0
 """How far below the floor a level is assumed to be that the database does not hold."""
 _EDGE_M, _EDGE_SHARE, _ROUNDING_M = 60.0, 0.05, 1.0
+_CARRIAGEWAY_SHARE, _LEAST_CARRIAGEWAY_M = 0.3, 2.0
+"""Of half a way's width, pavements included, and at least: the middles of the lanes beside its
+centre line."""
 _F = np.float32
 
 
@@ -50,6 +53,8 @@ class AreaMap:
         Weaker levels are not in the database.
     sites : mapping of str to tuple of float
         East, north and height of all cells of the database.
+    carriageway_m : ndarray of float32, shape (rows, cols), or None
+        To the edge of the nearest carriageway; None in a database with cells.
     """
 
     lattice: Lattice
@@ -62,6 +67,7 @@ class AreaMap:
     carriers: dict[tuple[int, int], tuple[int, ...]]
     floor_dbm: float
     sites: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    carriageway_m: Floats32 | None = None
 
     @classmethod
     def of_field(cls, field: RadioField, plan: CellPlan, floor_dbm: float) -> AreaMap:
@@ -83,6 +89,11 @@ class AreaMap:
                 level[row, :, count], level[row, :, count + 1] = top[:, -1], top[:, -2]
         elif count:
             level[..., count] = received[..., 0]
+        lane_m = None
+        if not field.cell_ids:
+            share_m = np.float32(_CARRIAGEWAY_SHARE) * field.half_width_m
+            edge_m = np.maximum(share_m, np.float32(_LEAST_CARRIAGEWAY_M))
+            lane_m = np.maximum(field.distance_to_way_m - edge_m, 0)
         return cls(
             field.lattice,
             field.cell_ids,
@@ -94,7 +105,14 @@ class AreaMap:
             _carriers(plan, field.cell_ids),
             floor_dbm,
             {cell.id: (cell.east_m, cell.north_m, cell.height_m) for cell in plan.cells},
+            lane_m,
         )
+
+    def of_carriageways(self) -> AreaMap | None:
+        """Return the area with carriageways for ways; None where their distance is not known."""
+        if self.carriageway_m is None:
+            return None
+        return replace(self, distance_m=self.carriageway_m)
 
     @cached_property
     def origin_m(self) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.models.street_motion import remounted
 from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
+from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
 from mapfilter.positioning.bayes.grid import StreetGrid
@@ -42,6 +44,9 @@ class BeliefFilters:
         Whether beliefs are masses on a grid in place of particles.
     positioned : tuple or None
         Options and rules that take the place of the others as long as positions are measured.
+    carriageways : CarriagewayFilters or None
+        What takes the place of model, options and rules of a vehicle while nothing but turns and
+        the map locate it.
     """
 
     model: BayesModel
@@ -49,6 +54,7 @@ class BeliefFilters:
     rules: AlternativeRules = field(default_factory=AlternativeRules)
     grid: bool = False
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
+    carriageways: CarriagewayFilters | None = None
 
     @cached_property
     def map_may_start(self) -> bool:
@@ -62,14 +68,38 @@ class BeliefFilters:
         gnss: GnssState = state.sources[GnssSource.name]
         return state.reckoning.travelled_m - gnss.used_at_m > _POSITIONED_M
 
+    def by_carriageways(
+        self, state: BayesState, *, compass: bool | None = None
+    ) -> CarriagewayFilters | None:
+        """Return what locates a vehicle by its turns and the map, if nothing else has yet.
+
+        ``compass`` is whether headings are a compass's; None for what the state holds.
+        """
+        compass = state.compass if compass is None else compass
+        if self.carriageways is None or compass or not self.map_may_start:
+            return None
+        gnss: GnssState = state.sources[GnssSource.name]
+        return None if isfinite(gnss.used_at_m) else self.carriageways
+
+    def moving_filter(self, state: BayesState, *, compass: bool) -> MapFilter:
+        """Return the filter that starts and moves beliefs."""
+        if self.by_carriageways(state, compass=compass) is not None:
+            return self._by_carriageways
+        return self.by_compass[compass]
+
     def rules_of(self, state: BayesState) -> AlternativeRules:
         """Return the rules for the evidence that there is."""
+        lanes = self.by_carriageways(state)
+        if lanes is not None:
+            return lanes.rules
         if self.positioned is None or self.by_map_alone(state):
             return self.rules
         return self.positioned[1]
 
     def filter_of(self, state: BayesState) -> MapFilter:
         """Return the filter of a single belief for the evidence that there is."""
+        if self.by_carriageways(state) is not None:
+            return self._by_carriageways
         if self.positioned is None or self.by_map_alone(state):
             return self.by_compass[state.compass]
         return self._positioned_by_compass[state.compass]
@@ -82,6 +112,12 @@ class BeliefFilters:
             grids = {compass: StreetGrid(model, compass) for compass in (True, False)}
             return {compass: GridFilter(grid, self.options) for compass, grid in grids.items()}
         return self._particle_filters(self.options)
+
+    @cached_property
+    def _by_carriageways(self) -> MapFilter:
+        assert self.carriageways is not None
+        lanes = replace(self, model=self.carriageways.model)
+        return lanes._particle_filters(self.carriageways.options)[False]
 
     @cached_property
     def _positioned_by_compass(self) -> dict[bool, MapFilter]:

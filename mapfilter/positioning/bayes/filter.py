@@ -25,6 +25,7 @@ from mapfilter.positioning.bayes.alternative import (
 )
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import (
     EvidenceSource,
     EvidenceUpdate,
@@ -57,7 +58,8 @@ class BayesPositioner(Filter[BayesState]):
     ``grid`` replaces particles by the exact filter on a grid; ``smooth`` smooths positions by the
     whole log. ``more_sources`` are sources of evidence besides the built-in ones. ``positioned``
     holds the options and rules that take the place of the others as long as positions or satellites
-    are measured; None for the same ones.
+    are measured; None for the same ones. ``carriageways`` locate a vehicle as long as nothing but
+    its turns and the map do.
     """
 
     model: BayesModel
@@ -69,6 +71,7 @@ class BayesPositioner(Filter[BayesState]):
     smooth: bool = False
     more_sources: tuple[EvidenceSource, ...] = ()
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
+    carriageways: CarriagewayFilters | None = None
 
     @property
     def crs(self) -> str:
@@ -93,7 +96,8 @@ class BayesPositioner(Filter[BayesState]):
     @cached_property
     def beliefs(self) -> BeliefFilters:
         """Filters and rules of single beliefs."""
-        return BeliefFilters(self.model, self.options, self.rules, self.grid, self.positioned)
+        known = self.model, self.options, self.rules, self.grid, self.positioned
+        return BeliefFilters(*known, self.carriageways)
 
     @cached_property
     def sources(self) -> tuple[EvidenceSource, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.mirrored import mirrored_step
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.bayes.state import BayesState
@@ -46,6 +47,7 @@ def moved(
     unused: list[UnusedReading] = []
     belief, compass, alternative = state.belief, state.compass, state.alternative
     reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
+    twin = state.twin
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         why = Reason.NOT_STARTED
@@ -61,13 +63,16 @@ def moved(
             if compass and not turned and reckoning.travelled_m == 0:
                 # Nothing has moved yet, so headings can still be relative to the first one.
                 compass, belief = False, beliefs.without_compass(belief, rng)
-            predict = beliefs.by_compass[compass].predict
+            predict = beliefs.moving_filter(state, compass=compass).predict
             belief, why = predict(belief, step, rng)
             belief = beliefs.remounted(belief, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
             if alternative is not None:
                 other, _ = predict(alternative.belief, step, rng)
                 alternative = replace(alternative, belief=other)
+            if twin is not None:
+                other, _ = predict(twin.belief, mirrored_step(step), rng)
+                twin = replace(twin, belief=other)
         if why is not Reason.USED:
             unused.append(UnusedReading(epoch.time_s, "motion", "", why))
     return BayesState(
@@ -85,4 +90,5 @@ def moved(
         reported=state.reported,
         watch=watch,
         last_fix=state.last_fix,
+        twin=twin,
     ), unused

@@ -17,6 +17,7 @@ from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.over_survey import (
@@ -51,10 +52,8 @@ _VEHICLE_LEAVES_PER_M = 3e-4
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
 _CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
-"""Where the map alone is the evidence: factor of the numbers of particles, as many places stay
-possible for long; least mass and distance of the switch rule; largest log odds of the null
-hypothesis, and its cost of a metre, as a path fits streets of another place for some hundred
-metres."""
+"""Where the map alone is the evidence: factor of the numbers of particles; least mass and distance
+of the switch rule; largest log odds of the null hypothesis, its cost of a metre."""
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
@@ -249,7 +248,8 @@ class BayesFilter(Options):
             unclear_below_mass=min(rules.unclear_below_mass, self.switch_mass),
             clear_from_mass=min(rules.clear_from_mass, self.switch_mass),
         )
-        positioned = None
+        positioned, carriageways = None, None
+        model = BayesModel(area, motion, weights, evidence)
         if not area.cell_ids:
             positioned = particles, rules
             rules = replace(
@@ -266,13 +266,15 @@ class BayesFilter(Options):
                 switch_mass=max(self.switch_mass, _LEAST_MASS_BY_MAP),
                 switch_hold_m=max(self.switch_hold_m, _LEAST_HOLD_BY_MAP_M),
             )
+            if self.vehicle:
+                carriageways = carriageway_filters(model, particles, rules, positioned[0])
         satellites = GnssOptions(
             zenith_m=self.satellite_sd_m,
             height_m=self.antenna_height_m,
             height_sd_m=self.antenna_height_sd_m,
         )
         return BayesPositioner(
-            BayesModel(area, motion, weights, evidence),
+            model,
             particles,
             rules,
             grid=self.name == "grid",
@@ -280,6 +282,7 @@ class BayesFilter(Options):
             timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
             smooth=self.smooth,
             positioned=positioned,
+            carriageways=carriageways,
         )
 
 

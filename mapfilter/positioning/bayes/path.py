@@ -88,6 +88,12 @@ class RecentPath:
         return self.turned_rad >= _LEAST_TURNED_RAD
 
     @property
+    def mirrored(self) -> RecentPath:
+        """The same path with left and right exchanged."""
+        points = tuple(replace(point, north_m=-point.north_m) for point in self.points)
+        return replace(self, here=replace(self.here, north_m=-self.here.north_m), points=points)
+
+    @property
     def earlier_m(self) -> Floats32:
         """East and north of the points relative to the end, shape (K, 2)."""
         here = self.here

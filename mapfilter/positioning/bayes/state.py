@@ -12,6 +12,7 @@ from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
@@ -60,6 +61,8 @@ class BayesState:
         Whether sensors still measure.
     last_fix : GnssFix or None
         The last one that was used.
+    twin : MirroredTwin or None
+        The mirrored motion, while a belief by the map alone has to prove itself.
     """
 
     belief: MapBelief | None = None
@@ -76,6 +79,7 @@ class BayesState:
     reported: Reported | None = None
     watch: SensorWatch = field(default_factory=SensorWatch)
     last_fix: GnssFix | None = None
+    twin: MirroredTwin | None = None
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -94,6 +98,7 @@ class BayesState:
             reported=reported,
             watch=self.watch,
             last_fix=self.last_fix,
+            twin=self.twin,
         )
 
     @property

@@ -21,6 +21,7 @@ from mapfilter.positioning.bayes.alternative import (
 )
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import (
     Context,
     EvidenceSource,
@@ -29,6 +30,7 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
@@ -89,7 +91,7 @@ class Weighing:
             return None
         path = next((one.path for one in updates if one.path is not None), None)
         prior = Start(reading, state.compass, path=path)
-        belief = self.beliefs.by_compass[state.compass].init(prior, rng)
+        belief = self.beliefs.moving_filter(state, compass=state.compass).init(prior, rng)
         states = {}
         for source in self.sources:
             belief, own = source.start(belief, epoch, state.reckoning.travelled_m)
@@ -117,7 +119,11 @@ class Weighing:
         beliefs, area = self.beliefs, self.beliefs.model.area
         update, rules = beliefs.filter_of(state).update, beliefs.rules_of(state)
         by_map_alone = beliefs.by_map_alone(state)
-        plain = by_map_alone and not state.path.is_distinctive
+        lanes, turned_rad = beliefs.by_carriageways(state), state.path.turned_rad
+        if lanes is None:
+            plain = by_map_alone and not state.path.is_distinctive
+        else:
+            plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
         doubt = doubt or _at_edge(area, before)
         tracked = measured and before.status is Status.TRACKING
@@ -132,7 +138,8 @@ class Weighing:
                 alternative.belief, updates, measured=measured, alternative=True
             )
             terms = own_reading or RadioReading()
-            doubt = plain or alternative.null.log_odds > rules.converge_log_odds
+            doubt = plain or lanes is not None
+            doubt = doubt or alternative.null.log_odds > rules.converge_log_odds
             terms = replace(terms, doubted=doubt)
             other, _ = update(alternative.belief, terms, rng)
             own = _challenged(rules, alternative.null, terms, alternative.belief, other)
@@ -167,7 +174,32 @@ class Weighing:
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
         )
+        if lanes is not None or state.twin is not None:
+            after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
         return after, Reason.USED
+
+    def _twin_of(
+        self,
+        state: BayesState,
+        lanes: CarriagewayFilters | None,
+        reading: RadioReading,
+        rng: np.random.Generator,
+        taken_over: bool,
+    ) -> MirroredTwin | None:
+        """Return the twin after a reading: started where one is needed, None where none is."""
+        main, twin = state.belief, state.twin
+        if lanes is None or main is None or main.status is not Status.SEARCHING:
+            return None
+        if twin is None or taken_over:
+            if not state.path.whole:
+                return None
+            prior = Start(None, compass=False, path=state.path.mirrored)
+            belief = self.beliefs.filter_of(state).init(prior, rng)
+            return MirroredTwin.beside(main, belief, lanes.places)
+        belief, _ = self.beliefs.filter_of(state).update(
+            twin.belief, replace(reading, doubted=True), rng
+        )
+        return replace(twin, belief=belief)
 
     def in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
         """Return a state that is LOST while its belief is spread over more than one place.
