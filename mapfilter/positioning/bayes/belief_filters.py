@@ -10,12 +10,13 @@ import numpy as np
 
 from mapfilter.filters.contract import BeliefFilter, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
-from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
 from mapfilter.models.street_motion import remounted
 from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
 from mapfilter.positioning.bayes.grid import StreetGrid
+from mapfilter.positioning.bayes.held import HoldRules, contested
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
@@ -49,6 +50,7 @@ class BeliefFilters:
     rules: AlternativeRules = field(default_factory=AlternativeRules)
     grid: bool = False
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
+    holds: HoldRules = field(default_factory=HoldRules)
 
     @cached_property
     def map_may_start(self) -> bool:
@@ -84,6 +86,13 @@ class BeliefFilters:
         return self._particle_filters(self.options)
 
     @cached_property
+    def held_otherwise(self) -> MapFilter:
+        """The filter of beliefs in which the phone was turned: smaller ones."""
+        few = self.holds.particles
+        options = replace(self.options, min_particles=few, min_search_particles=few)
+        return ParticleFilter(self.model, replace(options, max_particles=2 * few))
+
+    @cached_property
     def _positioned_by_compass(self) -> dict[bool, MapFilter]:
         return self._particle_filters(self.positioned[0] if self.positioned else self.options)
 
@@ -96,6 +105,13 @@ class BeliefFilters:
             True: ParticleFilter(self.model, known),
             False: ParticleFilter(self.model, unknown),
         }
+
+    def is_contested(self, state: BayesState) -> bool:
+        """Return whether a belief in which the phone was turned is ahead of the belief."""
+        main = state.belief
+        if not state.held or not isinstance(main, ParticleBelief):
+            return False
+        return contested(state.held, main, self.holds)
 
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""

@@ -31,6 +31,7 @@ from mapfilter.positioning.bayes.evidence import (
     RadioReading,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.held import HoldRules
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
@@ -69,6 +70,7 @@ class BayesPositioner(Filter[BayesState]):
     smooth: bool = False
     more_sources: tuple[EvidenceSource, ...] = ()
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
+    holds: HoldRules = field(default_factory=HoldRules)
 
     @property
     def crs(self) -> str:
@@ -93,7 +95,7 @@ class BayesPositioner(Filter[BayesState]):
     @cached_property
     def beliefs(self) -> BeliefFilters:
         """Filters and rules of single beliefs."""
-        return BeliefFilters(self.model, self.options, self.rules, self.grid, self.positioned)
+        return BeliefFilters(self.model, self.options, self.rules, self.grid, self.positioned, self.holds)
 
     @cached_property
     def sources(self) -> tuple[EvidenceSource, ...]:
@@ -141,6 +143,7 @@ class BayesPositioner(Filter[BayesState]):
         unclear, spacing_m = state.unclear, state.particle_spacing_m
         if unclear:
             state = replace(state, status=Status.TRACKING, unclear=False)
+            unclear = not self.beliefs.is_contested(state)
         before, weighing = state.status, self._weighing
         heard = epoch.radio
         watch, epoch, (motion, radio) = watched(state.watch, epoch)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 
-from mapfilter.filters.contract import Reason
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.held import forked, jump_rad, still_open
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import UnusedReading
+
+_HELD_SEED = 7331
 
 
 def moved(
@@ -46,8 +50,11 @@ def moved(
     unused: list[UnusedReading] = []
     belief, compass, alternative = state.belief, state.compass, state.alternative
     reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
+    hold, walking_rad, held, rules = state.hold, state.walking_rad, state.held, beliefs.holds
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
+        measured = step
+        step = hold.read(measured)
         why = Reason.NOT_STARTED
         if beliefs.map_may_start:
             known = isfinite(raw.heading_rad) == compass or not path.here.travelled_m
@@ -62,12 +69,38 @@ def moved(
                 # Nothing has moved yet, so headings can still be relative to the first one.
                 compass, belief = False, beliefs.without_compass(belief, rng)
             predict = beliefs.by_compass[compass].predict
+            jump = jump_rad(walking_rad, raw, rules) if compass else 0.0
+            may_split = state.status is Status.TRACKING and belief.status is Status.TRACKING
+            if jump and may_split and isinstance(belief, ParticleBelief) and not _positioned(epoch):
+                own = np.random.default_rng([_HELD_SEED, round(1000 * abs(epoch.time_s)) % 2**32])
+                more = forked(
+                    belief,
+                    state.null,
+                    hold,
+                    walking_rad,
+                    raw.heading_rad,
+                    reckoning.travelled_m,
+                    beliefs.model.motion.white_rad,
+                    rules,
+                    own,
+                )
+                held = still_open((*held, *more), belief, reckoning.travelled_m, rules)
+            if held:
+                own = np.random.default_rng([_HELD_SEED + 1, round(1000 * abs(epoch.time_s)) % 2**32])
+                held = tuple(
+                    replace(one, belief=predict(one.belief, one.hold.read(measured), own)[0])
+                    for one in held
+                )
             belief, why = predict(belief, step, rng)
             belief = beliefs.remounted(belief, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
             if alternative is not None:
                 other, _ = predict(alternative.belief, step, rng)
                 alternative = replace(alternative, belief=other)
+        if isfinite(raw.heading_rad) and raw.step_m > 0:
+            walking_rad = raw.heading_rad
+        elif isfinite(raw.spread_m):
+            walking_rad = nan
         if why is not Reason.USED:
             unused.append(UnusedReading(epoch.time_s, "motion", "", why))
     return BayesState(
@@ -85,4 +118,11 @@ def moved(
         reported=state.reported,
         watch=watch,
         last_fix=state.last_fix,
+        hold=hold,
+        walking_rad=walking_rad,
+        held=held,
     ), unused
+
+
+def _positioned(epoch: Epoch) -> bool:
+    return epoch.fix is not None or bool(epoch.ranges)

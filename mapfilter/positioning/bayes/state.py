@@ -12,6 +12,7 @@ from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
@@ -60,6 +61,12 @@ class BayesState:
         Whether sensors still measure.
     last_fix : GnssFix or None
         The last one that was used.
+    hold : Hold
+        How headings are read.
+    walking_rad : float
+        Heading of the last row of a walk, as measured.
+    held : tuple of HeldOtherwise
+        Beliefs in which the phone was turned, tested against the belief.
     """
 
     belief: MapBelief | None = None
@@ -76,6 +83,9 @@ class BayesState:
     reported: Reported | None = None
     watch: SensorWatch = field(default_factory=SensorWatch)
     last_fix: GnssFix | None = None
+    hold: Hold = field(default_factory=Hold)
+    walking_rad: float = nan
+    held: tuple[HeldOtherwise, ...] = ()
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -94,6 +104,9 @@ class BayesState:
             reported=reported,
             watch=self.watch,
             last_fix=self.last_fix,
+            hold=self.hold,
+            walking_rad=self.walking_rad,
+            held=self.held,
         )
 
     @property

@@ -29,6 +29,7 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.held import still_open, winner
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
@@ -167,7 +168,46 @@ class Weighing:
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
         )
-        return after, Reason.USED
+        return self._held(after, updates, epoch, measured=measured), Reason.USED
+
+    def _held(
+        self, state: BayesState, updates: list[EvidenceUpdate], epoch: Epoch, *, measured: bool
+    ) -> BayesState:
+        """Weigh the beliefs in which the phone was turned; one may take over."""
+        main = state.belief
+        if not state.held:
+            return state
+        positioned = epoch.fix is not None or bool(epoch.ranges)
+        if positioned or not isinstance(main, ParticleBelief):
+            return replace(state, held=())
+        beliefs = self.beliefs
+        rules, holds = beliefs.rules_of(state), beliefs.holds
+        rng = np.random.default_rng([7333, round(1000 * abs(epoch.time_s)) % 2**32])
+        found = []
+        for one in state.held:
+            reading = weighed_by(one.belief, updates, measured=measured)
+            assert reading is not None
+            belief, _ = beliefs.held_otherwise.update(one.belief, reading, rng)
+            null = _challenged(rules, one.null, reading, one.belief, belief)
+            found.append(replace(one, belief=belief, null=null))
+        travelled_m = state.reckoning.travelled_m
+        held = still_open(tuple(found), main, travelled_m, holds)
+        best = winner(held, main, holds)
+        if best is None:
+            return replace(state, held=held)
+        others = tuple(
+            replace(one, log_prior=one.log_prior - best.log_prior) for one in held if one is not best
+        )
+        return replace(
+            state,
+            belief=best.belief,
+            status=Status.TRACKING,
+            null=best.null,
+            alternative=None,
+            takeovers=state.takeovers + 1,
+            hold=best.hold,
+            held=others,
+        )
 
     def in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
         """Return a state that is LOST while its belief is spread over more than one place.
@@ -187,7 +227,8 @@ class Weighing:
         least = 0.0 if measured else rules.unclear_below_mass
         if was_unclear:
             least = rules.clear_from_mass
-        return state if mass >= least else replace(state, status=Status.LOST, unclear=True)
+        clear = mass >= least and not self.beliefs.is_contested(state)
+        return state if clear else replace(state, status=Status.LOST, unclear=True)
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
