@@ -24,6 +24,8 @@ from mapfilter.models.street_motion import BIAS
 from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 
+_USUAL_RAD = radians(30.0)
+
 
 @dataclass(frozen=True, slots=True)
 class HoldRules(Options):
@@ -38,13 +40,15 @@ class HoldRules(Options):
     longest_row_m : float
         Longer rows may hold a corner, so their changes are no jumps.
     probability, around_probability : float
-        That such a change, or one right round, is the phone's; shared by the ways to hold it.
+        That such a change, or one right round, is the phone's.
+    mirrored_odds : float
+        Odds of a phone being mirrored against being turned.
     lost_odds : float
         Log odds against the belief from which on it is LOST.
     win_odds : float
         Log odds from which on the belief is replaced.
-    abandon_odds : float
-        Log odds at which the phone was not turned.
+    abandon_threshold : float
+        Log Bayes factor at which the phone was not turned.
     abandon_after_m : float
         Distance after which an undecided one is dropped.
     particles : int
@@ -54,11 +58,12 @@ class HoldRules(Options):
     jump_deg: Positive = 60.0
     around_deg: Positive = 150.0
     longest_row_m: Positive = 3.0
-    probability: Share = 0.1
-    around_probability: Probability = 0.5
-    lost_odds: float = 0.0
+    probability: Share = 0.006
+    around_probability: Probability = 0.25
+    mirrored_odds: Positive = 0.25
+    lost_odds: float = 1.0
     win_odds: float = 4.0
-    abandon_odds: float = -5.0
+    abandon_threshold: float = -4.0
     abandon_after_m: NotNegative = 400.0
     most: int = 4
     particles: int = 1000
@@ -78,6 +83,11 @@ class Hold:
         return replace(
             step, heading_rad=self.direction_rad(step.heading_rad), turn_rad=self.sign * step.turn_rad
         )
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether headings are read nearly as they are."""
+        return self.sign > 0 and abs(self.offset_rad) < _USUAL_RAD
 
     def direction_rad(self, heading_rad: float) -> float:
         """Return the direction that a heading stands for."""
@@ -153,11 +163,13 @@ def forked(
     """Return the beliefs in which the phone was turned where its heading jumped."""
     jump = abs(float(wrap_rad(after_rad - before_rad)))
     around = jump > radians(rules.around_deg)
-    p = rules.around_probability if around else rules.probability
     holds = holds_after(hold, before_rad, after_rad)
-    log_prior = log(p / (1 - p) / len(holds)) if 0 < p < 1 else -np.inf
     found = []
     for one in holds:
+        likely = around or (hold != Hold() and one.is_usual)
+        p = rules.around_probability if likely else rules.probability
+        times = rules.mirrored_odds if one.sign != hold.sign else 1.0
+        log_prior = log(times * p / (1 - p)) if 0 < p < 1 else -np.inf
         count = min(rules.particles, belief.log_weight.size)
         chosen = rng.choice(belief.log_weight.size, count, p=_shares(belief))
         state = belief.state[:, chosen].copy()
@@ -189,8 +201,8 @@ def still_open(
     found = []
     for one in others:
         gone_m = travelled_m - one.start_m
-        odds = one.log_odds(main)
-        if odds <= rules.abandon_odds or gone_m >= rules.abandon_after_m:
+        gained = one.log_odds(main) - one.log_prior
+        if gained <= rules.abandon_threshold or gone_m >= rules.abandon_after_m:
             continue
         found.append(one)
     found.sort(key=lambda one: -one.log_odds(main))
@@ -211,10 +223,14 @@ def contested(others: tuple[HeldOtherwise, ...], main: ParticleBelief, rules: Ho
 
 
 def winner(
-    others: tuple[HeldOtherwise, ...], main: ParticleBelief, rules: HoldRules
+    others: tuple[HeldOtherwise, ...],
+    main: ParticleBelief,
+    rules: HoldRules,
+    most_null_log_odds: float,
 ) -> HeldOtherwise | None:
-    """Return the belief that takes over."""
+    """Return the belief that takes over; the null hypothesis must be improbable beside it."""
     best = max(others, key=lambda one: one.log_odds(main), default=None)
     if best is None or best.log_odds(main) < rules.win_odds:
         return None
-    return best if best.belief.status is Status.TRACKING else None
+    agrees = best.null.log_odds <= most_null_log_odds
+    return best if agrees and best.belief.status is Status.TRACKING else None

@@ -192,7 +192,7 @@ class Weighing:
             found.append(replace(one, belief=belief, null=null))
         travelled_m = state.reckoning.travelled_m
         held = still_open(tuple(found), main, travelled_m, holds)
-        best = winner(held, main, holds)
+        best = winner(held, main, holds, rules.converge_log_odds)
         if best is None:
             return replace(state, held=held)
         others = tuple(
