@@ -16,7 +16,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.held import HoldRules, contested
+from mapfilter.positioning.bayes.held import HoldRules, is_ahead
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
@@ -43,6 +43,8 @@ class BeliefFilters:
         Whether beliefs are masses on a grid in place of particles.
     positioned : tuple or None
         Options and rules that take the place of the others as long as positions are measured.
+    holds : HoldRules
+        When a phone may have been turned.
     """
 
     model: BayesModel
@@ -111,7 +113,7 @@ class BeliefFilters:
         main = state.belief
         if not state.held or not isinstance(main, ParticleBelief):
             return False
-        return contested(state.held, main, self.holds)
+        return is_ahead(self.holds, state.held, main)
 
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""

@@ -58,7 +58,7 @@ class BayesPositioner(Filter[BayesState]):
     ``grid`` replaces particles by the exact filter on a grid; ``smooth`` smooths positions by the
     whole log. ``more_sources`` are sources of evidence besides the built-in ones. ``positioned``
     holds the options and rules that take the place of the others as long as positions or satellites
-    are measured; None for the same ones.
+    are measured; None for the same ones. ``holds`` says when a phone may have been turned.
     """
 
     model: BayesModel
@@ -95,7 +95,9 @@ class BayesPositioner(Filter[BayesState]):
     @cached_property
     def beliefs(self) -> BeliefFilters:
         """Filters and rules of single beliefs."""
-        return BeliefFilters(self.model, self.options, self.rules, self.grid, self.positioned, self.holds)
+        return BeliefFilters(
+            self.model, self.options, self.rules, self.grid, self.positioned, self.holds
+        )
 
     @cached_property
     def sources(self) -> tuple[EvidenceSource, ...]:
@@ -150,6 +152,8 @@ class BayesPositioner(Filter[BayesState]):
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
+        elif epoch.motion and (self.beliefs.is_contested(state) or not state.hold.is_usual):
+            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         if radio is not Reason.USED:
             unused += [UnusedReading(epoch.time_s, row.role, name_of(row), radio) for row in heard]
         if repeated:

@@ -10,14 +10,15 @@ import numpy as np
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.held import forked, jump_rad, still_open
+from mapfilter.positioning.bayes.held import forked, jumps, own_rng, still_open
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import UnusedReading
 
-_HELD_SEED = 7331
+_FORKED, _MOVED = 1, 2
+"""Salts of the draws of beliefs in which the phone was turned."""
 
 
 def moved(
@@ -50,7 +51,9 @@ def moved(
     unused: list[UnusedReading] = []
     belief, compass, alternative = state.belief, state.compass, state.alternative
     reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
-    hold, walking_rad, held, rules = state.hold, state.walking_rad, state.held, beliefs.holds
+    hold, walking_rad, rules = state.hold, state.walking_rad, beliefs.holds
+    positioned = epoch.fix is not None or bool(epoch.ranges)
+    held = () if positioned else state.held
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         measured = step
@@ -69,24 +72,22 @@ def moved(
                 # Nothing has moved yet, so headings can still be relative to the first one.
                 compass, belief = False, beliefs.without_compass(belief, rng)
             predict = beliefs.by_compass[compass].predict
-            jump = jump_rad(walking_rad, raw, rules) if compass else 0.0
-            may_split = state.status is Status.TRACKING and belief.status is Status.TRACKING
-            if jump and may_split and isinstance(belief, ParticleBelief) and not _positioned(epoch):
-                own = np.random.default_rng([_HELD_SEED, round(1000 * abs(epoch.time_s)) % 2**32])
+            tracked = state.status is Status.TRACKING and belief.status is Status.TRACKING
+            fork = tracked and compass and not positioned and jumps(walking_rad, raw, rules)
+            if fork and isinstance(belief, ParticleBelief):
                 more = forked(
+                    rules,
                     belief,
                     state.null,
                     hold,
-                    walking_rad,
-                    raw.heading_rad,
+                    (walking_rad, raw.heading_rad),
                     reckoning.travelled_m,
                     beliefs.model.motion.white_rad,
-                    rules,
-                    own,
+                    own_rng(epoch.time_s, _FORKED),
                 )
-                held = still_open((*held, *more), belief, reckoning.travelled_m, rules)
+                held = still_open(rules, (*held, *more), belief, reckoning.travelled_m)
             if held:
-                own = np.random.default_rng([_HELD_SEED + 1, round(1000 * abs(epoch.time_s)) % 2**32])
+                own = own_rng(epoch.time_s, _MOVED)
                 held = tuple(
                     replace(one, belief=predict(one.belief, one.hold.read(measured), own)[0])
                     for one in held
@@ -122,7 +123,3 @@ def moved(
         walking_rad=walking_rad,
         held=held,
     ), unused
-
-
-def _positioned(epoch: Epoch) -> bool:
-    return epoch.fix is not None or bool(epoch.ranges)

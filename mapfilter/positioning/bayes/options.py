@@ -18,6 +18,7 @@ from mapfilter.options import Below1, NotNegative, Options, Positive, Probabilit
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.held import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.over_survey import (
     SURVEYED,
@@ -280,6 +281,8 @@ class BayesFilter(Options):
             timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
             smooth=self.smooth,
             positioned=positioned,
+            # A vehicle's compass is screwed on; without cells any street may go straight on.
+            holds=HoldRules(watched=bool(area.cell_ids) and not self.vehicle),
         )
 
 

@@ -29,10 +29,13 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import still_open, winner
+from mapfilter.positioning.bayes.held import after_takeover, own_rng, still_open, winner
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
+
+_WEIGHED = 3
+"""Salt of the draws of beliefs in which the phone was turned."""
 
 
 @dataclass(frozen=True)
@@ -167,10 +170,11 @@ class Weighing:
             null=null if by_map_alone and not now.taken_over else now.null,
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
+            held=() if now.taken_over else state.held,
         )
-        return self._held(after, updates, epoch, measured=measured), Reason.USED
+        return self._held_otherwise(after, updates, epoch, measured=measured), Reason.USED
 
-    def _held(
+    def _held_otherwise(
         self, state: BayesState, updates: list[EvidenceUpdate], epoch: Epoch, *, measured: bool
     ) -> BayesState:
         """Weigh the beliefs in which the phone was turned; one may take over."""
@@ -182,22 +186,18 @@ class Weighing:
             return replace(state, held=())
         beliefs = self.beliefs
         rules, holds = beliefs.rules_of(state), beliefs.holds
-        rng = np.random.default_rng([7333, round(1000 * abs(epoch.time_s)) % 2**32])
-        found = []
+        found, rng = [], own_rng(epoch.time_s, _WEIGHED)
         for one in state.held:
             reading = weighed_by(one.belief, updates, measured=measured)
-            assert reading is not None
+            if reading is None:
+                return state
             belief, _ = beliefs.held_otherwise.update(one.belief, reading, rng)
             null = _challenged(rules, one.null, reading, one.belief, belief)
             found.append(replace(one, belief=belief, null=null))
-        travelled_m = state.reckoning.travelled_m
-        held = still_open(tuple(found), main, travelled_m, holds)
-        best = winner(held, main, holds, rules.converge_log_odds)
+        held = still_open(holds, found, main, state.reckoning.travelled_m)
+        best = winner(holds, held, main, rules.converge_log_odds)
         if best is None:
             return replace(state, held=held)
-        others = tuple(
-            replace(one, log_prior=one.log_prior - best.log_prior) for one in held if one is not best
-        )
         return replace(
             state,
             belief=best.belief,
@@ -206,7 +206,7 @@ class Weighing:
             alternative=None,
             takeovers=state.takeovers + 1,
             hold=best.hold,
-            held=others,
+            held=after_takeover(held, best),
         )
 
     def in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
