@@ -52,6 +52,7 @@ class Reason(StrEnum):
     MOTION_MISSING = "motion_missing"
     MOTION_STUCK = "motion_stuck"
     HEADING_STUCK = "heading_stuck"
+    PHONE_TURNED = "phone_turned"
     DELIVERED_TWICE = "delivered_twice"
     STALE_RADIO = "stale_radio"
     NOT_STARTED = "not_started"

@@ -27,6 +27,7 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.repeats import MotionRepeats
@@ -56,6 +57,8 @@ _CLASSES: dict[str, type] = {
         Fix,
         GnssFix,
         GnssState,
+        HeldOtherwise,
+        Hold,
         LevelErrors,
         LevelMemory,
         MirroredTwin,

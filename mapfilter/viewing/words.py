@@ -21,6 +21,7 @@ REASONS: Mapping[Reason, str] = {
     Reason.MOTION_MISSING: "motion is missing for a while",
     Reason.MOTION_STUCK: "the motion sensor repeats itself",
     Reason.HEADING_STUCK: "the heading repeats itself while one walks",
+    Reason.PHONE_TURNED: "the heading has jumped as that of a phone that is turned",
     Reason.DELIVERED_TWICE: "the same rows of motion were delivered again",
     Reason.STALE_RADIO: "the modem repeats an old report",
     Reason.NOT_STARTED: "there is no belief yet",

@@ -10,6 +10,7 @@ from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import STATES, STRETCH, TURN, MotionErrors
+from mapfilter.positioning.bayes.held import Hold
 from mapfilter.positioning.bayes.smoothing import BayesSmoother, Kept
 from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
 from mapfilter.positioning.estimate_columns import EstimateColumns
@@ -179,7 +180,7 @@ def test_positions_ways_and_masses_are_those_of_the_paths():
     assert places(estimate)[4].tolist() == pytest.approx([45.0, 25.0 - 20.0 / 3], abs=0.1)
 
 
-def at(epoch, state, alternative=None, takeovers=0):
+def at(epoch, state, alternative=None, takeovers=0, hold=None, held=()):
     """The part of the filter's state after an epoch that the history uses."""
     east_m, north_m, travelled_m = MOVED[epoch]
     state = np.vstack([state, np.zeros((STATES - 5, state.shape[1]), np.float32)])
@@ -190,6 +191,8 @@ def at(epoch, state, alternative=None, takeovers=0):
         belief=belief,
         alternative=alternative,
         takeovers=takeovers,
+        hold=hold or Hold(),
+        held=held,
     )
 
 
@@ -237,6 +240,19 @@ def test_an_alternative_that_took_over_replaces_what_was_kept_since(won):
     expected = [1.0, 9.0, 9.0, 9.0, 9.0] if won else [1.0] * 5
     assert [float(k.state[0, 0]) for k in history.kept] == expected
     assert history.alternative == []
+
+
+def test_beliefs_whose_phone_was_not_turned_are_dropped_once_it_was():
+    """They were those of another way, from the jump of the heading on."""
+    history, turned = BayesSmoother(AREA, ERRORS, every_m=1.0), Hold(1.0, 3.0)
+    main, other = cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
+    held = (SimpleNamespace(hold=turned, start_m=6.0),)
+    tracks = [at(0, main), at(1, main, held=held), at(2, main, held=held)]
+    tracks += [at(3, other, takeovers=1, hold=turned), at(4, other, takeovers=1, hold=turned)]
+    for before, after in zip([tracks[0], *tracks], tracks, strict=False):
+        history.add(before, after)
+    assert [k.epoch for k in history.kept] == [0, 3, 4]
+    assert [float(k.state[0, 0]) for k in history.kept] == [1.0, 9.0, 9.0]
 
 
 def test_evidence_is_kept_by_epoch():

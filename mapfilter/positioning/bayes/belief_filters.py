@@ -11,13 +11,14 @@ import numpy as np
 
 from mapfilter.filters.contract import BeliefFilter, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
-from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
 from mapfilter.models.street_motion import remounted
 from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
 from mapfilter.positioning.bayes.grid import StreetGrid
+from mapfilter.positioning.bayes.held import HoldRules, is_ahead
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
@@ -47,6 +48,8 @@ class BeliefFilters:
     carriageways : CarriagewayFilters or None
         What takes the place of model, options and rules of a vehicle while nothing but turns and
         the map locate it.
+    holds : HoldRules
+        When a phone may have been turned.
     """
 
     model: BayesModel
@@ -55,6 +58,7 @@ class BeliefFilters:
     grid: bool = False
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
     carriageways: CarriagewayFilters | None = None
+    holds: HoldRules = field(default_factory=HoldRules)
 
     @cached_property
     def map_may_start(self) -> bool:
@@ -120,6 +124,13 @@ class BeliefFilters:
         return lanes._particle_filters(self.carriageways.options)[False]
 
     @cached_property
+    def held_otherwise(self) -> MapFilter:
+        """The filter of beliefs in which the phone was turned: smaller ones."""
+        few = self.holds.particles
+        options = replace(self.options, min_particles=few, min_search_particles=few)
+        return ParticleFilter(self.model, replace(options, max_particles=2 * few))
+
+    @cached_property
     def _positioned_by_compass(self) -> dict[bool, MapFilter]:
         return self._particle_filters(self.positioned[0] if self.positioned else self.options)
 
@@ -132,6 +143,13 @@ class BeliefFilters:
             True: ParticleFilter(self.model, known),
             False: ParticleFilter(self.model, unknown),
         }
+
+    def is_contested(self, state: BayesState) -> bool:
+        """Return whether a belief in which the phone was turned is ahead of the belief."""
+        main = state.belief
+        if not state.held or not isinstance(main, ParticleBelief):
+            return False
+        return is_ahead(self.holds, state.held, main)
 
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""

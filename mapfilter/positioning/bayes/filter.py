@@ -32,6 +32,7 @@ from mapfilter.positioning.bayes.evidence import (
     RadioReading,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.held import HoldRules
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
@@ -59,7 +60,7 @@ class BayesPositioner(Filter[BayesState]):
     whole log. ``more_sources`` are sources of evidence besides the built-in ones. ``positioned``
     holds the options and rules that take the place of the others as long as positions or satellites
     are measured; None for the same ones. ``carriageways`` locate a vehicle as long as nothing but
-    its turns and the map do.
+    its turns and the map do. ``holds`` says when a phone may have been turned.
     """
 
     model: BayesModel
@@ -72,6 +73,7 @@ class BayesPositioner(Filter[BayesState]):
     more_sources: tuple[EvidenceSource, ...] = ()
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
     carriageways: CarriagewayFilters | None = None
+    holds: HoldRules = field(default_factory=HoldRules)
 
     @property
     def crs(self) -> str:
@@ -97,7 +99,7 @@ class BayesPositioner(Filter[BayesState]):
     def beliefs(self) -> BeliefFilters:
         """Filters and rules of single beliefs."""
         known = self.model, self.options, self.rules, self.grid, self.positioned
-        return BeliefFilters(*known, self.carriageways)
+        return BeliefFilters(*known, self.carriageways, self.holds)
 
     @cached_property
     def sources(self) -> tuple[EvidenceSource, ...]:
@@ -145,12 +147,15 @@ class BayesPositioner(Filter[BayesState]):
         unclear, spacing_m = state.unclear, state.particle_spacing_m
         if unclear:
             state = replace(state, status=Status.TRACKING, unclear=False)
+            unclear = not self.beliefs.is_contested(state)
         before, weighing = state.status, self._weighing
         heard = epoch.radio
         watch, epoch, (motion, radio) = watched(state.watch, epoch)
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
+        elif epoch.motion and (self.beliefs.is_contested(state) or not state.hold.is_usual):
+            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         if radio is not Reason.USED:
             unused += [UnusedReading(epoch.time_s, row.role, name_of(row), radio) for row in heard]
         if repeated:

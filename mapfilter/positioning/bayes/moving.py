@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 
-from mapfilter.filters.contract import Reason
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.held import forked, jumps, own_rng, still_open
 from mapfilter.positioning.bayes.mirrored import mirrored_step
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import UnusedReading
+
+_FORKED, _MOVED = 1, 2
+"""Salts of the draws of beliefs in which the phone was turned."""
 
 
 def moved(
@@ -48,8 +53,13 @@ def moved(
     belief, compass, alternative = state.belief, state.compass, state.alternative
     reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
     twin = state.twin
+    hold, walking_rad, rules = state.hold, state.walking_rad, beliefs.holds
+    positioned = epoch.fix is not None or bool(epoch.ranges)
+    held = () if positioned else state.held
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
+        measured = step
+        step = hold.read(measured)
         why = Reason.NOT_STARTED
         if beliefs.map_may_start:
             known = isfinite(raw.heading_rad) == compass or not path.here.travelled_m
@@ -64,6 +74,26 @@ def moved(
                 # Nothing has moved yet, so headings can still be relative to the first one.
                 compass, belief = False, beliefs.without_compass(belief, rng)
             predict = beliefs.moving_filter(state, compass=compass).predict
+            tracked = state.status is Status.TRACKING and belief.status is Status.TRACKING
+            fork = tracked and compass and not positioned and jumps(walking_rad, raw, rules)
+            if fork and isinstance(belief, ParticleBelief):
+                more = forked(
+                    rules,
+                    belief,
+                    state.null,
+                    hold,
+                    (walking_rad, raw.heading_rad),
+                    reckoning.travelled_m,
+                    beliefs.model.motion.white_rad,
+                    own_rng(epoch.time_s, _FORKED),
+                )
+                held = still_open(rules, (*held, *more), belief, reckoning.travelled_m)
+            if held:
+                own = own_rng(epoch.time_s, _MOVED)
+                held = tuple(
+                    replace(one, belief=predict(one.belief, one.hold.read(measured), own)[0])
+                    for one in held
+                )
             belief, why = predict(belief, step, rng)
             belief = beliefs.remounted(belief, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
@@ -73,6 +103,10 @@ def moved(
             if twin is not None:
                 other, _ = predict(twin.belief, mirrored_step(step), rng)
                 twin = replace(twin, belief=other)
+        if isfinite(raw.heading_rad) and raw.step_m > 0:
+            walking_rad = raw.heading_rad
+        elif isfinite(raw.spread_m):
+            walking_rad = nan
         if why is not Reason.USED:
             unused.append(UnusedReading(epoch.time_s, "motion", "", why))
     return BayesState(
@@ -91,4 +125,7 @@ def moved(
         watch=watch,
         last_fix=state.last_fix,
         twin=twin,
+        hold=hold,
+        walking_rad=walking_rad,
+        held=held,
     ), unused

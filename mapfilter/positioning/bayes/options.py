@@ -19,6 +19,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.held import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.over_survey import (
     SURVEYED,
@@ -283,6 +284,8 @@ class BayesFilter(Options):
             smooth=self.smooth,
             positioned=positioned,
             carriageways=carriageways,
+            # A vehicle's compass is screwed on; without cells any street may go straight on.
+            holds=HoldRules(watched=bool(area.cell_ids) and not self.vehicle),
         )
 
 

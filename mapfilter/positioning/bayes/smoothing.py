@@ -79,7 +79,12 @@ class BayesSmoother:
         """Record the states before and after one epoch; a takeover replaces beliefs kept since."""
         self.last, now = after, after.reckoning
         self.moved.append((now.east_m, now.north_m, now.travelled_m))
-        if before.alternative is not None and after.alternative is None:
+        if after.hold != before.hold:
+            # Since the phone was turned, the beliefs were those of one that was not.
+            since_m = min(one.start_m for one in before.held if one.hold == after.hold)
+            self.kept = [k for k in self.kept if k.travelled_m < since_m]
+            self.alternative = []
+        elif before.alternative is not None and after.alternative is None:
             if after.takeovers > before.takeovers:
                 start_m = before.alternative.start_m
                 self.kept = [k for k in self.kept if k.travelled_m < start_m] + self.alternative

@@ -12,6 +12,7 @@ from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
@@ -63,6 +64,12 @@ class BayesState:
         The last one that was used.
     twin : MirroredTwin or None
         The mirrored motion, while a belief by the map alone has to prove itself.
+    hold : Hold
+        How headings are read.
+    walking_rad : float
+        Heading of the last row of a walk, as measured.
+    held : tuple of HeldOtherwise
+        Beliefs in which the phone was turned, tested against the belief.
     """
 
     belief: MapBelief | None = None
@@ -80,6 +87,9 @@ class BayesState:
     watch: SensorWatch = field(default_factory=SensorWatch)
     last_fix: GnssFix | None = None
     twin: MirroredTwin | None = None
+    hold: Hold = field(default_factory=Hold)
+    walking_rad: float = nan
+    held: tuple[HeldOtherwise, ...] = ()
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -99,6 +109,9 @@ class BayesState:
             watch=self.watch,
             last_fix=self.last_fix,
             twin=self.twin,
+            hold=self.hold,
+            walking_rad=self.walking_rad,
+            held=self.held,
         )
 
     @property

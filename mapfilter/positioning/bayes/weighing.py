@@ -30,10 +30,14 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.held import after_takeover, own_rng, still_open, winner
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
+
+_WEIGHED = 3
+"""Salt of the draws of beliefs in which the phone was turned."""
 
 
 @dataclass(frozen=True)
@@ -173,10 +177,46 @@ class Weighing:
             null=null if by_map_alone and not now.taken_over else now.null,
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
+            held=() if now.taken_over else state.held,
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
-        return after, Reason.USED
+        return self._held_otherwise(after, updates, epoch, measured=measured), Reason.USED
+
+    def _held_otherwise(
+        self, state: BayesState, updates: list[EvidenceUpdate], epoch: Epoch, *, measured: bool
+    ) -> BayesState:
+        """Weigh the beliefs in which the phone was turned; one may take over."""
+        main = state.belief
+        if not state.held:
+            return state
+        positioned = epoch.fix is not None or bool(epoch.ranges)
+        if positioned or not isinstance(main, ParticleBelief):
+            return replace(state, held=())
+        beliefs = self.beliefs
+        rules, holds = beliefs.rules_of(state), beliefs.holds
+        found, rng = [], own_rng(epoch.time_s, _WEIGHED)
+        for one in state.held:
+            reading = weighed_by(one.belief, updates, measured=measured)
+            if reading is None:
+                return state
+            belief, _ = beliefs.held_otherwise.update(one.belief, reading, rng)
+            null = _challenged(rules, one.null, reading, one.belief, belief)
+            found.append(replace(one, belief=belief, null=null))
+        held = still_open(holds, found, main, state.reckoning.travelled_m)
+        best = winner(holds, held, main, rules.converge_log_odds)
+        if best is None:
+            return replace(state, held=held)
+        return replace(
+            state,
+            belief=best.belief,
+            status=Status.TRACKING,
+            null=best.null,
+            alternative=None,
+            takeovers=state.takeovers + 1,
+            hold=best.hold,
+            held=after_takeover(held, best),
+        )
 
     def _twin_of(
         self,
@@ -219,7 +259,8 @@ class Weighing:
         least = 0.0 if measured else rules.unclear_below_mass
         if was_unclear:
             least = rules.clear_from_mass
-        return state if mass >= least else replace(state, status=Status.LOST, unclear=True)
+        clear = mass >= least and not self.beliefs.is_contested(state)
+        return state if clear else replace(state, status=Status.LOST, unclear=True)
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator

@@ -1,0 +1,263 @@
+"""A phone that is held otherwise from one step to the next: turned, or its axes mapped anew.
+
+A compass heading that jumps between two rows of a walk has two explanations: the walker turned
+there, or walks straight on and the phone was turned. The belief follows the first. Beside it,
+smaller beliefs follow the second, weighed by the same readings: one for a phone that was *turned*,
+so that all further headings are off by the jump, and one for a phone whose headings are *mirrored*
+from there on. The difference of their log evidence, with the odds of such an event, decides: while
+one of them is ahead elsewhere, the position is LOST; when it is far ahead, it takes over, and
+headings are read as it reads them. Walks without a jump have no such beliefs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import hypot, isfinite, log, radians
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge
+
+from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.filters.hypotheses import NEAR_M
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.geodesy import wrap_rad
+from mapfilter.models.street_motion import BIAS
+from mapfilter.options import NotNegative, Options, Positive, Probability
+from mapfilter.positioning.bayes.alternative import NullHypothesis
+
+_USUAL_RAD = radians(30.0)
+_MILLISECONDS, _SEEDS = 1000.0, 2**32
+
+
+@dataclass(frozen=True, slots=True)
+class HoldRules(Options):
+    """When a phone may have been turned, and when that is believed.
+
+    Log odds are those of such a belief against the main one: of the phone having been turned, and
+    the log Bayes factor since.
+
+    Parameters
+    ----------
+    watched : bool
+        Whether jumps of headings are looked at.
+    jump_deg : float
+        Change of the heading from one row of a walk to the next that may be the phone's.
+    around_deg : float
+        Change from which on it is one right round, which is rare in walks.
+    longest_row_m : float
+        Longer rows may hold a corner, so their changes are no jumps.
+    probability, around_probability : float
+        That such a change, or one right round, is that of a phone being turned.
+    mirrored_odds : float
+        Odds of its being mirrored against its being turned.
+    lost_log_odds : float
+        Log odds from which on the main belief is LOST.
+    win_log_odds : float
+        Log odds from which on it is replaced.
+    abandon_threshold : float
+        Log Bayes factor at which the phone was not turned.
+    abandon_after_m : float
+        Distance after which that stays undecided.
+    most : int
+        Most beliefs at a time.
+    particles : int
+        Of each of them.
+    """
+
+    watched: bool = True
+    jump_deg: Positive = 60.0
+    around_deg: Positive = 150.0
+    longest_row_m: Positive = 3.0
+    probability: Probability = 0.006
+    around_probability: Probability = 0.25
+    mirrored_odds: Positive = 0.25
+    lost_log_odds: float = 1.0
+    win_log_odds: float = 8.0
+    abandon_threshold: float = -4.0
+    abandon_after_m: NotNegative = 400.0
+    most: Annotated[int, Ge(1)] = 4
+    particles: Annotated[int, Ge(10)] = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """How headings are read: their sign, and the angle that is added."""
+
+    sign: float = 1.0
+    offset_rad: float = 0.0
+
+    def read(self, step: MotionStep) -> MotionStep:
+        """Return a step with the direction that its heading stands for."""
+        if (self.sign == 1.0 and self.offset_rad == 0.0) or not isfinite(step.heading_rad):
+            return step
+        direction_rad = self.direction_rad(step.heading_rad)
+        return replace(step, heading_rad=direction_rad, turn_rad=self.sign * step.turn_rad)
+
+    def direction_rad(self, heading_rad: float) -> float:
+        """Return the direction that a heading stands for."""
+        return float(wrap_rad(self.sign * heading_rad + self.offset_rad))
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether headings are read nearly as they are."""
+        return self.sign > 0 and abs(self.offset_rad) < _USUAL_RAD
+
+    def straight_on(self, before_rad: float, after_rad: float) -> tuple[Hold, Hold]:
+        """Return how headings are read of a phone that was turned, or mirrored, on a straight walk.
+
+        Parameters
+        ----------
+        before_rad, after_rad : float
+            Headings as measured, of the rows before and after.
+
+        Examples
+        --------
+        >>> turned, mirrored = Hold().straight_on(0.5, -2.5)
+        >>> turned.direction_rad(-2.5), mirrored.direction_rad(-2.5)
+        (0.5, 0.5)
+        >>> f"{turned.direction_rad(-2.4):.1f}, {mirrored.direction_rad(-2.4):.1f}"
+        '0.6, 0.4'
+        """
+        ahead_rad, sign = self.direction_rad(before_rad), self.sign
+        turned = Hold(sign, float(wrap_rad(ahead_rad - sign * after_rad)))
+        return turned, Hold(-sign, float(wrap_rad(ahead_rad + sign * after_rad)))
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOtherwise:
+    """A belief with a phone that is held otherwise since its heading jumped.
+
+    Parameters
+    ----------
+    belief : ParticleBelief
+        Its log evidence begins with that of the main belief.
+    hold : Hold
+        How it reads headings.
+    log_prior : float
+        Log odds of the phone having been turned.
+    start_m : float
+        Distance travelled at the jump.
+    null : NullHypothesis
+        Beside this belief.
+    """
+
+    belief: ParticleBelief
+    hold: Hold
+    log_prior: float
+    start_m: float
+    null: NullHypothesis = field(default_factory=NullHypothesis)
+
+    def log_bayes_factor(self, main: ParticleBelief) -> float:
+        """Return the logarithm of the Bayes factor against the main belief."""
+        return self.belief.log_evidence - main.log_evidence
+
+    def log_odds(self, main: ParticleBelief) -> float:
+        """Return the log odds against the main belief."""
+        return self.log_prior + self.log_bayes_factor(main)
+
+    def is_elsewhere(self, main: ParticleBelief) -> bool:
+        """Return whether its position is another one."""
+        own, other = self.belief.summary.mean, main.summary.mean
+        return hypot(own[0] - other[0], own[1] - other[1]) > NEAR_M
+
+
+def own_rng(time_s: float, salt: int) -> np.random.Generator:
+    """Return a generator for an epoch, so that the draws of the main belief stay as they are."""
+    return np.random.default_rng((salt, round(_MILLISECONDS * abs(time_s)) % _SEEDS))
+
+
+def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:
+    """Return whether the heading of a row is far from that of the row before."""
+    if not (rules.watched and isfinite(before_rad) and isfinite(step.heading_rad)):
+        return False
+    changed = abs(float(wrap_rad(step.heading_rad - before_rad)))
+    return 0 < step.step_m <= rules.longest_row_m and changed > radians(rules.jump_deg)
+
+
+def forked(
+    rules: HoldRules,
+    belief: ParticleBelief,
+    null: NullHypothesis,
+    hold: Hold,
+    headings_rad: tuple[float, float],
+    travelled_m: float,
+    white_rad: float,
+    rng: np.random.Generator,
+) -> tuple[HeldOtherwise, ...]:
+    """Return the beliefs in which the phone was turned where its heading jumped.
+
+    Parameters
+    ----------
+    belief, null, hold
+        The main belief before the jump, what speaks against it, and how it reads headings.
+    headings_rad : tuple of float
+        As measured, before and after the jump.
+    travelled_m : float
+        By dead reckoning.
+    white_rad : float
+        White noise of a heading, which is in the jump twice.
+    """
+    before_rad, after_rad = headings_rad
+    around = abs(float(wrap_rad(after_rad - before_rad))) > radians(rules.around_deg)
+    share = np.exp(belief.log_weight - belief.log_weight.max())
+    count = min(rules.particles, share.size)
+    found = []
+    for one in hold.straight_on(before_rad, after_rad):
+        # Who has turned a phone is likely to turn it back.
+        likely = around or (one.is_usual and not hold.is_usual)
+        probability = rules.around_probability if likely else rules.probability
+        log_prior = log(probability / (1 - probability))
+        log_prior += log(rules.mirrored_odds) if one.sign != hold.sign else 0.0
+        chosen = rng.choice(share.size, count, p=share / share.sum())
+        state = belief.state[:, chosen].copy()
+        state[BIAS] = wrap_rad(state[BIAS] + 2**0.5 * white_rad * rng.standard_normal(count))
+        own = replace(
+            belief,
+            state=state,
+            log_weight=np.full(count, -log(count)),
+            kept=belief.kept[:, chosen],
+        )
+        found.append(HeldOtherwise(own, one, log_prior, travelled_m, null))
+    return tuple(found)
+
+
+def still_open(
+    rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
+) -> tuple[HeldOtherwise, ...]:
+    """Return the beliefs that are neither refuted nor undecided for too long, most likely first."""
+    kept = [
+        one
+        for one in held
+        if one.log_bayes_factor(main) > rules.abandon_threshold
+        and travelled_m - one.start_m < rules.abandon_after_m
+    ]
+    kept.sort(key=lambda one: -one.log_odds(main))
+    return tuple(kept[: rules.most])
+
+
+def is_ahead(rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief) -> bool:
+    """Return whether one of the beliefs is ahead of the main one, and elsewhere."""
+    return any(one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main) for one in held)
+
+
+def winner(
+    rules: HoldRules,
+    held: Sequence[HeldOtherwise],
+    main: ParticleBelief,
+    most_null_log_odds: float,
+) -> HeldOtherwise | None:
+    """Return the belief that takes over; the null hypothesis must be improbable beside it."""
+    best = max(held, key=lambda one: one.log_odds(main), default=None)
+    if best is None or best.log_odds(main) < rules.win_log_odds:
+        return None
+    agrees = best.belief.status is Status.TRACKING and best.null.log_odds <= most_null_log_odds
+    return best if agrees else None
+
+
+def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[HeldOtherwise, ...]:
+    """Return the other beliefs, with their odds against the one that has taken over."""
+    return tuple(
+        replace(one, log_prior=one.log_prior - best.log_prior) for one in held if one is not best
+    )
