@@ -241,6 +241,17 @@ class WindowReader:
         return table
 
 
+def part_box(footer: pq.FileMetaData) -> tuple[int, int, int, int]:
+    """Return the first and last row, and the first and last column of a part's points."""
+    names = {footer.schema.column(i).name: i for i in range(footer.num_columns)}
+    groups = [footer.row_group(i) for i in range(footer.num_row_groups)]
+    ends = [[_ends(one, names[axis]) for one in groups] for axis in ("row", "col")]
+    (top, bottom), (left, right) = (
+        (min(low for low, _ in axis), max(high for _, high in axis)) for axis in ends
+    )
+    return top, bottom, left, right
+
+
 def _ends(group: pq.RowGroupMetaData, column: int) -> tuple[int, int]:
     known = group.column(column).statistics
     return (known.min, known.max) if known is not None and known.has_min_max else _EVERYWHERE

@@ -1,0 +1,145 @@
+"""Compiled look-ups in an area that is held by tiles: which tile a hypothesis is in, and its ways.
+
+Pixels are those of the whole area; a tile's arrays begin at a row and column of it. Positions are
+turned into pixels with the same arithmetic as on an area that is held whole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mapfilter._types import Bytes, Floats32, Ints, Ints32
+from mapfilter.models.fingerprint import RasterFrame
+
+_F = np.float32
+
+
+@njit(error_model="numpy", cache=True)
+def tiles_of(pixel: Ints32, cols: int, side: int, tile_cols: int) -> Ints32:
+    """Return the number of the tile that each flat pixel lies in, tiles of ``side`` pixels."""
+    found = np.empty(pixel.size, dtype=np.int32)
+    for i in range(pixel.size):
+        row, col = pixel[i] // cols, pixel[i] % cols
+        found[i] = (row // side) * tile_cols + col // side
+    return found
+
+
+@njit(error_model="numpy", cache=True)
+def look_up_levels(
+    pixel: Ints32,
+    which: Ints,
+    cols: int,
+    corner: tuple[int, int],
+    near: Ints32,
+    levels_dbm: Floats32,
+    rough_db: Bytes,
+    found_dbm: Floats32,
+    found_rough_db: Bytes,
+) -> None:
+    """Fill in the levels and their roughness for the hypotheses ``which`` of a tile, in place.
+
+    ``levels_dbm`` (K, P) are those of each cell at the tile's nearest points, ``rough_db``
+    (K, rows, cols) or empty that of each pixel; found are (N, K).
+    """
+    top, left = corner
+    for j in range(which.size):
+        i = which[j]
+        row, col = pixel[i] // cols - top, pixel[i] % cols - left
+        point = near[row, col]
+        for k in range(levels_dbm.shape[0]):
+            found_dbm[i, k] = levels_dbm[k, point]
+        for k in range(rough_db.shape[0]):
+            found_rough_db[i, k] = rough_db[k, row, col]
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def upper_left(state: Floats32, raster: RasterFrame) -> Ints32:
+    """Return the flat pixel whose centre lies north-west of each hypothesis, as bilinearly used.
+
+    ``raster`` is from the centre of its first pixel.
+    """
+    zero = _F(0.0)
+    west, top, k = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m)
+    last_col, last_row = np.int32(raster.cols - 2), np.int32(raster.rows - 2)
+    width = np.int32(raster.cols)
+    east, north = state[0], state[1]
+    first = np.empty(state.shape[1], dtype=np.int32)
+    for i in range(first.size):
+        x = (east[i] - west) * k
+        y = (top - north[i]) * k
+        x = x if x > zero else zero
+        y = y if y > zero else zero
+        col, row = np.int32(x), np.int32(y)
+        col = col if col < last_col else last_col
+        row = row if row < last_row else last_row
+        first[i] = np.int32(row * width) + col
+    return first
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def interpolate_tile(
+    state: Floats32,
+    first: Ints32,
+    which: Ints,
+    raster: RasterFrame,
+    corner: tuple[int, int],
+    values: Floats32,
+    found: Floats32,
+) -> None:
+    """Fill in a tile's values at the hypotheses ``which``, bilinear between centres, in place.
+
+    ``first`` is what :func:`upper_left` returns.
+    """
+    zero, one = _F(0.0), _F(1.0)
+    west, north_m, k = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m)
+    east, north, (top, left) = state[0], state[1], corner
+    for j in range(which.size):
+        i = which[j]
+        x = (east[i] - west) * k
+        y = (north_m - north[i]) * k
+        x = x if x > zero else zero
+        y = y if y > zero else zero
+        col, row = np.int32(first[i] % raster.cols), np.int32(first[i] // raster.cols)
+        u, v = x - _F(col), y - _F(row)
+        u = u if u < one else one
+        v = v if v < one else one
+        r, c = row - top, col - left
+        upper = values[r, c] + u * (values[r, c + 1] - values[r, c])
+        under = values[r + 1, c] + u * (values[r + 1, c + 1] - values[r + 1, c])
+        found[i] = upper + v * (under - upper)
+
+
+@njit(error_model="numpy", cache=True)
+def pixels_from_south(
+    east_m: Floats32, north_m: Floats32, rows: int, cols: int, per_m: float
+) -> Ints32:
+    """Return the flat pixel of each place, rows counted from the south in double precision."""
+    pixel = np.empty(east_m.size, dtype=np.int32)
+    last_col, last_row, zero = np.int32(cols - 1), np.int32(rows - 1), np.int32(0)
+    for i in range(pixel.size):
+        col, row = np.int32(east_m[i] * per_m), np.int32(north_m[i] * per_m)
+        col = col if col > zero else zero
+        row = row if row > zero else zero
+        col = col if col < last_col else last_col
+        row = row if row < last_row else last_row
+        pixel[i] = np.int32(np.int32(last_row - row) * np.int32(cols)) + col
+    return pixel
+
+
+@njit(error_model="numpy", cache=True)
+def level_ranges(
+    point: Ints, level_dbm: Floats32, cols: int, side: int, tile_cols: int, tiles: int
+) -> tuple[Floats32, Floats32]:
+    """Return the least and the largest level of a cell in each tile; NaN where it has none."""
+    least = np.full(tiles, np.nan, dtype=np.float32)
+    most = np.full(tiles, np.nan, dtype=np.float32)
+    for i in range(point.size):
+        row, col = point[i] // cols, point[i] % cols
+        tile = (row // side) * tile_cols + col // side
+        level = level_dbm[i]
+        if not least[tile] <= level:
+            least[tile] = level
+        if not most[tile] >= level:
+            most[tile] = level
+    return least, most

@@ -1,0 +1,290 @@
+"""Tiles of a large area, read from its database when they are looked up, and given up again.
+
+A tile has the nearest point of each pixel, and the levels of a cell at these points: only of cells
+that are looked up, and nothing of cells that are not received there. What was looked up longest ago
+is given up when all of it takes more than a number of bytes.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import cached_property
+from threading import RLock
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from mapfilter._types import Bytes, Floats32, Ints, Ints32
+from mapfilter.database.cell_levels import (
+    CellLevels,
+    NearestPoints,
+    PointReader,
+    cell_boxes,
+    read_cell,
+)
+from mapfilter.database.parquet import read_columns
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.models.level_errors import roughness, roughness_px
+from mapfilter.models.street_motion import map_log_likelihood
+from mapfilter.models.tile_kernels import level_ranges
+from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
+
+TILE_PX = 128
+HELD_BYTES = 640 << 20
+"""Most bytes of tiles and levels that are held at a time."""
+_ENTRY_BYTES = 300
+
+_Value = TypeVar("_Value")
+
+
+class LevelRange(NamedTuple):
+    """Least and largest level of a cell in some tiles, (rows, cols); NaN where it has none.
+
+    ``row`` and ``col`` are those of the first tile.
+    """
+
+    row: int
+    col: int
+    least_dbm: Floats32
+    most_dbm: Floats32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tile:
+    """A tile of an area.
+
+    Parameters
+    ----------
+    points : NearestPoints
+        Of a window that reaches beyond the tile by the width of the roughness.
+    row, col : ndarray of int64, shape (M,)
+        The points of the database that lie in the tile itself.
+    box : tuple of int
+        First and last row, first and last column of all nearest points.
+    """
+
+    points: NearestPoints
+    row: Ints
+    col: Ints
+    box: tuple[int, int, int, int]
+
+    @property
+    def corner(self) -> tuple[int, int]:
+        """Row and column of the first pixel of the arrays."""
+        return self.points.window[0], self.points.window[1]
+
+
+class Held:
+    """Values by keys, of which those that were asked for longest ago are given up."""
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most_bytes = most_bytes
+        self._entries: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self.bytes = 0
+
+    def get(
+        self, key: Hashable, make: Callable[[], _Value], size: Callable[[_Value], int]
+    ) -> _Value:
+        """Return the value of a key, made where it is not held."""
+        entry = self._entries.get(key)
+        if entry is not None:
+            self._entries.move_to_end(key)
+            found: _Value = entry[0]
+            return found
+        value = make()
+        count = size(value) + _ENTRY_BYTES
+        self._entries[key] = value, count
+        self.bytes += count
+        while self.bytes > self._most_bytes and len(self._entries) > 1:
+            _, (_, gone) = self._entries.popitem(last=False)
+            self.bytes -= gone
+        return value
+
+
+class AreaTiles:
+    """The tiles of a database's area.
+
+    Whoever looks something up holds ``lock`` meanwhile, and keeps nothing but copies.
+
+    Parameters
+    ----------
+    cell_ids : tuple of str
+        Bands.
+    side : int
+        Of a tile, pixels.
+    most_bytes : int
+        Of everything that is held.
+    """
+
+    def __init__(
+        self,
+        database: RadioRouteDatabase,
+        cell_ids: tuple[str, ...],
+        side: int = TILE_PX,
+        most_bytes: int = HELD_BYTES,
+    ) -> None:
+        self.database, self.cell_ids, self.side = database, cell_ids, side
+        self.most_bytes = most_bytes
+        lattice = database.lattice
+        self.rows, self.cols = -(-lattice.rows // side), -(-lattice.cols // side)
+        self.quiet_dbm = np.float32(database.floor_dbm - BELOW_FLOOR_DB)
+        self.lock = RLock()
+        self.held = Held(most_bytes)
+        self._ranges: dict[int, LevelRange] = {}
+        self._halo = max(roughness_px(lattice.resolution_m) // 2, 1)
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        # Other processes read for themselves.
+        return self.database, self.cell_ids, self.side, self.most_bytes
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        self.__init__(*state)  # type: ignore[misc]
+
+    @cached_property
+    def boxes(self) -> Ints:
+        """First and last row, first and last column of each cell's points, (C, 4)."""
+        with self.lock:
+            return cell_boxes(self.database, self.cell_ids)
+
+    @cached_property
+    def _reader(self) -> PointReader:
+        return PointReader(self.database)
+
+    def tile(self, number: int) -> Tile:
+        """Return a tile."""
+
+        def make() -> Tile:
+            lattice, side, halo = self.database.lattice, self.side, self._halo
+            top, left = side * (number // self.cols), side * (number % self.cols)
+            bottom, right = min(top + side, lattice.rows), min(left + side, lattice.cols)
+            first_row, first_col = max(top - halo, 0), max(left - halo, 0)
+            rows = min(bottom + halo, lattice.rows) - first_row
+            cols = min(right + halo, lattice.cols) - first_col
+            points = self._reader.nearest((first_row, first_col, rows, cols))
+            row, col = points.point // lattice.cols, points.point % lattice.cols
+            own = (row >= top) & (row < bottom) & (col >= left) & (col < right)
+            box = int(row.min()), int(row.max()), int(col.min()), int(col.max())
+            return Tile(points, row[own], col[own], box)
+
+        return self.held.get(("tile", number), make, _tile_bytes)
+
+    def every_point(self) -> Ints:
+        """Return the numbers of all points of the database, without what is known there."""
+        point = read_columns(self.database.points_part, ("point",))["point"].to_numpy()
+        return np.sort(point)
+
+    def log_map(self, number: int, sd_m: float) -> Floats32:
+        """Return the map's log-likelihood at the pixels of a tile's arrays."""
+
+        def make() -> Floats32:
+            return map_log_likelihood(self.tile(number).points.edge_m, sd_m)
+
+        return self.held.get(("ways", number, sd_m), make, _array_bytes)
+
+    def levels(self, number: int, band: int) -> Floats32 | None:
+        """Return a cell's levels at a tile's nearest points, (P,); None where it has none.
+
+        Bands C and C + 1 are the strongest and the second strongest level.
+        """
+        points, count = self.tile(number).points, len(self.cell_ids)
+        if band >= count:
+            top_dbm = points.best_dbm if band == count else points.second_dbm
+            return np.where(np.isnan(top_dbm), self.quiet_dbm, top_dbm)
+        if not self.reaches(number, band):
+            return None
+
+        def make() -> Floats32 | None:
+            cell = self.cell(band)
+            at = np.minimum(np.searchsorted(cell.point, points.point), cell.point.size - 1)
+            there = cell.point[at] == points.point
+            if not there.any():
+                return None
+            return np.where(there, cell.level_dbm[at], self.quiet_dbm)
+
+        return self.held.get(("levels", number, band), make, _array_bytes)
+
+    def rough_db(self, number: int, band: int) -> Bytes | None:
+        """Return the roughness of a cell's levels at a tile's pixels; None where it has none."""
+        level_dbm = self.levels(number, band)
+        if level_dbm is None:
+            return None
+
+        def make() -> Bytes:
+            layer = level_dbm[self.tile(number).points.near]
+            rough_db = roughness(layer[..., None], self.database.lattice.resolution_m)[..., 0]
+            return np.minimum(np.rint(10 * rough_db), 255).astype(np.uint8)
+
+        return self.held.get(("rough", number, band), make, _array_bytes)
+
+    def reaches(self, number: int, band: int) -> bool:
+        """Return whether a cell may have a level at a tile's nearest points."""
+        top, bottom, left, right = self.tile(number).box
+        low, high, west, east = self.boxes[band].tolist()
+        return bool(low <= bottom and high >= top and west <= right and east >= left)
+
+    def strong(self, number: int, bands: Ints32, limit_dbm: float) -> list[int]:
+        """Return the places in ``bands`` of cells that may be above a level in a tile."""
+        top, bottom, left, right = self.tile(number).box
+        boxes = self.boxes[bands]
+        meets = (boxes[:, 0] <= bottom) & (boxes[:, 1] >= top)
+        meets &= (boxes[:, 2] <= right) & (boxes[:, 3] >= left)
+        found = []
+        for place in np.flatnonzero(meets).tolist():
+            row, col, _, most_dbm = self.range_of(int(bands[place]))
+            rows = slice(max(top // self.side - row, 0), max(bottom // self.side - row + 1, 0))
+            cols = slice(max(left // self.side - col, 0), max(right // self.side - col + 1, 0))
+            if (most_dbm[rows, cols] > limit_dbm).any():
+                found.append(place)
+        return found
+
+    def range_of(self, band: int) -> LevelRange:
+        """Return the range of a cell's levels by tiles; kept for good once it was read."""
+        found = self._ranges.get(band)
+        if found is None:
+            self.cell(band)
+            found = self._ranges[band]
+        return found
+
+    def cell(self, band: int) -> CellLevels:
+        """Return all levels of a cell."""
+
+        def make() -> CellLevels:
+            cell = read_cell(self.database, self.cell_ids[band])
+            if band not in self._ranges:
+                self._ranges[band] = self._range(cell)
+            return cell
+
+        return self.held.get(("cell", band), make, _cell_bytes)
+
+    def _range(self, cell: CellLevels) -> LevelRange:
+        cols, tiles = self.database.lattice.cols, self.rows * self.cols
+        least, most = level_ranges(*cell, cols, self.side, self.cols, tiles)
+        least, most = least.reshape(self.rows, self.cols), most.reshape(self.rows, self.cols)
+        row, col = np.nonzero(np.isfinite(most))
+        part = np.s_[row.min() : row.max() + 1, col.min() : col.max() + 1]
+        return LevelRange(int(row.min()), int(col.min()), least[part].copy(), most[part].copy())
+
+
+def _tile_bytes(tile: Tile) -> int:
+    points = tile.points
+    arrays = (
+        points.near,
+        points.point,
+        points.way_id,
+        points.best_dbm,
+        points.second_dbm,
+        points.edge_m,
+        tile.row,
+        tile.col,
+    )
+    return sum(one.nbytes for one in arrays)
+
+
+def _cell_bytes(cell: CellLevels) -> int:
+    return cell.point.nbytes + cell.level_dbm.nbytes
+
+
+def _array_bytes(array: Floats32 | Bytes | None) -> int:
+    return 0 if array is None else array.nbytes
