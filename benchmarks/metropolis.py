@@ -47,7 +47,7 @@ from mapfilter.simulation.simulate import SimulationSettings, simulate_log
 
 CRS, WEST_M, NORTH_M, PIXEL_M = "EPSG:32632", 400_000.0, 5_600_000.0, 5.0
 FLOOR_DBM, MARGIN_DB, TILE_PX = -104.0, 6.0, 256
-STREET_M, CELLS_PER_KM2, NAMESAKES = 125.0, 4.0, 2
+STREET_M, CELLS_PER_KM2 = 125.0, 4.0
 EIRP_DBM, AT_1KM_DB, PER_DECADE_DB = 50.0, 132.0, 38.0
 SHADOW_DB, ERROR_DB, SHADOW_PX = 6.0, 6.0, 1024
 """Deviations of the predicted levels about their mean, and of the measured about the predicted;
@@ -156,7 +156,7 @@ def made_ways(lattice: Lattice, seed: int) -> Ways:
     return Ways.open(CRS, 1 + np.arange(len(ends)), names, shapely.linestrings(ends))
 
 
-def made_plan(crs: str, lattice: Lattice, seed: int) -> CellPlan:
+def made_plan(lattice: Lattice, seed: int, namesakes: int) -> CellPlan:
     """Return sites of three sectors about the points of a hexagonal grid."""
     rng = np.random.default_rng(seed)
     west, south, east, north = lattice.bounds_m
@@ -164,7 +164,7 @@ def made_plan(crs: str, lattice: Lattice, seed: int) -> CellPlan:
     cells, rows = [], ceil((north - south) / (spacing_m * sqrt(3) / 2))
     per_row = ceil((east - west) / spacing_m)
     number = 0
-    codes = ceil(3 * rows * per_row / NAMESAKES)
+    codes = ceil(3 * rows * per_row / namesakes)
     carriers = max(codes // 64 + 1, 12)
     for row in range(rows):
         for col in range(per_row):
@@ -180,10 +180,12 @@ def made_plan(crs: str, lattice: Lattice, seed: int) -> CellPlan:
                     arfcn=1 + code % carriers, bsic=code // carriers % 64,
                 ))  # fmt: skip
                 number += 1
-    return CellPlan(crs, tuple(cells))
+    return CellPlan(lattice.crs, tuple(cells))
 
 
-def made_database(folder: Path, km2: float, extract: Path | None) -> dict[str, float]:
+def made_database(
+    folder: Path, km2: float, extract: Path | None, namesakes: int
+) -> dict[str, float]:
     """Write a database; return the time (processor seconds) and counts."""
     began_s = time.process_time()
     if extract is None:
@@ -192,7 +194,7 @@ def made_database(folder: Path, km2: float, extract: Path | None) -> dict[str, f
         ways = made_ways(lattice, 1)
     else:
         lattice, ways = real_ways(extract)
-    plan = made_plan(lattice.crs, lattice, 2)
+    plan = made_plan(lattice, 2, namesakes)
     radio = Radio.of(plan, lattice)
     source = LayerRoutes(RouteSource.of(ways, None, None, HALF_WIDTH_M, crs=lattice.crs), lattice)
     windows = [w for w in tile_windows(lattice, TILE_PX) if source.holds(lattice.window(*w))]
@@ -342,7 +344,9 @@ def compare(folder: Path, count: int, length_m: float, seed: int, how: str) -> N
             before = time.process_time()
             state, out = positioner.step(state, epoch, rng)
             steps.append(time.process_time() - before)
-        ends.append((str(state.status), round(out.fix.east_m, 1), round(out.fix.north_m, 1)))
+        end = log.truth.iloc[-1]
+        away_m = np.hypot(out.fix.east_m - end["east_m"], out.fix.north_m - end["north_m"])
+        ends.append((str(state.status), round(float(away_m), 1)))
     print(json.dumps({
         "how": how, "loaded_s": loaded_s, "total_s": sum(steps), "median_s": np.median(steps),
         "most_s": max(steps), "peak_gb": peak_memory_bytes() / 1e9, "ends": ends,
@@ -356,12 +360,13 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--km2", type=float, default=25.0)
     parser.add_argument("--map", type=Path)
+    parser.add_argument("--namesakes", type=int, default=1, help="cells of a carrier and code")
     parser.add_argument("--walks", type=int, default=5)
     parser.add_argument("--length-m", type=float, default=1200.0)
     parser.add_argument("--seed", type=int, default=100)
     given = parser.parse_args()
     if given.what == "build":
-        print(json.dumps(made_database(given.folder, given.km2, given.map)))
+        print(json.dumps(made_database(given.folder, given.km2, given.map, given.namesakes)))
     elif given.what == "walk":
         walked(given.folder, given.walks, given.length_m, given.seed, given.map)
     else:
