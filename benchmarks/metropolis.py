@@ -105,7 +105,8 @@ class Radio:
         gain[away_m < 1.5 * half_m] = 0.0
         nearest_km = np.maximum(away_m - half_m, 50.0) / 1000
         most_dbm = EIRP_DBM - AT_1KM_DB - PER_DECADE_DB * np.log10(nearest_km) + gain
-        return np.flatnonzero((away_m - half_m < REACH_M) & (most_dbm + 2.5 * SHADOW_DB > FLOOR_DBM))
+        audible = most_dbm + 2.5 * SHADOW_DB > FLOOR_DBM
+        return np.flatnonzero((away_m - half_m < REACH_M) & audible)
 
 
 @njit(cache=True)
@@ -139,7 +140,7 @@ def levels_dbm(  # type: ignore[no-untyped-def]
 
 
 def made_ways(lattice: Lattice, seed: int) -> Ways:
-    """Return an irregular grid of streets: corners moved by chance, a sixth of the edges left out."""
+    """Return an irregular grid of streets: corners moved by chance, a sixth of its edges gone."""
     rng = np.random.default_rng(seed)
     west, south, east, north = lattice.bounds_m
     across, up = int((east - west) / STREET_M), int((north - south) / STREET_M)
@@ -278,6 +279,7 @@ def walked(folder: Path, count: int, length_m: float, seed: int, extract: Path |
     database = open_database(folder / "database")
     opened_s = time.process_time() - began
     positioner = BayesFilter().over(database)
+    positioner.warm_up([])
     loaded_s = time.process_time() - began
     area = positioner.area
     lattice = database.lattice

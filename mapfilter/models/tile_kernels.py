@@ -143,3 +143,65 @@ def level_ranges(
         if not most[tile] >= level:
             most[tile] = level
     return least, most
+
+
+@njit(error_model="numpy", cache=True)
+def levels_at_points(
+    point: Ints, cell_point: Ints, cell_dbm: Floats32, quiet_dbm: float
+) -> tuple[Floats32, bool]:
+    """Return a cell's level at points, and whether it has one at any; both in ascending order."""
+    found = np.full(point.size, quiet_dbm, dtype=np.float32)
+    there, j = False, np.searchsorted(cell_point, point[0])
+    for i in range(point.size):
+        while j < cell_point.size and cell_point[j] < point[i]:
+            j += 1
+        if j == cell_point.size:
+            break
+        if cell_point[j] == point[i]:
+            found[i], there = cell_dbm[j], True
+    return found, there
+
+
+@njit(error_model="numpy", cache=True)
+def tenths_of_roughness(levels_dbm: Floats32, near: Ints32, size: int) -> Bytes:
+    """Return the roughness of levels at the nearest points of pixels, in tenths of a dB.
+
+    It is that of :func:`mapfilter.models.level_errors.roughness` with a square of ``size`` pixels.
+    """
+    rows, cols = near.shape
+    half, per = size // 2, 1.0 / size
+    level, square = np.empty((rows, cols)), np.empty((rows, cols))
+    for r in range(rows):
+        for c in range(cols):
+            value = np.float64(levels_dbm[near[r, c]])
+            level[r, c], square[r, c] = value, value * value
+    down, down_square = np.zeros((rows, cols)), np.zeros((rows, cols))
+    for r in range(rows):
+        for k in range(r - half, r + half + 1):
+            at = _reflected(k, rows)
+            for c in range(cols):
+                down[r, c] += level[at, c]
+                down_square[r, c] += square[at, c]
+    found = np.empty((rows, cols), dtype=np.uint8)
+    for r in range(rows):
+        total, total_square = 0.0, 0.0
+        for k in range(-half, half + 1):
+            total += down[r, _reflected(k, cols)]
+            total_square += down_square[r, _reflected(k, cols)]
+        for c in range(cols):
+            mean = total * per * per
+            variance = total_square * per * per - mean * mean
+            rough_db = np.float32(np.sqrt(max(variance, 0.0)))
+            found[r, c] = np.uint8(min(np.rint(np.float32(10.0) * rough_db), np.float32(255.0)))
+            gone, new = _reflected(c - half, cols), _reflected(c + half + 1, cols)
+            total += down[r, new] - down[r, gone]
+            total_square += down_square[r, new] - down_square[r, gone]
+    return found
+
+
+@njit(inline="always")
+def _reflected(at: int, size: int) -> int:
+    """Return a place in a row that is continued by its mirror image."""
+    while at < 0 or at >= size:
+        at = -1 - at if at < 0 else 2 * size - 1 - at
+    return at

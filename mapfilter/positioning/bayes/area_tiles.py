@@ -26,9 +26,9 @@ from mapfilter.database.cell_levels import (
 )
 from mapfilter.database.parquet import read_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.models.level_errors import roughness, roughness_px
+from mapfilter.models.level_errors import roughness_px
 from mapfilter.models.street_motion import map_log_likelihood
-from mapfilter.models.tile_kernels import level_ranges
+from mapfilter.models.tile_kernels import level_ranges, levels_at_points, tenths_of_roughness
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 
 TILE_PX = 128
@@ -133,7 +133,8 @@ class AreaTiles:
         self.lock = RLock()
         self.held = Held(most_bytes)
         self._ranges: dict[int, LevelRange] = {}
-        self._halo = max(roughness_px(lattice.resolution_m) // 2, 1)
+        self._rough_px = roughness_px(lattice.resolution_m)
+        self._halo = self._rough_px // 2
 
     def __getstate__(self) -> tuple[Any, ...]:
         # Other processes read for themselves.
@@ -196,12 +197,10 @@ class AreaTiles:
             return None
 
         def make() -> Floats32 | None:
-            cell = self.cell(band)
-            at = np.minimum(np.searchsorted(cell.point, points.point), cell.point.size - 1)
-            there = cell.point[at] == points.point
-            if not there.any():
-                return None
-            return np.where(there, cell.level_dbm[at], self.quiet_dbm)
+            level_dbm, there = levels_at_points(
+                points.point, *self.cell(band), float(self.quiet_dbm)
+            )
+            return level_dbm if there else None
 
         return self.held.get(("levels", number, band), make, _array_bytes)
 
@@ -212,9 +211,9 @@ class AreaTiles:
             return None
 
         def make() -> Bytes:
-            layer = level_dbm[self.tile(number).points.near]
-            rough_db = roughness(layer[..., None], self.database.lattice.resolution_m)[..., 0]
-            return np.minimum(np.rint(10 * rough_db), 255).astype(np.uint8)
+            near, size = self.tile(number).points.near, self._rough_px
+            tenths: Bytes = tenths_of_roughness(level_dbm, near, size)
+            return tenths
 
         return self.held.get(("rough", number, band), make, _array_bytes)
 
