@@ -16,13 +16,30 @@ _F = np.float32
 
 
 @njit(error_model="numpy", cache=True)
-def tiles_of(pixel: Ints32, cols: int, side: int, tile_cols: int) -> Ints32:
-    """Return the number of the tile that each flat pixel lies in, tiles of ``side`` pixels."""
-    found = np.empty(pixel.size, dtype=np.int32)
+def by_tile(
+    pixel: Ints32, cols: int, side: int, tile_cols: int, tiles: int
+) -> tuple[Ints, Ints, Ints]:
+    """Return flat pixels (N,) grouped by their tiles of ``side`` pixels.
+
+    Indices of the pixels, those of a tile together and in their order; where each tile's begin,
+    with N at the end; and the numbers of these tiles, of ``tiles`` in all.
+    """
+    of = np.empty(pixel.size, dtype=np.int64)
+    count = np.zeros(tiles, dtype=np.int64)
     for i in range(pixel.size):
         row, col = pixel[i] // cols, pixel[i] % cols
-        found[i] = (row // side) * tile_cols + col // side
-    return found
+        of[i] = (row // side) * tile_cols + col // side
+        count[of[i]] += 1
+    numbers = np.flatnonzero(count)
+    first = np.zeros(numbers.size + 1, dtype=np.int64)
+    for k in range(numbers.size):
+        first[k + 1] = first[k] + count[numbers[k]]
+        count[numbers[k]] = first[k]
+    order = np.empty(pixel.size, dtype=np.int64)
+    for i in range(pixel.size):
+        order[count[of[i]]] = i
+        count[of[i]] += 1
+    return order, first, numbers
 
 
 @njit(error_model="numpy", cache=True)

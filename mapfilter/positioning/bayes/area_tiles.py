@@ -223,20 +223,36 @@ class AreaTiles:
         low, high, west, east = self.boxes[band].tolist()
         return bool(low <= bottom and high >= top and west <= right and east >= left)
 
-    def strong(self, number: int, bands: Ints32, limit_dbm: float) -> list[int]:
-        """Return the places in ``bands`` of cells that may be above a level in a tile."""
-        top, bottom, left, right = self.tile(number).box
-        boxes = self.boxes[bands]
-        meets = (boxes[:, 0] <= bottom) & (boxes[:, 1] >= top)
-        meets &= (boxes[:, 2] <= right) & (boxes[:, 3] >= left)
-        found = []
-        for place in np.flatnonzero(meets).tolist():
-            row, col, _, most_dbm = self.range_of(int(bands[place]))
-            rows = slice(max(top // self.side - row, 0), max(bottom // self.side - row + 1, 0))
-            cols = slice(max(left // self.side - col, 0), max(right // self.side - col + 1, 0))
-            if (most_dbm[rows, cols] > limit_dbm).any():
-                found.append(place)
+    def strong(self, number: int, bands: Ints32, limit_dbm: float) -> Ints:
+        """Return the places in ``bands``, ascending, of cells that may be above a level in a tile.
+
+        Cells that are read for it are those whose points may be among the tile's.
+        """
+        reaching, most_dbm = self._strongest(number)
+        strong = reaching[most_dbm > limit_dbm]
+        place = np.minimum(np.searchsorted(bands, strong), max(bands.size - 1, 0))
+        found: Ints = place[bands[place] == strong] if bands.size else place[:0]
         return found
+
+    def _strongest(self, number: int) -> tuple[Ints, Floats32]:
+        """Return the cells that may reach a tile, and an upper bound of their levels there."""
+
+        def make() -> tuple[Ints, Floats32]:
+            top, bottom, left, right = self.tile(number).box
+            boxes, side = self.boxes, self.side
+            meets = (boxes[:, 0] <= bottom) & (boxes[:, 1] >= top)
+            meets &= (boxes[:, 2] <= right) & (boxes[:, 3] >= left)
+            bands = np.flatnonzero(meets)
+            bound_dbm = np.full(bands.size, -np.inf, dtype=np.float32)
+            for k, band in enumerate(bands.tolist()):
+                row, col, _, most_dbm = self.range_of(band)
+                rows = slice(max(top // side - row, 0), max(bottom // side - row + 1, 0))
+                cols = slice(max(left // side - col, 0), max(right // side - col + 1, 0))
+                part = most_dbm[rows, cols]
+                bound_dbm[k] = np.fmax.reduce(part, axis=None, initial=-np.inf)
+            return bands, bound_dbm
+
+        return self.held.get(("strongest", number), make, _arrays_bytes)
 
     def range_of(self, band: int) -> LevelRange:
         """Return the range of a cell's levels by tiles; kept for good once it was read."""
@@ -283,6 +299,10 @@ def _tile_bytes(tile: Tile) -> int:
 
 def _cell_bytes(cell: CellLevels) -> int:
     return cell.point.nbytes + cell.level_dbm.nbytes
+
+
+def _arrays_bytes(arrays: tuple[Ints, Floats32]) -> int:
+    return sum(one.nbytes for one in arrays)
 
 
 def _array_bytes(array: Floats32 | Bytes | None) -> int:

@@ -15,10 +15,10 @@ from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.level_kernels import Prediction
 from mapfilter.models.tile_kernels import (
+    by_tile,
     interpolate_tile,
     look_up_levels,
     pixels_from_south,
-    tiles_of,
     upper_left,
 )
 from mapfilter.positioning.bayes.area_frame import AreaFrame, carriers_of, sites_of
@@ -132,7 +132,7 @@ class TiledArea(AreaFrame):
                 tile = tiles.tile(number)
                 (top, left), cols = tile.corner, self.lattice.cols
                 point = tile.points.near[pixel[which] // cols - top, pixel[which] % cols - left]
-                for k in tiles.strong(number, cell, limit_dbm):
+                for k in tiles.strong(number, cell, limit_dbm).tolist():
                     level_dbm = tiles.levels(number, int(cell[k]))
                     if level_dbm is not None:
                         above[k] += np.count_nonzero(level_dbm[point] > limit)
@@ -187,14 +187,10 @@ class TiledArea(AreaFrame):
         """Yield each tile that pixels lie in, and which of them."""
         if not pixel.size:
             return
-        number = tiles_of(pixel, self.lattice.cols, self.tiles.side, self.tiles.cols)
-        if (number == number[0]).all():
-            yield int(number[0]), np.arange(pixel.size)
-            return
-        order = np.argsort(number, kind="stable")
-        ends = np.flatnonzero(np.diff(number[order])) + 1
-        for which in np.split(order, ends):
-            yield int(number[which[0]]), which
+        side, tiles = self.tiles.side, self.tiles
+        order, first, numbers = by_tile(pixel, self.lattice.cols, side, tiles.cols, self.count)
+        for k, number in enumerate(numbers.tolist()):
+            yield number, order[first[k] : first[k + 1]]
 
     @cached_property
     def count(self) -> int:
