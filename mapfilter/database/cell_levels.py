@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from mapfilter._types import Floats32, Ints, Ints32
-from mapfilter.database.parquet import Window, WindowReader, opened, part_box, read_columns
+from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.database.parquet import Window, WindowReader, opened, part_ranges, read_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase, way_columns
 from mapfilter.errors import StoreError, fail
 from mapfilter.geodesy import Lattice
@@ -45,26 +45,36 @@ def received_cells(database: RadioRouteDatabase) -> tuple[str, ...]:
     )
 
 
-def cell_boxes(database: RadioRouteDatabase, cell_ids: tuple[str, ...]) -> Ints:
-    """Return the first and last row, and the first and last column of each cell's points, (C, 4).
+class PartExtents(NamedTuple):
+    """Where the points of M parts lie, and their strongest level.
 
-    Only the parts' footers are read.
+    ``band`` (M,) is the cell of each part; ``box`` (M, 4) the first and last row, and the first and
+    last column; ``most_dbm`` (M,) the largest level.
+    """
+
+    band: Ints
+    box: Ints
+    most_dbm: Floats
+
+
+def part_extents(database: RadioRouteDatabase, cell_ids: tuple[str, ...]) -> PartExtents:
+    """Return the extents of the parts of some cells; only the parts' footers are read.
 
     Raises
     ------
     StoreError
         A part is damaged, or the database was replaced since it was opened.
     """
-    boxes = np.empty((len(cell_ids), 4), dtype=np.int64)
+    bands, boxes, most_dbm = [], [], []
     for band, cell_id in enumerate(cell_ids):
-        found = []
         for part in database.level_parts[cell_id]:
             if part.rows:
                 with opened(part) as file:
-                    found.append(part_box(file.metadata))
-        low, high = np.min(found, axis=0), np.max(found, axis=0)
-        boxes[band] = low[0], high[1], low[2], high[3]
-    return boxes
+                    found = part_ranges(file.metadata, ("row", "col", "level_dbm"))
+                bands.append(band)
+                boxes.append((*found[0], *found[1]))
+                most_dbm.append(found[2][1])
+    return PartExtents(np.array(bands), np.array(boxes, dtype=np.int64), np.array(most_dbm))
 
 
 def read_cell(database: RadioRouteDatabase, cell_id: str) -> CellLevels:

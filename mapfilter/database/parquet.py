@@ -241,15 +241,15 @@ class WindowReader:
         return table
 
 
-def part_box(footer: pq.FileMetaData) -> tuple[int, int, int, int]:
-    """Return the first and last row, and the first and last column of a part's points."""
+def part_ranges(footer: pq.FileMetaData, columns: Sequence[str]) -> list[tuple[float, float]]:
+    """Return the least and the largest value of each column of a part, by its footer alone."""
     names = {footer.schema.column(i).name: i for i in range(footer.num_columns)}
     groups = [footer.row_group(i) for i in range(footer.num_row_groups)]
-    ends = [[_ends(one, names[axis]) for one in groups] for axis in ("row", "col")]
-    (top, bottom), (left, right) = (
-        (min(low for low, _ in axis), max(high for _, high in axis)) for axis in ends
-    )
-    return top, bottom, left, right
+    found: list[tuple[float, float]] = []
+    for column in columns:
+        ends = [_ends(one, names[column]) for one in groups]
+        found.append((min(low for low, _ in ends), max(high for _, high in ends)))
+    return found
 
 
 def _ends(group: pq.RowGroupMetaData, column: int) -> tuple[int, int]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_town import CRS, FLOOR_DBM, NAMES, PIXEL_M, SIDE_M, Town, walk_log
 
-from mapfilter.database.cell_levels import PointReader, cell_boxes
+from mapfilter.database.cell_levels import PointReader, part_extents
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels
@@ -313,11 +313,30 @@ def test_large_areas_are_held_by_tiles(database, monkeypatch):
     assert isinstance(open_area(database.without_cells()), AreaMap)
 
 
-def test_boxes_of_cells_hold_their_points(database):
-    boxes = cell_boxes(database, database.cell_ids)
-    for cell, box in zip(database.cell_ids, boxes.tolist(), strict=True):
-        row, col, _ = database.cell_points(cell, np.inf)
-        assert box == [row.min(), row.max(), col.min(), col.max()]
+def test_extents_of_parts_hold_their_points(database):
+    extents = part_extents(database, database.cell_ids)
+    for band, cell in enumerate(database.cell_ids):
+        row, col, level_dbm = database.cell_points(cell, np.inf)
+        own = extents.band == band
+        assert own.sum() == len(database.level_parts[cell]) == 1
+        assert extents.box[own].tolist() == [[row.min(), row.max(), col.min(), col.max()]]
+        assert extents.most_dbm[own] == level_dbm.max()
+
+
+def test_cells_are_read_only_where_they_may_be_strong(database, whole):
+    """At some places above a level, and none is missed; a limit that none reaches reads none."""
+    tiled = TiledArea.of_database(database, side=20)
+    bands = np.arange(len(whole.cell_ids), dtype=np.int32)
+    flat = whole.level_dbm.reshape(whole.on_way.size, -1)[:, :-2]
+    pixel = np.random.default_rng(4).integers(whole.on_way.size, size=500).astype(np.int32)
+    limits_dbm = (0.0, -60.0, -80.0, FLOOR_DBM, FLOOR_DBM - 20)
+    for limit_dbm in limits_dbm:
+        share = tiled.shares_above(pixel, bands, limit_dbm)
+        assert np.array_equal(share, (flat[pixel] > limit_dbm).mean(axis=0))
+        assert limit_dbm < 0 or not [key for key in tiled.tiles.held._entries if key[0] == "cell"]
+    some = bands[[0, 3, 5]]
+    share = tiled.shares_above(pixel, some, -80.0)
+    assert np.array_equal(share, (flat[pixel][:, some] > -80.0).mean(axis=0))
 
 
 def test_the_nearest_point_may_be_far_beyond_the_window(tmp_path, town):

@@ -16,12 +16,13 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from mapfilter._types import Bytes, Floats32, Ints, Ints32
+from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints, Ints32
 from mapfilter.database.cell_levels import (
     CellLevels,
     NearestPoints,
+    PartExtents,
     PointReader,
-    cell_boxes,
+    part_extents,
     read_cell,
 )
 from mapfilter.database.parquet import read_columns
@@ -74,6 +75,17 @@ class Tile:
     def corner(self) -> tuple[int, int]:
         """Row and column of the first pixel of the arrays."""
         return self.points.window[0], self.points.window[1]
+
+
+class _Reaching(NamedTuple):
+    """The cells that may have a level in a tile, ascending, (C,), and a bound of these levels.
+
+    The bound is by the footers of the parts until it is ``exact``: by the cell's range.
+    """
+
+    band: Ints
+    bound_dbm: Floats
+    exact: Bools
 
 
 class Held:
@@ -144,10 +156,10 @@ class AreaTiles:
         self.__init__(*state)  # type: ignore[misc]
 
     @cached_property
-    def boxes(self) -> Ints:
-        """First and last row, first and last column of each cell's points, (C, 4)."""
+    def extents(self) -> PartExtents:
+        """Where the parts of the cells lie, and how strong they are."""
         with self.lock:
-            return cell_boxes(self.database, self.cell_ids)
+            return part_extents(self.database, self.cell_ids)
 
     @cached_property
     def _reader(self) -> PointReader:
@@ -193,7 +205,9 @@ class AreaTiles:
         if band >= count:
             top_dbm = points.best_dbm if band == count else points.second_dbm
             return np.where(np.isnan(top_dbm), self.quiet_dbm, top_dbm)
-        if not self.reaches(number, band):
+        reaching = self._reaching(number).band
+        at = int(np.searchsorted(reaching, band))
+        if at == reaching.size or reaching[at] != band:
             return None
 
         def make() -> Floats32 | None:
@@ -217,42 +231,43 @@ class AreaTiles:
 
         return self.held.get(("rough", number, band), make, _array_bytes)
 
-    def reaches(self, number: int, band: int) -> bool:
-        """Return whether a cell may have a level at a tile's nearest points."""
-        top, bottom, left, right = self.tile(number).box
-        low, high, west, east = self.boxes[band].tolist()
-        return bool(low <= bottom and high >= top and west <= right and east >= left)
-
     def strong(self, number: int, bands: Ints32, limit_dbm: float) -> Ints:
         """Return the places in ``bands``, ascending, of cells that may be above a level in a tile.
 
-        Cells that are read for it are those whose points may be among the tile's.
+        Cells are read for it only where the footers of their parts leave it open.
         """
-        reaching, most_dbm = self._strongest(number)
-        strong = reaching[most_dbm > limit_dbm]
+        reaching = self._reaching(number)
+        for k in np.flatnonzero((reaching.bound_dbm > limit_dbm) & ~reaching.exact).tolist():
+            reaching.bound_dbm[k] = self._bound(number, int(reaching.band[k]))
+            reaching.exact[k] = True
+        strong = reaching.band[reaching.bound_dbm > limit_dbm]
         place = np.minimum(np.searchsorted(bands, strong), max(bands.size - 1, 0))
         found: Ints = place[bands[place] == strong] if bands.size else place[:0]
         return found
 
-    def _strongest(self, number: int) -> tuple[Ints, Floats32]:
-        """Return the cells that may reach a tile, and an upper bound of their levels there."""
+    def _reaching(self, number: int) -> _Reaching:
+        """Return the cells with a part that may reach a tile's nearest points."""
 
-        def make() -> tuple[Ints, Floats32]:
+        def make() -> _Reaching:
             top, bottom, left, right = self.tile(number).box
-            boxes, side = self.boxes, self.side
-            meets = (boxes[:, 0] <= bottom) & (boxes[:, 1] >= top)
-            meets &= (boxes[:, 2] <= right) & (boxes[:, 3] >= left)
-            bands = np.flatnonzero(meets)
-            bound_dbm = np.full(bands.size, -np.inf, dtype=np.float32)
-            for k, band in enumerate(bands.tolist()):
-                row, col, _, most_dbm = self.range_of(band)
-                rows = slice(max(top // side - row, 0), max(bottom // side - row + 1, 0))
-                cols = slice(max(left // side - col, 0), max(right // side - col + 1, 0))
-                part = most_dbm[rows, cols]
-                bound_dbm[k] = np.fmax.reduce(part, axis=None, initial=-np.inf)
-            return bands, bound_dbm
+            low, high, west, east = self.extents.box.T
+            meets = (low <= bottom) & (high >= top) & (west <= right) & (east >= left)
+            band, of = np.unique(self.extents.band[meets], return_inverse=True)
+            bound_dbm = np.full(band.size, -np.inf)
+            np.maximum.at(bound_dbm, of, self.extents.most_dbm[meets])
+            return _Reaching(band, bound_dbm, np.zeros(band.size, dtype=np.bool_))
 
-        return self.held.get(("strongest", number), make, _arrays_bytes)
+        return self.held.get(("reaching", number), make, _arrays_bytes)
+
+    def _bound(self, number: int, band: int) -> float:
+        """Return an upper bound of a cell's levels at a tile's nearest points."""
+        top, bottom, left, right = self.tile(number).box
+        row, col, _, most_dbm = self.range_of(band)
+        rows, cols = (
+            slice(max(first // self.side - at, 0), max(last // self.side - at + 1, 0))
+            for first, last, at in ((top, bottom, row), (left, right, col))
+        )
+        return float(np.fmax.reduce(most_dbm[rows, cols], axis=None, initial=-np.inf))
 
     def range_of(self, band: int) -> LevelRange:
         """Return the range of a cell's levels by tiles; kept for good once it was read."""
@@ -301,7 +316,7 @@ def _cell_bytes(cell: CellLevels) -> int:
     return cell.point.nbytes + cell.level_dbm.nbytes
 
 
-def _arrays_bytes(arrays: tuple[Ints, Floats32]) -> int:
+def _arrays_bytes(arrays: _Reaching) -> int:
     return sum(one.nbytes for one in arrays)
 
 

@@ -133,10 +133,8 @@ def _heard(reading: RadioReading | None) -> _Heard:
         heard += [([cell], level) for cell, level in levels]
     if reading.serving >= 0 and all(reading.serving not in cells for cells, _ in heard):
         heard.append(([reading.serving], float("nan")))
-    if not heard:
-        bounds = [one for one in reading.bounds if one.censored >= 0]
-        heard = [(one.cells.tolist(), one.level_dbm) for one in bounds]
-    return heard
+    several = [one for one in reading.bounds if one.censored == 0]
+    return heard + [(one.cells.tolist(), one.level_dbm) for one in several]
 
 
 def _best_tiles(area: TiledArea, heard: _Heard, errors: LevelErrors) -> Ints:
