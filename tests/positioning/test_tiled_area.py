@@ -18,8 +18,8 @@ from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES, interpolate
 from mapfilter.positioning.bayes import options
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.area_tiles import Held
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.held import Held
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
 from mapfilter.positioning.bayes.tile_search import (
     SearchedTiles,
@@ -113,6 +113,9 @@ def test_every_value_is_that_of_the_whole_area(database, whole, side):
     level_dbm, rough_db = every_level(tiled)
     assert np.array_equal(level_dbm, whole.level_dbm.reshape(-1, bands))
     assert np.array_equal(rough_db, whole.flat_rough_db.reshape(-1, bands)[:, :-2])
+    band = np.arange(level_dbm.shape[0]) % (bands - 2)
+    at = tiled.levels_at(every_pixel(tiled)[::7], band[::7])
+    assert np.array_equal(at, whole.levels_at(every_pixel(whole)[::7], band[::7]))
     # There is something to be seen: levels below the floor, and ground far from any street.
     quiet = level_dbm[:, :-2] == tiled.tiles.quiet_dbm
     assert 0.05 < quiet.mean() < 0.95

@@ -7,12 +7,10 @@ is given up when all of it takes more than a number of bytes.
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
 from threading import RLock
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,13 +29,11 @@ from mapfilter.models.level_errors import roughness_px
 from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.models.tile_kernels import level_ranges, levels_at_points, tenths_of_roughness
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
+from mapfilter.positioning.bayes.held import Held
 
 TILE_PX = 128
 HELD_BYTES = 640 << 20
 """Most bytes of tiles and levels that are held at a time."""
-_ENTRY_BYTES = 300
-
-_Value = TypeVar("_Value")
 
 
 class LevelRange(NamedTuple):
@@ -86,33 +82,6 @@ class _Reaching(NamedTuple):
     band: Ints
     bound_dbm: Floats
     exact: Bools
-
-
-class Held:
-    """Values by keys, of which those that were asked for longest ago are given up."""
-
-    def __init__(self, most_bytes: int) -> None:
-        self._most_bytes = most_bytes
-        self._entries: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
-        self.bytes = 0
-
-    def get(
-        self, key: Hashable, make: Callable[[], _Value], size: Callable[[_Value], int]
-    ) -> _Value:
-        """Return the value of a key, made where it is not held."""
-        entry = self._entries.get(key)
-        if entry is not None:
-            self._entries.move_to_end(key)
-            found: _Value = entry[0]
-            return found
-        value = make()
-        count = size(value) + _ENTRY_BYTES
-        self._entries[key] = value, count
-        self.bytes += count
-        while self.bytes > self._most_bytes and len(self._entries) > 1:
-            _, (_, gone) = self._entries.popitem(last=False)
-            self.bytes -= gone
-        return value
 
 
 class AreaTiles:
