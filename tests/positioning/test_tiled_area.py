@@ -18,8 +18,8 @@ from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES, interpolate
 from mapfilter.positioning.bayes import options
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.bounded_cache import BoundedCache
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.held import Held
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
 from mapfilter.positioning.bayes.tile_search import (
     SearchedTiles,
@@ -167,7 +167,7 @@ def test_what_is_held_stays_within_its_bytes(database, whole):
 
 
 def test_what_was_asked_for_longest_ago_is_given_up_first():
-    held, made = Held(3 * 400 + 99), []
+    held, made = BoundedCache(3 * 400 + 99), []
 
     def ask(key):
         return held.get(key, lambda: made.append(key) or key, lambda _: 100)

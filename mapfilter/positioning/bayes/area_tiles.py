@@ -29,7 +29,7 @@ from mapfilter.models.level_errors import roughness_px
 from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.models.tile_kernels import level_ranges, levels_at_points, tenths_of_roughness
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
-from mapfilter.positioning.bayes.held import Held
+from mapfilter.positioning.bayes.bounded_cache import BoundedCache
 
 TILE_PX = 128
 HELD_BYTES = 640 << 20
@@ -112,7 +112,7 @@ class AreaTiles:
         self.rows, self.cols = -(-lattice.rows // side), -(-lattice.cols // side)
         self.quiet_dbm = np.float32(database.floor_dbm - BELOW_FLOOR_DB)
         self.lock = RLock()
-        self.held = Held(most_bytes)
+        self.held = BoundedCache(most_bytes)
         self._ranges: dict[int, LevelRange] = {}
         self._rough_px = roughness_px(lattice.resolution_m)
         self._halo = self._rough_px // 2

@@ -12,7 +12,7 @@ _ENTRY_BYTES = 300
 _Value = TypeVar("_Value")
 
 
-class Held:
+class BoundedCache:
     """Values by keys, of which those that were asked for longest ago are given up."""
 
     def __init__(self, most_bytes: int) -> None:
