@@ -241,6 +241,17 @@ class WindowReader:
         return table
 
 
+def part_ranges(footer: pq.FileMetaData, columns: Sequence[str]) -> list[tuple[float, float]]:
+    """Return the least and the largest value of each column of a part, by its footer alone."""
+    names = {footer.schema.column(i).name: i for i in range(footer.num_columns)}
+    groups = [footer.row_group(i) for i in range(footer.num_row_groups)]
+    found: list[tuple[float, float]] = []
+    for column in columns:
+        ends = [_ends(one, names[column]) for one in groups]
+        found.append((min(low for low, _ in ends), max(high for _, high in ends)))
+    return found
+
+
 def _ends(group: pq.RowGroupMetaData, column: int) -> tuple[int, int]:
     known = group.column(column).statistics
     return (known.min, known.max) if known is not None and known.has_min_max else _EVERYWHERE

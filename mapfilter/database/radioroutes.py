@@ -339,9 +339,9 @@ class RadioRouteDatabase:
             where = "whole lattice" if bounds_m is None else f"area {bounds_m}"
             raise fail(InputError, where, "points of the database", "none", "another area or CRS")
         order = np.lexsort((points["col"], points["row"]))
-        code, classes = _codes(points.pop("way_class"))
-        by_class_m = np.array([half_width_of(name) for name in classes], dtype=np.float32)[code]
-        half_width_m = np.where(points["way_id"] == 0, np.float32(0), by_class_m)
+        half_width_m, on_way_m = way_columns(points)
+        del points["way_class"]
+        on_way_m = on_way_m[order]
         points = {name: values[order] for name, values in points.items()}
         received: list[tuple[str, Rows, Rows, Floats32]] = []
         for cell_id in self.cell_ids:
@@ -350,7 +350,6 @@ class RadioRouteDatabase:
             if found and found["row"].size:
                 row, col = found["row"] - top, found["col"] - left
                 received.append((cell_id, row, col, found["level_dbm"]))
-        on_way_m = np.where(points["on_square"], np.float32(0), points["distance_to_way_m"])
         pixels = points["row"] - top, points["col"] - left
         return fill_field(window, pixels, points["way_id"], on_way_m, half_width_m[order], received)
 
@@ -368,6 +367,18 @@ class RadioRouteDatabase:
             hint = "degrees given for metres, or another CRS"
             raise fail(InputError, "area", f"an area within {covered}", bounds_m, hint)
         return top, left, self.lattice.window(top, left, rows, cols)
+
+
+def way_columns(points: Mapping[str, Any]) -> tuple[Floats32, Floats32]:
+    """Return half the usual width of each point's way (0 without one), and the distance to it.
+
+    ``points`` has the columns way_id, way_class, on_square and distance_to_way_m; distances are 0
+    in squares.
+    """
+    code, classes = _codes(points["way_class"])
+    by_class_m = np.array([half_width_of(name) for name in classes], dtype=np.float32)[code]
+    half_width_m = np.where(points["way_id"] == 0, np.float32(0), by_class_m)
+    return half_width_m, np.where(points["on_square"], np.float32(0), points["distance_to_way_m"])
 
 
 def part_named(name: str, folder: Path, manifest: Mapping[str, Any], generation: str) -> Part:

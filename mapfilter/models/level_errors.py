@@ -126,12 +126,17 @@ class LevelReport(NamedTuple):
     offset_db: float
 
 
+def roughness_px(resolution_m: float) -> int:
+    """Return the side of the square of :func:`roughness`, pixels."""
+    return max(2 * round(_ROUGHNESS_M / resolution_m / 2) + 1, 3)
+
+
 def roughness(level_dbm: Floats32, resolution_m: float) -> Floats32:
     """Return the local standard deviation of predicted levels, (rows, cols, C), in dB.
 
     It is that of a square of 45 to 50 m at pixels of 5 to 10 m, and of 3 x 3 pixels at least.
     """
-    size = max(2 * round(_ROUGHNESS_M / resolution_m / 2) + 1, 3)
+    size = roughness_px(resolution_m)
     found = np.empty(level_dbm.shape, dtype=np.float32)
     for band in range(level_dbm.shape[2]):
         level = level_dbm[..., band].astype(np.float64)

@@ -72,3 +72,25 @@ def weighed_by_ways(
     weighed = log_weight.copy()
     weigh_by_map(found, moved[OFF], factors, weighed)
     return weighed
+
+
+@njit(error_model="numpy", cache=True)
+def weighed_at_places(
+    moved: Floats32,
+    log_likelihood: Floats32,
+    size_m: tuple[float, float],
+    factors: MapFactors,
+    beyond: float,
+    log_weight: Floats,
+) -> Floats:
+    """Return log weights as :func:`weighed_by_ways` does, where the map's were looked up, (N,).
+
+    Those of hypotheses beyond the area are replaced in place.
+    """
+    if not np.isnan(beyond):
+        outside, instead = places_beyond(moved, size_m[0], size_m[1]), _F(beyond)
+        for i in range(log_likelihood.size):
+            log_likelihood[i] = instead if outside[i] else log_likelihood[i]
+    weighed = log_weight.copy()
+    weigh_by_map(log_likelihood, moved[OFF], factors, weighed)
+    return weighed

@@ -160,7 +160,7 @@ def level_at(model: BayesModel, place_m: tuple[float, float], cell: int) -> floa
     if cell < 0 or not np.isfinite(place_m).all():
         return nan
     pixel = pixels(np.array(place_m, dtype=np.float32)[:, None], model.area.frame)[0]
-    return float(model.area.level_dbm.reshape(-1, len(model.area.cell_ids) + 2)[pixel, cell])
+    return float(model.area.levels_at(np.array([pixel]), np.array([cell]))[0])
 
 
 def _near(state: Floats32, place_m: tuple[float, float]) -> Bools:

@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt
 from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import Points, RadioField, RadioRouteDatabase
 from mapfilter.models.level_errors import roughness
-from mapfilter.positioning.bayes.area_map import BELOW_FLOOR_DB
+from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.radio.cells import CellPlan
 from mapfilter.viewing.arrays import cell_numbers, packed, places, starts
 from mapfilter.viewing.streets import middle_lines

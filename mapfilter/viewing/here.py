@@ -17,6 +17,7 @@ from scipy.special import log_ndtr
 
 from mapfilter._types import Floats
 from mapfilter.models.level_memory import OTHER_DBM, OTHER_SD_DB
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import FIRST_SPACING_M
@@ -98,8 +99,9 @@ def constants(model: BayesModel) -> dict[str, Any]:
     }
 
 
-def _mean_rough_db2(area: AreaMap, share: float) -> float:
-    if not area.cell_ids:
+def _mean_rough_db2(area: AreaFrame, share: float) -> float:
+    # In an area that is held by tiles most cells are received nearly nowhere.
+    if not area.cell_ids or not isinstance(area, AreaMap):
         return 0.0
     rough_db = 0.1 * area.flat_rough_db.reshape(-1, len(area.cell_ids) + 2)[::97, :-2]
     return float(share * np.mean(rough_db.astype(np.float64) ** 2))

@@ -10,7 +10,7 @@ import numpy as np
 from mapfilter._types import Floats, Ints
 from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import pixels
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
 from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
 from mapfilter.radio.cells import CellPlan
@@ -147,7 +147,7 @@ def dbm(values: Any) -> dict[str, Any]:
     return packed(values, "u1", scale=0.5, offset=-150.0, none=255)
 
 
-def level_on(area: AreaMap) -> LevelAt:
+def level_on(area: AreaFrame) -> LevelAt:
     """Return a function that looks levels up on a filter's own map."""
     (west, south), band_of = area.origin_m, area.band_of
 
@@ -158,7 +158,7 @@ def level_on(area: AreaMap) -> LevelAt:
         known = np.isfinite(place).all(axis=0)
         at = pixels(np.where(known, place, 0.0).astype(np.float32), area.frame)
         band = np.array([band_of.get(cell or "", -1) for cell in cells], dtype=np.int64)
-        level = area.level_dbm.reshape(-1, len(area.cell_ids) + 2)[at, band].astype(np.float64)
+        level = area.levels_at(at, band).astype(np.float64)
         return np.where(known & (band >= 0), level, np.nan)
 
     return look_up

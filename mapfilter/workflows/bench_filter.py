@@ -169,7 +169,7 @@ def make_world(folder: Path, settings: Sequence[str]) -> tuple[Path, Sequence[Pa
 
 def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInputs, ParticleBelief]:
     """Return a step's motion and report, and particles about a place of a walk with truth."""
-    area, truth = model.area, log.truth.iloc[len(log.truth) // 2]
+    area, truth = model.whole, log.truth.iloc[len(log.truth) // 2]
     belief = ParticleFilter(model, ParticleOptions(max_particles=count, min_particles=count)).init(
         Start(None, True, float(truth["east_m"]), float(truth["north_m"]), 50.0),
         np.random.default_rng(0),

@@ -105,7 +105,7 @@ class NumpyModel:
 
     def weigh(self, state: Floats) -> tuple[Floats, Floats]:
         """Return the log-likelihood of a whole step, and what particles keep, shape (W, N)."""
-        area, reading = self.model.area, self.reading
+        area, reading = self.model.whole, self.reading
         pixel = self._pixels(state[EAST], state[NORTH])
         now = area.level_dbm[pixel]
         level, best, second = now[:, reading.serving], now[:, -2], now[:, -1]

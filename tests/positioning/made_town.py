@@ -30,13 +30,14 @@ class Town:
     slope: float = 35.0
 
     @classmethod
-    def of(cls, seed):
+    def of(cls, seed, slope=35.0):
         """Return a town; others have other streets and cells of the same names."""
         rng = np.random.default_rng(seed)
         east_m, north_m = (np.cumsum(rng.uniform(70, 150, 12)) for _ in range(2))
         east_m, north_m = (x[x < SIDE_M - 30] for x in (east_m, north_m))
         sites_m = rng.uniform(100, SIDE_M - 100, (4, 2))
-        return cls(east_m, north_m, sites_m[[0, 0, 1, 2, 3, 3]] + [[0, 0], [3, 0]] * 3)
+        cells_m = sites_m[[0, 0, 1, 2, 3, 3]] + [[0, 0], [3, 0]] * 3
+        return cls(east_m, north_m, cells_m, slope)
 
     def levels_dbm(self, place_m):
         """Levels of all cells at places, (..., 2), each sector stronger to its own side."""
@@ -64,11 +65,15 @@ class Town:
         field = RadioField(
             lattice, NAMES, level, distance, np.full_like(distance, 3.0), way, on_way
         )
+        return AreaMap.of_field(field, self.plan(), FLOOR_DBM)
+
+    def plan(self):
+        """Return the town's cells."""
         cells = tuple(
             Cell(name, name, WEST_M + x, SOUTH_M + y, 30.0, None, 50.0, 900.0, "omni")
             for name, (x, y) in zip(NAMES, self.cells_m, strict=True)
         )
-        return AreaMap.of_field(field, CellPlan(CRS, cells), FLOOR_DBM)
+        return CellPlan(CRS, cells)
 
     def walk(self, length_m, rng):
         """Return places every 5 m: on along streets, with turns at crossings."""

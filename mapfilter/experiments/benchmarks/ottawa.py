@@ -168,6 +168,6 @@ def _scored(
 
 def _on_map(positioner: BayesPositioner, places: Floats) -> float:
     """Return the share of places within 50 m of the map."""
-    area = positioner.area
+    area = positioner.model.whole
     away_m, _ = cKDTree(area.points.T + np.array(area.origin_m)).query(places)
     return float(np.mean(away_m <= _ON_MAP_M)) if len(places) else float("nan")

@@ -37,7 +37,7 @@ class CarriagewayFilters:
     @cached_property
     def places(self) -> int:
         """Number of points that a belief is drawn from."""
-        return int(self.model.area.points.shape[1])
+        return int(self.model.whole.points.shape[1])
 
 
 def carriageway_filters(
@@ -56,7 +56,7 @@ def carriageway_filters(
         Those of other evidence, with the share of a belief in one place, and the distance for which
         that must hold, that a user asks for.
     """
-    area = model.area.of_carriageways()
+    area = model.whole.of_carriageways()
     if area is None:
         return None
     weights = replace(model.weights, sd_m=min(model.weights.sd_m, _LANE_SD_M))

@@ -23,7 +23,7 @@ from mapfilter.positioning.bayes.alternative import (
     AlternativeRules,
     report,
 )
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import (
@@ -81,7 +81,7 @@ class BayesPositioner(Filter[BayesState]):
         return self.area.lattice.crs
 
     @property
-    def area(self) -> AreaMap:
+    def area(self) -> AreaFrame:
         """Map of the area."""
         return self.model.area
 

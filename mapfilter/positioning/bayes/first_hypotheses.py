@@ -23,7 +23,7 @@ from mapfilter.models.street_motion import (
     STRETCH,
     TURN,
 )
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.path_start import (
@@ -31,6 +31,8 @@ from mapfilter.positioning.bayes.path_start import (
     ends_of_path,
     possible_turns_rad,
 )
+from mapfilter.positioning.bayes.tile_search import points_everywhere, searched_tiles
+from mapfilter.positioning.bayes.tiled_area import TiledArea
 
 if TYPE_CHECKING:
     from mapfilter.positioning.bayes.model import BayesModel
@@ -93,7 +95,7 @@ def first_hypotheses(
     state[STRETCH] = model.motion.stretch_sd * rng.standard_normal(most)
     if prior.path is not None:
         turns = possible_turns_rad(model.motion.bias_sd_rad, compass=prior.compass)
-        ends = ends_of_path(model.area, model.weights, prior.path, turns, most, rng)
+        ends = ends_of_path(model.whole, model.weights, prior.path, turns, most, rng)
         state[EAST : NORTH + 1], state[OFF], log_weight = (
             ends.place_m,
             ends.off,
@@ -113,17 +115,31 @@ def _spread(
     rng: np.random.Generator,
 ) -> None:
     """Fill places on the map and off it; off it more of them, with smaller weights."""
-    size_m, spread_m = np.array(model.area.size_m), model.area.lattice.resolution_m
+    area, spread_m = model.area, model.area.lattice.resolution_m
     beyond = int(_BEYOND_SHARE * state.shape[1])
     off = int(_OFF_SHARE * state.shape[1])
     on = state.shape[1] - off - beyond
-    anywhere = (size_m * rng.random((_TRIES * off, 2))).T.astype(np.float32)
+    searched = None
+    if isinstance(area, TiledArea):
+        searched = searched_tiles(area, reading, model.evidence.levels)
+        on_ways = points_everywhere(area) if searched is None else searched.points
+    else:
+        on_ways = model.whole.points
+    drawn = rng.random((_TRIES * off, 2))
+    if searched is None:
+        anywhere = (np.array(area.size_m) * drawn).T.astype(np.float32)
+        around = _around(area, beyond, rng)
+    else:
+        anywhere = searched.anywhere(drawn)
+        around = searched.around(area.size_m, BEYOND_M, beyond, rng)
+        if not around.shape[1]:
+            on, beyond = on + beyond, 0
     inside = 1 - _BEYOND_AT_START
     first = 0
     for count, points, pixel_m, is_off, share in (
-        (on, model.area.points, spread_m, 0.0, inside * (1 - OFF_AT_START)),
+        (on, on_ways, spread_m, 0.0, inside * (1 - OFF_AT_START)),
         (off, anywhere, 0.0, 1.0, inside * OFF_AT_START),
-        (beyond, _around(model.area, beyond, rng), 0.0, OFF_AT_START, _BEYOND_AT_START),
+        (beyond, around, 0.0, OFF_AT_START, _BEYOND_AT_START),
     ):
         part = slice(first, first + count)
         first += count
@@ -137,7 +153,7 @@ def _spread(
         log_weight[part] = log_mean + np.log(share / count)
 
 
-def _around(area: AreaMap, count: int, rng: np.random.Generator) -> Floats32:
+def _around(area: AreaFrame, count: int, rng: np.random.Generator) -> Floats32:
     """Draw places around the area, shape (2, count)."""
     size_m = np.array(area.size_m)[:, None]
     found = np.empty((2, 0), dtype=np.float32)

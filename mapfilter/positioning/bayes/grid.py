@@ -57,7 +57,7 @@ class StreetGrid:
 
     def start(self, prior: Start) -> tuple[Floats32, Floats32]:
         """Return mass on the ways and off them: by the first evidence, or about a known start."""
-        area = self.model.area
+        area = self.model.whole
         row, col = np.indices(area.on_way.shape).reshape(2, -1)
         nothing = np.zeros(row.size, dtype=np.float32)
         state = self.states(row, col, nothing, nothing)

@@ -65,7 +65,7 @@ class MeasuredMapModel(BayesModel):
 
     @cached_property
     def _way_pixels(self) -> Ints32:
-        return np.flatnonzero(self.area.on_way).astype(np.int32)
+        return np.flatnonzero(self.whole.on_way).astype(np.int32)
 
     def rough_db(self) -> Bytes:
         """Return by how much the map's deviation exceeds that of the options."""
@@ -73,7 +73,7 @@ class MeasuredMapModel(BayesModel):
 
     @cached_property
     def _rough_db(self) -> Bytes:
-        sd_db = np.zeros((self.area.level_dbm[..., 0].size, self._bands))
+        sd_db = np.zeros((self.whole.on_way.size, self._bands))
         if self.level_sd_db is not None:
             sd_db[:, :-2] = self.level_sd_db.reshape(len(self.area.cell_ids), -1).T
         more_db = np.sqrt(np.maximum(sd_db**2 - self.evidence.levels.total_db**2, 0.0))

@@ -36,11 +36,13 @@ from mapfilter.models.street_motion import (
     MotionErrors,
     move,
 )
-from mapfilter.models.way_map import WayMap, weighed_by_ways
+from mapfilter.models.way_map import WayMap, weighed_at_places, weighed_by_ways
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import SERVING_UNDER_NULL, RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import BEYOND_M, Start, first_hypotheses
 from mapfilter.positioning.bayes.radio import EvidenceOptions
+from mapfilter.positioning.bayes.tiled_area import TiledArea
 
 _BEYOND_COST_PER_M = 0.015
 """Negative log-likelihood of each metre beyond the area, in a database with cells."""
@@ -57,7 +59,7 @@ class BayesModel:
     each report counts by the share of its errors that is new.
     """
 
-    area: AreaMap
+    area: AreaFrame
     motion: MotionErrors = field(default_factory=MotionErrors)
     weights: MapWeights = field(default_factory=MapWeights)
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
@@ -81,10 +83,16 @@ class BayesModel:
         (width_m, height_m), more_m = self.area.size_m, BEYOND_M
         return Bins.over((-more_m, -more_m, width_m + more_m, height_m + more_m))
 
+    @property
+    def whole(self) -> AreaMap:
+        """The area, where all of it is held."""
+        assert isinstance(self.area, AreaMap), "an area that is held by tiles"
+        return self.area
+
     @cached_property
     def log_map(self) -> Floats32:
         """Log-likelihood of the map at every pixel."""
-        return self.area.log_map(self.weights.sd_m)
+        return self.whole.log_map(self.weights.sd_m)
 
     @cached_property
     def _ways(self) -> WayMap:
@@ -125,7 +133,14 @@ class BayesModel:
         per_m = self.weights.weight_per_m
         beyond = -cost / per_m if per_m > 0 else nan
         factors = self.weights.over(length_m)
-        weighed: Floats = weighed_by_ways(moved, self._ways, factors, beyond, log_weight)
+        weighed: Floats
+        if isinstance(self.area, TiledArea):
+            on_map = self.area.log_map_at(moved, self.weights.sd_m)
+            weighed = weighed_at_places(
+                moved, on_map, self.area.size_m, factors, beyond, log_weight
+            )
+        else:
+            weighed = weighed_by_ways(moved, self._ways, factors, beyond, log_weight)
         return moved, weighed
 
     def weigh(
@@ -155,9 +170,16 @@ class BayesModel:
                 if reading.tracked and self.remember:
                     withheld_share = 1 - self.evidence.levels.tracking_share
                     kept_back = gained(start, log_weight, withheld_share)
-            flat, bands, table = self.area.flat_level_dbm, self._bands, self._bound_table
             for bound in reading.bounds:
-                fingerprint.weigh_by_bound(pixel, flat, bands, bound, table, log_weight)
+                predicted, own, cells = self._looked_up(pixel, bound.cells, rough=False)
+                fingerprint.weigh_by_bound(
+                    own,
+                    predicted.level_dbm,
+                    predicted.bands,
+                    bound._replace(cells=cells),
+                    self._bound_table,
+                    log_weight,
+                )
             if kept_back is not None:
                 counted = log_weight - kept_back
                 share = self.evidence.levels.tracking_share
@@ -182,13 +204,24 @@ class BayesModel:
 
     def rough_db(self) -> Bytes:
         """Return what is added to the deviation of levels, in tenths of a dB, flat as levels."""
-        return self.area.flat_rough_db
+        return self.whole.flat_rough_db
 
     @property
     def prediction(self) -> Prediction:
         """Predicted levels of the area, as kernels take them."""
         share = self.evidence.levels.roughness
-        return Prediction(self.area.flat_level_dbm, self.rough_db(), self._bands, share)
+        return Prediction(self.whole.flat_level_dbm, self.rough_db(), self._bands, share)
+
+    def _looked_up(
+        self, pixel: Ints32, cell: Ints32, *, rough: bool = True
+    ) -> tuple[Prediction, Ints32, Ints32]:
+        """Return a prediction of cells at pixels, and the pixels and bands in it.
+
+        Of an area that is held by tiles it has a pixel for each hypothesis, and these cells only.
+        """
+        if isinstance(self.area, TiledArea):
+            return self.area.predicted(pixel, cell, self.evidence.levels.roughness, rough=rough)
+        return self.prediction, pixel, cell
 
     @property
     def _bands(self) -> int:
@@ -214,12 +247,15 @@ class BayesModel:
     def _weigh_serving(
         self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
     ) -> None:
-        flat, table = self.area.flat_level_dbm, self._serving_table
-        cell, weight = reading.serving, reading.serving_weight
-        odds = cloud.shared.fault_odds(cell, cloud.kept)
+        table, weight = self._serving_table, reading.serving_weight
+        odds = cloud.shared.fault_odds(reading.serving, cloud.kept)
         other = -self.evidence.serving.fault_nats
+        # Its own level, the strongest and the second strongest.
+        cells = np.array([reading.serving, self._bands - 2, self._bands - 1], dtype=np.int32)
+        predicted, pixel, cells = self._looked_up(pixel, cells, rough=False)
+        flat, bands, cell = predicted.level_dbm, predicted.bands, int(cells[0])
         fingerprint.weigh_by_serving(
-            pixel, flat, self._bands, cell, table, weight, odds, other, log_weight
+            pixel, flat, bands, cell, table, weight, odds, other, log_weight
         )
 
     def _weigh_levels(
@@ -231,25 +267,33 @@ class BayesModel:
         memory, kept, weight = cloud.shared, cloud.kept, errors.weight
         if not self.remember and reading.length_m > 0:
             weight *= 1 - exp(-2 * reading.length_m / _NEW_M)
-        predicted = self.prediction
         # Cells that nobody expects say nothing, neither for the belief nor against it.
-        report = report._replace(absent=expected_absent(predicted, pixel, report))
+        report = report._replace(absent=self._expected_absent(pixel, report))
         cells = np.concatenate([report.cell, report.absent])
         # What they keep has been copied as it was aged.
         memory, kept = memory.with_cells(cells[: memory.slots], kept, in_place=True)
         if report.cell.size > memory.slots:
             slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
-        rough_db2 = mean_rough_db2(predicted, pixel, report.cell)
+        predicted, own, cells = self._looked_up(pixel, report.cell)
+        rough_db2 = mean_rough_db2(predicted, own, cells)
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
-        weigh_by_levels(kept, pixel, predicted, terms, weight, log_weight)
+        weigh_by_levels(kept, own, predicted, terms._replace(cell=cells), weight, log_weight)
         if absent.cell.size:
-            table = self._bound_table
-            weigh_by_absence(kept, pixel, predicted, absent, table, weight, log_weight)
+            predicted, own, cells = self._looked_up(pixel, absent.cell)
+            table, expected = self._bound_table, absent._replace(cell=cells)
+            weigh_by_absence(kept, own, predicted, expected, table, weight, log_weight)
         other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
         memory = replace(memory, other_log_likelihood=other)
         return Cloud(cloud.state, kept, memory)
+
+    def _expected_absent(self, pixel: Ints32, report: LevelReport) -> Ints32:
+        if not isinstance(self.area, TiledArea):
+            return expected_absent(self.prediction, pixel, report)
+        some = np.ascontiguousarray(pixel[:: _every(pixel)])
+        share = self.area.shares_above(some, report.absent, report.limit_dbm)
+        return _most_expected(report.absent, share)
 
 
 def mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:
@@ -264,6 +308,10 @@ def expected_absent(predicted: Prediction, pixel: Ints32, report: LevelReport) -
     if not absent.size:
         return absent
     share = shares_above(pixel, _every(pixel), predicted, absent, report.limit_dbm)
+    return _most_expected(absent, share)
+
+
+def _most_expected(absent: Ints32, share: Floats) -> Ints32:
     expected = [k for k, part in enumerate(share.tolist()) if part > _LEAST_EXPECTED]
     expected.sort(key=lambda k: -share[k])
     found: Ints32 = absent[expected]

@@ -16,6 +16,7 @@ from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.alternative import AlternativeRules
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.filter import BayesPositioner
@@ -28,6 +29,7 @@ from mapfilter.positioning.bayes.over_survey import (
     over_survey,
 )
 from mapfilter.positioning.bayes.radio import EvidenceOptions
+from mapfilter.positioning.bayes.tiled_area import TiledArea
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 _SLOW, _FAST, _WHITE = 7.0, 4.0, 3.3
@@ -59,8 +61,19 @@ of the switch rule; largest log odds of the null hypothesis, its cost of a metre
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
 
-def open_area(database: RadioRouteDatabase) -> AreaMap:
-    """Read a whole database into the map that the filter looks up."""
+WHOLE_VALUES = 100_000_000
+"""Most levels of an area that is held whole: rows times columns times cells and two more."""
+
+
+def open_area(database: RadioRouteDatabase, *, whole: bool = False) -> AreaFrame:
+    """Return the map that the filter looks up: of a whole database, or of a large one by tiles.
+
+    Larger areas than :data:`WHOLE_VALUES` are held by tiles unless they have to be ``whole``.
+    """
+    lattice = database.lattice
+    values = lattice.rows * lattice.cols * (len(database.cell_ids) + 2)
+    if database.cell_ids and values > WHOLE_VALUES and not whole:
+        return TiledArea.of_database(database)
     return AreaMap.of_field(database.field(), database.plan, database.floor_dbm)
 
 
@@ -174,14 +187,14 @@ class BayesFilter(Options):
         return "bayes"
 
     def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> BayesPositioner:  # noqa: ARG002
-        """Return the filter over the area of a database, which is read as a whole.
+        """Return the filter over the area of a database, which is read as a whole, or by tiles.
 
         Over surveyed levels, options that have their defaults are those of measured maps
         (:mod:`mapfilter.positioning.bayes.over_survey`).
         """
         measured = database.measured()
         if measured is None:
-            return self.over_area(open_area(database))
+            return self.over_area(open_area(database, whole=self.name == "grid"))
         roles = {one["role"] for one in database.manifest["inputs"]}
         tracks = "tracks" in roles and not roles & {"map", "roads"}
         options = self._with({**SURVEYED, **(SURVEYED_WAYS if tracks else {})})
@@ -202,11 +215,11 @@ class BayesFilter(Options):
         }
         return replace(self, **taken)
 
-    def over_area(self, area: AreaMap) -> BayesPositioner:
+    def over_area(self, area: AreaFrame) -> BayesPositioner:
         """Return the filter over an area."""
         return self.resolved._over_area(area)
 
-    def _over_area(self, area: AreaMap) -> BayesPositioner:
+    def _over_area(self, area: AreaFrame) -> BayesPositioner:
         motion = MotionErrors(
             step_sd_m=self.step_sd_m,
             heading_sd_rad=radians(self.heading_sd_deg),

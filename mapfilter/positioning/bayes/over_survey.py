@@ -76,7 +76,7 @@ def over_survey(
     measured : MeasuredParts
         Of the database.
     """
-    options, area = options or SurveyedEvidence(), bound.model.area
+    options, area = options or SurveyedEvidence(), bound.model.whole
     sd_db = measured.deviations.spread(area.cell_ids, area.on_way)
     evidence = bound.model.evidence
     levels = replace(evidence.levels, white_db=options.measurement_db)

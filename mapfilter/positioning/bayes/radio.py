@@ -19,7 +19,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import BoundReading, ServingWeights
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.options import NotNegative, Options, Positive, Share
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import (
     SERVING_UNDER_NULL,
     Context,
@@ -94,7 +94,7 @@ class RadioSource(EvidenceSource):
         under the null hypothesis.
     """
 
-    area: AreaMap
+    area: AreaFrame
     options: EvidenceOptions
     usual_serving: Callable[[int, float], float] = _same_everywhere
     name: ClassVar[str] = "radio"

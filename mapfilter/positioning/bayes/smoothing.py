@@ -28,7 +28,7 @@ from mapfilter.models.street_motion import (
     MotionErrors,
 )
 from mapfilter.positioning.bayes.alternative import MapBelief
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.estimate import TrackEstimate
 
@@ -67,7 +67,7 @@ class BayesSmoother:
         After the last epoch.
     """
 
-    area: AreaMap
+    area: AreaFrame
     errors: MotionErrors
     every_m: float = 5.0
     kept: list[Kept] = field(default_factory=list)
@@ -157,7 +157,7 @@ class BayesSmoother:
 
 def _paths(
     kept: list[Kept],
-    area: AreaMap,
+    area: AreaFrame,
     errors: MotionErrors,
     rng: np.random.Generator,
     paths: int,

@@ -11,7 +11,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
@@ -134,7 +134,7 @@ class Reported(NamedTuple):
 
 
 def step_output(
-    area: AreaMap,
+    area: AreaFrame,
     state: BayesState,
     time_s: float,
     reason: Reason,
@@ -154,7 +154,7 @@ def step_output(
 
 
 def _output(
-    area: AreaMap,
+    area: AreaFrame,
     state: BayesState,
     time_s: float,
     reason: Reason,

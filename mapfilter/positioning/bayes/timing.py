@@ -17,7 +17,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.ranging import range_differences, timing_advances
 from mapfilter.models.state import StateLayout
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Difference, Epoch
@@ -77,7 +77,7 @@ class TimingSource(EvidenceSource):
     ``advances`` is False where a measured map of timing advances is used instead.
     """
 
-    area: AreaMap
+    area: AreaFrame
     options: TimingOptions
     advances: bool = True
     name: ClassVar[str] = "timing"

@@ -19,7 +19,7 @@ from mapfilter.positioning.bayes.alternative import (
     doubted,
     resolve_alternative,
 )
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import (
@@ -299,7 +299,7 @@ def weighed_by(
     return reading if reading is None else replace(reading, tracked=tracked)
 
 
-def _at_edge(area: AreaMap, belief: MapBelief) -> bool:
+def _at_edge(area: AreaFrame, belief: MapBelief) -> bool:
     """Return whether a belief lies at the edge of the area."""
     if isinstance(belief, ParticleBelief) and area.clear_of_edge(belief.state):
         # A summary takes longer.

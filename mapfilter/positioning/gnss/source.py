@@ -15,7 +15,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
@@ -84,7 +84,7 @@ class GnssSource(EvidenceSource):
     ``clock`` is whether hypotheses can carry a clock: those of the grid filter cannot.
     """
 
-    area: AreaMap
+    area: AreaFrame
     options: GnssOptions
     clock: bool = True
     name: ClassVar[str] = "gnss"

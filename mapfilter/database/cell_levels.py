@@ -1,0 +1,198 @@
+"""Levels of a database by cell and by window, for readers of areas too large to hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.database.parquet import Window, WindowReader, opened, part_ranges, read_columns
+from mapfilter.database.radioroutes import RadioRouteDatabase, way_columns
+from mapfilter.errors import StoreError, fail
+from mapfilter.geodesy import Lattice
+
+_POINT_COLUMNS = (
+    "row",
+    "col",
+    "way_id",
+    "way_class",
+    "on_square",
+    "distance_to_way_m",
+    "best_level_dbm",
+    "margin_db",
+)
+_FIRST_MARGIN_PX = 32
+
+
+class CellLevels(NamedTuple):
+    """All levels of one cell.
+
+    ``point`` (N,) are numbers of points in ascending order, ``level_dbm`` (N,) their levels.
+    """
+
+    point: Ints
+    level_dbm: Floats32
+
+
+def received_cells(database: RadioRouteDatabase) -> tuple[str, ...]:
+    """Return the cells with a level somewhere, in the plan's order."""
+    parts = database.level_parts
+    return tuple(
+        cell for cell in database.cell_ids if any(part.rows for part in parts.get(cell, ()))
+    )
+
+
+class PartExtents(NamedTuple):
+    """Where the points of M parts lie, and their strongest level.
+
+    ``band`` (M,) is the cell of each part; ``box`` (M, 4) the first and last row, and the first and
+    last column; ``most_dbm`` (M,) the largest level.
+    """
+
+    band: Ints
+    box: Ints
+    most_dbm: Floats
+
+
+def part_extents(database: RadioRouteDatabase, cell_ids: tuple[str, ...]) -> PartExtents:
+    """Return the extents of the parts of some cells; only the parts' footers are read.
+
+    Raises
+    ------
+    StoreError
+        A part is damaged, or the database was replaced since it was opened.
+    """
+    bands, boxes, most_dbm = [], [], []
+    for band, cell_id in enumerate(cell_ids):
+        for part in database.level_parts[cell_id]:
+            if part.rows:
+                with opened(part) as file:
+                    found = part_ranges(file.metadata, ("row", "col", "level_dbm"))
+                bands.append(band)
+                boxes.append((*found[0], *found[1]))
+                most_dbm.append(found[2][1])
+    return PartExtents(np.array(bands), np.array(boxes, dtype=np.int64), np.array(most_dbm))
+
+
+def read_cell(database: RadioRouteDatabase, cell_id: str) -> CellLevels:
+    """Read all levels of a cell.
+
+    Raises
+    ------
+    StoreError
+        A part is damaged, or the database was replaced since it was opened.
+    """
+    points, levels, lattice = [], [], database.lattice
+    for part in database.level_parts[cell_id]:
+        table = read_columns(part, ("point", "level_dbm"))
+        point = table["point"].to_numpy()
+        if point.size and not 0 <= point.min() <= point.max() < lattice.rows * lattice.cols:
+            expected = "points on the database's lattice"
+            raise fail(StoreError, str(part), expected, "others", "parts mixed up")
+        points.append(point)
+        levels.append(table["level_dbm"].to_numpy())
+    point, level_dbm = np.concatenate(points), np.concatenate(levels)
+    order = np.argsort(point)
+    return CellLevels(point[order], level_dbm[order].astype(np.float32))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NearestPoints:
+    """The nearest point of the database to each pixel of a window, and what is known there.
+
+    Parameters
+    ----------
+    window : tuple of int
+        Row, column, rows and columns on the database's lattice.
+    near : ndarray of int32, shape (rows, cols)
+        Index of each pixel's nearest point among the P that are the nearest of any.
+    point : ndarray of int64, shape (P,)
+        Their numbers, in ascending order.
+    way_id : ndarray of int64, shape (P,)
+    best_dbm, second_dbm : ndarray of float32, shape (P,)
+        Strongest and second strongest level; NaN where there is none.
+    edge_m : ndarray of float32, shape (rows, cols)
+        Distance to the edge of the nearest way, 0 on it.
+    """
+
+    window: Window
+    near: Ints32
+    point: Ints
+    way_id: Ints
+    best_dbm: Floats32
+    second_dbm: Floats32
+    edge_m: Floats32
+
+
+class PointReader:
+    """Reads the points of a database by windows."""
+
+    def __init__(self, database: RadioRouteDatabase) -> None:
+        self._lattice = database.lattice
+        self._reader = WindowReader([database.points_part], _POINT_COLUMNS, database.lattice)
+
+    def nearest(self, window: Window) -> NearestPoints:
+        """Return the nearest points of a window, those of the whole database.
+
+        Points around the window are read as far as they may be the nearest of a pixel in it.
+        """
+        top, left, rows, cols = window
+        margin, lattice = _FIRST_MARGIN_PX, self._lattice
+        while True:
+            outer = _grown(window, margin, lattice)
+            points = self._reader.read(outer)
+            if points and points["row"].size:
+                order = np.lexsort((points["col"], points["row"]))
+                row, col = (points[name][order] for name in ("row", "col"))
+                number = np.full(outer[2:], -1, dtype=np.int32)
+                number[row - outer[0], col - outer[1]] = np.arange(row.size)
+                away_px, at = distance_transform_edt(number < 0, return_indices=True)
+                inner = np.s_[
+                    top - outer[0] : top - outer[0] + rows, left - outer[1] : left - outer[1] + cols
+                ]
+                if np.all(away_px[inner] < _seen_px(window, outer, lattice)):
+                    break
+                margin = max(2 * margin, int(away_px[inner].max()) + 2)
+            else:
+                margin *= 4
+        nearest = number[at[0][inner], at[1][inner]]
+        used, near = np.unique(nearest, return_inverse=True)
+        half_width_m, on_way_m = way_columns(points)
+        half_width_m, on_way_m = half_width_m[order], on_way_m[order]
+        away_m = away_px[inner] * lattice.resolution_m + on_way_m.astype(np.float64)[nearest]
+        best_dbm = points["best_level_dbm"][order][used]
+        margin_db = points["margin_db"][order][used].astype(np.float64)
+        # Levels and margins are kept to 0.01 dB.
+        second_dbm = np.round(best_dbm.astype(np.float64) - margin_db, 2)
+        return NearestPoints(
+            window,
+            near.reshape(rows, cols).astype(np.int32),
+            row[used].astype(np.int64) * lattice.cols + col[used],
+            points["way_id"][order][used],
+            best_dbm.astype(np.float32),
+            second_dbm.astype(np.float32),
+            np.maximum(away_m.astype(np.float32) - half_width_m[nearest], 0),
+        )
+
+
+def _grown(window: Window, margin: int, lattice: Lattice) -> Window:
+    top, left = max(window[0] - margin, 0), max(window[1] - margin, 0)
+    bottom = min(window[0] + window[2] + margin, lattice.rows)
+    right = min(window[1] + window[3] + margin, lattice.cols)
+    return top, left, bottom - top, right - left
+
+
+def _seen_px(window: Window, outer: Window, lattice: Lattice) -> Ints:
+    """Return how far from each pixel of a window the nearest pixel beyond another one lies."""
+    far = 2 * (lattice.rows + lattice.cols)
+    (top, left, rows, cols), (low, west, high, wide) = window, outer
+    row, col = np.arange(top, top + rows), np.arange(left, left + cols)
+    above = row - low + 1 if low > 0 else np.full(rows, far)
+    below = low + high - row if low + high < lattice.rows else np.full(rows, far)
+    before = col - west + 1 if west > 0 else np.full(cols, far)
+    behind = west + wide - col if west + wide < lattice.cols else np.full(cols, far)
+    seen: Ints = np.minimum(np.minimum(above, below)[:, None], np.minimum(before, behind)[None, :])
+    return seen

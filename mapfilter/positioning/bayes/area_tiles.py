@@ -1,0 +1,293 @@
+"""Tiles of a large area, read from its database when they are looked up, and given up again.
+
+A tile has the nearest point of each pixel, and the levels of a cell at these points: only of cells
+that are looked up, and nothing of cells that are not received there. What was looked up longest ago
+is given up when all of it takes more than a number of bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from threading import RLock
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints, Ints32
+from mapfilter.database.cell_levels import (
+    CellLevels,
+    NearestPoints,
+    PartExtents,
+    PointReader,
+    part_extents,
+    read_cell,
+)
+from mapfilter.database.parquet import read_columns
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.models.level_errors import roughness_px
+from mapfilter.models.street_motion import map_log_likelihood
+from mapfilter.models.tile_kernels import level_ranges, levels_at_points, tenths_of_roughness
+from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
+from mapfilter.positioning.bayes.bounded_cache import BoundedCache
+
+TILE_PX = 128
+HELD_BYTES = 640 << 20
+"""Most bytes of tiles and levels that are held at a time."""
+
+
+class LevelRange(NamedTuple):
+    """Least and largest level of a cell in some tiles, (rows, cols); NaN where it has none.
+
+    ``row`` and ``col`` are those of the first tile.
+    """
+
+    row: int
+    col: int
+    least_dbm: Floats32
+    most_dbm: Floats32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tile:
+    """A tile of an area.
+
+    Parameters
+    ----------
+    points : NearestPoints
+        Of a window that reaches beyond the tile by the width of the roughness.
+    row, col : ndarray of int64, shape (M,)
+        The points of the database that lie in the tile itself.
+    box : tuple of int
+        First and last row, first and last column of all nearest points.
+    """
+
+    points: NearestPoints
+    row: Ints
+    col: Ints
+    box: tuple[int, int, int, int]
+
+    @property
+    def corner(self) -> tuple[int, int]:
+        """Row and column of the first pixel of the arrays."""
+        return self.points.window[0], self.points.window[1]
+
+
+class _Reaching(NamedTuple):
+    """The cells that may have a level in a tile, ascending, (C,), and a bound of these levels.
+
+    The bound is by the footers of the parts until it is ``exact``: by the cell's range.
+    """
+
+    band: Ints
+    bound_dbm: Floats
+    exact: Bools
+
+
+class AreaTiles:
+    """The tiles of a database's area.
+
+    Whoever looks something up holds ``lock`` meanwhile, and keeps nothing but copies.
+
+    Parameters
+    ----------
+    cell_ids : tuple of str
+        Bands.
+    side : int
+        Of a tile, pixels.
+    most_bytes : int
+        Of everything that is held.
+    """
+
+    def __init__(
+        self,
+        database: RadioRouteDatabase,
+        cell_ids: tuple[str, ...],
+        side: int = TILE_PX,
+        most_bytes: int = HELD_BYTES,
+    ) -> None:
+        self.database, self.cell_ids, self.side = database, cell_ids, side
+        self.most_bytes = most_bytes
+        lattice = database.lattice
+        self.rows, self.cols = -(-lattice.rows // side), -(-lattice.cols // side)
+        self.quiet_dbm = np.float32(database.floor_dbm - BELOW_FLOOR_DB)
+        self.lock = RLock()
+        self.held = BoundedCache(most_bytes)
+        self._ranges: dict[int, LevelRange] = {}
+        self._rough_px = roughness_px(lattice.resolution_m)
+        self._halo = self._rough_px // 2
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        # Other processes read for themselves.
+        return self.database, self.cell_ids, self.side, self.most_bytes
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        self.__init__(*state)  # type: ignore[misc]
+
+    @cached_property
+    def extents(self) -> PartExtents:
+        """Where the parts of the cells lie, and how strong they are."""
+        with self.lock:
+            return part_extents(self.database, self.cell_ids)
+
+    @cached_property
+    def _reader(self) -> PointReader:
+        return PointReader(self.database)
+
+    def tile(self, number: int) -> Tile:
+        """Return a tile."""
+
+        def make() -> Tile:
+            lattice, side, halo = self.database.lattice, self.side, self._halo
+            top, left = side * (number // self.cols), side * (number % self.cols)
+            bottom, right = min(top + side, lattice.rows), min(left + side, lattice.cols)
+            first_row, first_col = max(top - halo, 0), max(left - halo, 0)
+            rows = min(bottom + halo, lattice.rows) - first_row
+            cols = min(right + halo, lattice.cols) - first_col
+            points = self._reader.nearest((first_row, first_col, rows, cols))
+            row, col = points.point // lattice.cols, points.point % lattice.cols
+            own = (row >= top) & (row < bottom) & (col >= left) & (col < right)
+            box = int(row.min()), int(row.max()), int(col.min()), int(col.max())
+            return Tile(points, row[own], col[own], box)
+
+        return self.held.get(("tile", number), make, _tile_bytes)
+
+    def every_point(self) -> Ints:
+        """Return the numbers of all points of the database, without what is known there."""
+        point = read_columns(self.database.points_part, ("point",))["point"].to_numpy()
+        return np.sort(point)
+
+    def log_map(self, number: int, sd_m: float) -> Floats32:
+        """Return the map's log-likelihood at the pixels of a tile's arrays."""
+
+        def make() -> Floats32:
+            return map_log_likelihood(self.tile(number).points.edge_m, sd_m)
+
+        return self.held.get(("ways", number, sd_m), make, _array_bytes)
+
+    def levels(self, number: int, band: int) -> Floats32 | None:
+        """Return a cell's levels at a tile's nearest points, (P,); None where it has none.
+
+        Bands C and C + 1 are the strongest and the second strongest level.
+        """
+        points, count = self.tile(number).points, len(self.cell_ids)
+        if band >= count:
+            top_dbm = points.best_dbm if band == count else points.second_dbm
+            return np.where(np.isnan(top_dbm), self.quiet_dbm, top_dbm)
+        reaching = self._reaching(number).band
+        at = int(np.searchsorted(reaching, band))
+        if at == reaching.size or reaching[at] != band:
+            return None
+
+        def make() -> Floats32 | None:
+            level_dbm, there = levels_at_points(
+                points.point, *self.cell(band), float(self.quiet_dbm)
+            )
+            return level_dbm if there else None
+
+        return self.held.get(("levels", number, band), make, _array_bytes)
+
+    def rough_db(self, number: int, band: int) -> Bytes | None:
+        """Return the roughness of a cell's levels at a tile's pixels; None where it has none."""
+        level_dbm = self.levels(number, band)
+        if level_dbm is None:
+            return None
+
+        def make() -> Bytes:
+            near, size = self.tile(number).points.near, self._rough_px
+            tenths: Bytes = tenths_of_roughness(level_dbm, near, size)
+            return tenths
+
+        return self.held.get(("rough", number, band), make, _array_bytes)
+
+    def strong(self, number: int, bands: Ints32, limit_dbm: float) -> Ints:
+        """Return the places in ``bands``, ascending, of cells that may be above a level in a tile.
+
+        Cells are read for it only where the footers of their parts leave it open.
+        """
+        reaching = self._reaching(number)
+        for k in np.flatnonzero((reaching.bound_dbm > limit_dbm) & ~reaching.exact).tolist():
+            reaching.bound_dbm[k] = self._bound(number, int(reaching.band[k]))
+            reaching.exact[k] = True
+        strong = reaching.band[reaching.bound_dbm > limit_dbm]
+        place = np.minimum(np.searchsorted(bands, strong), max(bands.size - 1, 0))
+        found: Ints = place[bands[place] == strong] if bands.size else place[:0]
+        return found
+
+    def _reaching(self, number: int) -> _Reaching:
+        """Return the cells with a part that may reach a tile's nearest points."""
+
+        def make() -> _Reaching:
+            top, bottom, left, right = self.tile(number).box
+            low, high, west, east = self.extents.box.T
+            meets = (low <= bottom) & (high >= top) & (west <= right) & (east >= left)
+            band, of = np.unique(self.extents.band[meets], return_inverse=True)
+            bound_dbm = np.full(band.size, -np.inf)
+            np.maximum.at(bound_dbm, of, self.extents.most_dbm[meets])
+            return _Reaching(band, bound_dbm, np.zeros(band.size, dtype=np.bool_))
+
+        return self.held.get(("reaching", number), make, _arrays_bytes)
+
+    def _bound(self, number: int, band: int) -> float:
+        """Return an upper bound of a cell's levels at a tile's nearest points."""
+        top, bottom, left, right = self.tile(number).box
+        row, col, _, most_dbm = self.range_of(band)
+        rows, cols = (
+            slice(max(first // self.side - at, 0), max(last // self.side - at + 1, 0))
+            for first, last, at in ((top, bottom, row), (left, right, col))
+        )
+        return float(np.fmax.reduce(most_dbm[rows, cols], axis=None, initial=-np.inf))
+
+    def range_of(self, band: int) -> LevelRange:
+        """Return the range of a cell's levels by tiles; kept for good once it was read."""
+        found = self._ranges.get(band)
+        if found is None:
+            self.cell(band)
+            found = self._ranges[band]
+        return found
+
+    def cell(self, band: int) -> CellLevels:
+        """Return all levels of a cell."""
+
+        def make() -> CellLevels:
+            cell = read_cell(self.database, self.cell_ids[band])
+            if band not in self._ranges:
+                self._ranges[band] = self._range(cell)
+            return cell
+
+        return self.held.get(("cell", band), make, _cell_bytes)
+
+    def _range(self, cell: CellLevels) -> LevelRange:
+        cols, tiles = self.database.lattice.cols, self.rows * self.cols
+        least, most = level_ranges(*cell, cols, self.side, self.cols, tiles)
+        least, most = least.reshape(self.rows, self.cols), most.reshape(self.rows, self.cols)
+        row, col = np.nonzero(np.isfinite(most))
+        part = np.s_[row.min() : row.max() + 1, col.min() : col.max() + 1]
+        return LevelRange(int(row.min()), int(col.min()), least[part].copy(), most[part].copy())
+
+
+def _tile_bytes(tile: Tile) -> int:
+    points = tile.points
+    arrays = (
+        points.near,
+        points.point,
+        points.way_id,
+        points.best_dbm,
+        points.second_dbm,
+        points.edge_m,
+        tile.row,
+        tile.col,
+    )
+    return sum(one.nbytes for one in arrays)
+
+
+def _cell_bytes(cell: CellLevels) -> int:
+    return cell.point.nbytes + cell.level_dbm.nbytes
+
+
+def _arrays_bytes(arrays: _Reaching) -> int:
+    return sum(one.nbytes for one in arrays)
+
+
+def _array_bytes(array: Floats32 | Bytes | None) -> int:
+    return 0 if array is None else array.nbytes

@@ -1,0 +1,39 @@
+"""Values that are held as long as all of them take no more than some bytes."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Any, TypeVar
+
+_ENTRY_BYTES = 300
+"""What an entry takes besides its value."""
+
+_Value = TypeVar("_Value")
+
+
+class BoundedCache:
+    """Values by keys, of which those that were asked for longest ago are given up."""
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most_bytes = most_bytes
+        self._entries: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self.bytes = 0
+
+    def get(
+        self, key: Hashable, make: Callable[[], _Value], size: Callable[[_Value], int]
+    ) -> _Value:
+        """Return the value of a key, made where it is not held."""
+        entry = self._entries.get(key)
+        if entry is not None:
+            self._entries.move_to_end(key)
+            found: _Value = entry[0]
+            return found
+        value = make()
+        count = size(value) + _ENTRY_BYTES
+        self._entries[key] = value, count
+        self.bytes += count
+        while self.bytes > self._most_bytes and len(self._entries) > 1:
+            _, (_, gone) = self._entries.popitem(last=False)
+            self.bytes -= gone
+        return value

@@ -1,0 +1,198 @@
+"""A large area: levels and ways by tiles, loaded where hypotheses are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
+from mapfilter.database.cell_levels import received_cells
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.geodesy import Lattice
+from mapfilter.models.fingerprint import RasterFrame
+from mapfilter.models.level_kernels import Prediction
+from mapfilter.models.tile_kernels import (
+    by_tile,
+    interpolate_tile,
+    look_up_levels,
+    pixels_from_south,
+    upper_left,
+)
+from mapfilter.positioning.bayes.area_frame import AreaFrame, carriers_of, sites_of
+from mapfilter.positioning.bayes.area_tiles import HELD_BYTES, TILE_PX, AreaTiles
+
+SEARCH_TILES = 48
+"""Most tiles in which the first hypotheses are drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class TiledArea(AreaFrame):
+    """An area whose levels and ways are read by tiles where they are looked up.
+
+    What is looked up equals that of :class:`~mapfilter.positioning.bayes.area_map.AreaMap`.
+
+    Parameters
+    ----------
+    lattice, cell_ids, known_ids, carriers, floor_dbm, sites
+        As of :class:`~mapfilter.positioning.bayes.area_frame.AreaFrame`.
+    tiles : AreaTiles
+        Of the database.
+    search_tiles : int
+        Most tiles in which the first hypotheses are drawn.
+    """
+
+    lattice: Lattice
+    cell_ids: tuple[str, ...]
+    known_ids: frozenset[str]
+    carriers: dict[tuple[int, int], tuple[int, ...]]
+    floor_dbm: float
+    sites: Mapping[str, tuple[float, float, float]]
+    tiles: AreaTiles
+    search_tiles: int = SEARCH_TILES
+
+    @classmethod
+    def of_database(
+        cls,
+        database: RadioRouteDatabase,
+        side: int = TILE_PX,
+        most_bytes: int = HELD_BYTES,
+        search_tiles: int = SEARCH_TILES,
+    ) -> TiledArea:
+        """Prepare a database with cells; nothing of its points or levels is read yet."""
+        plan, cells = database.plan, received_cells(database)
+        return cls(
+            database.lattice,
+            cells,
+            frozenset(plan.ids),
+            carriers_of(plan, cells),
+            database.floor_dbm,
+            sites_of(plan),
+            AreaTiles(database, cells, side, most_bytes),
+            search_tiles,
+        )
+
+    def looked_up(
+        self, pixel: Ints32, cell: Ints32, *, rough: bool = True
+    ) -> tuple[Floats32, Bytes]:
+        """Return levels and their roughness (tenths of a dB) of cells (K,) at pixels (N,): (N, K).
+
+        Without ``rough`` the second is empty.
+        """
+        bands, tiles = cell.tolist(), self.tiles
+        found_dbm = np.full((pixel.size, cell.size), tiles.quiet_dbm, dtype=np.float32)
+        found_rough = np.zeros((pixel.size, cell.size if rough else 0), dtype=np.uint8)
+        with tiles.lock:
+            for number, which in self._by_tile(pixel):
+                tile = tiles.tile(number)
+                near = tile.points.near
+                levels = [tiles.levels(number, band) for band in bands]
+                heard = [k for k, level in enumerate(levels) if level is not None]
+                if not heard:
+                    continue
+                level_dbm = np.full((cell.size, tile.points.point.size), tiles.quiet_dbm)
+                rough_db = np.zeros((cell.size if rough else 0, *near.shape), dtype=np.uint8)
+                for k in heard:
+                    level_dbm[k] = levels[k]
+                    page = tiles.rough_db(number, bands[k]) if rough else None
+                    if page is not None:
+                        rough_db[k] = page
+                look_up_levels(
+                    pixel,
+                    which,
+                    self.lattice.cols,
+                    tile.corner,
+                    near,
+                    level_dbm,
+                    rough_db,
+                    found_dbm,
+                    found_rough,
+                )
+        return found_dbm, found_rough
+
+    def predicted(
+        self, pixel: Ints32, cell: Ints32, share: float, *, rough: bool = True
+    ) -> tuple[Prediction, Ints32, Ints32]:
+        """Return predicted levels of cells as kernels take them, with their pixels and bands.
+
+        Each hypothesis has a pixel of its own.
+        """
+        level_dbm, rough_db = self.looked_up(pixel, cell, rough=rough)
+        predicted = Prediction(level_dbm.reshape(-1), rough_db.reshape(-1), cell.size, share)
+        own = np.arange(pixel.size, dtype=np.int32)
+        return predicted, own, np.arange(cell.size, dtype=np.int32)
+
+    def shares_above(self, pixel: Ints32, cell: Ints32, limit_dbm: float) -> Floats:
+        """Return the share of pixels (N,) at which each cell (K,) is above a level."""
+        above, tiles, limit = np.zeros(cell.size), self.tiles, np.float32(limit_dbm)
+        with tiles.lock:
+            for number, which in self._by_tile(pixel):
+                tile = tiles.tile(number)
+                (top, left), cols = tile.corner, self.lattice.cols
+                point = tile.points.near[pixel[which] // cols - top, pixel[which] % cols - left]
+                for k in tiles.strong(number, cell, limit_dbm).tolist():
+                    level_dbm = tiles.levels(number, int(cell[k]))
+                    if level_dbm is not None:
+                        above[k] += np.count_nonzero(level_dbm[point] > limit)
+            if tiles.quiet_dbm > limit:
+                # Cells that are nowhere received are above such a limit everywhere.
+                found_dbm, _ = self.looked_up(pixel, cell, rough=False)
+                above = np.count_nonzero(found_dbm > limit, axis=0).astype(np.float64)
+        return above / pixel.size
+
+    def log_map_at(self, state: Floats32, sd_m: float) -> Floats32:
+        """Return the map's log-likelihood at hypotheses, (N,), between the pixels' centres."""
+        pixel_m, rows, cols = self.lattice.resolution_m, self.lattice.rows, self.lattice.cols
+        centres = RasterFrame(pixel_m / 2, (rows - 0.5) * pixel_m, 1 / pixel_m, rows, cols)
+        first = upper_left(state, centres)
+        found = np.empty(first.size, dtype=np.float32)
+        with self.tiles.lock:
+            for number, which in self._by_tile(first):
+                corner = self.tiles.tile(number).corner
+                values = self.tiles.log_map(number, sd_m)
+                interpolate_tile(state, first, which, centres, corner, values, found)
+        return found
+
+    def levels_at(self, pixel: Ints32, band: Ints) -> Floats32:
+        """Return the levels of cells (N,), by their bands, each at a pixel (N,)."""
+        bands, at = np.unique(band, return_inverse=True)
+        found_dbm, _ = self.looked_up(
+            np.asarray(pixel, dtype=np.int32), bands.astype(np.int32), rough=False
+        )
+        level_dbm: Floats32 = found_dbm[np.arange(pixel.size), at]
+        return level_dbm
+
+    def matched_way(
+        self, east_m: Floats32, north_m: Floats32, weight: Floats32
+    ) -> tuple[int, float]:
+        """Return the way that holds the largest share of a belief, and that share."""
+        rows, cols = self.lattice.rows, self.lattice.cols
+        pixel = pixels_from_south(east_m, north_m, rows, cols, 1 / self.lattice.resolution_m)
+        way_id = np.zeros(pixel.size, dtype=np.int64)
+        with self.tiles.lock:
+            for number, which in self._by_tile(pixel):
+                tile = self.tiles.tile(number)
+                (top, left), points = tile.corner, tile.points
+                at = points.near[pixel[which] // cols - top, pixel[which] % cols - left]
+                way_id[which] = points.way_id[at]
+        ways, rank = np.unique(way_id, return_inverse=True)
+        mass = np.zeros(ways.size, dtype=np.float32)
+        np.add.at(mass, rank, weight)
+        best = int(np.argmax(mass))
+        return int(ways[best]), min(float(mass[best]), 1.0)
+
+    def _by_tile(self, pixel: Ints32) -> Iterator[tuple[int, Ints]]:
+        """Yield each tile that pixels lie in, and which of them."""
+        if not pixel.size:
+            return
+        side, tiles = self.tiles.side, self.tiles
+        order, first, numbers = by_tile(pixel, self.lattice.cols, side, tiles.cols, self.count)
+        for k, number in enumerate(numbers.tolist()):
+            yield number, order[first[k] : first[k + 1]]
+
+    @cached_property
+    def count(self) -> int:
+        """Number of tiles."""
+        return self.tiles.rows * self.tiles.cols
