@@ -179,7 +179,9 @@ def scored(tmp_path, method, statuses, errors_m, accuracy_m, radius_m=25.0):
     estimate = TrackEstimate.of_fixes(CRS, "bayes", fixes)
     points = np.array([[0.0, 100.0, 400.0], [50.0, 51.0, 0.0]])
     area = SimpleNamespace(points=points, origin_m=(EAST_M, NORTH_M))
-    return ottawa._scored("carling", one, method, log, estimate, SimpleNamespace(area=area))
+    return ottawa._scored(
+        "carling", one, method, log, estimate, SimpleNamespace(model=SimpleNamespace(whole=area))
+    )
 
 
 def test_a_session_is_scored_at_its_good_fixes(tmp_path):

@@ -59,6 +59,7 @@ def test_the_usual_options():
         "map_nats_per_m": 0.04,
         "unclear_below_mass": 0.8,
         "clear_from_mass": 0.95,
+        "takes_over_searching": False,
     }
     evidence = EvidenceOptions()
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)
