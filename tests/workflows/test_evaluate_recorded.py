@@ -170,16 +170,6 @@ def test_parts_and_runs_are_chosen(fake, tmp_path):
         run_recorded("fake", tmp_path, tmp_path / "out", parts=["three"])
 
 
-def test_the_usual_number_of_runs_is_less_than_all_of_them(fake, tmp_path, monkeypatch):
-    few = replace(fake.benchmark(), usual_runs=1)
-    monkeypatch.setattr(evaluate_recorded, "BENCHMARKS", {"fake": few})
-    run_recorded("fake", tmp_path, tmp_path / "few")
-    assert fake.done == ["one-unit-0", "two-unit-0"]
-    fake.done.clear()
-    run_recorded("fake", tmp_path, tmp_path / "all", runs=2)
-    assert fake.done == ["one-unit-0", "one-unit-1", "two-unit-0", "two-unit-1"]
-
-
 def test_what_runs_share_is_read_once_and_from_the_file_as_it_is(fake, tmp_path, monkeypatch):
     given = []
 

@@ -93,8 +93,6 @@ class Benchmark:
         Locates a task; also given what ``read`` returned, None without it.
     read : callable, optional
         From the first of several tasks: reads what all of them share.
-    usual_runs : int, optional
-        Runs of each unit where their number is not asked for; all when left out.
     shared_by_part : bool
         Whether all tasks of a part share what is read, or only the runs of a unit.
     prepare : callable, optional
@@ -115,7 +113,6 @@ class Benchmark:
     read: Callable[[Task], Any] | None = None
     published_m: Mapping[tuple[str, str], float] = field(default_factory=dict)
     baseline: str = "median"
-    usual_runs: int | None = None
     shared_by_part: bool = False
 
     def together(self, tasks: Sequence[Task], most: int) -> list[tuple[Task, ...]]:
@@ -139,7 +136,7 @@ class Benchmark:
             yield self.judge(task, shared)
 
     def tasks(self, data: Path, work: Path, seed: int, runs: int | None = None) -> list[Task]:
-        """Return all tasks, at most ``runs`` of each unit; by default the usual number.
+        """Return all tasks, at most ``runs`` of each unit.
 
         Raises
         ------
@@ -153,11 +150,10 @@ class Benchmark:
             faults = Faults()
             faults.add(str(folder), "recordings to be judged", "none", "see its README")
             faults.raise_if_any(InputError)
-        most = runs or self.usual_runs
         return [
             Task(part, unit, run, folder, work, seed)
             for part, unit, count in found
-            for run in range(count if most is None else min(count, most))
+            for run in range(min(count, runs or count))
         ]
 
 

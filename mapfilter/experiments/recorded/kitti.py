@@ -33,8 +33,8 @@ from mapfilter.tracks.deadreckoning import dead_reckon
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.readers.formats import read_recording
 
-STARTS, USUAL_STARTS = 10, 3
-"""Runs of a drive, and those that are made where their number is not asked for."""
+STARTS = 10
+"""Runs of a drive."""
 STRAIGHT = ("01", "04", "06")
 """A motorway, a straight drive, and one that goes up and down one street: by the data's README
 there is too little in them to converge."""
@@ -183,5 +183,4 @@ BENCHMARK = Benchmark(
     prepare,
     read,
     published_m={("", ""): 3.1},
-    usual_runs=USUAL_STARTS,
 )
