@@ -131,11 +131,11 @@ def test_every_value_is_that_of_the_whole_area(database, whole, side):
         assert tiled.matched_way(*some) == whole.matched_way(*some)
 
 
-@pytest.mark.parametrize(("side", "most_bytes"), [(40, 1 << 30), (48, 150_000)])
+@pytest.mark.parametrize(("side", "largest_bytes"), [(40, 1 << 30), (48, 150_000)])
 @pytest.mark.parametrize("levels", [True, False])
-def test_a_walk_is_located_alike(database, whole, town, side, most_bytes, levels):
+def test_a_walk_is_located_alike(database, whole, town, side, largest_bytes, levels):
     """To the last bit, and however little is held."""
-    tiled = TiledArea.of_database(database, side, most_bytes, search_tiles=EVERY_TILE)
+    tiled = TiledArea.of_database(database, side, largest_bytes, search_tiles=EVERY_TILE)
     outputs = []
     for area in (whole, tiled):
         filter_ = BayesFilter(max_particles=4000, min_search_particles=2000, levels=levels)
@@ -151,7 +151,7 @@ def test_a_walk_is_located_alike(database, whole, town, side, most_bytes, levels
 
 def test_what_is_held_stays_within_its_bytes(database, whole):
     bound = 150_000
-    tiled = TiledArea.of_database(database, side=24, most_bytes=bound)
+    tiled = TiledArea.of_database(database, side=24, largest_bytes=bound)
     rng, most, pixels = np.random.default_rng(3), 0, whole.on_way.size
     bands = np.arange(len(whole.cell_ids), dtype=np.int32)
     level_dbm = whole.level_dbm.reshape(pixels, -1)
@@ -180,7 +180,7 @@ def test_what_was_asked_for_longest_ago_is_given_up_first():
 
 
 def test_threads_see_the_same(database, whole):
-    tiled = TiledArea.of_database(database, side=24, most_bytes=100_000)
+    tiled = TiledArea.of_database(database, side=24, largest_bytes=100_000)
     bands = np.arange(len(whole.cell_ids), dtype=np.int32)
     level_dbm = whole.level_dbm.reshape(whole.on_way.size, -1)
     rough_db = whole.flat_rough_db.reshape(whole.on_way.size, -1)

@@ -23,8 +23,8 @@ from mapfilter.positioning.bayes.area_frame import (
 from mapfilter.radio.cells import CellPlan
 
 _CARRIAGEWAY_SHARE, _LEAST_CARRIAGEWAY_M = 0.3, 2.0
-"""Of half a way's width, pavements included, and at least: the middles of the lanes beside its
-centre line."""
+"""Of half a way's width, pavements included: the middles of the lanes beside its centre line. The
+least is that of any way, also of one of less than 2 m to either side: its width may be unknown."""
 
 
 @dataclass(frozen=True, eq=False)
