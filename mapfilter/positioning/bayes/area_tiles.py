@@ -203,7 +203,8 @@ class AreaTiles:
     def strong(self, number: int, bands: Ints32, limit_dbm: float) -> Ints:
         """Return the places in ``bands`` of cells that may be above a level in a tile.
 
-        ``bands`` (K,) ascend, and so do the places. Cells are read for it only where the footers of their parts leave it open.
+        ``bands`` (K,) ascend, and so do the places. Cells are read for it only where the footers
+        of their parts leave it open.
         """
         reaching = self._reaching(number)
         for k in np.flatnonzero((reaching.bound_dbm > limit_dbm) & ~reaching.exact).tolist():
