@@ -2,9 +2,10 @@
 
 ``build`` writes a database of streets and cells of three-sector sites, by default four cells per
 square kilometre on pixels of 5 m: made streets in an irregular grid over ``--km2``, or those of an
-OpenStreetMap extract of Heidelberg (``--map FILE``; its lattice is fixed). Levels fall off with the distance and the antenna, and are
-shadowed; what phones measure is shadowed otherwise, too. ``walk`` locates walks with an unknown
-start; ``whole`` and ``tiles`` locate walks in one small made area that is held whole, or by tiles.
+OpenStreetMap extract of Heidelberg (``--map FILE``; the lattice is that of this city). Levels fall
+off with the distance and the antenna, and are shadowed; what phones measure is shadowed otherwise,
+too. ``walk`` locates walks with an unknown start; ``whole`` and ``tiles`` locate walks in one small
+made area that is held whole, or by tiles.
 """
 
 import argparse

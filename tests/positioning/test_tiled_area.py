@@ -416,9 +416,10 @@ def test_other_evidence_is_used_alike(database, whole, town, extra):
     for area in (whole, tiled):
         positioner = filter_.over_area(area)
         track = locate(log, positioner, np.random.default_rng(5))
-        outputs.append(track.estimate)
-    pd.testing.assert_frame_equal(*outputs, check_exact=True)
-    assert outputs[0]["east_m"].nunique() > 20
+        outputs.append([track.estimate.east_m, track.estimate.north_m, track.estimate.radii_m])
+    for one, other in zip(*outputs, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+    assert np.unique(outputs[0][0]).size > 20
 
 
 def test_a_search_lets_other_threads_look_up_between_cells_and_tiles(database, town):
@@ -479,7 +480,8 @@ def test_two_devices_over_one_area_are_located_as_one_after_the_other(database, 
 
     def over():
         area = TiledArea.of_database(database, side=30, largest_bytes=400_000, search_tiles=12)
-        return BayesFilter(max_particles=2000, min_search_particles=1000, min_particles=500).over_area(area)
+        few = BayesFilter(max_particles=2000, min_search_particles=1000, min_particles=500)
+        return few.over_area(area)
 
     expected = [positions(over(), steps) for steps in logs]
     shared = over()

@@ -210,14 +210,16 @@ def _gains_of_terms(area: TiledArea, terms: Sequence[Term]) -> tuple[Floats, Boo
     x_m, y_m = west + x * (east - west), south + y * (north - south)
     spacing_m = area.tiles.side * area.lattice.resolution_m / _PER_AXIS
     for term in terms:
-        placed = isinstance(term, PlacedTerm)
-        at = term.place_m if placed else _peak_m(term, x_m.ravel(), y_m.ravel(), spacing_m)
+        if isinstance(term, PlacedTerm):
+            at = term.place_m
+        else:
+            at = _peak_m(term, x_m.ravel(), y_m.ravel(), spacing_m)
         every_x = np.concatenate([x_m, np.clip(at[0], west, east)], axis=1)
         every_y = np.concatenate([y_m, np.clip(at[1], south, north)], axis=1)
         found = _at_places(term, every_x.ravel(), every_y.ravel())
         most = found.reshape(every_x.shape).max(axis=1)
         gain += most
-        if placed:
+        if isinstance(term, PlacedTerm):
             near |= most > -_NEAR_NATS
     return gain, near
 
