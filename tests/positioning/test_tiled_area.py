@@ -16,6 +16,7 @@ from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels
 from mapfilter.errors import StoreError
 from mapfilter.geodesy import Lattice
+from mapfilter.gnss.orbits import gps_time, nominal_gps
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES, interpolate
 from mapfilter.positioning.bayes import options
@@ -33,8 +34,10 @@ from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import GnssFix, epochs
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.gnss.gate import FixTerm
-from mapfilter.positioning.gnss.options import TimingOptions
+from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
+from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.simulation.satellites import ReceptionModel, receive
 from mapfilter.tracks.log import make_log
 
 EVERY_TILE = 10_000
@@ -375,6 +378,24 @@ def test_a_timing_advance_decides_how_far_from_its_site_is_searched(database):
     )
     assert (near_m < 2.5 * 78.1).all()
     assert (far_m > 2.5 * 78.1).all()
+
+
+def test_first_pseudoranges_decide_where_is_searched(database, whole):
+    """Clock and height are unknown, and so is the place of their largest likelihood."""
+    tiled = TiledArea.of_database(database, side=20, search_tiles=5)
+    x, y = far_in_coverage(whole, "A")
+    truth = pd.DataFrame({"time_s": [0.0], "east_m": WEST_M + x, "north_m": SOUTH_M + y})
+    ranges = receive(
+        truth, CRS, None, nominal_gps(gps_time(1.7e9)[0]), 1.7e9, ReceptionModel(),
+        np.random.default_rng(1),
+    )  # fmt: skip
+    log = make_log(CRS, pseudoranges=ranges, start_utc_s=1.7e9)
+    (epoch,) = epochs(log)
+    terms = GnssSource(tiled, GnssOptions()).first(epoch).terms
+    assert len(terms) == 1
+    reading = RadioReading(tiled.band_of["A"], 1.0, terms=terms)
+    west, south, east, north = searched_tiles(tiled, reading, LevelErrors()).boxes_m.T
+    assert ((x >= west) & (x <= east) & (y >= south) & (y <= north)).any()
 
 
 class Peak:
