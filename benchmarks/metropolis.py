@@ -1,10 +1,11 @@
-"""Positions in a made metropolis: python benchmarks/metropolis.py build|walk|compare FOLDER.
+"""Positions in a made metropolis: python benchmarks/metropolis.py build|walk|whole|tiles FOLDER.
 
 ``build`` writes a database of streets and cells of three-sector sites, by default four cells per
 square kilometre on pixels of 5 m: made streets in an irregular grid over ``--km2``, or those of an
-OpenStreetMap extract (``--map FILE``). Levels fall off with the distance and the antenna, and are
-shadowed; what phones measure is shadowed otherwise, too. ``walk`` locates walks with an unknown
-start; ``compare`` holds one small area whole and by tiles, in one run.
+OpenStreetMap extract of Heidelberg (``--map FILE``; the lattice is that of this city). Levels fall
+off with the distance and the antenna, and are shadowed; what phones measure is shadowed otherwise,
+too. ``walk`` locates walks with an unknown start; ``whole`` and ``tiles`` locate walks in one small
+made area that is held whole, or by tiles.
 """
 
 import argparse
@@ -27,6 +28,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels, tile_windows
+from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.success import wilson_interval
 from mapfilter.filters.contract import Status
@@ -54,6 +56,8 @@ SHADOW_DB, ERROR_DB, SHADOW_PX = 6.0, 6.0, 1024
 side of the patterns that both are made of, which correlate over some 40 m."""
 REACH_M = 5_000.0
 WINDOW_M = 4_000.0
+MOST_FAILED = 1000
+"""Starts in a row without a route of the length of a walk before the area is given up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,14 +244,17 @@ def real_ways(extract: Path) -> tuple[Lattice, Ways]:
 
 
 def walks(database: RadioRouteDatabase, ways: Ways, count: int, length_m: float, seed: int):  # type: ignore[no-untyped-def]
-    """Yield logs of walks that begin anywhere in the area, 600 m from its edge or farther."""
+    """Yield logs of walks that begin anywhere in the area, 600 m from its edge or farther.
+
+    Starts without a route are drawn again; a thousand of them in a row end it with an InputError.
+    """
     lattice, plan = database.lattice, database.plan
     radio, tree = Radio.of(plan, lattice), shapely.STRtree(ways.geometry)
     west, south, east, north = lattice.bounds_m
     half_m = min(WINDOW_M, east - west - 1200, north - south - 1200) / 2
     report = ReportModel(phone_offset_sd_db=3.0)
     settings = SimulationSettings(journey=JourneyPlan(length_m=length_m), reports=report)
-    made, attempt = 0, 0
+    made, attempt, failed = 0, 0, 0
     while made < count:
         rng = np.random.default_rng((seed, attempt))
         attempt += 1
@@ -258,11 +265,15 @@ def walks(database: RadioRouteDatabase, ways: Ways, count: int, length_m: float,
         try:
             network = street_network(some)
             along = route(network, length_m, rng, leg_m=settings.journey.leg_m)
-        except Exception as error:  # A window without streets is no start.
-            print("no walk:", type(error).__name__, flush=True)
+        except MapfilterError as error:  # A window without streets is no start.
+            print("no walk:", error, flush=True)
+            failed += 1
+            if failed == MOST_FAILED:
+                expected = f"a route of {length_m:.0f} m"
+                raise fail(InputError, "area", expected, f"none in {failed} starts") from error
             continue
+        failed = 0
         truth = journey(along, settings.journey, rng)
-        window = lattice.window(0, 0, 1, 1)
         row, col = lattice.row_col(truth["east_m"].to_numpy(), truth["north_m"].to_numpy())
         top, left = max(int(row.min()), 0), max(int(col.min()), 0)
         window = lattice.window(top, left, int(row.max()) - top + 1, int(col.max()) - left + 1)
@@ -356,12 +367,12 @@ def compare(folder: Path, count: int, length_m: float, seed: int, how: str) -> N
 
 
 def main() -> None:
-    """Run one of the three."""
+    """Build an area, or locate walks in it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=["build", "walk", "whole", "tiles"])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--km2", type=float, default=25.0)
-    parser.add_argument("--map", type=Path)
+    parser.add_argument("--map", type=Path, help="OpenStreetMap extract of Heidelberg")
     parser.add_argument("--namesakes", type=int, default=1, help="cells of a carrier and code")
     parser.add_argument("--walks", type=int, default=5)
     parser.add_argument("--length-m", type=float, default=1200.0)

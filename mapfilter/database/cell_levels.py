@@ -138,6 +138,11 @@ class PointReader:
         """Return the nearest points of a window, those of the whole database.
 
         Points around the window are read as far as they may be the nearest of a pixel in it.
+
+        Raises
+        ------
+        StoreError
+            The database has no points, or a part is damaged or was replaced.
         """
         top, left, rows, cols = window
         margin, lattice = _FIRST_MARGIN_PX, self._lattice
@@ -156,6 +161,9 @@ class PointReader:
                 if np.all(away_px[inner] < _seen_px(window, outer, lattice)):
                     break
                 margin = max(2 * margin, int(away_px[inner].max()) + 2)
+            elif outer == (0, 0, lattice.rows, lattice.cols):
+                where, expected = "whole lattice", "points of the database"
+                raise fail(StoreError, where, expected, "none", "a database without ways")
             else:
                 margin *= 4
         nearest = number[at[0][inner], at[1][inner]]

@@ -106,7 +106,22 @@ def interpolate_tile(
 ) -> None:
     """Fill in a tile's values at the hypotheses ``which``, bilinear between centres, in place.
 
-    ``first`` is what :func:`upper_left` returns.
+    Parameters
+    ----------
+    state : ndarray of float32, shape (S, N)
+        East and north in metres in the first two rows.
+    first : ndarray of int32, shape (N,)
+        What :func:`upper_left` returns.
+    which : ndarray of int64, shape (M,)
+        Indices of the hypotheses whose first pixel lies in the tile.
+    raster : RasterFrame
+        From the centre of the area's first pixel.
+    corner : tuple of int
+        Row and column in the area of the tile's first value.
+    values : ndarray of float32, shape (rows, cols)
+        Of the tile and of pixels around it.
+    found : ndarray of float32, shape (N,)
+        Filled in at ``which``.
     """
     zero, one = _F(0.0), _F(1.0)
     west, north_m, k = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m)
@@ -148,7 +163,11 @@ def pixels_from_south(
 def level_ranges(
     point: Ints, level_dbm: Floats32, cols: int, side: int, tile_cols: int, tiles: int
 ) -> tuple[Floats32, Floats32]:
-    """Return the least and the largest level of a cell in each tile; NaN where it has none."""
+    """Return the least and the largest level (dBm) of a cell in each tile, both (``tiles``,).
+
+    They are NaN where it has none. ``point`` (N,) are flat pixels on a lattice of ``cols`` columns,
+    ``level_dbm`` (N,) the levels there; tiles have ``side`` pixels, ``tile_cols`` of them in a row.
+    """
     least = np.full(tiles, np.nan, dtype=np.float32)
     most = np.full(tiles, np.nan, dtype=np.float32)
     for i in range(point.size):
@@ -166,7 +185,11 @@ def level_ranges(
 def levels_at_points(
     point: Ints, cell_point: Ints, cell_dbm: Floats32, quiet_dbm: float
 ) -> tuple[Floats32, bool]:
-    """Return a cell's level at points, and whether it has one at any; both in ascending order."""
+    """Return a cell's level at points (P,), and whether it has one at any of them.
+
+    ``point`` (P,), at least one, and ``cell_point`` (N,), the points where the cell has a level,
+    ascend; ``cell_dbm`` (N,) are its levels, ``quiet_dbm`` is taken where it has none.
+    """
     found = np.full(point.size, quiet_dbm, dtype=np.float32)
     there, j = False, np.searchsorted(cell_point, point[0])
     for i in range(point.size):

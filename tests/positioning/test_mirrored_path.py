@@ -11,14 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.database.build import build_roads
+from mapfilter.database.radioroutes import RadioField
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
+from mapfilter.geodesy import Lattice
+from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.mirrored import MirroredTwin, MirrorRules, mirrored_step
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.epochs import epochs
+from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.index import RouteSource
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
@@ -177,3 +181,16 @@ def test_carriageways_are_narrower_than_ways(town):
     # Half a way is 6 m wide, its carriageways 2 m: what lies between is beside them.
     assert lanes.distance_m[area.on_way].max() == pytest.approx(4.0, abs=1.0)
     assert replace(area, carriageway_m=None).of_carriageways() is None
+
+
+@pytest.mark.parametrize(("half_width_m", "edge_m"), [(1.0, 1.0), (5.0, 2.0), (10.0, 3.0)])
+def test_a_carriageway_is_no_wider_than_its_way(half_width_m, edge_m):
+    """0.3 of the way, at least 2 m, and never more than the way."""
+    away_m = np.array([[0.0, 20.0]], dtype=np.float32)
+    on_way = away_m == 0
+    field = RadioField(
+        Lattice(CRS, 0.0, 20.0, 20.0, 1, 2), (), np.empty((1, 2, 0), dtype=np.float32), away_m,
+        np.full_like(away_m, half_width_m), np.ones((1, 2), dtype=np.int64), on_way,
+    )  # fmt: skip
+    area = AreaMap.of_field(field, CellPlan(CRS, ()), -110.0).of_carriageways()
+    assert area.distance_m.tolist() == [[0.0, 20.0 - edge_m]]

@@ -3,10 +3,12 @@
 import pickle
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
-from made_town import CRS, FLOOR_DBM, NAMES, PIXEL_M, SIDE_M, Town, walk_log
+from made_town import CRS, FLOOR_DBM, NAMES, PIXEL_M, SIDE_M, SOUTH_M, WEST_M, Town, walk_log
 
 from mapfilter.database.cell_levels import PointReader, part_extents
 from mapfilter.database.parts import Head, write_parts
@@ -14,6 +16,7 @@ from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels
 from mapfilter.errors import StoreError
 from mapfilter.geodesy import Lattice
+from mapfilter.gnss.orbits import gps_time, nominal_gps
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES, interpolate
 from mapfilter.positioning.bayes import options
@@ -27,8 +30,15 @@ from mapfilter.positioning.bayes.tile_search import (
     searched_tiles,
 )
 from mapfilter.positioning.bayes.tiled_area import TiledArea
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.bayes.timing import TimingSource
+from mapfilter.positioning.epochs import GnssFix, epochs
+from mapfilter.positioning.filter import locate
+from mapfilter.positioning.gnss.gate import FixTerm
+from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
+from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.simulation.satellites import ReceptionModel, receive
+from mapfilter.tracks.log import make_log
 
 EVERY_TILE = 10_000
 NONE = np.zeros(0, dtype=np.int32)
@@ -131,11 +141,11 @@ def test_every_value_is_that_of_the_whole_area(database, whole, side):
         assert tiled.matched_way(*some) == whole.matched_way(*some)
 
 
-@pytest.mark.parametrize(("side", "most_bytes"), [(40, 1 << 30), (48, 150_000)])
+@pytest.mark.parametrize(("side", "largest_bytes"), [(40, 1 << 30), (48, 150_000)])
 @pytest.mark.parametrize("levels", [True, False])
-def test_a_walk_is_located_alike(database, whole, town, side, most_bytes, levels):
+def test_a_walk_is_located_alike(database, whole, town, side, largest_bytes, levels):
     """To the last bit, and however little is held."""
-    tiled = TiledArea.of_database(database, side, most_bytes, search_tiles=EVERY_TILE)
+    tiled = TiledArea.of_database(database, side, largest_bytes, search_tiles=EVERY_TILE)
     outputs = []
     for area in (whole, tiled):
         filter_ = BayesFilter(max_particles=4000, min_search_particles=2000, levels=levels)
@@ -151,7 +161,7 @@ def test_a_walk_is_located_alike(database, whole, town, side, most_bytes, levels
 
 def test_what_is_held_stays_within_its_bytes(database, whole):
     bound = 150_000
-    tiled = TiledArea.of_database(database, side=24, most_bytes=bound)
+    tiled = TiledArea.of_database(database, side=24, largest_bytes=bound)
     rng, most, pixels = np.random.default_rng(3), 0, whole.on_way.size
     bands = np.arange(len(whole.cell_ids), dtype=np.int32)
     level_dbm = whole.level_dbm.reshape(pixels, -1)
@@ -180,7 +190,7 @@ def test_what_was_asked_for_longest_ago_is_given_up_first():
 
 
 def test_threads_see_the_same(database, whole):
-    tiled = TiledArea.of_database(database, side=24, most_bytes=100_000)
+    tiled = TiledArea.of_database(database, side=24, largest_bytes=100_000)
     bands = np.arange(len(whole.cell_ids), dtype=np.int32)
     level_dbm = whole.level_dbm.reshape(whole.on_way.size, -1)
     rough_db = whole.flat_rough_db.reshape(whole.on_way.size, -1)
@@ -231,9 +241,9 @@ def test_a_database_that_was_replaced_is_told(folder, tmp_path):
 
 def reading(area, town, place_m):
     level = town.levels_dbm(np.asarray(place_m))
-    heard = [k for k in np.argsort(-level) if level[k] > FLOOR_DBM][:4]
-    bands = np.array([area.band_of[NAMES[k]] for k in heard], dtype=np.int32)
-    report = LevelReport(bands, level[heard].astype("f4"), NONE, FLOOR_DBM, 0.0)
+    received = [k for k in np.argsort(-level) if level[k] > FLOOR_DBM][:4]
+    bands = np.array([area.band_of[NAMES[k]] for k in received], dtype=np.int32)
+    report = LevelReport(bands, level[received].astype("f4"), NONE, FLOOR_DBM, 0.0)
     return RadioReading(int(bands[0]), 1.0, report)
 
 
@@ -270,6 +280,236 @@ def test_with_a_serving_cell_alone_the_tiles_are_those_where_it_is_strong(databa
     row, col = np.unravel_index(level_dbm.argmax(), level_dbm.shape)
     x, y = (col + 0.5) * PIXEL_M, SIDE_M - (row + 0.5) * PIXEL_M
     assert (np.hypot(searched.points[0] - x, searched.points[1] - y) < 0.1).any()
+
+
+def far_in_coverage(whole, cell):
+    """Return the point on a way, in the local frame, where a cell is weakest."""
+    level_dbm = np.where(whole.on_way, whole.level_dbm[..., whole.band_of[cell]], np.inf)
+    level_dbm[level_dbm < FLOOR_DBM] = np.inf
+    row, col = np.unravel_index(level_dbm.argmin(), level_dbm.shape)
+    return (col + 0.5) * PIXEL_M, SIDE_M - (row + 0.5) * PIXEL_M
+
+
+def fixes(place_m, count=1, sigma_m=5.0):
+    times = np.arange(count, dtype=float)
+    east_m, north_m = WEST_M + place_m[0], SOUTH_M + place_m[1]
+    columns = {"time_s": times, "east_m": east_m, "north_m": north_m}
+    return pd.DataFrame({**columns, "var_east_m2": sigma_m**2, "var_north_m2": sigma_m**2})
+
+
+def serving(cell, **columns):
+    return pd.DataFrame({"time_s": [0.0], "role": "serving", "cell": cell, **columns})
+
+
+def last_place_m(area, log):
+    """Return the last position in the local frame."""
+    positioner = BayesFilter(max_particles=4000, min_search_particles=4000).over_area(area)
+    rng, state = np.random.default_rng(5), positioner.begin()
+    for epoch in epochs(log):
+        state, output = positioner.step(state, epoch, rng)
+    return output.fix.east_m - WEST_M, output.fix.north_m - SOUTH_M
+
+
+@pytest.mark.parametrize("cell", ["A", None])
+def test_a_first_fix_decides_where_is_searched(database, whole, cell):
+    """With a serving cell that is stronger elsewhere, and alone."""
+    tiled = TiledArea.of_database(database, side=20, search_tiles=5)
+    place_m = far_in_coverage(whole, "A")
+    radio = serving(cell) if cell else None
+    log = make_log(CRS, gnss=fixes(place_m), radio=radio, start_utc_s=1.7e9)
+    for area in (whole, tiled):
+        x, y = last_place_m(area, log)
+        assert np.hypot(x - place_m[0], y - place_m[1]) < 5
+
+
+def fix_term(place_m, sigma_m=5.0):
+    fix = GnssFix(WEST_M + place_m[0], SOUTH_M + place_m[1], sigma_m**2, sigma_m**2, 0.0)
+    return FixTerm(fix, (WEST_M, SOUTH_M))
+
+
+def test_a_fix_alone_is_searched_for_in_the_tiles_around_it(database, whole):
+    tiled = TiledArea.of_database(database, side=20, search_tiles=5)
+    x, y = far_in_coverage(whole, "A")
+    reading = RadioReading(terms=(fix_term((x, y)),))
+    west, south, east, north = searched_tiles(tiled, reading, LevelErrors()).boxes_m.T
+    away_m = np.hypot(x - np.clip(x, west, east), y - np.clip(y, south, north))
+    assert away_m.min() == 0
+    assert away_m.max() < 15
+    # One that is too wide for the tiles of a search, or far beyond the area, leaves it everywhere.
+    for other in (fix_term((x, y), 500.0), fix_term((-5000.0, y))):
+        assert searched_tiles(tiled, RadioReading(terms=(other,)), LevelErrors()) is None
+
+
+def test_a_fix_where_the_reported_cell_is_not_received_is_searched_for_as_well(database, whole):
+    tiled = TiledArea.of_database(database, side=20, search_tiles=5)
+    band = whole.band_of["A"]
+    quiet = whole.on_way & (whole.level_dbm[..., band] < FLOOR_DBM)
+    level_dbm = np.where(whole.on_way, whole.level_dbm[..., band], -np.inf)
+    strong_row, strong_col = np.unravel_index(level_dbm.argmax(), level_dbm.shape)
+    rows, cols = np.nonzero(quiet)
+    k = np.hypot(rows - strong_row, cols - strong_col).argmax()
+    x, y = (cols[k] + 0.5) * PIXEL_M, SIDE_M - (rows[k] + 0.5) * PIXEL_M
+    reading = RadioReading(band, 1.0, terms=(fix_term((x, y)),))
+    west, south, east, north = searched_tiles(tiled, reading, LevelErrors()).boxes_m.T
+    inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+    assert inside.any()
+    # The others are those of the cell.
+    assert len(west) == 5
+    x, y = (strong_col + 0.5) * PIXEL_M, SIDE_M - (strong_row + 0.5) * PIXEL_M
+    assert ((x >= west) & (x <= east) & (y >= south) & (y <= north)).any()
+
+
+def test_a_timing_advance_decides_how_far_from_its_site_is_searched(database):
+    """Steps of 78 m: 2 to 3 of them from the site, where the cell is not strongest."""
+    tiled = TiledArea.of_database(database, side=20, search_tiles=5)
+    options = TimingOptions(step_m=78.1, advance_sd_m=20.0)
+    log = make_log(CRS, radio=serving("A", timing_advance=2.0), start_utc_s=1.7e9)
+    (epoch,) = epochs(log)
+    terms = TimingSource(tiled, options).first(epoch).terms
+    searched = searched_tiles(
+        tiled, RadioReading(tiled.band_of["A"], 1.0, terms=terms), LevelErrors()
+    )
+    east_m, north_m, _ = tiled.sites["A"]
+    west, south, east, north = searched.boxes_m.T
+    x, y = east_m - WEST_M, north_m - SOUTH_M
+    near_m = np.hypot(x - np.clip(x, west, east), y - np.clip(y, south, north))
+    far_m = np.hypot(
+        np.maximum(abs(x - west), abs(x - east)), np.maximum(abs(y - south), abs(y - north))
+    )
+    assert (near_m < 2.5 * 78.1).all()
+    assert (far_m > 2.5 * 78.1).all()
+
+
+def test_first_pseudoranges_decide_where_is_searched(database, whole):
+    """Clock and height are unknown, and so is the place of their largest likelihood."""
+    tiled = TiledArea.of_database(database, side=20, search_tiles=5)
+    x, y = far_in_coverage(whole, "A")
+    truth = pd.DataFrame({"time_s": [0.0], "east_m": WEST_M + x, "north_m": SOUTH_M + y})
+    ranges = receive(
+        truth, CRS, None, nominal_gps(gps_time(1.7e9)[0]), 1.7e9, ReceptionModel(),
+        np.random.default_rng(1),
+    )  # fmt: skip
+    log = make_log(CRS, pseudoranges=ranges, start_utc_s=1.7e9)
+    (epoch,) = epochs(log)
+    terms = GnssSource(tiled, GnssOptions()).first(epoch).terms
+    assert len(terms) == 1
+    reading = RadioReading(tiled.band_of["A"], 1.0, terms=terms)
+    west, south, east, north = searched_tiles(tiled, reading, LevelErrors()).boxes_m.T
+    assert ((x >= west) & (x <= east) & (y >= south) & (y <= north)).any()
+
+
+class Peak:
+    """A sharp likelihood whose place is not stated, as that of satellites."""
+
+    def __init__(self, place_m):
+        self.at_m = place_m
+
+    def log_likelihood(self, state):
+        x, y = self.at_m
+        return -0.5 * ((state[0] - x) ** 2 + (state[1] - y) ** 2).astype(float) / 5.0**2
+
+
+def test_a_sharp_term_is_found_between_the_places_that_are_tried(database, whole):
+    tiled = TiledArea.of_database(database, side=20, search_tiles=5)
+    x, y = far_in_coverage(whole, "A")
+    reading = RadioReading(tiled.band_of["A"], 1.0, terms=(Peak((x, y)),))
+    west, south, east, north = searched_tiles(tiled, reading, LevelErrors()).boxes_m.T
+    assert ((x >= west) & (x <= east) & (y >= south) & (y <= north)).any()
+
+
+@pytest.mark.parametrize(
+    "extra", [{"fix": True}, {"advance": True}, {"smooth": True}], ids=lambda one: next(iter(one))
+)
+def test_other_evidence_is_used_alike(database, whole, town, extra):
+    """Fixes, timing advances and smoothing: as on the whole area, to the last bit."""
+    plain = walk_log(town, 6, 200.0)
+    radio = plain.radio.copy()
+    if "advance" in extra:
+        radio["timing_advance"] = np.where(radio["role"] == "serving", 0.0, np.nan)
+    truth = plain.truth
+    gnss = truth[::10].assign(var_east_m2=64.0, var_north_m2=64.0) if "fix" in extra else None
+    log = make_log(CRS, motion=plain.motion, radio=radio, gnss=gnss, truth=truth, start_utc_s=1.7e9)
+    filter_ = BayesFilter(
+        max_particles=4000, min_search_particles=2000, smooth=extra.get("smooth", False)
+    )
+    tiled = TiledArea.of_database(database, side=40, search_tiles=EVERY_TILE)
+    outputs = []
+    for area in (whole, tiled):
+        positioner = filter_.over_area(area)
+        track = locate(log, positioner, np.random.default_rng(5))
+        outputs.append([track.estimate.east_m, track.estimate.north_m, track.estimate.radii_m])
+    for one, other in zip(*outputs, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+    assert np.unique(outputs[0][0]).size > 20
+
+
+def test_a_search_lets_other_threads_look_up_between_cells_and_tiles(database, town):
+    tiled = TiledArea.of_database(database, side=20, search_tiles=24)
+    lock = CountingLock(tiled.tiles.lock)
+    tiled.tiles.lock = lock
+    walk_m = town.walk(3000.0, np.random.default_rng(8))
+    place_m = walk_m[town.levels_dbm(walk_m).max(axis=1).argmax()]
+    one = reading(tiled, town, place_m)
+    searched = searched_tiles(tiled, one, LevelErrors())
+    assert lock.released >= len(searched.boxes_m) + len(one.levels.cell)
+    before, pixel = lock.released, every_pixel(tiled)
+    tiled.looked_up(pixel, one.levels.cell)
+    assert lock.released >= before + tiled.count
+
+
+class CountingLock:
+    """A lock that counts how often it was given up by who held it."""
+
+    def __init__(self, lock):
+        self.lock, self.depth, self.released = lock, 0, 0
+
+    def __enter__(self):
+        self.lock.__enter__()
+        self.depth += 1
+
+    def __exit__(self, *args):
+        self.depth -= 1
+        self.released += not self.depth
+        self.lock.__exit__(*args)
+
+
+def test_levels_of_many_cells_are_looked_up_in_blocks(database, whole, monkeypatch):
+    tiled = TiledArea.of_database(database, side=40)
+    pixel = every_pixel(tiled)
+    band = pixel % len(whole.cell_ids)
+    most, look = [], TiledArea.looked_up
+
+    def watched(self, pixel, cell, **options):
+        most.append(pixel.size * cell.size)
+        return look(self, pixel, cell, **options)
+
+    monkeypatch.setattr(TiledArea, "looked_up", watched)
+    assert np.array_equal(tiled.levels_at(pixel, band), whole.levels_at(pixel, band))
+    assert max(most) < 2000
+
+
+def test_two_devices_over_one_area_are_located_as_one_after_the_other(database, town):
+    """In two threads of one service, within few bytes, so that each gives up the other's tiles."""
+    logs = [list(epochs(walk_log(town, seed, 150.0))) for seed in (6, 7)]
+
+    def positions(positioner, steps):
+        rng, state, found = np.random.default_rng(5), positioner.begin(), []
+        for epoch in steps:
+            state, output = positioner.step(state, epoch, rng)
+            found.append(repr((output.fix, output.evidence)))
+        return found
+
+    def over():
+        area = TiledArea.of_database(database, side=30, largest_bytes=400_000, search_tiles=12)
+        few = BayesFilter(max_particles=2000, min_search_particles=1000, min_particles=500)
+        return few.over_area(area)
+
+    expected = [positions(over(), steps) for steps in logs]
+    shared = over()
+    with ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(lambda steps: positions(shared, steps), logs))
+    assert found == expected
+    assert expected[0] != expected[1]
 
 
 def test_places_are_drawn_in_the_tiles_and_beyond_the_edge_beside_them():
@@ -314,6 +554,18 @@ def test_large_areas_are_held_by_tiles(database, monkeypatch):
     # The exact filter needs every pixel, and a database of roads alone every street.
     assert isinstance(GridFilter().over(database).area, AreaMap)
     assert isinstance(open_area(database.without_cells()), AreaMap)
+
+
+def test_a_large_database_whose_cells_are_received_nowhere_is_held_whole(database, monkeypatch):
+    """As one of roads alone; its cells are known, and have no levels."""
+    quiet = replace(database)
+    quiet.__dict__["level_parts"] = {}
+    assert quiet.cell_ids
+    monkeypatch.setattr(options, "WHOLE_VALUES", 1)
+    area = open_area(quiet)
+    assert isinstance(area, AreaMap)
+    assert area.cell_ids == ()
+    assert area.known_ids == set(NAMES)
 
 
 def test_extents_of_parts_hold_their_points(database):
@@ -365,3 +617,10 @@ def test_the_nearest_point_may_be_far_beyond_the_window(tmp_path, town):
     whole = AreaMap.of_field(database.field(), plan, FLOOR_DBM)
     assert np.array_equal(found.edge_m, whole.distance_m[380:, 390:])
     assert found.edge_m.max() > 5 * np.hypot(399, 399) - 20
+
+
+def test_a_database_without_points_has_no_nearest(database, monkeypatch):
+    reader = PointReader(database)
+    monkeypatch.setattr(reader._reader, "read", lambda _: {})
+    with pytest.raises(StoreError, match="expected points of the database, found none"):
+        reader.nearest((0, 0, 20, 20))

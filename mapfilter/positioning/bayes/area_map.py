@@ -23,8 +23,8 @@ from mapfilter.positioning.bayes.area_frame import (
 from mapfilter.radio.cells import CellPlan
 
 _CARRIAGEWAY_SHARE, _LEAST_CARRIAGEWAY_M = 0.3, 2.0
-"""Of half a way's width, pavements included, and at least: the middles of the lanes beside its
-centre line."""
+"""Of half a way's width, pavements included, and at least, but no more than half of its width: the
+middles of the lanes beside its centre line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +83,7 @@ class AreaMap(AreaFrame):
         if not field.cell_ids:
             share_m = np.float32(_CARRIAGEWAY_SHARE) * field.half_width_m
             edge_m = np.maximum(share_m, np.float32(_LEAST_CARRIAGEWAY_M))
+            edge_m = np.minimum(edge_m, field.half_width_m)
             lane_m = np.maximum(field.distance_to_way_m - edge_m, 0)
         return cls(
             field.lattice,

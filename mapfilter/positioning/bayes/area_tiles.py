@@ -95,7 +95,7 @@ class AreaTiles:
         Bands.
     side : int
         Of a tile, pixels.
-    most_bytes : int
+    largest_bytes : int
         Of everything that is held.
     """
 
@@ -104,22 +104,22 @@ class AreaTiles:
         database: RadioRouteDatabase,
         cell_ids: tuple[str, ...],
         side: int = TILE_PX,
-        most_bytes: int = HELD_BYTES,
+        largest_bytes: int = HELD_BYTES,
     ) -> None:
         self.database, self.cell_ids, self.side = database, cell_ids, side
-        self.most_bytes = most_bytes
+        self.largest_bytes = largest_bytes
         lattice = database.lattice
         self.rows, self.cols = -(-lattice.rows // side), -(-lattice.cols // side)
         self.quiet_dbm = np.float32(database.floor_dbm - BELOW_FLOOR_DB)
         self.lock = RLock()
-        self.held = BoundedCache(most_bytes)
+        self.held = BoundedCache(largest_bytes)
         self._ranges: dict[int, LevelRange] = {}
         self._rough_px = roughness_px(lattice.resolution_m)
         self._halo = self._rough_px // 2
 
     def __getstate__(self) -> tuple[Any, ...]:
         # Other processes read for themselves.
-        return self.database, self.cell_ids, self.side, self.most_bytes
+        return self.database, self.cell_ids, self.side, self.largest_bytes
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         self.__init__(*state)  # type: ignore[misc]
@@ -201,9 +201,10 @@ class AreaTiles:
         return self.held.get(("rough", number, band), make, _array_bytes)
 
     def strong(self, number: int, bands: Ints32, limit_dbm: float) -> Ints:
-        """Return the places in ``bands``, ascending, of cells that may be above a level in a tile.
+        """Return the places in ``bands`` of cells that may be above a level in a tile.
 
-        Cells are read for it only where the footers of their parts leave it open.
+        ``bands`` (K,) ascend, and so do the places. Cells are read for it only where the footers
+        of their parts leave it open.
         """
         reaching = self._reaching(number)
         for k in np.flatnonzero((reaching.bound_dbm > limit_dbm) & ~reaching.exact).tolist():

@@ -15,8 +15,8 @@ _Value = TypeVar("_Value")
 class BoundedCache:
     """Values by keys, of which those that were asked for longest ago are given up."""
 
-    def __init__(self, most_bytes: int) -> None:
-        self._most_bytes = most_bytes
+    def __init__(self, largest_bytes: int) -> None:
+        self._largest_bytes = largest_bytes
         self._entries: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self.bytes = 0
 
@@ -33,7 +33,7 @@ class BoundedCache:
         count = size(value) + _ENTRY_BYTES
         self._entries[key] = value, count
         self.bytes += count
-        while self.bytes > self._most_bytes and len(self._entries) > 1:
+        while self.bytes > self._largest_bytes and len(self._entries) > 1:
             _, (_, gone) = self._entries.popitem(last=False)
             self.bytes -= gone
         return value

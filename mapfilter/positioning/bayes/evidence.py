@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
@@ -38,6 +38,15 @@ class Term(Protocol):
 
     def log_likelihood(self, state: Floats32) -> Floats:
         """Return the value for each hypothesis, shape (N,), or one for all, shape (1,)."""
+
+
+@runtime_checkable
+class PlacedTerm(Term, Protocol):
+    """A log-likelihood that is largest, and 0, at a known place: that of a position fix."""
+
+    @property
+    def place_m(self) -> tuple[float, float]:
+        """East and north of the place in the frame of the hypotheses."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from annotated_types import Ge, Gt, Le
 
+from mapfilter.database.cell_levels import received_cells
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.filters.particle import ParticleOptions
@@ -62,17 +63,18 @@ Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
 
 WHOLE_VALUES = 100_000_000
-"""Most levels of an area that is held whole: rows times columns times cells and two more."""
+"""Most levels of an area that is held whole: rows times columns times received cells and two."""
 
 
 def open_area(database: RadioRouteDatabase, *, whole: bool = False) -> AreaFrame:
     """Return the map that the filter looks up: of a whole database, or of a large one by tiles.
 
-    Larger areas than :data:`WHOLE_VALUES` are held by tiles unless they have to be ``whole``.
+    Larger areas than :data:`WHOLE_VALUES` are held by tiles unless they have to be ``whole``, or
+    no cell has a level anywhere.
     """
-    lattice = database.lattice
-    values = lattice.rows * lattice.cols * (len(database.cell_ids) + 2)
-    if database.cell_ids and values > WHOLE_VALUES and not whole:
+    lattice, received = database.lattice, len(received_cells(database))
+    values = lattice.rows * lattice.cols * (received + 2)
+    if received and values > WHOLE_VALUES and not whole:
         return TiledArea.of_database(database)
     return AreaMap.of_field(database.field(), database.plan, database.floor_dbm)
 

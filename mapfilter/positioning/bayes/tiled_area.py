@@ -26,6 +26,9 @@ from mapfilter.positioning.bayes.area_tiles import HELD_BYTES, TILE_PX, AreaTile
 
 SEARCH_TILES = 48
 """Most tiles in which the first hypotheses are drawn."""
+_LEVELS_AT_ONCE = 256
+"""Pixels that levels are looked up at together: as each may be of another cell, they are looked up
+at all pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +61,22 @@ class TiledArea(AreaFrame):
         cls,
         database: RadioRouteDatabase,
         side: int = TILE_PX,
-        most_bytes: int = HELD_BYTES,
+        largest_bytes: int = HELD_BYTES,
         search_tiles: int = SEARCH_TILES,
     ) -> TiledArea:
-        """Prepare a database with cells; nothing of its points or levels is read yet."""
+        """Prepare a database with cells; nothing of its points or levels is read yet.
+
+        Parameters
+        ----------
+        database : RadioRouteDatabase
+            With a level of at least one cell.
+        side : int
+            Of a tile, pixels.
+        largest_bytes : int
+            Of all tiles and levels that are held at a time.
+        search_tiles : int
+            Most tiles in which the first hypotheses are drawn.
+        """
         plan, cells = database.plan, received_cells(database)
         return cls(
             database.lattice,
@@ -70,7 +85,7 @@ class TiledArea(AreaFrame):
             carriers_of(plan, cells),
             database.floor_dbm,
             sites_of(plan),
-            AreaTiles(database, cells, side, most_bytes),
+            AreaTiles(database, cells, side, largest_bytes),
             search_tiles,
         )
 
@@ -84,17 +99,17 @@ class TiledArea(AreaFrame):
         bands, tiles = cell.tolist(), self.tiles
         found_dbm = np.full((pixel.size, cell.size), tiles.quiet_dbm, dtype=np.float32)
         found_rough = np.zeros((pixel.size, cell.size if rough else 0), dtype=np.uint8)
-        with tiles.lock:
-            for number, which in self._by_tile(pixel):
+        for number, which in self._by_tile(pixel):
+            with tiles.lock:
                 tile = tiles.tile(number)
                 near = tile.points.near
                 levels = [tiles.levels(number, band) for band in bands]
-                heard = [k for k, level in enumerate(levels) if level is not None]
-                if not heard:
+                received = [k for k, level in enumerate(levels) if level is not None]
+                if not received:
                     continue
                 level_dbm = np.full((cell.size, tile.points.point.size), tiles.quiet_dbm)
                 rough_db = np.zeros((cell.size if rough else 0, *near.shape), dtype=np.uint8)
-                for k in heard:
+                for k in received:
                     level_dbm[k] = levels[k]
                     page = tiles.rough_db(number, bands[k]) if rough else None
                     if page is not None:
@@ -127,8 +142,8 @@ class TiledArea(AreaFrame):
     def shares_above(self, pixel: Ints32, cell: Ints32, limit_dbm: float) -> Floats:
         """Return the share of pixels (N,) at which each cell (K,) is above a level."""
         above, tiles, limit = np.zeros(cell.size), self.tiles, np.float32(limit_dbm)
-        with tiles.lock:
-            for number, which in self._by_tile(pixel):
+        for number, which in self._by_tile(pixel):
+            with tiles.lock:
                 tile = tiles.tile(number)
                 (top, left), cols = tile.corner, self.lattice.cols
                 point = tile.points.near[pixel[which] // cols - top, pixel[which] % cols - left]
@@ -136,10 +151,10 @@ class TiledArea(AreaFrame):
                     level_dbm = tiles.levels(number, int(cell[k]))
                     if level_dbm is not None:
                         above[k] += np.count_nonzero(level_dbm[point] > limit)
-            if tiles.quiet_dbm > limit:
-                # Cells that are nowhere received are above such a limit everywhere.
-                found_dbm, _ = self.looked_up(pixel, cell, rough=False)
-                above = np.count_nonzero(found_dbm > limit, axis=0).astype(np.float64)
+        if tiles.quiet_dbm > limit:
+            # Cells that are nowhere received are above such a limit everywhere.
+            found_dbm, _ = self.looked_up(pixel, cell, rough=False)
+            above = np.count_nonzero(found_dbm > limit, axis=0).astype(np.float64)
         return above / pixel.size
 
     def log_map_at(self, state: Floats32, sd_m: float) -> Floats32:
@@ -148,8 +163,8 @@ class TiledArea(AreaFrame):
         centres = RasterFrame(pixel_m / 2, (rows - 0.5) * pixel_m, 1 / pixel_m, rows, cols)
         first = upper_left(state, centres)
         found = np.empty(first.size, dtype=np.float32)
-        with self.tiles.lock:
-            for number, which in self._by_tile(first):
+        for number, which in self._by_tile(first):
+            with self.tiles.lock:
                 corner = self.tiles.tile(number).corner
                 values = self.tiles.log_map(number, sd_m)
                 interpolate_tile(state, first, which, centres, corner, values, found)
@@ -157,11 +172,12 @@ class TiledArea(AreaFrame):
 
     def levels_at(self, pixel: Ints32, band: Ints) -> Floats32:
         """Return the levels of cells (N,), by their bands, each at a pixel (N,)."""
-        bands, at = np.unique(band, return_inverse=True)
-        found_dbm, _ = self.looked_up(
-            np.asarray(pixel, dtype=np.int32), bands.astype(np.int32), rough=False
-        )
-        level_dbm: Floats32 = found_dbm[np.arange(pixel.size), at]
+        pixel, level_dbm = np.asarray(pixel, dtype=np.int32), np.empty(pixel.size, dtype=np.float32)
+        for first in range(0, pixel.size, _LEVELS_AT_ONCE):
+            part = slice(first, first + _LEVELS_AT_ONCE)
+            bands, at = np.unique(band[part], return_inverse=True)
+            found_dbm, _ = self.looked_up(pixel[part], bands.astype(np.int32), rough=False)
+            level_dbm[part] = found_dbm[np.arange(at.size), at]
         return level_dbm
 
     def matched_way(
@@ -171,8 +187,8 @@ class TiledArea(AreaFrame):
         rows, cols = self.lattice.rows, self.lattice.cols
         pixel = pixels_from_south(east_m, north_m, rows, cols, 1 / self.lattice.resolution_m)
         way_id = np.zeros(pixel.size, dtype=np.int64)
-        with self.tiles.lock:
-            for number, which in self._by_tile(pixel):
+        for number, which in self._by_tile(pixel):
+            with self.tiles.lock:
                 tile = self.tiles.tile(number)
                 (top, left), points = tile.corner, tile.points
                 at = points.near[pixel[which] // cols - top, pixel[which] % cols - left]

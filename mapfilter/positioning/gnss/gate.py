@@ -61,6 +61,11 @@ class FixTerm:
     fix: GnssFix
     origin_m: tuple[float, float]
 
+    @property
+    def place_m(self) -> tuple[float, float]:
+        """East and north of the fix in the frame of the hypotheses."""
+        return self.fix.east_m - self.origin_m[0], self.fix.north_m - self.origin_m[1]
+
     def log_likelihood(self, state: Floats32) -> Floats:
         """Return the log-likelihood of each hypothesis."""
         fix, (west, south) = widened(self.fix, 1.0), self.origin_m
