@@ -126,9 +126,11 @@ class BeliefFilters:
     @cached_property
     def held_otherwise(self) -> MapFilter:
         """The filter of beliefs in which the phone was turned: smaller ones."""
-        few = self.holds.particles
-        options = replace(self.options, min_particles=few, min_search_particles=few)
-        return ParticleFilter(self.model, replace(options, max_particles=2 * few))
+        few = min(self.holds.particles, self.options.max_particles)
+        options = replace(
+            self.options, max_particles=2 * few, min_particles=few, min_search_particles=few
+        )
+        return ParticleFilter(self.model, options)
 
     @cached_property
     def _positioned_by_compass(self) -> dict[bool, MapFilter]:

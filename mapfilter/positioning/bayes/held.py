@@ -35,8 +35,7 @@ _MILLISECONDS, _SEEDS = 1000.0, 2**32
 class HoldRules(Options):
     """When a phone may have been turned, and when that is believed.
 
-    Log odds are those of such a belief against the main one: of the phone having been turned, and
-    the log Bayes factor since.
+    Log odds of such a belief are against the main one, with the log Bayes factor since.
 
     Parameters
     ----------
@@ -48,6 +47,8 @@ class HoldRules(Options):
         Change from which on it is one right round, which is rare in walks.
     longest_row_m : float
         Longer rows may hold a corner, so their changes are no jumps.
+    longest_pause_s : float
+        Who stood for longer may have turned there, so the change over it is no jump.
     probability, around_probability : float
         That such a change, or one right round, is that of a phone being turned.
     mirrored_odds : float
@@ -60,16 +61,17 @@ class HoldRules(Options):
         Log Bayes factor at which the phone was not turned.
     abandon_after_m : float
         Distance after which that stays undecided.
-    most : int
-        Most beliefs at a time.
+    max_beliefs : int
+        Largest number of beliefs at a time.
     particles : int
-        Of each of them.
+        Least number of hypotheses of each of them; twice as many where it is wide.
     """
 
     watched: bool = True
     jump_deg: Positive = 60.0
     around_deg: Positive = 150.0
     longest_row_m: Positive = 3.0
+    longest_pause_s: Positive = 3.0
     probability: Probability = 0.006
     around_probability: Probability = 0.25
     mirrored_odds: Positive = 0.25
@@ -77,7 +79,7 @@ class HoldRules(Options):
     win_log_odds: float = 8.0
     abandon_threshold: float = -4.0
     abandon_after_m: NotNegative = 400.0
-    most: Annotated[int, Ge(1)] = 4
+    max_beliefs: Annotated[int, Ge(1)] = 4
     particles: Annotated[int, Ge(10)] = 1000
 
 
@@ -169,7 +171,16 @@ def own_rng(time_s: float, salt: int) -> np.random.Generator:
 
 
 def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:
-    """Return whether the heading of a row is far from that of the row before."""
+    """Return whether the heading of a row is far from that of the row before.
+
+    Parameters
+    ----------
+    before_rad : float
+        Heading of the row before, as measured; NaN where there is none.
+    step : MotionStep
+        The row, as measured.
+    rules : HoldRules
+    """
     if not (rules.watched and isfinite(before_rad) and isfinite(step.heading_rad)):
         return False
     changed = abs(float(wrap_rad(step.heading_rad - before_rad)))
@@ -186,18 +197,23 @@ def forked(
     white_rad: float,
     rng: np.random.Generator,
 ) -> tuple[HeldOtherwise, ...]:
-    """Return the beliefs in which the phone was turned where its heading jumped.
+    """Return the beliefs in which the phone was turned, or mirrored, where its heading jumped.
 
     Parameters
     ----------
-    belief, null, hold
-        The main belief before the jump, what speaks against it, and how it reads headings.
+    rules : HoldRules
+    belief, null : ParticleBelief and NullHypothesis
+        The main belief before the jump, and what speaks against it.
+    hold : Hold
+        How it reads headings.
     headings_rad : tuple of float
         As measured, before and after the jump.
     travelled_m : float
         By dead reckoning.
     white_rad : float
         White noise of a heading, which is in the jump twice.
+    rng : numpy.random.Generator
+        For the draws of these beliefs alone.
     """
     before_rad, after_rad = headings_rad
     around = abs(float(wrap_rad(after_rad - before_rad))) > radians(rules.around_deg)
@@ -226,7 +242,17 @@ def forked(
 def still_open(
     rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
 ) -> tuple[HeldOtherwise, ...]:
-    """Return the beliefs that are neither refuted nor undecided for too long, most likely first."""
+    """Return the beliefs that are neither refuted nor undecided for too long, most likely first.
+
+    Parameters
+    ----------
+    rules : HoldRules
+    held : sequence of HeldOtherwise
+        The beliefs in which the phone was turned, weighed by the same readings as ``main``.
+    main : ParticleBelief
+    travelled_m : float
+        Distance travelled by now, by dead reckoning.
+    """
     kept = [
         one
         for one in held
@@ -234,7 +260,7 @@ def still_open(
         and travelled_m - one.start_m < rules.abandon_after_m
     ]
     kept.sort(key=lambda one: -one.log_odds(main))
-    return tuple(kept[: rules.most])
+    return tuple(kept[: rules.max_beliefs])
 
 
 def is_ahead(rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief) -> bool:
@@ -246,13 +272,23 @@ def winner(
     rules: HoldRules,
     held: Sequence[HeldOtherwise],
     main: ParticleBelief,
-    most_null_log_odds: float,
+    max_null_log_odds: float,
 ) -> HeldOtherwise | None:
-    """Return the belief that takes over; the null hypothesis must be improbable beside it."""
+    """Return the belief that takes over: tracked, most likely, far ahead, and not in doubt.
+
+    Parameters
+    ----------
+    rules : HoldRules
+    held : sequence of HeldOtherwise
+        The beliefs in which the phone was turned, weighed by the same readings as ``main``.
+    main : ParticleBelief
+    max_null_log_odds : float
+        Largest log odds of the null hypothesis beside it.
+    """
     best = max(held, key=lambda one: one.log_odds(main), default=None)
     if best is None or best.log_odds(main) < rules.win_log_odds:
         return None
-    agrees = best.belief.status is Status.TRACKING and best.null.log_odds <= most_null_log_odds
+    agrees = best.belief.status is Status.TRACKING and best.null.log_odds <= max_null_log_odds
     return best if agrees else None
 
 

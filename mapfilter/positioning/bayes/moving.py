@@ -56,6 +56,10 @@ def moved(
     hold, walking_rad, rules = state.hold, state.walking_rad, beliefs.holds
     positioned = epoch.fix is not None or bool(epoch.ranges)
     held = () if positioned else state.held
+    if not epoch.time_s - state.watch.moving_s <= rules.longest_pause_s:
+        # Who stood may have turned there.
+        walking_rad = nan
+    fork_rng, held_rng = own_rng(epoch.time_s, _FORKED), own_rng(epoch.time_s, _MOVED)
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         measured = step
@@ -85,20 +89,20 @@ def moved(
                     (walking_rad, raw.heading_rad),
                     reckoning.travelled_m,
                     beliefs.model.motion.white_rad,
-                    own_rng(epoch.time_s, _FORKED),
+                    fork_rng,
                 )
                 held = still_open(rules, (*held, *more), belief, reckoning.travelled_m)
             if held:
-                own = own_rng(epoch.time_s, _MOVED)
                 held = tuple(
-                    replace(one, belief=predict(one.belief, one.hold.read(measured), own)[0])
+                    replace(one, belief=predict(one.belief, one.hold.read(measured), held_rng)[0])
                     for one in held
                 )
             belief, why = predict(belief, step, rng)
             belief = beliefs.remounted(belief, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
             if alternative is not None:
-                other, _ = predict(alternative.belief, step, rng)
+                # It began anew, and nothing says that the phone is held otherwise.
+                other, _ = predict(alternative.belief, measured, rng)
                 alternative = replace(alternative, belief=other)
             if twin is not None:
                 other, _ = predict(twin.belief, mirrored_step(step), rng)
@@ -113,6 +117,7 @@ def moved(
         belief=belief,
         status=state.status,
         unclear=state.unclear,
+        contested=state.contested,
         sources=state.sources,
         reckoning=reckoning,
         heading_rad=heading_rad,
