@@ -175,15 +175,17 @@ def walked(state, rng, *rows, positioner=WATCHED):
 def test_an_alternative_reads_headings_as_they_are_also_once_it_takes_over():
     state, rng = begun()
     other = beside(state.belief, -250.0, log_evidence=100.0)
-    state = replace(
-        state, hold=Hold(1.0, np.pi), alternative=AlternativeHypothesis(other, 0.0, 0.0)
-    )
+    alternative = AlternativeHypothesis(other, 0.0, 0.0)
+    state = replace(state, hold=Hold(1.0, np.pi), alternative=alternative)
     after, _ = walked(state, rng, (1.0, 5.0, 0.0))
     for then, before, moved_m in (
         (after.belief, state.belief, -5.0),
         (after.alternative.belief, other, 5.0),
     ):
         assert then.summary.mean[0] - before.summary.mean[0] == pytest.approx(moved_m, abs=1.0)
+    # Whatever the reading says of a place that was chosen for the test.
+    certain = replace(after.alternative, null=NullHypothesis(-40.0))
+    after = replace(after, alternative=certain)
     after, output = WATCHED.step(after, Epoch(2.0, (MotionStep(5.0, 0.0),), RADIO), rng)
     assert after.takeovers == 1
     assert after.hold == Hold()

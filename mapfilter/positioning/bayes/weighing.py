@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
@@ -130,18 +129,15 @@ class Weighing:
             plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
         doubt = doubt or _at_edge(area, before)
-        tracked = measured and before.status is Status.TRACKING
-        reading = replace(evidence, tracked=tracked, doubted=doubt)
+        reading = replace(_tracked(evidence, before, measured=measured), doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
         null = _challenged(rules, state.null, reading, before, belief)
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
-            own_reading = weighed_by(
-                alternative.belief, updates, measured=measured, alternative=True
-            )
-            terms = own_reading or RadioReading()
+            terms = joined(updates, alternative=True) or RadioReading()
+            terms = _tracked(terms, alternative.belief, measured=measured)
             doubt = plain or lanes is not None
             doubt = doubt or alternative.null.log_odds > rules.converge_log_odds
             terms = replace(terms, doubted=doubt)
@@ -196,8 +192,7 @@ class Weighing:
         rules, holds = beliefs.rules_of(state), beliefs.holds
         found, rng = [], own_rng(time_s, _WEIGHED)
         for one in state.held:
-            tracked = measured and one.belief.status is Status.TRACKING
-            reading = replace(evidence, tracked=tracked)
+            reading = _tracked(evidence, one.belief, measured=measured)
             belief, info = beliefs.held_otherwise.update(one.belief, reading, rng)
             if info.reason is not Reason.USED:
                 continue
@@ -288,17 +283,9 @@ class Weighing:
         )
 
 
-def weighed_by(
-    belief: MapBelief,
-    updates: Sequence[EvidenceUpdate],
-    *,
-    measured: bool,
-    alternative: bool = False,
-) -> RadioReading | None:
-    """Return the evidence as a belief is weighed by it; None without any."""
-    reading = joined(updates, alternative=alternative)
-    tracked = measured and belief.status is Status.TRACKING
-    return reading if reading is None else replace(reading, tracked=tracked)
+def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> RadioReading:
+    """Return a reading as a belief is weighed by it."""
+    return replace(reading, tracked=measured and belief.status is Status.TRACKING)
 
 
 def _at_edge(area: AreaFrame, belief: MapBelief) -> bool:
