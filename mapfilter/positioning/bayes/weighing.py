@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
@@ -136,8 +137,9 @@ class Weighing:
         null = _challenged(rules, state.null, reading, before, belief)
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
-            terms = joined(updates, alternative=True) or RadioReading()
-            terms = _tracked(terms, alternative.belief, measured=measured)
+            other = alternative.belief
+            terms = weighed_by(other, updates, measured=measured, alternative=True)
+            terms = terms or RadioReading()
             doubt = plain or lanes is not None
             doubt = doubt or alternative.null.log_odds > rules.converge_log_odds
             terms = replace(terms, doubted=doubt)
@@ -281,6 +283,18 @@ class Weighing:
             sources,
             null=null,
         )
+
+
+def weighed_by(
+    belief: MapBelief,
+    updates: Sequence[EvidenceUpdate],
+    *,
+    measured: bool,
+    alternative: bool = False,
+) -> RadioReading | None:
+    """Return the evidence as a belief is weighed by it; None without any."""
+    reading = joined(updates, alternative=alternative)
+    return None if reading is None else _tracked(reading, belief, measured=measured)
 
 
 def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> RadioReading:
