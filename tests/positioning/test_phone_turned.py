@@ -132,17 +132,23 @@ def test_measured_positions_leave_no_doubt():
     assert since > 100
 
 
-def test_headings_read_otherwise_by_mistake_are_read_as_they_are_once_positions_are_measured():
+@pytest.mark.parametrize("mistaken", [True, False])
+def test_measured_positions_tell_how_headings_are_to_be_read(mistaken):
+    """Positions of 100 s end a wrong reading; a few that agree with a right one leave it."""
+    hold, until_s = (Hold(-1.0, 2.2), 100) if mistaken else (Hold(1.0, np.pi), 10)
     log, rng = log_of(2), np.random.default_rng(2)
+    if not mistaken:
+        motion = log.motion.assign(heading_rad=log.motion["heading_rad"] + np.pi)
+        log = make_log(log.crs, motion=motion, radio=log.radio, truth=log.truth)
     state = WATCHED.begin_at(log.truth["east_m"][0], log.truth["north_m"][0], 5.0, rng)
-    state, ends = replace(state, hold=Hold(-1.0, 2.2)), []
+    state, ends = replace(state, hold=hold), []
     for epoch in epochs(log):
-        measured = epoch.time_s <= 100
+        measured = epoch.time_s <= until_s
         state, output = WATCHED.step(state, with_a_fix(epoch, log) if measured else epoch, rng)
         truth, fix = with_a_fix(epoch, log).fix, output.fix
         ends.append((np.hypot(fix.east_m - truth.east_m, fix.north_m - truth.north_m), fix.status))
     off_m, statuses = zip(*ends[-100:], strict=True)
-    assert state.hold == Hold()
+    assert state.hold == (Hold() if mistaken else hold)
     assert np.median(off_m) < 30
     assert np.mean([one is Status.TRACKING for one in statuses]) > 0.8
 

@@ -184,9 +184,6 @@ class BayesPositioner(Filter[BayesState]):
         if motion is Reason.USED and epoch.motion and (state.contested or taken_over):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         gnss: GnssState = state.sources[GnssSource.name]
-        if gnss.was_used(epoch.time_s) and state.hold != Hold():
-            # A wrong one would not be noticed while positions are measured, and last.
-            state = replace(state, hold=Hold())
         if epoch.fix is not None and gnss.was_used(epoch.time_s):
             state = replace(state, last_fix=epoch.fix)
         if reason not in _TOLD_ELSEWHERE:

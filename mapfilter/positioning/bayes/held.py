@@ -217,8 +217,6 @@ def forked(
     """
     before_rad, after_rad = headings_rad
     around = abs(float(wrap_rad(after_rad - before_rad))) > radians(rules.around_deg)
-    share = np.exp(belief.log_weight - belief.log_weight.max())
-    count = min(rules.particles, share.size)
     found = []
     for one in hold.straight_on(before_rad, after_rad):
         # Who has turned a phone is likely to turn it back.
@@ -226,17 +224,36 @@ def forked(
         probability = rules.around_probability if likely else rules.probability
         log_prior = log(probability / (1 - probability))
         log_prior += log(rules.mirrored_odds) if one.sign != hold.sign else 0.0
-        chosen = rng.choice(share.size, count, p=share / share.sum())
-        state = belief.state[:, chosen].copy()
-        state[BIAS] = wrap_rad(state[BIAS] + 2**0.5 * white_rad * rng.standard_normal(count))
-        own = replace(
-            belief,
-            state=state,
-            log_weight=np.full(count, -log(count)),
-            kept=belief.kept[:, chosen],
-        )
+        own = _smaller(rules, belief, white_rad, rng)
         found.append(HeldOtherwise(own, one, log_prior, travelled_m, null))
     return tuple(found)
+
+
+def as_measured(
+    rules: HoldRules,
+    belief: ParticleBelief,
+    null: NullHypothesis,
+    travelled_m: float,
+    white_rad: float,
+    rng: np.random.Generator,
+) -> HeldOtherwise:
+    """Return the belief in which headings are as measured; parameters as of :func:`forked`."""
+    log_prior = log(rules.around_probability / (1 - rules.around_probability))
+    own = _smaller(rules, belief, white_rad, rng)
+    return HeldOtherwise(own, Hold(), log_prior, travelled_m, null)
+
+
+def _smaller(
+    rules: HoldRules, belief: ParticleBelief, white_rad: float, rng: np.random.Generator
+) -> ParticleBelief:
+    """Return fewer hypotheses of a belief, with the white noise of two headings."""
+    share = np.exp(belief.log_weight - belief.log_weight.max())
+    count = min(rules.particles, share.size)
+    chosen = rng.choice(share.size, count, p=share / share.sum())
+    state = belief.state[:, chosen].copy()
+    state[BIAS] = wrap_rad(state[BIAS] + 2**0.5 * white_rad * rng.standard_normal(count))
+    log_weight = np.full(count, -log(count))
+    return replace(belief, state=state, log_weight=log_weight, kept=belief.kept[:, chosen])
 
 
 def still_open(
