@@ -15,7 +15,6 @@ from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
     Hold,
-    HoldRules,
     after_takeover,
     is_ahead,
     jumps,
@@ -23,6 +22,7 @@ from mapfilter.positioning.bayes.held import (
     still_open,
     winner,
 )
+from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.weighing import Weighing

@@ -18,7 +18,8 @@ from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.held import HoldRules, is_ahead
+from mapfilter.positioning.bayes.held import is_ahead
+from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState

@@ -32,7 +32,8 @@ from mapfilter.positioning.bayes.evidence import (
     RadioReading,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import Hold, HoldRules
+from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
