@@ -255,6 +255,23 @@ def test_beliefs_whose_phone_was_not_turned_are_dropped_once_it_was():
     assert [float(k.state[0, 0]) for k in history.kept] == [1.0, 9.0, 9.0]
 
 
+@pytest.mark.parametrize("takeovers", [0, 1])
+def test_headings_that_are_read_as_usual_again(takeovers):
+    """By a measured position beliefs stay; by an alternative those since its start are another's.
+
+    No belief with a turned phone has led back to the usual reading.
+    """
+    history, turned = BayesSmoother(AREA, ERRORS, every_m=1.0), Hold(1.0, 3.0)
+    main, other = cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
+    rival = SimpleNamespace(belief=at(0, other).belief, start_m=6.0) if takeovers else None
+    tracks = [at(0, main, hold=turned), at(1, main, rival, hold=turned)]
+    tracks += [at(2, main, rival, hold=turned), at(3, other, takeovers=takeovers)]
+    for before, after in zip([tracks[0], *tracks], tracks, strict=False):
+        history.add(before, after)
+    assert [k.epoch for k in history.kept] == ([0, 3] if takeovers else [0, 1, 2, 3])
+    assert history.alternative == []
+
+
 def test_evidence_is_kept_by_epoch():
     tracking, converged = Status.TRACKING, Status.CONVERGED
     cases = [(10.0, tracking), (10.1, tracking), (5.0, converged), (nan, tracking), (9.0, tracking)]

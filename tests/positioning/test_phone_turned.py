@@ -1,15 +1,32 @@
 """Headings that jump in a walk: the walker has turned, or the phone was turned or mirrored."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from made_town import Town, walk_log
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.positioning.bayes.held import Hold, HoldRules, jumps
+from mapfilter.filters.particle import UpdateInfo
+from mapfilter.positioning.bayes import moving
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.held import (
+    HeldOtherwise,
+    Hold,
+    after_takeover,
+    is_ahead,
+    jumps,
+    own_rng,
+    still_open,
+    winner,
+)
+from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import GnssFix, epochs
+from mapfilter.positioning.bayes.weighing import Weighing
+from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
 
@@ -76,11 +93,12 @@ def test_a_turned_phone_is_noticed_and_its_headings_are_read_otherwise(change):
 
 
 def test_walks_whose_headings_do_not_jump_are_the_same_to_the_bit():
-    """Rows of 5 m may hold a corner: by default none of the town's turns is a jump."""
+    """The town's corners, of 90° between rows short enough, are below the least jump."""
     log = log_of(3)
-    found, other = (followed(one, log, 3)[3][-1] for one in (AREA, UNWATCHED))
-    assert found.belief.state.tobytes() == other.belief.state.tobytes()
-    assert found.held == ()
+    watched = replace(WATCHED, holds=replace(WATCHED.holds, jump_deg=140.0))
+    found, other = (followed(one, log, 3)[3] for one in (watched, UNWATCHED))
+    assert found[-1].belief.state.tobytes() == other[-1].belief.state.tobytes()
+    assert all(one.held == () for one in found)
 
 
 def test_walkers_who_turn_are_followed_as_before():
@@ -95,24 +113,218 @@ def test_walkers_who_turn_are_followed_as_before():
         assert claimed.mean() > plain[1].mean() - 0.05
 
 
+def with_a_fix(epoch, log):
+    """An epoch with a fix at the true place, of 5 m."""
+    truth = log.truth
+    place = (float(np.interp(epoch.time_s, truth["time_s"], truth[name]))
+             for name in ("east_m", "north_m"))  # fmt: skip
+    return replace(epoch, fix=GnssFix(*place, 25.0, 25.0))
+
+
 def test_measured_positions_leave_no_doubt():
     log, rng = log_of(1, reversed_), np.random.default_rng(1)
     state = WATCHED.begin_at(log.truth["east_m"][0], log.truth["north_m"][0], 5.0, rng)
+    since = 0
     for epoch in epochs(log):
-        here = GnssFix(
-            *(float(np.interp(epoch.time_s, log.truth["time_s"], log.truth[name]))
-              for name in ("east_m", "north_m")), 25.0, 25.0
-        )  # fmt: skip
-        state, _ = WATCHED.step(state, replace(epoch, fix=here), rng)
-        assert state.held == ()
+        since += bool(since or state.held)
+        state, _ = WATCHED.step(state, with_a_fix(epoch, log) if since else epoch, rng)
+        assert not (since and state.held)
+    assert since > 100
 
 
-def test_a_state_with_such_beliefs_can_be_saved():
-    _, _, _, states = followed(WATCHED, log_of(1, reversed_), 1)
-    held = next(one for one in states if one.held)
+@pytest.mark.parametrize("mistaken", [True, False])
+def test_measured_positions_tell_how_headings_are_to_be_read(mistaken):
+    """Positions of 100 s end a wrong reading; a few that agree with a right one leave it."""
+    hold, until_s = (Hold(-1.0, 2.2), 100) if mistaken else (Hold(1.0, np.pi), 10)
+    log, rng = log_of(2), np.random.default_rng(2)
+    if not mistaken:
+        motion = log.motion.assign(heading_rad=log.motion["heading_rad"] + np.pi)
+        log = make_log(log.crs, motion=motion, radio=log.radio, truth=log.truth)
+    state = WATCHED.begin_at(log.truth["east_m"][0], log.truth["north_m"][0], 5.0, rng)
+    state, ends = replace(state, hold=hold), []
+    for epoch in epochs(log):
+        measured = epoch.time_s <= until_s
+        state, output = WATCHED.step(state, with_a_fix(epoch, log) if measured else epoch, rng)
+        truth, fix = with_a_fix(epoch, log).fix, output.fix
+        ends.append((np.hypot(fix.east_m - truth.east_m, fix.north_m - truth.north_m), fix.status))
+    off_m, statuses = zip(*ends[-100:], strict=True)
+    assert state.hold == (Hold() if mistaken else hold)
+    assert np.median(off_m) < 30
+    assert np.mean([one is Status.TRACKING for one in statuses]) > 0.8
+
+
+START_M = 500_450.0, 4_500_450.0
+RADIO = next(one.radio for one in epochs(log_of(1)) if one.radio)
+
+
+def begun(positioner=WATCHED):
+    """A tracked state and its generator."""
+    rng = np.random.default_rng(5)
+    return positioner.begin_at(*START_M, 5.0, rng), rng
+
+
+def beside(belief, east_m=0.0, **changed):
+    """A belief elsewhere."""
+    state = belief.state.copy()
+    state[0] += east_m
+    return replace(belief, state=state, **changed)
+
+
+def walked(state, rng, *rows, positioner=WATCHED):
+    """The state after rows of time, length and heading."""
+    for time_s, step_m, heading_rad in rows:
+        motion = (MotionStep(step_m, heading_rad),)
+        state, output = positioner.step(state, Epoch(time_s, motion), rng)
+    return state, output
+
+
+def test_an_alternative_reads_headings_as_they_are_also_once_it_takes_over():
+    state, rng = begun()
+    other = beside(state.belief, -250.0, log_evidence=100.0)
+    alternative = AlternativeHypothesis(other, 0.0, 0.0)
+    state = replace(state, hold=Hold(1.0, np.pi), alternative=alternative)
+    after, _ = walked(state, rng, (1.0, 5.0, 0.0))
+    for then, before, moved_m in (
+        (after.belief, state.belief, -5.0),
+        (after.alternative.belief, other, 5.0),
+    ):
+        assert then.summary.mean[0] - before.summary.mean[0] == pytest.approx(moved_m, abs=1.0)
+    # Whatever the reading says of a place that was chosen for the test.
+    certain = replace(after.alternative, null=NullHypothesis(-40.0))
+    after = replace(after, alternative=certain)
+    after, output = WATCHED.step(after, Epoch(2.0, (MotionStep(5.0, 0.0),), RADIO), rng)
+    assert after.takeovers == 1
+    assert after.hold == Hold()
+    assert Reason.PHONE_TURNED not in {one.reason for one in output.unused}
+
+
+def test_few_hypotheses_are_enough_for_beliefs_in_which_the_phone_was_turned():
+    few = BayesFilter(max_particles=600, min_search_particles=300, min_particles=200)
+    positioner = few.over_area(TOWN.area())
+    assert positioner.beliefs.held_otherwise.options.min_particles == 600
+
+
+def test_rows_of_one_time_have_draws_of_their_own(monkeypatch):
+    made = []
+    monkeypatch.setattr(moving, "own_rng", lambda *key: made.append(key) or own_rng(*key))
+    state, rng = begun()
+    motion = tuple(MotionStep(1.4, heading) for heading in (0.0, 3.0, 3.0, 0.0, 0.0))
+    state, _ = WATCHED.step(state, Epoch(1.0, motion), rng)
+    assert len(state.held) == 4
+    assert len(made) == len(set(made)) > 0
+
+
+def test_who_stands_may_turn_there():
+    walk = [(time_s, 1.4, 0.0) for time_s in (1.0, 2.0, 3.0)]
+    rest = [(time_s, 0.0, 0.0) for time_s in (4.0, 5.0, 6.0, 7.0)]
+    for rows, count in (
+        ([*walk, (4.0, 1.4, 3.0)], 2),
+        ([*walk, *rest[:1], (5.0, 1.4, 3.0)], 2),
+        ([*walk, *rest, (8.0, 1.4, 3.0)], 0),
+        ([*walk, (8.0, 1.4, 3.0)], 0),
+    ):
+        assert len(walked(*begun(), *rows)[0].held) == count
+
+
+def test_the_two_reasons_to_be_lost_are_told_apart():
+    state, rng = begun()
+    held = HeldOtherwise(beside(state.belief, 200.0), Hold(1.0, 3.0), 3.0, 0.0)
+    rest = (1.0, 0.0, 0.0)
+    state, output = walked(replace(state, held=(held,)), rng, rest)
+    assert (output.fix.status, state.unclear, state.contested) == (Status.LOST, False, True)
+    assert Reason.PHONE_TURNED in {one.reason for one in output.unused}
+    # 90 % in one place are enough after that, and too few after a way that was not measured.
+    wide = state.belief.state.copy()
+    wide[0, ::10] += 200.0
+    state = replace(state, held=(), belief=replace(state.belief, state=wide))
+    cleared, output = walked(state, rng, (2.0, 0.0, 0.0))
+    assert (output.fix.status, cleared.contested) == (Status.TRACKING, False)
+    assert Reason.PHONE_TURNED not in {one.reason for one in output.unused}
+    both = replace(state, unclear=True, held=(held,))
+    for time_s, now in ((2.0, both), (3.0, None)):
+        both, output = walked(now or replace(both, held=()), rng, (time_s, 0.0, 0.0))
+        assert (output.fix.status, both.unclear) == (Status.LOST, True)
+
+
+def test_motion_that_is_read_otherwise_is_used():
+    state, rng = begun()
+    _, output = walked(replace(state, hold=Hold(1.0, np.pi)), rng, (1.0, 1.4, 0.0))
+    assert not [one for one in output.unused if one.kind == "motion"]
+
+
+def test_beliefs_that_a_reading_leaves_no_hypothesis_of_are_dropped():
+    state, rng = begun()
+    none = replace(state.belief, log_weight=np.full_like(state.belief.log_weight, -np.inf))
+    good, gone = (HeldOtherwise(one, Hold(1.0, 3.0), 0.0, 0.0) for one in (state.belief, none))
+    radio = Epoch(1.0, (MotionStep(5.0, 0.0),), RADIO)
+    state, _ = WATCHED.step(replace(state, held=(gone, good)), radio, rng)
+    assert len(state.held) == 1
+    used, unused = (
+        SimpleNamespace(update=lambda belief, *_, why=why: (belief, UpdateInfo(why, None, 1)))
+        for why in (Reason.USED, Reason.NO_CANDIDATES_LEFT)
+    )
+    searching = replace(state.belief, status=Status.SEARCHING)
+    state = replace(state, belief=searching, twin=MirroredTwin(searching, 0.0))
+    for own, kept in ((used, True), (unused, False)):
+        weighing = Weighing(SimpleNamespace(filter_of=lambda _, own=own: own), None, ())
+        assert (weighing._twin_of(state, object(), RadioReading(), rng, False) is not None) == kept
+
+
+def test_a_state_with_such_beliefs_can_be_saved_and_goes_on():
+    log = log_of(1, reversed_)
+    _, _, _, states = followed(WATCHED, log, 1)
+    at = next(k for k, one in enumerate(states) if one.held)
+    held = states[at]
     again = decode(encode({"state": held}), "made")["state"]
     assert [one.hold for one in again.held] == [one.hold for one in held.held]
     assert encode({"state": again}) == encode({"state": held})
+    ends = []
+    for state in (held, again):
+        rng, now = np.random.default_rng(9), state
+        for epoch in list(epochs(log))[at + 1 : at + 6]:
+            now, _ = WATCHED.step(now, epoch, rng)
+        ends.append(now)
+    assert ends[0].held
+    assert encode({"state": ends[0]}) == encode({"state": ends[1]})
+
+
+def one_of(log_odds, east_m=100.0, start_m=0.0, status=Status.TRACKING, null=-9.0, prior=0.0):
+    """A belief with given log odds against MAIN."""
+    summary = SimpleNamespace(mean=(east_m, 0.0))
+    belief = SimpleNamespace(
+        log_evidence=MAIN.log_evidence + log_odds - prior, summary=summary, status=status
+    )
+    return HeldOtherwise(belief, Hold(1.0, 3.0), prior, start_m, NullHypothesis(null))
+
+
+MAIN = SimpleNamespace(log_evidence=-50.0, summary=SimpleNamespace(mean=(0.0, 0.0)))
+RULES = HoldRules(max_beliefs=2)
+
+
+def test_which_beliefs_stay_open():
+    low, high, mid = one_of(-3.0), one_of(2.0), one_of(1.0, start_m=300.0)
+    assert still_open(RULES, (low, high, mid), MAIN, 399.0) == (high, mid)
+    assert still_open(RULES, (low, high, mid), MAIN, 400.0) == (mid,)
+    # The Bayes factor refutes, whatever the odds before.
+    assert still_open(RULES, (one_of(-3.0, prior=1.5),), MAIN, 0.0) == ()
+
+
+def test_when_a_belief_is_ahead_and_when_it_takes_over():
+    assert is_ahead(RULES, (one_of(0.9), one_of(1.1)), MAIN)
+    assert not is_ahead(RULES, (one_of(0.9), one_of(9.0, east_m=40.0)), MAIN)
+    assert not is_ahead(RULES, (), MAIN)
+    best = one_of(9.0)
+    assert winner(RULES, (one_of(8.5), best), MAIN, -3.0) is best
+    assert winner(RULES, (one_of(7.9),), MAIN, -3.0) is None
+    assert winner(RULES, (one_of(9.0, null=-2.0),), MAIN, -3.0) is None
+    assert winner(RULES, (one_of(9.0, status=Status.SEARCHING),), MAIN, -3.0) is None
+    assert winner(RULES, (), MAIN, -3.0) is None
+
+
+def test_the_other_beliefs_keep_their_odds_after_a_takeover():
+    best, other = one_of(9.0, prior=-1.0), one_of(4.0, prior=-5.0)
+    (left,) = after_takeover((best, other), best)
+    assert left.log_odds(best.belief) == pytest.approx(4.0 - 9.0)
 
 
 def test_what_a_jump_is():

@@ -18,7 +18,8 @@ from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.held import HoldRules, is_ahead
+from mapfilter.positioning.bayes.held import is_ahead
+from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
@@ -126,9 +127,11 @@ class BeliefFilters:
     @cached_property
     def held_otherwise(self) -> MapFilter:
         """The filter of beliefs in which the phone was turned: smaller ones."""
-        few = self.holds.particles
-        options = replace(self.options, min_particles=few, min_search_particles=few)
-        return ParticleFilter(self.model, replace(options, max_particles=2 * few))
+        few = min(self.holds.particles, self.options.max_particles)
+        options = replace(
+            self.options, max_particles=2 * few, min_particles=few, min_search_particles=few
+        )
+        return ParticleFilter(self.model, options)
 
     @cached_property
     def _positioned_by_compass(self) -> dict[bool, MapFilter]:

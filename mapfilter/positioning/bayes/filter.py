@@ -32,7 +32,8 @@ from mapfilter.positioning.bayes.evidence import (
     RadioReading,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import HoldRules
+from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
@@ -144,18 +145,15 @@ class BayesPositioner(Filter[BayesState]):
     ) -> tuple[BayesState, StepOutput]:
         """Process one epoch."""
         epoch, repeated = _with_a_new_fix(state, epoch)
-        unclear, spacing_m = state.unclear, state.particle_spacing_m
-        if unclear:
-            state = replace(state, status=Status.TRACKING, unclear=False)
-            unclear = not self.beliefs.is_contested(state)
+        unclear, spacing_m, hold = state.unclear, state.particle_spacing_m, state.hold
+        if unclear or state.contested:
+            state = replace(state, status=Status.TRACKING, unclear=False, contested=False)
         before, weighing = state.status, self._weighing
         heard = epoch.radio
         watch, epoch, (motion, radio) = watched(state.watch, epoch)
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
-        elif epoch.motion and (self.beliefs.is_contested(state) or not state.hold.is_usual):
-            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         if radio is not Reason.USED:
             unused += [UnusedReading(epoch.time_s, row.role, name_of(row), radio) for row in heard]
         if repeated:
@@ -183,6 +181,9 @@ class BayesPositioner(Filter[BayesState]):
                 if belief is not state.belief or status is not state.status:
                     state = replace(state, belief=belief, status=status)
                 state = weighing.in_one_place(state, measured=measured, was_unclear=unclear)
+        taken_over = state.hold not in (hold, Hold())
+        if motion is Reason.USED and epoch.motion and (state.contested or taken_over):
+            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         gnss: GnssState = state.sources[GnssSource.name]
         if epoch.fix is not None and gnss.was_used(epoch.time_s):
             state = replace(state, last_fix=epoch.fix)

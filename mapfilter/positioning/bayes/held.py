@@ -14,71 +14,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import hypot, isfinite, log, radians
-from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge
 
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS
-from mapfilter.options import NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.alternative import NullHypothesis
+from mapfilter.positioning.bayes.hold_rules import HoldRules
 
 _USUAL_RAD = radians(30.0)
 _MILLISECONDS, _SEEDS = 1000.0, 2**32
-
-
-@dataclass(frozen=True, slots=True)
-class HoldRules(Options):
-    """When a phone may have been turned, and when that is believed.
-
-    Log odds are those of such a belief against the main one: of the phone having been turned, and
-    the log Bayes factor since.
-
-    Parameters
-    ----------
-    watched : bool
-        Whether jumps of headings are looked at.
-    jump_deg : float
-        Change of the heading from one row of a walk to the next that may be the phone's.
-    around_deg : float
-        Change from which on it is one right round, which is rare in walks.
-    longest_row_m : float
-        Longer rows may hold a corner, so their changes are no jumps.
-    probability, around_probability : float
-        That such a change, or one right round, is that of a phone being turned.
-    mirrored_odds : float
-        Odds of its being mirrored against its being turned.
-    lost_log_odds : float
-        Log odds from which on the main belief is LOST.
-    win_log_odds : float
-        Log odds from which on it is replaced.
-    abandon_threshold : float
-        Log Bayes factor at which the phone was not turned.
-    abandon_after_m : float
-        Distance after which that stays undecided.
-    most : int
-        Most beliefs at a time.
-    particles : int
-        Of each of them.
-    """
-
-    watched: bool = True
-    jump_deg: Positive = 60.0
-    around_deg: Positive = 150.0
-    longest_row_m: Positive = 3.0
-    probability: Probability = 0.006
-    around_probability: Probability = 0.25
-    mirrored_odds: Positive = 0.25
-    lost_log_odds: float = 1.0
-    win_log_odds: float = 8.0
-    abandon_threshold: float = -4.0
-    abandon_after_m: NotNegative = 400.0
-    most: Annotated[int, Ge(1)] = 4
-    particles: Annotated[int, Ge(10)] = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +117,16 @@ def own_rng(time_s: float, salt: int) -> np.random.Generator:
 
 
 def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:
-    """Return whether the heading of a row is far from that of the row before."""
+    """Return whether the heading of a row is far from that of the row before.
+
+    Parameters
+    ----------
+    before_rad : float
+        Heading of the row before, as measured; NaN where there is none.
+    step : MotionStep
+        The row, as measured.
+    rules : HoldRules
+    """
     if not (rules.watched and isfinite(before_rad) and isfinite(step.heading_rad)):
         return False
     changed = abs(float(wrap_rad(step.heading_rad - before_rad)))
@@ -186,23 +143,26 @@ def forked(
     white_rad: float,
     rng: np.random.Generator,
 ) -> tuple[HeldOtherwise, ...]:
-    """Return the beliefs in which the phone was turned where its heading jumped.
+    """Return the beliefs in which the phone was turned, or mirrored, where its heading jumped.
 
     Parameters
     ----------
-    belief, null, hold
-        The main belief before the jump, what speaks against it, and how it reads headings.
+    rules : HoldRules
+    belief, null : ParticleBelief and NullHypothesis
+        The main belief before the jump, and what speaks against it.
+    hold : Hold
+        How it reads headings.
     headings_rad : tuple of float
         As measured, before and after the jump.
     travelled_m : float
         By dead reckoning.
     white_rad : float
         White noise of a heading, which is in the jump twice.
+    rng : numpy.random.Generator
+        For the draws of these beliefs alone.
     """
     before_rad, after_rad = headings_rad
     around = abs(float(wrap_rad(after_rad - before_rad))) > radians(rules.around_deg)
-    share = np.exp(belief.log_weight - belief.log_weight.max())
-    count = min(rules.particles, share.size)
     found = []
     for one in hold.straight_on(before_rad, after_rad):
         # Who has turned a phone is likely to turn it back.
@@ -210,23 +170,52 @@ def forked(
         probability = rules.around_probability if likely else rules.probability
         log_prior = log(probability / (1 - probability))
         log_prior += log(rules.mirrored_odds) if one.sign != hold.sign else 0.0
-        chosen = rng.choice(share.size, count, p=share / share.sum())
-        state = belief.state[:, chosen].copy()
-        state[BIAS] = wrap_rad(state[BIAS] + 2**0.5 * white_rad * rng.standard_normal(count))
-        own = replace(
-            belief,
-            state=state,
-            log_weight=np.full(count, -log(count)),
-            kept=belief.kept[:, chosen],
-        )
+        own = _smaller(rules, belief, white_rad, rng)
         found.append(HeldOtherwise(own, one, log_prior, travelled_m, null))
     return tuple(found)
+
+
+def as_measured(
+    rules: HoldRules,
+    belief: ParticleBelief,
+    null: NullHypothesis,
+    travelled_m: float,
+    white_rad: float,
+    rng: np.random.Generator,
+) -> HeldOtherwise:
+    """Return the belief in which headings are as measured; parameters as of :func:`forked`."""
+    log_prior = log(rules.around_probability / (1 - rules.around_probability))
+    own = _smaller(rules, belief, white_rad, rng)
+    return HeldOtherwise(own, Hold(), log_prior, travelled_m, null)
+
+
+def _smaller(
+    rules: HoldRules, belief: ParticleBelief, white_rad: float, rng: np.random.Generator
+) -> ParticleBelief:
+    """Return fewer hypotheses of a belief, with the white noise of two headings."""
+    share = np.exp(belief.log_weight - belief.log_weight.max())
+    count = min(rules.particles, share.size)
+    chosen = rng.choice(share.size, count, p=share / share.sum())
+    state = belief.state[:, chosen].copy()
+    state[BIAS] = wrap_rad(state[BIAS] + 2**0.5 * white_rad * rng.standard_normal(count))
+    log_weight = np.full(count, -log(count))
+    return replace(belief, state=state, log_weight=log_weight, kept=belief.kept[:, chosen])
 
 
 def still_open(
     rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
 ) -> tuple[HeldOtherwise, ...]:
-    """Return the beliefs that are neither refuted nor undecided for too long, most likely first."""
+    """Return the beliefs that are neither refuted nor undecided for too long, most likely first.
+
+    Parameters
+    ----------
+    rules : HoldRules
+    held : sequence of HeldOtherwise
+        The beliefs in which the phone was turned, weighed by the same readings as ``main``.
+    main : ParticleBelief
+    travelled_m : float
+        Distance travelled by now, by dead reckoning.
+    """
     kept = [
         one
         for one in held
@@ -234,7 +223,7 @@ def still_open(
         and travelled_m - one.start_m < rules.abandon_after_m
     ]
     kept.sort(key=lambda one: -one.log_odds(main))
-    return tuple(kept[: rules.most])
+    return tuple(kept[: rules.max_beliefs])
 
 
 def is_ahead(rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief) -> bool:
@@ -246,13 +235,23 @@ def winner(
     rules: HoldRules,
     held: Sequence[HeldOtherwise],
     main: ParticleBelief,
-    most_null_log_odds: float,
+    max_null_log_odds: float,
 ) -> HeldOtherwise | None:
-    """Return the belief that takes over; the null hypothesis must be improbable beside it."""
+    """Return the belief that takes over: tracked, most likely, far ahead, and not in doubt.
+
+    Parameters
+    ----------
+    rules : HoldRules
+    held : sequence of HeldOtherwise
+        The beliefs in which the phone was turned, weighed by the same readings as ``main``.
+    main : ParticleBelief
+    max_null_log_odds : float
+        Largest log odds of the null hypothesis beside it.
+    """
     best = max(held, key=lambda one: one.log_odds(main), default=None)
     if best is None or best.log_odds(main) < rules.win_log_odds:
         return None
-    agrees = best.belief.status is Status.TRACKING and best.null.log_odds <= most_null_log_odds
+    agrees = best.belief.status is Status.TRACKING and best.null.log_odds <= max_null_log_odds
     return best if agrees else None
 
 

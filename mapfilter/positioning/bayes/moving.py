@@ -10,7 +10,7 @@ import numpy as np
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.held import forked, jumps, own_rng, still_open
+from mapfilter.positioning.bayes.held import Hold, as_measured, forked, jumps, own_rng, still_open
 from mapfilter.positioning.bayes.mirrored import mirrored_step
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
@@ -55,7 +55,18 @@ def moved(
     twin = state.twin
     hold, walking_rad, rules = state.hold, state.walking_rad, beliefs.holds
     positioned = epoch.fix is not None or bool(epoch.ranges)
-    held = () if positioned else state.held
+    held = state.held
+    if positioned:
+        # Positions leave no doubt of a jump, and tell whether headings are still read rightly.
+        held = () if hold == Hold() else tuple(one for one in held if one.hold == Hold())
+    if not epoch.time_s - state.watch.moving_s <= rules.longest_pause_s:
+        # Who stood may have turned there.
+        walking_rad = nan
+    fork_rng, held_rng = own_rng(epoch.time_s, _FORKED), own_rng(epoch.time_s, _MOVED)
+    if positioned and not held and hold != Hold() and isinstance(belief, ParticleBelief):
+        gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
+        if state.status is belief.status is Status.TRACKING:
+            held = (as_measured(rules, belief, state.null, gone_m, white_rad, fork_rng),)
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         measured = step
@@ -85,20 +96,20 @@ def moved(
                     (walking_rad, raw.heading_rad),
                     reckoning.travelled_m,
                     beliefs.model.motion.white_rad,
-                    own_rng(epoch.time_s, _FORKED),
+                    fork_rng,
                 )
                 held = still_open(rules, (*held, *more), belief, reckoning.travelled_m)
             if held:
-                own = own_rng(epoch.time_s, _MOVED)
                 held = tuple(
-                    replace(one, belief=predict(one.belief, one.hold.read(measured), own)[0])
+                    replace(one, belief=predict(one.belief, one.hold.read(measured), held_rng)[0])
                     for one in held
                 )
             belief, why = predict(belief, step, rng)
             belief = beliefs.remounted(belief, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
             if alternative is not None:
-                other, _ = predict(alternative.belief, step, rng)
+                # It began anew, and nothing says that the phone is held otherwise.
+                other, _ = predict(alternative.belief, measured, rng)
                 alternative = replace(alternative, belief=other)
             if twin is not None:
                 other, _ = predict(twin.belief, mirrored_step(step), rng)
@@ -113,6 +124,7 @@ def moved(
         belief=belief,
         status=state.status,
         unclear=state.unclear,
+        contested=state.contested,
         sources=state.sources,
         reckoning=reckoning,
         heading_rad=heading_rad,

@@ -21,7 +21,7 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.held import HoldRules
+from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.over_survey import (
     SURVEYED,

@@ -79,13 +79,17 @@ class BayesSmoother:
         """Record the states before and after one epoch; a takeover replaces beliefs kept since."""
         self.last, now = after, after.reckoning
         self.moved.append((now.east_m, now.north_m, now.travelled_m))
-        if after.hold != before.hold:
-            # Since the phone was turned, the beliefs were those of one that was not.
-            since_m = min(one.start_m for one in before.held if one.hold == after.hold)
+        taken_over, held_anew = after.takeovers > before.takeovers, after.hold != before.hold
+        if taken_over and held_anew:
+            # The dead reckoning since the start of what has taken over was read otherwise.
+            starts_m = [one.start_m for one in before.held if one.hold == after.hold]
+            if not starts_m and before.alternative is not None:
+                starts_m = [before.alternative.start_m]
+            since_m = min(starts_m, default=now.travelled_m)
             self.kept = [k for k in self.kept if k.travelled_m < since_m]
             self.alternative = []
         elif before.alternative is not None and after.alternative is None:
-            if after.takeovers > before.takeovers:
+            if taken_over:
                 start_m = before.alternative.start_m
                 self.kept = [k for k in self.kept if k.travelled_m < start_m] + self.alternative
             self.alternative = []

@@ -40,6 +40,8 @@ class BayesState:
         As reported; that of the belief may differ while it is LOST.
     unclear : bool
         LOST only because the belief is spread over more than one place.
+    contested : bool
+        LOST only because a belief in which the phone was turned is ahead.
     sources : mapping of str to object
         State of each source of evidence by its name.
     reckoning : DeadReckoning
@@ -75,6 +77,7 @@ class BayesState:
     belief: MapBelief | None = None
     status: Status = Status.SEARCHING
     unclear: bool = False
+    contested: bool = False
     sources: Mapping[str, Any] = field(default_factory=dict)
     reckoning: DeadReckoning = field(default_factory=DeadReckoning)
     heading_rad: float = nan
@@ -97,6 +100,7 @@ class BayesState:
             belief=self.belief,
             status=self.status,
             unclear=self.unclear,
+            contested=self.contested,
             sources=self.sources,
             reckoning=self.reckoning,
             heading_rad=self.heading_rad,

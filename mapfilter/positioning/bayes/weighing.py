@@ -30,7 +30,7 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import after_takeover, own_rng, still_open, winner
+from mapfilter.positioning.bayes.held import Hold, after_takeover, own_rng, still_open, winner
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
@@ -117,8 +117,8 @@ class Weighing:
 
         ``measured`` is whether motion was.
         """
-        reading = joined(updates)
-        if reading is None:
+        evidence = joined(updates)
+        if evidence is None:
             return state, Reason.USED
         beliefs, area = self.beliefs, self.beliefs.model.area
         update, rules = beliefs.filter_of(state).update, beliefs.rules_of(state)
@@ -130,18 +130,16 @@ class Weighing:
             plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
         doubt = doubt or _at_edge(area, before)
-        tracked = measured and before.status is Status.TRACKING
-        reading = replace(reading, tracked=tracked, doubted=doubt)
+        reading = replace(_tracked(evidence, before, measured=measured), doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
         null = _challenged(rules, state.null, reading, before, belief)
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
-            own_reading = weighed_by(
-                alternative.belief, updates, measured=measured, alternative=True
-            )
-            terms = own_reading or RadioReading()
+            other = alternative.belief
+            terms = weighed_by(other, updates, measured=measured, alternative=True)
+            terms = terms or RadioReading()
             doubt = plain or lanes is not None
             doubt = doubt or alternative.null.log_odds > rules.converge_log_odds
             terms = replace(terms, doubted=doubt)
@@ -177,30 +175,29 @@ class Weighing:
             null=null if by_map_alone and not now.taken_over else now.null,
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
+            # An alternative reads headings as they are.
+            hold=Hold() if now.taken_over else state.hold,
             held=() if now.taken_over else state.held,
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
-        return self._held_otherwise(after, updates, epoch, measured=measured), Reason.USED
+        return self._held_otherwise(after, evidence, epoch.time_s, measured=measured), Reason.USED
 
     def _held_otherwise(
-        self, state: BayesState, updates: list[EvidenceUpdate], epoch: Epoch, *, measured: bool
+        self, state: BayesState, evidence: RadioReading, time_s: float, *, measured: bool
     ) -> BayesState:
         """Weigh the beliefs in which the phone was turned; one may take over."""
         main = state.belief
-        if not state.held:
+        if not state.held or not isinstance(main, ParticleBelief):
             return state
-        positioned = epoch.fix is not None or bool(epoch.ranges)
-        if positioned or not isinstance(main, ParticleBelief):
-            return replace(state, held=())
         beliefs = self.beliefs
         rules, holds = beliefs.rules_of(state), beliefs.holds
-        found, rng = [], own_rng(epoch.time_s, _WEIGHED)
+        found, rng = [], own_rng(time_s, _WEIGHED)
         for one in state.held:
-            reading = weighed_by(one.belief, updates, measured=measured)
-            if reading is None:
-                return state
-            belief, _ = beliefs.held_otherwise.update(one.belief, reading, rng)
+            reading = _tracked(evidence, one.belief, measured=measured)
+            belief, info = beliefs.held_otherwise.update(one.belief, reading, rng)
+            if info.reason is not Reason.USED:
+                continue
             null = _challenged(rules, one.null, reading, one.belief, belief)
             found.append(replace(one, belief=belief, null=null))
         held = still_open(holds, found, main, state.reckoning.travelled_m)
@@ -236,10 +233,10 @@ class Weighing:
             prior = Start(None, compass=False, path=state.path.mirrored)
             belief = self.beliefs.filter_of(state).init(prior, rng)
             return MirroredTwin.beside(main, belief, lanes.places)
-        belief, _ = self.beliefs.filter_of(state).update(
+        belief, info = self.beliefs.filter_of(state).update(
             twin.belief, replace(reading, doubted=True), rng
         )
-        return replace(twin, belief=belief)
+        return replace(twin, belief=belief) if info.reason is Reason.USED else None
 
     def in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
         """Return a state that is LOST while its belief is spread over more than one place.
@@ -259,8 +256,10 @@ class Weighing:
         least = 0.0 if measured else rules.unclear_below_mass
         if was_unclear:
             least = rules.clear_from_mass
-        clear = mass >= least and not self.beliefs.is_contested(state)
-        return state if clear else replace(state, status=Status.LOST, unclear=True)
+        unclear, contested = mass < least, self.beliefs.is_contested(state)
+        if not (unclear or contested):
+            return state
+        return replace(state, status=Status.LOST, unclear=unclear, contested=contested)
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
@@ -295,8 +294,12 @@ def weighed_by(
 ) -> RadioReading | None:
     """Return the evidence as a belief is weighed by it; None without any."""
     reading = joined(updates, alternative=alternative)
-    tracked = measured and belief.status is Status.TRACKING
-    return reading if reading is None else replace(reading, tracked=tracked)
+    return None if reading is None else _tracked(reading, belief, measured=measured)
+
+
+def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> RadioReading:
+    """Return a reading as a belief is weighed by it."""
+    return replace(reading, tracked=measured and belief.status is Status.TRACKING)
 
 
 def _at_edge(area: AreaFrame, belief: MapBelief) -> bool:
