@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -84,7 +83,7 @@ class BeliefFilters:
         if self.carriageways is None or compass or not self.map_may_start:
             return None
         gnss: GnssState = state.sources[GnssSource.name]
-        return None if isfinite(gnss.used_at_m) else self.carriageways
+        return None if gnss.met else self.carriageways
 
     def moving_filter(self, state: BayesState, *, compass: bool) -> MapFilter:
         """Return the filter that starts and moves beliefs."""

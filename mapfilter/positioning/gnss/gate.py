@@ -144,6 +144,11 @@ class GnssState:
         ranges_m = -inf if self.receiver is None else self.receiver.used_at_m
         return max(self.fix_used_at_m, ranges_m)
 
+    @property
+    def met(self) -> bool:
+        """Whether a fix or pseudoranges were there at all, used or not."""
+        return self.receiver is not None or isfinite(self.compared_at_m)
+
     def was_used(self, time_s: float) -> bool:
         """Return whether a fix or pseudoranges of that time were compared, and not rejected."""
         return self.compared_at_s == time_s >= self.probation_until_s and not self.rejecting
