@@ -22,6 +22,8 @@ from mapfilter.positioning.bayes.mirrored import MirroredTwin, MirrorRules, mirr
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.gnss.gate import GnssState
+from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.index import RouteSource
 from mapfilter.serving.state_file import decode, encode
@@ -154,6 +156,14 @@ def test_where_positions_are_measured_there_is_no_twin(vehicle):
         assert state.twin is None
     assert vehicle.beliefs.by_carriageways(state) is None
     assert vehicle.beliefs.filter_of(state) is not vehicle.beliefs._by_carriageways
+
+
+def test_satellites_that_are_compared_but_not_used_yet_end_it_too(vehicle):
+    state = vehicle.begin()
+    assert vehicle.beliefs.by_carriageways(state, compass=False) is not None
+    sources = {**state.sources, GnssSource.name: GnssState(compared_at_m=0.0)}
+    state = replace(state, sources=sources)
+    assert vehicle.beliefs.by_carriageways(state, compass=False) is None
 
 
 def test_headings_of_a_compass_and_walkers_have_no_twin(town, vehicle):
