@@ -95,16 +95,12 @@ class Weighing:
             return None
         path = next((one.path for one in updates if one.path is not None), None)
         prior = Start(reading, state.compass, path=path)
-        # Where positions are measured at the start, ways are as wide as they are.
-        positioned = epoch.fix is not None or bool(epoch.ranges)
-        usual = self.beliefs.by_compass[state.compass]
-        own = usual if positioned else self.beliefs.moving_filter(state, compass=state.compass)
-        belief = own.init(prior, rng)
+        belief = self.beliefs.moving_filter(state, compass=state.compass).init(prior, rng)
         states = {}
         for source in self.sources:
-            belief, held = source.start(belief, epoch, state.reckoning.travelled_m)
-            if held is not None:
-                states[source.name] = held
+            belief, own = source.start(belief, epoch, state.reckoning.travelled_m)
+            if own is not None:
+                states[source.name] = own
         return belief, states
 
     def weighed(
