@@ -139,7 +139,8 @@ def _by_typical_step(row_sd_m: float, log: TrackLog) -> float:
     usual_m = float(np.median(moving)) if moving.size else 0.0
     if usual_m <= _LONG_ROW_M:
         return row_sd_m
-    return max(row_sd_m * (MotionErrors().typical_step_m / usual_m) ** 0.5, _LEAST_STEP_SD_M)
+    share = float((MotionErrors().typical_step_m / usual_m) ** 0.5)
+    return max(share * row_sd_m, _LEAST_STEP_SD_M)
 
 
 def timing_step_m(log: TrackLog) -> float | None:
