@@ -269,8 +269,12 @@ def test_both_parts_come_back_from_a_folder(tmp_path):
     [
         # Readings of none of the cells; deviations of one that is none of them, or off the lattice.
         (MeasuredParts(readings(("X", "Y")), deviations(("A",), (0, 0, 0, 1.0))), READINGS),
+        (MeasuredParts(readings(("X",), 1), deviations(("A",), (0, 0, 0, 1.0))), READINGS),
         (MeasuredParts(readings(("A",)), deviations(("A", "X"), (1, 0, 0, 1.0))), DEVIATIONS),
-        (MeasuredParts(readings(("A",)), deviations(("A",), (0, 5, 0, 1.0))), DEVIATIONS),
+        (
+            MeasuredParts(readings(("A",)), deviations(("A",), (0, 1, 1, 2.0), (0, 5, 0, 1.0))),
+            DEVIATIONS,
+        ),
         (MeasuredParts(readings(("A",)), deviations(("A",), (0, 0, 7, 1.0))), DEVIATIONS),
     ],
 )

@@ -154,7 +154,9 @@ def ranges(clock_m=2000.0, errors=(1.0, -2.0, 0.5, 1.5, -1.0, 0.3), count=6, off
     away_m = np.linalg.norm(local - np.array([*off_m, 0.0]), axis=1)
     places = local @ frame.axes + frame.origin_m
     return tuple(
-        Pseudorange(f"G{k:02d}", float(away_m[k] + clock_m + errors[k]), 3.0, tuple(map(float, one)))
+        Pseudorange(
+            f"G{k:02d}", float(away_m[k] + clock_m + errors[k]), 3.0, tuple(map(float, one))
+        )
         for k, one in enumerate(places)
     )
 
