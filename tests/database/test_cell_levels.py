@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from small_world import CRS, IDS, LATTICE, make_database, make_plan, make_world
 
@@ -125,6 +126,25 @@ def test_points_beyond_the_lattice_are_refused(database):
     ) as caught:
         read_cell(beyond, IDS[0])
     assert str(database.level_parts[IDS[0]][0]) in caught.value.faults[0].where
+
+
+@pytest.mark.parametrize(
+    ("points", "good"),
+    [((0,), True), ((1999,), True), ((2000,), False), ((-1,), False), ((-1, 7), False),
+     ((5, 2000), False), ((5, 3, 0), True), ((), True)],
+)  # fmt: skip
+def test_which_points_lie_on_the_lattice(database, monkeypatch, points, good):
+    levels_dbm = -60.0 - np.arange(len(points), dtype=np.float32)
+    table = pa.table({"point": np.array(points, dtype=np.int64), "level_dbm": levels_dbm})
+    monkeypatch.setattr(cell_levels, "read_columns", lambda _, columns: table.select(columns))
+    if not good:
+        with pytest.raises(StoreError, match="points on the database's lattice, found others"):
+            read_cell(database, IDS[0])
+        return
+    found = read_cell(database, IDS[0])
+    order = np.argsort(points)
+    np.testing.assert_array_equal(found.point, np.array(points, dtype=int)[order])
+    np.testing.assert_array_equal(found.level_dbm, levels_dbm[order])
 
 
 WIDE = Lattice(CRS, 500_000.0, 4_000_000.0, 10.0, 300, 260)

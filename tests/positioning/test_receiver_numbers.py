@@ -10,13 +10,16 @@ from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import project
 from mapfilter.gnss.sky import GridFrame, ecef_from_lonlat
 from mapfilter.models.motion import clock_noise
+from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.epochs import Epoch, Pseudorange
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     Receiver,
     Sky,
     agreement,
+    begun,
     carried,
+    centred,
     clock_reset,
     moved,
     near_clock,
@@ -91,6 +94,8 @@ def test_the_score_of_a_belief_is_its_likelihood_less_the_usual(free):
     total = np.log(share @ np.exp(nats))
     np.testing.assert_allclose(found.gain, nats - total, atol=1e-6)
     assert found.score == pytest.approx(total + 0.5 * max(4 - free, 0), abs=1e-6)
+    usual = weighed(sky, SIGMA_M, receiver_of(), PLACES, np.log(share), ROWS)
+    assert usual.score == pytest.approx(total + 2.0, abs=1e-6)
     # Clock and height afterwards are those of Kalman's update.
     gain = P_2 @ slope.T @ np.linalg.inv(covariance)
     np.testing.assert_allclose(found.covariance, P_2 - gain @ slope @ P_2, atol=1e-7)
@@ -147,6 +152,26 @@ def test_an_unknown_clock_is_set_by_the_median_satellite():
     after = near_clock(sky, receiver_of())
     np.testing.assert_allclose(after.mean, [1004.0, 2.0, 15.0])
     np.testing.assert_array_equal(MEAN, [990.0, 2.0, 15.0])
+
+
+def test_a_new_receiver_was_never_used():
+    found = begun(OPTIONS, 3.0, 7.0)
+    assert (found.time_s, found.travelled_m, found.used_at_m) == (3.0, 7.0, -np.inf)
+    deviations = OPTIONS.clock_sd_m, OPTIONS.drift_sd_mps, OPTIONS.height_sd_m
+    np.testing.assert_array_equal(found.covariance, np.diag(np.square(deviations)))
+    np.testing.assert_array_equal(found.mean, 0.0)
+
+
+def test_hypotheses_carry_what_is_left_beside_the_mean():
+    rng = np.random.default_rng(3)
+    state = rng.standard_normal((STATES, 4)).astype(np.float32)
+    rows = rng.standard_normal((3, 4)) + 1e6
+    for given in (state, np.vstack([state, np.ones((3, 4), dtype=np.float32)])):
+        receiver, carrying = centred(receiver_of(), rows, given)
+        assert carrying.dtype == np.float32
+        np.testing.assert_array_equal(carrying[:STATES], state)
+        np.testing.assert_allclose(carrying[STATES:], rows - rows.mean(axis=1)[:, None], atol=1e-6)
+        np.testing.assert_allclose(receiver.mean, MEAN + rows.mean(axis=1))
 
 
 def test_hypotheses_without_a_receiver_carry_nothing():
