@@ -80,6 +80,9 @@ def test_the_agreement_is_half_the_degrees_of_freedom_less_the_innovation(count,
     found = agreement(sky, SIGMA_M[:count], receiver_of(), PLACES, weight, ROWS, free)
     assert found == pytest.approx(0.5 * (max(count - free, 0) - square), rel=1e-6)
     assert abs(square) > 0.05
+    if not free:
+        usual = agreement(sky, SIGMA_M[:count], receiver_of(), PLACES, weight, ROWS)
+        assert usual == found
 
 
 @pytest.mark.parametrize("free", [0, 1, 9])

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import log, pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.alternative import NullHypothesis
-from mapfilter.positioning.bayes.held import Hold, as_measured, forked, own_rng
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold, as_measured, forked, own_rng
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 
 RULES = HoldRules(
@@ -145,3 +146,21 @@ def test_a_reading_of_headings_by_hand():
     assert Hold(1.0, np.radians(29.9)).is_usual
     assert not Hold(1.0, np.radians(30.1)).is_usual
     assert not Hold(-1.0, 0.0).is_usual
+
+
+@pytest.mark.parametrize(
+    ("other_m", "elsewhere"),
+    [((30.0, 40.0), False), ((31.0, 40.0), True), ((-30.0, -41.0), True), ((30.0, -39.0), False)],
+)
+def test_a_position_is_another_one_from_fifty_metres_on(other_m, elsewhere):
+    def at(place_m):
+        return SimpleNamespace(summary=SimpleNamespace(mean=place_m), log_evidence=-9.0)
+
+    one = HeldOtherwise(at((700.0, 500.0)), Hold(), -1.0, 0.0)
+    main = at((700.0 + other_m[0], 500.0 + other_m[1]))
+    assert one.is_elsewhere(main) is elsewhere
+    assert one.log_odds(replace_evidence(main, -12.0)) == pytest.approx(2.0)
+
+
+def replace_evidence(belief, log_evidence):
+    return SimpleNamespace(summary=belief.summary, log_evidence=log_evidence)
