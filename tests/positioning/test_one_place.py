@@ -133,7 +133,8 @@ def test_each_source_sees_the_belief_as_the_one_before_has_left_it():
         assert (context.particle_spacing_m, context.report_due) == (6.0, due)
     searching = replace(state, belief=None)
     weighing_.collected(searching, Epoch(0.0, ()), 6.0)
-    assert [source.asked[-1][0] for source in (one, other)] == ["first", "first"]
+    # What the first has started the second updates.
+    assert [source.asked[-1][0] for source in (one, other)] == ["first", "update"]
     quiet = Weighing(None, radio, (other,))
     same, _ = quiet.collected(state, Epoch(0.0, ()), 6.0)
     assert same is state
