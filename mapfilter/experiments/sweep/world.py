@@ -149,8 +149,11 @@ def opened_world(folder: Path, sha256: str) -> SweepWorld:
 
 @lru_cache(maxsize=32)
 def opened_filter(database: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:
-    """Return a filter over a database, by the SHA-256 of its manifest, once in each process."""
-    return choice.over(open_database(database, generation=sha256), ways=False)
+    """Return a filter over a database, by the SHA-256 of its manifest, once in each process.
+
+    It gives what scores need.
+    """
+    return choice.over(open_database(database, generation=sha256), ways=False).for_scores()
 
 
 def _levels(number: int) -> str:
