@@ -27,7 +27,7 @@ from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.layers import read_layer_roads
 from mapfilter.roads.osm import read_ways
-from mapfilter.survey.measurements import read_measurements
+from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.store import read_log, write_log

@@ -26,7 +26,8 @@ from mapfilter.roads.raster import raster_lattice, read_raster_ways
 from mapfilter.roads.routes import Roads, gaps, read_roads, unused_classes, within_reach_m
 from mapfilter.roads.ways import Bounds, Buildings, Water, Ways, clip_ways
 from mapfilter.simulation.synthetic_city import SyntheticCity, manhattan, synthetic_city
-from mapfilter.survey.measurements import Measurements, read_measurements
+from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.tracks.store import is_log
 from mapfilter.workflows.measured import recorded_rows
 

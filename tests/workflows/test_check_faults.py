@@ -8,7 +8,7 @@ from command_line import mapfilter
 from rasterio.transform import Affine
 
 from mapfilter.check import site_checks as check_peaks
-from mapfilter.check.site_checks import place_fits
+from mapfilter.check.place_fits import place_fits
 from mapfilter.geodesy import Lattice
 
 
