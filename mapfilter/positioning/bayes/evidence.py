@@ -219,4 +219,7 @@ def joined(updates: Sequence[EvidenceUpdate], *, alternative: bool = False) -> R
     for one in updates:
         other = alternative and one.alternative_under_null is not None
         under_null += (one.alternative_under_null or 0.0) if other else one.under_null
+    if not terms and under_null == radio.under_null:
+        # A radio report has no terms of its own.
+        return radio
     return replace(radio, terms=terms, under_null=under_null)

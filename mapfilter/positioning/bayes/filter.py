@@ -61,8 +61,8 @@ class BayesPositioner(Filter[BayesState]):
     whole log. ``more_sources`` are sources of evidence besides the built-in ones. ``positioned``
     holds the options and rules that take the place of the others as long as positions or satellites
     are measured; None for the same ones. ``carriageways`` locate a vehicle as long as nothing but
-    its turns and the map do. ``holds`` says when a phone may have been turned. ``scored`` is whether
-    outputs hold positions and their statuses alone.
+    its turns and the map do. ``holds`` says when a phone may have been turned. ``scored`` is
+    whether outputs leave out what scores do not need.
     """
 
     model: BayesModel

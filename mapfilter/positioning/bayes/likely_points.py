@@ -1,7 +1,7 @@
-"""How likely a report makes each point of an area, kept where other beliefs start from the same one.
+"""How likely a report makes each point of an area, kept for beliefs that start from an equal one.
 
-All runs of a sweep on one journey start from the same report; weighing all points by it took a tenth
-of a run.
+All runs of a sweep on one journey start from the same report; to weigh all points by it took a
+tenth of a run.
 """
 
 from __future__ import annotations
@@ -68,9 +68,7 @@ def likelihoods(
     return shares, float(most + np.log(weight.mean()))
 
 
-def likelihoods_on_ways(
-    model: BayesModel, reading: RadioReading | None
-) -> tuple[Floats32, float]:
+def likelihoods_on_ways(model: BayesModel, reading: RadioReading | None) -> tuple[Floats32, float]:
     """Return :func:`likelihoods` of all points on the ways of an area that is held as a whole."""
     points = model.whole.points
     known = None if reading is None else known_reading(reading)

@@ -148,7 +148,8 @@ def step_output(
 ) -> tuple[BayesState, StepOutput]:
     """Summarise the belief; ``reason`` is whether the epoch's report was used.
 
-    ``positions_only`` leaves out ways, the radius of 99 % and protection levels. A phone that stands still has the same belief for hours, which is not summarised again.
+    A phone that stands still has the same belief for hours, which is not summarised again.
+    ``positions_only`` leaves out ways, the radius of 99 % and protection levels.
     """
     made_of = state.belief, state.status, state.null.probability
     known = state.reported
