@@ -18,7 +18,7 @@ from made_recordings import MADE
 
 from mapfilter.config.load import load_config
 from mapfilter.geodesy import Lattice
-from mapfilter.gnss.orbits import read_yuma
+from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
 from mapfilter.radio.cells import read_cell_plan
 from mapfilter.radio.msi import read_msi
