@@ -273,7 +273,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             belief.status,
             belief.travelled_m,
             belief.agreement_start_m,
-            agrees=summary.mass_50m >= options.switch_mass
+            # Of a belief that has been found nobody asks.
+            agrees=belief.status is Status.SEARCHING
+            and summary.mass_50m >= options.switch_mass
             and self.model.can_converge(summary, reading),
             hold_m=options.switch_hold_m,
         )

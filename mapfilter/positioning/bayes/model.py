@@ -207,7 +207,9 @@ class BayesModel:
 
     def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
         """Return whether the leading hypothesis is on the map, and nothing else is as probable."""
-        return bool(summary.mean[OFF] < 0.5) and not reading.doubted
+        if reading.doubted or not summary.mean[OFF] < 0.5:
+            return False
+        return not reading.at_edge(self.area)
 
     def rough_db(self) -> Bytes:
         """Return what is added to the deviation of levels, in tenths of a dB, flat as levels."""

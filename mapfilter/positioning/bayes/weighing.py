@@ -129,9 +129,8 @@ class Weighing:
         else:
             plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
-        doubt = doubt or _at_edge(area, before)
         tracked = measured and before.status is Status.TRACKING
-        reading = replace(evidence, tracked=tracked, doubted=doubt)
+        reading = replace(evidence, tracked=tracked, doubted=doubt, belief=before)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
@@ -301,14 +300,6 @@ def weighed_by(
 def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> RadioReading:
     """Return a reading as a belief is weighed by it."""
     return replace(reading, tracked=measured and belief.status is Status.TRACKING)
-
-
-def _at_edge(area: AreaFrame, belief: MapBelief) -> bool:
-    """Return whether a belief lies at the edge of the area."""
-    if isinstance(belief, ParticleBelief) and area.clear_of_edge(belief.state):
-        # A summary takes longer.
-        return False
-    return area.at_edge(belief.summary.mean)
 
 
 def _holds(area: AreaFrame, belief: MapBelief) -> bool:
