@@ -1,14 +1,17 @@
 """Runs of a sweep share what is equal among them, and give what each gives by itself."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter._io import sha256_file
 from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.run import sweep_runs
+from mapfilter.experiments.sweep.world import opened_filter, scored_filter
 from mapfilter.positioning.filter import locate
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
@@ -62,3 +65,17 @@ def test_runs_of_a_sweep_are_those_of_filters_of_their_own(prepared):
     ]
     pd.testing.assert_frame_equal(found, table.to_table(alone).to_pandas(), check_exact=True)
     assert found["switched"].any(), "runs that only search have no errors to compare"
+
+
+def test_only_sweeps_leave_out_protection_levels(prepared):
+    """Benchmarks open the same filters, and score how often errors exceed their levels."""
+    plan, world, databases = prepared
+    run = next(plan.select(0, 1))
+    database = databases[run.database].path
+    sha256 = sha256_file(database / "manifest.json")
+    truth = true_path(world, plan, run.route)
+    log = radio_log(world, plan, truth, run.route, run.radio, run.report_period_s)
+    for opened, levels in ((opened_filter, True), (scored_filter, False)):
+        filter_ = opened(database, sha256, run.reading.choice)
+        found = locate(sensed(plan, log, run), filter_, filter_rng(plan.seed, run)).estimate
+        assert np.isfinite(found.radius_99_m).any() == levels

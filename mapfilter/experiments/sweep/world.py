@@ -149,11 +149,14 @@ def opened_world(folder: Path, sha256: str) -> SweepWorld:
 
 @lru_cache(maxsize=32)
 def opened_filter(database: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:
-    """Return a filter over a database, by the SHA-256 of its manifest, once in each process.
+    """Return a filter over a database, by the SHA-256 of its manifest, once in each process."""
+    return choice.over(open_database(database, generation=sha256), ways=False)
 
-    It gives what scores need.
-    """
-    return choice.over(open_database(database, generation=sha256), ways=False).for_scores()
+
+@lru_cache(maxsize=32)
+def scored_filter(database: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:
+    """Return the filter of :func:`opened_filter` without what success and errors do not need."""
+    return opened_filter(database, sha256, choice).for_scores()
 
 
 def _levels(number: int) -> str:
