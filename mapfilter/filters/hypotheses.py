@@ -137,18 +137,28 @@ def _bin_of(state: Floats32, bins: Bins) -> Ints32:
 
 
 @njit(error_model="numpy", cache=True)
-def _leader(mass: Floats32, touched: Ints32) -> tuple[int, float]:
-    """Return the touched bin whose neighbourhood is the heaviest, and that mass."""
+def _fill_around(
+    mass: Floats32, touched: Ints32, row: int, col: int, reach: int, around: Floats
+) -> None:
+    """Fill the masses of 3 x 3 bins about the touched ones that lie within reach of a bin."""
     rows, cols = mass.shape
+    for k in range(touched.size):
+        at_row, at_col = touched[k] // cols, touched[k] % cols
+        if abs(at_row - row) <= reach and abs(at_col - col) <= reach:
+            total = 0.0
+            for r in range(max(at_row - 1, 0), min(at_row + 2, rows)):
+                for c in range(max(at_col - 1, 0), min(at_col + 2, cols)):
+                    total += mass[r, c]
+            around[k] = total
+
+
+@njit(error_model="numpy", cache=True)
+def _leader(touched: Ints32, around: Floats) -> tuple[int, float]:
+    """Return the touched bin whose neighbourhood is the heaviest, and that mass."""
     best, most = -1, 0.0
     for k in range(touched.size):
-        row, col = touched[k] // cols, touched[k] % cols
-        total = 0.0
-        for r in range(max(row - 1, 0), min(row + 2, rows)):
-            for c in range(max(col - 1, 0), min(col + 2, cols)):
-                total += mass[r, c]
-        if total > most:
-            best, most = touched[k], total
+        if around[k] > most:
+            best, most = touched[k], around[k]
     return best, most
 
 
@@ -173,8 +183,10 @@ def _summarise(
         entropy -= share * log(share)
     others, found = np.empty((2, 3)), 0
     x = y = 0.0
+    around = np.empty(count)
+    _fill_around(mass, touched, 0, 0, max(bins.rows, bins.cols), around)
     for hypothesis in range(3):
-        best, most = _leader(mass, touched)
+        best, most = _leader(touched, around)
         if best < 0 or (hypothesis > 0 and most < 1e-4):
             break
         row, col = best // bins.cols, best % bins.cols
@@ -187,8 +199,10 @@ def _summarise(
         else:
             others[found, 0], others[found, 1], others[found, 2] = cx, cy, most
             found += 1
-        # What lies in the 5 x 5 bins about it is taken away.
+        # What lies in the 5 x 5 bins about it is taken away, which changes the neighbourhoods of
+        # 7 x 7.
         mass[max(row - 2, 0) : row + 3, max(col - 2, 0) : col + 3] = 0
+        _fill_around(mass, touched, row, col, 3, around)
     mean, covariance, radii, near = _moments(state, weight, x, y)
     return mean, covariance, radii, near, others[:found], entropy / log(2.0)
 

@@ -21,9 +21,10 @@ from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
-from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
+from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic, taken
 from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
+_LEAST_WEIGHT = np.finfo(np.float32).tiny
 _Count = Annotated[int, Ge(1)]
 PriorT = TypeVar("PriorT", contravariant=True)
 ReadingT = TypeVar("ReadingT", contravariant=True)
@@ -272,7 +273,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             belief.status,
             belief.travelled_m,
             belief.agreement_start_m,
-            agrees=summary.mass_50m >= options.switch_mass
+            # Of a belief that has been found nobody asks.
+            agrees=belief.status is Status.SEARCHING
+            and summary.mass_50m >= options.switch_mass
             and self.model.can_converge(summary, reading),
             hold_m=options.switch_hold_m,
         )
@@ -293,8 +296,10 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             copy_with_jitter(state, chosen, sd, draw_key(rng), copies)
             # Copies keep the part of their weight that they were not chosen by. Rounding may choose
             # the last one though its weight is none.
-            chosen_by = np.maximum(weight[chosen], np.finfo(np.float32).tiny)
-            log_weight = log_weight[chosen] - np.log(chosen_by)
+            log_of, chosen_by = np.empty(wanted), np.empty(wanted, dtype=np.float32)
+            taken(log_weight, weight, chosen, log_of, chosen_by)
+            np.maximum(chosen_by, _LEAST_WEIGHT, out=chosen_by)
+            log_weight = np.subtract(log_of, np.log(chosen_by, out=chosen_by), out=log_of)
             state, before = copies, kept
             kept = np.empty((before.shape[0], wanted), dtype=np.float32)
             copied(before, chosen, kept)

@@ -102,6 +102,17 @@ def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
 
 
 @njit(error_model="numpy", cache=True)
+def taken(
+    log_weight: Floats, weight: Floats32, chosen: Ints32, log_of: Floats, weight_of: Floats32
+) -> None:
+    """Fill ``log_of`` and ``weight_of`` (M,) with the weights of the chosen particles."""
+    for j in range(chosen.size):
+        i = np.uint32(chosen[j])
+        log_of[j] = log_weight[i]
+        weight_of[j] = weight[i]
+
+
+@njit(error_model="numpy", cache=True)
 def copied(kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
     """Copy the chosen columns of ``kept`` (W, N) to ``copies`` (W, M)."""
     rows = kept.shape[0]

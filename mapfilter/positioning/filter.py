@@ -119,6 +119,13 @@ class Filter(ABC, Generic[StateT]):
     def warm_up(self, merged: Sequence[Epoch]) -> None:
         """Load kernels and map data before the clock starts."""
 
+    def for_scores(self) -> Filter[StateT]:
+        """Return a filter whose positions and statuses are these, and that may leave out the rest.
+
+        Success and errors need neither ways nor protection levels. By default it is this one.
+        """
+        return self
+
     def smoother(self) -> Smoother | None:
         """Return a new smoother where positions shall be smoothed, else None."""
         return None

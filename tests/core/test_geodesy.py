@@ -16,6 +16,7 @@ from mapfilter.geodesy import (
     same_crs,
     unproject,
     utm_crs,
+    wrap_one_rad,
     wrap_rad,
 )
 
@@ -227,3 +228,13 @@ def test_bad_boxes_are_told_with_their_likely_mistake(box, hint):
 
 def test_angles_that_are_not_finite_are_unknown_without_a_warning():
     assert np.isnan(wrap_rad([np.inf, -np.inf, np.nan])).all()
+
+
+@pytest.mark.parametrize("near", [0.0, np.pi, -np.pi, 2 * np.pi, -3 * np.pi, 1e-20, 1e6])
+def test_one_angle_is_wrapped_to_the_same_bits(near):
+    angles = np.concatenate([near + np.random.default_rng(3).normal(0, 4, 500), [near, -near]])
+    angles = np.concatenate([angles, np.nextafter(angles, -np.inf), np.nextafter(angles, np.inf)])
+    assert np.array([wrap_one_rad(one) for one in angles.tolist()]).tobytes() == (
+        wrap_rad(angles).tobytes()
+    )
+    assert np.isnan(wrap_one_rad(float("nan")))

@@ -191,3 +191,29 @@ def test_rows_of_a_copy_are_moved_by_numbers_of_their_own():
     copy_with_jitter(state, picked, np.ones(6, "f4"), np.uint64(8), copies)
     beside = np.vstack([copies[:, :-1], copies[:, 1:]])
     assert np.abs(np.corrcoef(beside) - np.eye(12)).max() < 5 / 5000**0.5
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_runners_up_lead_once_the_places_before_them_are_taken_away(seed):
+    """Neighbourhoods that are summed anew about a leader alone are those of all bins."""
+    rng = np.random.default_rng(seed)
+    points = np.array([1000.0, 750.0])[:, None] * rng.random((2, 400))
+    points[:, :250] = points[:, :5].repeat(50, axis=1) + 60 * rng.standard_normal((2, 250))
+    weight = (rng.random(400) ** 3).astype("f4")
+    weight /= weight.sum()
+    said = summarise(points.astype("f4"), weight, BINS)
+    col, row = (np.clip((x.astype("f4") / 25).astype(int), 0, n - 1)
+                for x, n in zip(points, (40, 30), strict=True))  # fmt: skip
+    mass = np.zeros((32, 42), dtype="f4")
+    np.add.at(mass, (row + 1, col + 1), weight)
+    leaders, touched = [], mass[1:-1, 1:-1] > 0
+    for _ in range(3):
+        near = sum(mass[r : r + 30, c : c + 40].astype(float) for r in range(3) for c in range(3))
+        near[~touched] = 0.0
+        best_row, best_col = np.unravel_index(near.argmax(), near.shape)
+        leaders.append((best_row, best_col, near.max()))
+        mass[max(best_row - 1, 0) : best_row + 4, max(best_col - 1, 0) : best_col + 4] = 0
+    expected = [
+        [25 * c + 12.5, 25 * r + 12.5, pytest.approx(m, rel=1e-5)] for r, c, m in leaders[1:]
+    ]
+    assert said.runners_up.tolist() == expected

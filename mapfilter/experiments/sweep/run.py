@@ -24,7 +24,7 @@ from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import Radio, Run, SweepPlan
-from mapfilter.experiments.sweep.world import SweepWorld, opened_filter, opened_world, write_world
+from mapfilter.experiments.sweep.world import SweepWorld, opened_world, scored_filter, write_world
 from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import TrackLog
 
@@ -71,7 +71,7 @@ def run_batch(batch: Batch) -> pa.Table:
         log = _radio_log(batch.world, batch.world_sha256, plan, route, radio, period_s)
         truth = truth_of(log.truth)
         for run in alike:
-            filter_ = opened_filter(*databases[run.database], run.reading.choice)
+            filter_ = scored_filter(*databases[run.database], run.reading.choice)
             found = locate(sensed(plan, log, run), filter_, filter_rng(plan.seed, run)).estimate
             last = str(found.status[-1]) if len(found) else ""
             rows.append(table.row(run, accuracy(found, truth), last, plan.varied))

@@ -153,5 +153,11 @@ def opened_filter(database: Path, sha256: str, choice: FilterOptions) -> Filter[
     return choice.over(open_database(database, generation=sha256), ways=False)
 
 
+@lru_cache(maxsize=32)
+def scored_filter(database: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:
+    """Return the filter of :func:`opened_filter` without what success and errors do not need."""
+    return opened_filter(database, sha256, choice).for_scores()
+
+
 def _levels(number: int) -> str:
     return f"levels-{number}.npy"

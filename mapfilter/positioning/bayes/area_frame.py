@@ -122,10 +122,14 @@ class AreaFrame(ABC):
         found: Bools = places_beyond(state, *self.size_m)
         return found
 
+    def holds_all(self, east_m: Floats32, north_m: Floats32) -> bool:
+        """Return whether all places (N,) in the local frame lie in the area."""
+        return bool(all_inside(east_m, north_m, *self.size_m))
+
     def holds(self, east_m: Floats32, north_m: Floats32, weight: Floats32) -> bool:
         """Return whether most of a belief in the local frame lies in the area."""
         width_m, height_m = self.size_m
-        if all_inside(east_m, north_m, width_m, height_m):
+        if self.holds_all(east_m, north_m):
             return bool(weight.size)
         inside = (east_m >= 0) & (east_m <= width_m) & (north_m >= 0) & (north_m <= height_m)
         return bool(np.sum(weight[inside]) > 0.5)

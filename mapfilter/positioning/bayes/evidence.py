@@ -18,10 +18,12 @@ from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_memory import OTHER_DBM, OTHER_SD_DB
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
+from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
@@ -90,6 +92,8 @@ class RadioReading:
         Of the serving cell, in steps; NaN if not reported. Used by models with measured maps only.
     serving_under_null : float
         Log-likelihood of the serving cell at full weight, under the null hypothesis.
+    belief : MapBelief or None
+        The belief that is weighed, as it was before: at the edge of the area it does not converge.
     """
 
     serving: int = -1
@@ -103,6 +107,17 @@ class RadioReading:
     doubted: bool = False
     tracked: bool = False
     serving_under_null: float = SERVING_UNDER_NULL
+    belief: MapBelief | None = None
+
+    def at_edge(self, area: AreaFrame) -> bool:
+        """Return whether the belief lies at the edge of an area."""
+        belief = self.belief
+        if belief is None:
+            return False
+        if isinstance(belief, ParticleBelief) and area.clear_of_edge(belief.state):
+            # A summary takes longer.
+            return False
+        return area.at_edge(belief.summary.mean)
 
     def radio_under_null(self, other_log_likelihood: float) -> float:
         """Return the log-likelihood of the report under the null hypothesis.
@@ -219,4 +234,7 @@ def joined(updates: Sequence[EvidenceUpdate], *, alternative: bool = False) -> R
     for one in updates:
         other = alternative and one.alternative_under_null is not None
         under_null += (one.alternative_under_null or 0.0) if other else one.under_null
+    if not terms and under_null == radio.under_null:
+        # A radio report has no terms of its own.
+        return radio
     return replace(radio, terms=terms, under_null=under_null)

@@ -61,7 +61,8 @@ class BayesPositioner(Filter[BayesState]):
     whole log. ``more_sources`` are sources of evidence besides the built-in ones. ``positioned``
     holds the options and rules that take the place of the others as long as positions or satellites
     are measured; None for the same ones. ``carriageways`` locate a vehicle as long as nothing but
-    its turns and the map do. ``holds`` says when a phone may have been turned.
+    its turns and the map do. ``holds`` says when a phone may have been turned. ``scored`` is
+    whether outputs leave out what scores do not need.
     """
 
     model: BayesModel
@@ -75,6 +76,7 @@ class BayesPositioner(Filter[BayesState]):
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
     carriageways: CarriagewayFilters | None = None
     holds: HoldRules = field(default_factory=HoldRules)
+    scored: bool = False
 
     @property
     def crs(self) -> str:
@@ -190,7 +192,9 @@ class BayesPositioner(Filter[BayesState]):
         if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
-        return step_output(self.area, state, epoch.time_s, reason, tuple(unused))
+        return step_output(
+            self.area, state, epoch.time_s, reason, tuple(unused), positions_only=self.scored
+        )
 
     def evidence_at(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
@@ -206,10 +210,17 @@ class BayesPositioner(Filter[BayesState]):
         state, _ = moved(self.beliefs, state, watch, epoch, rng)
         return *self._weighing.collected(state, epoch, spacing_m), motion not in UNMEASURED
 
+    def for_scores(self) -> BayesPositioner:
+        """Return the filter without ways, radii of 99 % and protection levels in its outputs."""
+        return replace(self, scored=True)
+
     def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
-        """Load the compiled kernels, and prepare the area."""
-        if self.grid:
-            return
+        """Load the compiled kernels, and prepare the area, at the first log."""
+        if not self.grid:
+            _ = self._is_warm
+
+    @cached_property
+    def _is_warm(self) -> bool:
         model, rng = self.model, np.random.default_rng(0)
         west, south = model.area.origin_m
         small = replace(self, options=replace(self.options, max_particles=64, min_particles=32))
@@ -219,6 +230,7 @@ class BayesPositioner(Filter[BayesState]):
             update, reading = small.beliefs.by_compass[True].update, _every_kind()
             belief, _ = update(state.belief, reading, rng)
             update(belief, replace(reading, length_m=5.0, tracked=True), rng)
+        return True
 
     def smoother(self) -> BayesSmoother | None:
         """Return a new smoother if positions are to be smoothed."""

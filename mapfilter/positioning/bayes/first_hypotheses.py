@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter._types import Floats, Floats32
 from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import systematic
 from mapfilter.geodesy import wrap_rad
@@ -25,6 +25,7 @@ from mapfilter.models.street_motion import (
 )
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.likely_points import likelihoods, likelihoods_on_ways
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.path_start import (
     OFF_AT_START,
@@ -43,7 +44,6 @@ BEYOND_M = 300.0
 """Width of the belt around the area in which some of the first hypotheses lie."""
 _BEYOND_SHARE, _BEYOND_AT_START = 0.15, 0.02
 """Share of the first hypotheses in the belt, and that of the first belief."""
-_AT_ONCE = 50_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def _spread(
     beyond = int(_BEYOND_SHARE * state.shape[1])
     off = int(_OFF_SHARE * state.shape[1])
     on = state.shape[1] - off - beyond
-    searched = None
+    searched, whole = None, not isinstance(area, TiledArea)
     if isinstance(area, TiledArea):
         searched = searched_tiles(area, reading, model.evidence.levels)
         on_ways = points_everywhere(area) if searched is None else searched.points
@@ -146,7 +146,12 @@ def _spread(
         if not points.shape[1] or not count:
             log_weight[part] = -np.inf
             continue
-        chosen, log_mean = _likely(model, points, reading, count, rng)
+        if points is on_ways and whole:
+            weight, log_mean = likelihoods_on_ways(model, reading)
+        else:
+            weight, log_mean = likelihoods(model, points, reading)
+        chosen = np.empty(count, dtype=np.int32)
+        systematic(weight, rng.random(), chosen)
         beside = rng.random((2, count), dtype=np.float32) - _F(0.5)
         state[EAST : NORTH + 1, part] = points[:, chosen] + _F(pixel_m) * beside
         state[OFF, part] = is_off
@@ -162,28 +167,6 @@ def _around(area: AreaFrame, count: int, rng: np.random.Generator) -> Floats32:
         places = some.astype(np.float32)
         found = np.concatenate([found, places[:, np.flatnonzero(area.beyond(places))]], 1)
     return found[:, :count]
-
-
-def _likely(
-    model: BayesModel,
-    points: Floats32,
-    reading: RadioReading | None,
-    count: int,
-    rng: np.random.Generator,
-) -> tuple[Ints32, float]:
-    """Draw points by their likelihood; return them and the logarithm of its mean."""
-    log_weight = np.zeros(points.shape[1])
-    if reading is not None:
-        for first in range(0, points.shape[1], _AT_ONCE):
-            part = slice(first, first + _AT_ONCE)
-            state = np.zeros((STATES, points[:, part].shape[1]), dtype=np.float32)
-            state[EAST : NORTH + 1] = points[:, part]
-            model.weigh(cloud_of(state), log_weight[part], reading)
-    most = log_weight.max()
-    weight = np.exp(log_weight - most)
-    chosen = np.empty(count, dtype=np.int32)
-    systematic((weight / weight.sum()).astype(np.float32), rng.random(), chosen)
-    return chosen, float(most + np.log(weight.mean()))
 
 
 def any_heading(

@@ -20,7 +20,7 @@ import numpy as np
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.geodesy import wrap_rad
+from mapfilter.geodesy import wrap_one_rad, wrap_rad
 from mapfilter.models.street_motion import BIAS
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.hold_rules import HoldRules
@@ -45,7 +45,7 @@ class Hold:
 
     def direction_rad(self, heading_rad: float) -> float:
         """Return the direction that a heading stands for."""
-        return float(wrap_rad(self.sign * heading_rad + self.offset_rad))
+        return wrap_one_rad(self.sign * heading_rad + self.offset_rad)
 
     @property
     def is_usual(self) -> bool:
@@ -129,7 +129,7 @@ def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:
     """
     if not (rules.watched and isfinite(before_rad) and isfinite(step.heading_rad)):
         return False
-    changed = abs(float(wrap_rad(step.heading_rad - before_rad)))
+    changed = abs(wrap_one_rad(step.heading_rad - before_rad))
     return 0 < step.step_m <= rules.longest_row_m and changed > radians(rules.jump_deg)
 
 

@@ -6,8 +6,9 @@ map of ways, by radio reports and by the terms of other sources.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 from math import exp, isfinite, log, nan, sqrt
 
 import numpy as np
@@ -41,6 +42,7 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import SERVING_UNDER_NULL, RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import BEYOND_M, Start, first_hypotheses
+from mapfilter.positioning.bayes.likely_points import KEPT_REPORTS, KnownReading, likelihoods
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 
@@ -105,6 +107,11 @@ class BayesModel:
     @cached_property
     def _bound_table(self) -> Floats32:
         return fingerprint.bound_table()
+
+    @cached_property
+    def kept_likelihoods(self) -> Callable[[KnownReading], tuple[Floats32, float]]:
+        """Likelihoods of all points on ways, of the last few reports that beliefs started from."""
+        return lru_cache(maxsize=KEPT_REPORTS)(partial(_likelihoods_on_ways, self))
 
     def start(self, prior: Start, most: int, rng: np.random.Generator) -> tuple[Cloud, Floats]:
         """Draw the first hypotheses: by the first evidence, or about a known start."""
@@ -207,7 +214,9 @@ class BayesModel:
 
     def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
         """Return whether the leading hypothesis is on the map, and nothing else is as probable."""
-        return bool(summary.mean[OFF] < 0.5) and not reading.doubted
+        if reading.doubted or not summary.mean[OFF] < 0.5:
+            return False
+        return not reading.at_edge(self.area)
 
     def rough_db(self) -> Bytes:
         """Return what is added to the deviation of levels, in tenths of a dB, flat as levels."""
@@ -301,6 +310,10 @@ class BayesModel:
         some = np.ascontiguousarray(pixel[:: _every(pixel)])
         share = self.area.shares_above(some, report.absent, report.limit_dbm)
         return _most_expected(report.absent, share)
+
+
+def _likelihoods_on_ways(model: BayesModel, known: KnownReading) -> tuple[Floats32, float]:
+    return likelihoods(model, model.whole.points, known.reading)
 
 
 def mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite, nan
 
 import numpy as np
@@ -21,6 +22,26 @@ from mapfilter.positioning.estimate import UnusedReading
 
 _FORKED, _MOVED = 1, 2
 """Salts of the draws of beliefs in which the phone was turned."""
+
+
+@dataclass(frozen=True)
+class _OwnDraws:
+    """Generators of an epoch for beliefs in which the phone was turned.
+
+    Each is made when it is first asked for, which few epochs do: it takes 10 µs.
+    """
+
+    time_s: float
+
+    @cached_property
+    def forking(self) -> np.random.Generator:
+        """For beliefs that begin."""
+        return own_rng(self.time_s, _FORKED)
+
+    @cached_property
+    def moving(self) -> np.random.Generator:
+        """For beliefs that move."""
+        return own_rng(self.time_s, _MOVED)
 
 
 def moved(
@@ -63,11 +84,11 @@ def moved(
     if not epoch.time_s - state.watch.moving_s <= rules.longest_pause_s:
         # Who stood may have turned there.
         walking_rad = nan
-    fork_rng, held_rng = own_rng(epoch.time_s, _FORKED), own_rng(epoch.time_s, _MOVED)
+    own = _OwnDraws(epoch.time_s)
     if positioned and not held and hold != Hold() and isinstance(belief, ParticleBelief):
         gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
         if state.status is belief.status is Status.TRACKING:
-            held = (as_measured(rules, belief, state.null, gone_m, white_rad, fork_rng),)
+            held = (as_measured(rules, belief, state.null, gone_m, white_rad, own.forking),)
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         measured = step
@@ -97,12 +118,12 @@ def moved(
                     (walking_rad, raw.heading_rad),
                     reckoning.travelled_m,
                     beliefs.model.motion.white_rad,
-                    fork_rng,
+                    own.forking,
                 )
                 held = still_open(rules, (*held, *more), belief, reckoning.travelled_m)
             if held:
                 held = tuple(
-                    replace(one, belief=predict(one.belief, one.hold.read(measured), held_rng)[0])
+                    replace(one, belief=predict(one.belief, one.hold.read(measured), own.moving)[0])
                     for one in held
                 )
             belief, why = predict(belief, _assumed(step, belief), rng)

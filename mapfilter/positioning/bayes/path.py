@@ -9,7 +9,7 @@ import numpy as np
 
 from mapfilter._types import Floats32
 from mapfilter.filters.contract import MotionStep
-from mapfilter.geodesy import wrap_rad
+from mapfilter.geodesy import wrap_one_rad
 
 LEG_M = 5.0
 """Distance between two points of a path."""
@@ -112,4 +112,4 @@ def _bend_rad(first: DeadReckoning, middle: DeadReckoning, last: DeadReckoning) 
     """Return the angle between two legs."""
     before = atan2(middle.north_m - first.north_m, middle.east_m - first.east_m)
     after = atan2(last.north_m - middle.north_m, last.east_m - middle.east_m)
-    return abs(float(wrap_rad(after - before)))
+    return abs(wrap_one_rad(after - before))

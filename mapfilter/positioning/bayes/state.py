@@ -143,17 +143,20 @@ def step_output(
     time_s: float,
     reason: Reason,
     unused: tuple[UnusedReading, ...],
+    *,
+    positions_only: bool = False,
 ) -> tuple[BayesState, StepOutput]:
     """Summarise the belief; ``reason`` is whether the epoch's report was used.
 
     A phone that stands still has the same belief for hours, which is not summarised again.
+    ``positions_only`` leaves out ways, the radius of 99 % and protection levels.
     """
     made_of = state.belief, state.status, state.null.probability
     known = state.reported
     if known is not None and known.belief is made_of[0] and known[1:3] == made_of[1:]:
         fix = replace(known.output.fix, time_s=time_s, reason=reason)
         return state, StepOutput(fix, known.output.evidence, unused, known.output.tail)
-    output = _output(area, state, time_s, reason, unused)
+    output = _output(area, state, time_s, reason, unused, positions_only=positions_only)
     return state.with_output(Reported(*made_of, output)), output
 
 
@@ -163,6 +166,8 @@ def _output(
     time_s: float,
     reason: Reason,
     unused: tuple[UnusedReading, ...],
+    *,
+    positions_only: bool,
 ) -> StepOutput:
     belief, (west, south) = state.belief, area.origin_m
     count, way, tail = 0, (0, nan), None
@@ -171,11 +176,12 @@ def _output(
         summary = empty_summary(STATES)
     else:
         summary, count = belief.summary, belief.log_weight.size
-        places = belief.state[0], belief.state[1], belief.weight
-        way = area.matched_way(*places)
-        if count:
-            tail = sample_tail(*places, summary.mean, p_none=state.null.probability)
-            wide_m, protection_m = protected_m(tail, summary.radii_m)
+        if not positions_only:
+            places = belief.state[0], belief.state[1], belief.weight
+            way = area.matched_way(*places)
+            if count:
+                tail = sample_tail(*places, summary.mean, p_none=state.null.probability)
+                wide_m, protection_m = protected_m(tail, summary.radii_m)
     fix = Fix(
         time_s,
         float(summary.mean[0]) + west,

@@ -129,8 +129,8 @@ class Weighing:
         else:
             plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
-        doubt = doubt or _at_edge(area, before)
-        reading = replace(_tracked(evidence, before, measured=measured), doubted=doubt)
+        tracked = measured and before.status is Status.TRACKING
+        reading = replace(evidence, tracked=tracked, doubted=doubt, belief=before)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
@@ -146,7 +146,7 @@ class Weighing:
             other, _ = update(alternative.belief, terms, rng)
             own = _challenged(rules, alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)
-        gone = not area.holds(belief.state[0], belief.state[1], belief.weight)
+        gone = not _holds(area, belief)
         now = resolve_alternative(
             rules,
             state.status,
@@ -302,12 +302,12 @@ def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> Rad
     return replace(reading, tracked=measured and belief.status is Status.TRACKING)
 
 
-def _at_edge(area: AreaFrame, belief: MapBelief) -> bool:
-    """Return whether a belief lies at the edge of the area."""
-    if isinstance(belief, ParticleBelief) and area.clear_of_edge(belief.state):
-        # A summary takes longer.
-        return False
-    return area.at_edge(belief.summary.mean)
+def _holds(area: AreaFrame, belief: MapBelief) -> bool:
+    """Return whether most of a belief lies in the area; weights take longer than all places."""
+    east_m, north_m = belief.state[0], belief.state[1]
+    if east_m.size and area.holds_all(east_m, north_m):
+        return True
+    return area.holds(east_m, north_m, belief.weight)
 
 
 def _challenged(
