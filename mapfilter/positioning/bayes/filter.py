@@ -152,6 +152,8 @@ class BayesPositioner(Filter[BayesState]):
         heard = epoch.radio
         watch, epoch, (motion, radio) = watched(state.watch, epoch)
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
+        # Hypotheses that were carried on have to gather first.
+        unclear = unclear or state.unclear
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         if radio is not Reason.USED:
@@ -182,7 +184,9 @@ class BayesPositioner(Filter[BayesState]):
                     state = replace(state, belief=belief, status=status)
                 state = weighing.in_one_place(state, measured=measured, was_unclear=unclear)
         taken_over = state.hold not in (hold, Hold())
-        if motion is Reason.USED and epoch.motion and (state.contested or taken_over):
+        if motion is Reason.USED and state.contested and self.beliefs.may_have_left(state):
+            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.MOTION_STUCK))
+        elif motion is Reason.USED and epoch.motion and (state.contested or taken_over):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         gnss: GnssState = state.sources[GnssSource.name]
         if epoch.fix is not None and gnss.was_used(epoch.time_s):

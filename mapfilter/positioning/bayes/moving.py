@@ -18,8 +18,8 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import UnusedReading
 
-_FORKED, _MOVED = 1, 2
-"""Salts of the draws of beliefs in which the phone was turned."""
+_FORKED, _MOVED, _AWAY = 1, 2, 4
+"""Salts of the draws of beliefs in which the phone was turned, and of hypotheses carried on."""
 
 
 def moved(
@@ -67,6 +67,11 @@ def moved(
         gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
         if state.status is belief.status is Status.TRACKING:
             held = (as_measured(rules, belief, state.null, gone_m, white_rad, fork_rng),)
+    unclear = state.unclear
+    if belief is not None and watch.rest is None and beliefs.may_have_left(state):
+        gone_s = epoch.time_s - state.watch.moving_s
+        away = beliefs.carried_on(state, belief, gone_s, own_rng(epoch.time_s, _AWAY))
+        belief, unclear = away, unclear or away is not belief
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         measured = step
@@ -123,7 +128,7 @@ def moved(
     return BayesState(
         belief=belief,
         status=state.status,
-        unclear=state.unclear,
+        unclear=unclear,
         contested=state.contested,
         sources=state.sources,
         reckoning=reckoning,

@@ -162,7 +162,8 @@ def _followed(watch: SensorWatch, epoch: Epoch) -> tuple[_Way, Epoch, Reason]:
         return _Way(*way[:6], time_s, time_s, None, 0.0, moved_m), epoch, why
     if not isfinite(way.moving_s):
         return way, epoch, why
-    rest = (way.rest or Rest(way.moving_s)).heard(time_s, epoch.radio)
+    rest = way.rest or Rest(way.moving_s, pace_mps=way.speed_mps)
+    rest = rest.heard(time_s, epoch.radio)
     # A measured rest is none of the way, unless it was a counter that stood still.
     unmeasured_s = way.unmeasured_s + time_s - way.known_s
     if rest.is_carried:
@@ -232,11 +233,11 @@ def _timed(
 
 def _unmeasured(speed_mps: float, from_s: float, to_s: float) -> MotionStep:
     """Return the step to all sides between two times since the last measured one."""
-    spread_m2 = _spread_m2(speed_mps, to_s) - _spread_m2(speed_mps, from_s)
-    return MotionStep(speed_mps * (to_s - from_s), nan, nan, sqrt(max(spread_m2, 0.0)))
+    more_m2 = spread_m2(speed_mps, to_s) - spread_m2(speed_mps, from_s)
+    return MotionStep(speed_mps * (to_s - from_s), nan, nan, sqrt(max(more_m2, 0.0)))
 
 
-def _spread_m2(speed_mps: float, time_s: float) -> float:
+def spread_m2(speed_mps: float, time_s: float) -> float:
     """Return the mean square of the distance of a way that forgets its direction."""
     lasts_s = _STRAIGHT_S
     return 2 * speed_mps**2 * lasts_s * (time_s - lasts_s * (1 - exp(-time_s / lasts_s)))

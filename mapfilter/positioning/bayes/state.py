@@ -41,7 +41,8 @@ class BayesState:
     unclear : bool
         LOST only because the belief is spread over more than one place.
     contested : bool
-        LOST only because a belief in which the phone was turned is ahead.
+        LOST only because a belief in which the phone was turned is ahead, or because the phone may
+        have been carried on though no step is counted.
     sources : mapping of str to object
         State of each source of evidence by its name.
     reckoning : DeadReckoning

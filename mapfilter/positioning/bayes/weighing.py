@@ -256,7 +256,8 @@ class Weighing:
         least = 0.0 if measured else rules.unclear_below_mass
         if was_unclear:
             least = rules.clear_from_mass
-        unclear, contested = mass < least, self.beliefs.is_contested(state)
+        contested = self.beliefs.is_contested(state) or self.beliefs.may_have_left(state)
+        unclear = mass < least
         if not (unclear or contested):
             return state
         return replace(state, status=Status.LOST, unclear=unclear, contested=contested)
