@@ -155,6 +155,16 @@ class BeliefFilters:
             return False
         return is_ahead(self.holds, state.held, main)
 
+    def other_unit_m(self, state: BayesState) -> float:
+        """Return a further unit in which steps may be given, by their speed; 1 for none.
+
+        That is where they are a walker's by all that is stated, but not by their speed.
+        """
+        gnss: GnssState = state.sources[GnssSource.name]
+        if not self.holds.watched or not state.compass or gnss.met:
+            return 1.0
+        return state.watch.other_unit_m
+
     def may_have_left(self, state: BayesState) -> bool:
         """Return whether a walker may have left its position though no step is counted."""
         rest = state.watch.rest

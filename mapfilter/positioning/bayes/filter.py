@@ -183,7 +183,8 @@ class BayesPositioner(Filter[BayesState]):
                 if belief is not state.belief or status is not state.status:
                     state = replace(state, belief=belief, status=status)
                 state = weighing.in_one_place(state, measured=measured, was_unclear=unclear)
-        taken_over = state.hold not in (hold, Hold())
+        as_read = replace(state.hold, step_unit_m=hold.step_unit_m)
+        taken_over = as_read not in (hold, replace(Hold(), step_unit_m=hold.step_unit_m))
         if motion is Reason.USED and state.contested and self.beliefs.may_have_left(state):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.MOTION_STUCK))
         elif motion is Reason.USED and epoch.motion and (state.contested or taken_over):

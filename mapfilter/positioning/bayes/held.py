@@ -31,13 +31,17 @@ _MILLISECONDS, _SEEDS = 1000.0, 2**32
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """How headings are read: their sign, and the angle that is added."""
+    """How motion is read: the sign of headings, the angle that is added, the unit of steps in m."""
 
     sign: float = 1.0
     offset_rad: float = 0.0
+    step_unit_m: float = 1.0
 
     def read(self, step: MotionStep) -> MotionStep:
-        """Return a step with the direction that its heading stands for."""
+        """Return a step with the length and the direction that it stands for."""
+        if self.step_unit_m != 1.0:
+            unit_m = self.step_unit_m
+            step = replace(step, step_m=unit_m * step.step_m, spread_m=unit_m * step.spread_m)
         if (self.sign == 1.0 and self.offset_rad == 0.0) or not isfinite(step.heading_rad):
             return step
         direction_rad = self.direction_rad(step.heading_rad)
@@ -69,8 +73,9 @@ class Hold:
         '0.6, 0.4'
         """
         ahead_rad, sign = self.direction_rad(before_rad), self.sign
-        turned = Hold(sign, float(wrap_rad(ahead_rad - sign * after_rad)))
-        return turned, Hold(-sign, float(wrap_rad(ahead_rad + sign * after_rad)))
+        unit_m = self.step_unit_m
+        turned = Hold(sign, float(wrap_rad(ahead_rad - sign * after_rad)), unit_m)
+        return turned, Hold(-sign, float(wrap_rad(ahead_rad + sign * after_rad)), unit_m)
 
 
 @dataclass(frozen=True, eq=False)

@@ -114,7 +114,8 @@ def moved(
             reckoning = reckoning.moved(step)
             if alternative is not None:
                 # It began anew, and nothing says that the phone is held otherwise.
-                other, _ = predict(alternative.belief, measured, rng)
+                as_read = Hold(step_unit_m=alternative.step_unit_m).read(measured)
+                other, _ = predict(alternative.belief, as_read, rng)
                 alternative = replace(alternative, belief=other)
             if twin is not None:
                 other, _ = predict(twin.belief, mirrored_step(step), rng)
@@ -145,4 +146,5 @@ def moved(
         hold=hold,
         walking_rad=walking_rad,
         held=held,
+        alternatives=state.alternatives,
     ), unused

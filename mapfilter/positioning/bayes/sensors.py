@@ -31,6 +31,11 @@ _WALK_MPS = 1.4
 _STRAIGHT_S = 60.0
 """Time after which the direction of an unmeasured way is forgotten by 1/e."""
 
+_SPEED_ROWS, _SLOW_MPS, _FAST_MPS, _MOTOR_MPS = 30, 0.6, 2.6, 8.0
+_FOOT_M = 0.3048
+"""Rows by which the speed is known; bounds of the speed of a walker, and that from which on it is
+none in feet either."""
+
 _NATS_PER_M, _MOST_ROWS = 0.12, 3
 """Gain, for each level of at most three, from a report that repeats the last one: by the metres
 between them."""
@@ -96,6 +101,15 @@ class SensorWatch:
         if self.rows < _KNOWN_ROWS:
             return False
         return self.rests or self.irregular_s < _REGULAR * self.interval_s
+
+    @property
+    def other_unit_m(self) -> float:
+        """Unit of steps with which the speed is a walker's where it is not in metres; else 1."""
+        if self.rows < _SPEED_ROWS:
+            return 1.0
+        if _FAST_MPS < self.speed_mps < _MOTOR_MPS:
+            return _FOOT_M
+        return 1 / _FOOT_M if self.speed_mps < _SLOW_MPS else 1.0
 
 
 UNMEASURED = frozenset(

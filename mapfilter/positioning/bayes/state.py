@@ -73,6 +73,8 @@ class BayesState:
         Heading of the last row of a walk, as measured.
     held : tuple of HeldOtherwise
         Beliefs in which the phone was turned, tested against the belief.
+    alternatives : int
+        Number of alternatives that were started.
     """
 
     belief: MapBelief | None = None
@@ -94,6 +96,7 @@ class BayesState:
     hold: Hold = field(default_factory=Hold)
     walking_rad: float = nan
     held: tuple[HeldOtherwise, ...] = ()
+    alternatives: int = 0
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -117,6 +120,7 @@ class BayesState:
             hold=self.hold,
             walking_rad=self.walking_rad,
             held=self.held,
+            alternatives=self.alternatives,
         )
 
     @property

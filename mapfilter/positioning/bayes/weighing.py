@@ -161,6 +161,7 @@ class Weighing:
             sources = {**sources, **alternative.sources}
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
+        disputed = disputed or (not state.alternatives and beliefs.other_unit_m(state) != 1.0)
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
@@ -176,12 +177,19 @@ class Weighing:
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
             # An alternative reads headings as they are.
-            hold=Hold() if now.taken_over else state.hold,
+            hold=self._hold_after(state, taken_over=now.taken_over),
             held=() if now.taken_over else state.held,
+            alternatives=state.alternatives + (alternative is not now.alternative),
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
         return self._held_otherwise(after, evidence, epoch.time_s, measured=measured), Reason.USED
+
+    def _hold_after(self, state: BayesState, *, taken_over: bool) -> Hold:
+        """Return how motion is read after a reading."""
+        if not taken_over or state.alternative is None:
+            return state.hold
+        return Hold(step_unit_m=state.alternative.step_unit_m)
 
     def _held_otherwise(
         self, state: BayesState, evidence: RadioReading, time_s: float, *, measured: bool
@@ -276,6 +284,10 @@ class Weighing:
             # Many alternatives may follow each other, and each begins with the streets that fit
             # best: what speaks for a position off the map must not be forgotten with each.
             null = NullHypothesis(max(state.null.log_odds, null.log_odds))
+        # Every other alternative reads lengths in the other unit, if there is one.
+        unit_m, other_m = state.hold.step_unit_m, self.beliefs.other_unit_m(state)
+        if state.alternatives % 2 == 0 and other_m != 1.0:
+            unit_m = other_m if unit_m == 1.0 else 1.0
         return AlternativeHypothesis(
             belief,
             state.reckoning.travelled_m,
@@ -283,6 +295,7 @@ class Weighing:
             epoch.time_s,
             sources,
             null=null,
+            step_unit_m=unit_m,
         )
 
 
