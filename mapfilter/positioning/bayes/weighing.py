@@ -38,6 +38,9 @@ from mapfilter.positioning.epochs import Epoch
 
 _WEIGHED = 3
 """Salt of the draws of beliefs in which the phone was turned."""
+_OTHER_UNIT_NATS, _UNIT_OPEN_NATS = -4.0, -10.0
+"""Log odds of steps being given in another unit than metres where their speed is no walker's; log
+Bayes factor of an alternative in another unit above which a belief does not converge."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,7 @@ class Weighing:
         else:
             plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
-        doubt = doubt or _at_edge(area, before)
+        doubt = doubt or _at_edge(area, before) or _unit_open(state, before)
         reading = replace(_tracked(evidence, before, measured=measured), doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
@@ -161,7 +164,10 @@ class Weighing:
             sources = {**sources, **alternative.sources}
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
-        disputed = disputed or (not state.alternatives and beliefs.other_unit_m(state) != 1.0)
+        # A speed that is no walker's asks for the other unit, and a search in that for metres.
+        searched = state.hold.step_unit_m != 1.0 and now.belief.status is Status.SEARCHING
+        unasked = not state.alternatives and beliefs.other_unit_m(state) != 1.0
+        disputed = disputed or searched or unasked
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
@@ -270,6 +276,17 @@ class Weighing:
             return state
         return replace(state, status=Status.LOST, unclear=unclear, contested=contested)
 
+    def _unit_of_next_m(self, state: BayesState, main: MapBelief) -> float:
+        """Return the unit in which the next alternative reads lengths.
+
+        Beside a search in another unit it is metres; else every other one reads the other unit.
+        """
+        unit_m, other_m = state.hold.step_unit_m, self.beliefs.other_unit_m(state)
+        if unit_m != 1.0:
+            searching = main.status is Status.SEARCHING
+            return 1.0 if searching or state.alternatives % 2 == 0 else unit_m
+        return other_m if state.alternatives % 2 == 0 else 1.0
+
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
     ) -> AlternativeHypothesis | None:
@@ -284,14 +301,12 @@ class Weighing:
             # Many alternatives may follow each other, and each begins with the streets that fit
             # best: what speaks for a position off the map must not be forgotten with each.
             null = NullHypothesis(max(state.null.log_odds, null.log_odds))
-        # Every other alternative reads lengths in the other unit, if there is one.
-        unit_m, other_m = state.hold.step_unit_m, self.beliefs.other_unit_m(state)
-        if state.alternatives % 2 == 0 and other_m != 1.0:
-            unit_m = other_m if unit_m == 1.0 else 1.0
+        unit_m = self._unit_of_next_m(state, main)
+        prior_nats = 0.0 if unit_m == 1.0 else _OTHER_UNIT_NATS
         return AlternativeHypothesis(
             belief,
             state.reckoning.travelled_m,
-            main.log_evidence,
+            main.log_evidence + prior_nats,
             epoch.time_s,
             sources,
             null=null,
@@ -314,6 +329,14 @@ def weighed_by(
 def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> RadioReading:
     """Return a reading as a belief is weighed by it."""
     return replace(reading, tracked=measured and belief.status is Status.TRACKING)
+
+
+def _unit_open(state: BayesState, main: MapBelief) -> bool:
+    """Return whether an alternative that reads lengths in another unit keeps up."""
+    other = state.alternative
+    if other is None or other.step_unit_m == state.hold.step_unit_m:
+        return False
+    return other.log_bayes_factor(main) > _UNIT_OPEN_NATS
 
 
 def _at_edge(area: AreaFrame, belief: MapBelief) -> bool:
