@@ -153,7 +153,7 @@ class BeliefFilters:
         main = state.belief
         if not state.held or not isinstance(main, ParticleBelief):
             return False
-        return is_ahead(self.holds, state.held, main)
+        return is_ahead(self.holds, state.held, main, state.reckoning.travelled_m)
 
     def other_unit_m(self, state: BayesState) -> float:
         """Return a further unit in which steps may be given, by their speed; 1 for none.

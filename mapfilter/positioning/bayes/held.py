@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import hypot, isfinite, log, radians
+from math import hypot, isfinite, log, nan, radians
 
 import numpy as np
 
@@ -94,6 +94,8 @@ class HeldOtherwise:
         Distance travelled at the jump.
     null : NullHypothesis
         Beside this belief.
+    ahead_m : float
+        Distance travelled since which it is ahead of the main belief, and elsewhere; NaN if not.
     """
 
     belief: ParticleBelief
@@ -101,6 +103,7 @@ class HeldOtherwise:
     log_prior: float
     start_m: float
     null: NullHypothesis = field(default_factory=NullHypothesis)
+    ahead_m: float = nan
 
     def log_bayes_factor(self, main: ParticleBelief) -> float:
         """Return the logarithm of the Bayes factor against the main belief."""
@@ -228,12 +231,28 @@ def still_open(
         and travelled_m - one.start_m < rules.abandon_after_m
     ]
     kept.sort(key=lambda one: -one.log_odds(main))
-    return tuple(kept[: rules.max_beliefs])
+    return tuple(_compared(rules, one, main, travelled_m) for one in kept[: rules.max_beliefs])
 
 
-def is_ahead(rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief) -> bool:
-    """Return whether one of the beliefs is ahead of the main one, and elsewhere."""
-    return any(one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main) for one in held)
+def _compared(
+    rules: HoldRules, one: HeldOtherwise, main: ParticleBelief, travelled_m: float
+) -> HeldOtherwise:
+    """Return a belief with the distance since which it is ahead."""
+    if not (one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main)):
+        return replace(one, ahead_m=nan)
+    return one if isfinite(one.ahead_m) else replace(one, ahead_m=travelled_m)
+
+
+def is_ahead(
+    rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
+) -> bool:
+    """Return whether one of the beliefs is ahead of the main one, and elsewhere, for some way."""
+    return any(
+        travelled_m - one.ahead_m >= rules.lost_after_m
+        and one.log_odds(main) > rules.lost_log_odds
+        and one.is_elsewhere(main)
+        for one in held
+    )
 
 
 def winner(
