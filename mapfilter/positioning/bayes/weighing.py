@@ -165,9 +165,9 @@ class Weighing:
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
         # A speed that is no walker's asks for the other unit, and a search in that for metres.
-        searched = state.hold.step_unit_m != 1.0 and now.belief.status is Status.SEARCHING
-        unasked = not state.alternatives and beliefs.other_unit_m(state) != 1.0
-        disputed = disputed or searched or unasked
+        if now.belief.status is Status.SEARCHING:
+            unasked = not state.alternatives and beliefs.other_unit_m(state) != 1.0
+            disputed = disputed or unasked or state.hold.step_unit_m != 1.0
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
@@ -279,13 +279,14 @@ class Weighing:
     def _unit_of_next_m(self, state: BayesState, main: MapBelief) -> float:
         """Return the unit in which the next alternative reads lengths.
 
-        Beside a search in another unit it is metres; else every other one reads the other unit.
+        Beside a search in another unit it is metres; beside one in metres every other alternative
+        reads the other unit, and beside a position that was found every third one.
         """
         unit_m, other_m = state.hold.step_unit_m, self.beliefs.other_unit_m(state)
-        if unit_m != 1.0:
-            searching = main.status is Status.SEARCHING
-            return 1.0 if searching or state.alternatives % 2 == 0 else unit_m
-        return other_m if state.alternatives % 2 == 0 else 1.0
+        if main.status is not Status.SEARCHING:
+            other = 1.0 if unit_m != 1.0 else other_m
+            return other if state.alternatives % 3 == 2 else unit_m
+        return other_m if unit_m == 1.0 and state.alternatives % 2 == 0 else 1.0
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
