@@ -14,6 +14,7 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.world import outside_m
 
@@ -42,6 +43,9 @@ def check_logs(
         for note in opened.log.notes:
             if ", heading_rad: " in note:
                 findings.add("log-headings", str(path), f"{note}.", "warning")
+        stated = config.filter.bayes.vehicle is not None or opened.log.vehicle is not None
+        if not stated and (fault := speed_fault(opened.log.motion)):
+            findings.add("log-speeds", str(path), f"Motion: {fault}.", "warning")
         log = opened.log if lattice is None else in_frame(opened.log, lattice.crs)
         near = lattice is not None and _is_near(path, log, lattice, findings)
         # Motion without any reports is located by the streets alone.

@@ -30,17 +30,21 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import Hold, after_takeover, own_rng, still_open, winner
+from mapfilter.positioning.bayes.held import after_takeover, own_rng, still_open, winner
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.bayes.step_units import (
+    asks_for_unit,
+    hold_after_takeover,
+    is_unit_open,
+    log_odds_of_unit,
+    unit_of_next_m,
+)
 from mapfilter.positioning.epochs import Epoch
 
 _WEIGHED = 3
 """Salt of the draws of beliefs in which the phone was turned."""
-_OTHER_UNIT_NATS, _UNIT_OPEN_NATS = -4.0, -10.0
-"""Log odds of steps being given in another unit than metres where their speed is no walker's; log
-Bayes factor of an alternative in another unit above which a belief does not converge."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +136,7 @@ class Weighing:
         else:
             plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
-        doubt = doubt or _at_edge(area, before) or _unit_open(state, before)
+        doubt = doubt or _at_edge(area, before) or is_unit_open(state, before)
         reading = replace(_tracked(evidence, before, measured=measured), doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
@@ -164,10 +168,7 @@ class Weighing:
             sources = {**sources, **alternative.sources}
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
-        # A speed that is no walker's asks for the other unit, and a search in that for metres.
-        if now.belief.status is Status.SEARCHING:
-            unasked = not state.alternatives and beliefs.other_unit_m(state) != 1.0
-            disputed = disputed or unasked or state.hold.step_unit_m != 1.0
+        disputed = disputed or asks_for_unit(state, now.belief, beliefs.other_unit_m(state))
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
@@ -183,19 +184,13 @@ class Weighing:
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
             # An alternative reads headings as they are.
-            hold=self._hold_after(state, taken_over=now.taken_over),
+            hold=hold_after_takeover(state) if now.taken_over else state.hold,
             held=() if now.taken_over else state.held,
             alternatives=state.alternatives + (alternative is not now.alternative),
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
         return self._held_otherwise(after, evidence, epoch.time_s, measured=measured), Reason.USED
-
-    def _hold_after(self, state: BayesState, *, taken_over: bool) -> Hold:
-        """Return how motion is read after a reading."""
-        if not taken_over or state.alternative is None:
-            return state.hold
-        return Hold(step_unit_m=state.alternative.step_unit_m)
 
     def _held_otherwise(
         self, state: BayesState, evidence: RadioReading, time_s: float, *, measured: bool
@@ -276,18 +271,6 @@ class Weighing:
             return state
         return replace(state, status=Status.LOST, unclear=unclear, contested=contested)
 
-    def _unit_of_next_m(self, state: BayesState, main: MapBelief) -> float:
-        """Return the unit in which the next alternative reads lengths.
-
-        Beside a search in another unit it is metres; beside one in metres every other alternative
-        reads the other unit, and beside a position that was found every third one.
-        """
-        unit_m, other_m = state.hold.step_unit_m, self.beliefs.other_unit_m(state)
-        if main.status is not Status.SEARCHING:
-            other = 1.0 if unit_m != 1.0 else other_m
-            return other if state.alternatives % 3 == 2 else unit_m
-        return other_m if unit_m == 1.0 and state.alternatives % 2 == 0 else 1.0
-
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
     ) -> AlternativeHypothesis | None:
@@ -302,12 +285,11 @@ class Weighing:
             # Many alternatives may follow each other, and each begins with the streets that fit
             # best: what speaks for a position off the map must not be forgotten with each.
             null = NullHypothesis(max(state.null.log_odds, null.log_odds))
-        unit_m = self._unit_of_next_m(state, main)
-        prior_nats = 0.0 if unit_m == 1.0 else _OTHER_UNIT_NATS
+        unit_m = unit_of_next_m(state, main, self.beliefs.other_unit_m(state))
         return AlternativeHypothesis(
             belief,
             state.reckoning.travelled_m,
-            main.log_evidence + prior_nats,
+            main.log_evidence + log_odds_of_unit(unit_m),
             epoch.time_s,
             sources,
             null=null,
@@ -330,14 +312,6 @@ def weighed_by(
 def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> RadioReading:
     """Return a reading as a belief is weighed by it."""
     return replace(reading, tracked=measured and belief.status is Status.TRACKING)
-
-
-def _unit_open(state: BayesState, main: MapBelief) -> bool:
-    """Return whether an alternative that reads lengths in another unit keeps up."""
-    other = state.alternative
-    if other is None or other.step_unit_m == state.hold.step_unit_m:
-        return False
-    return other.log_bayes_factor(main) > _UNIT_OPEN_NATS
 
 
 def _at_edge(area: AreaFrame, belief: MapBelief) -> bool:
