@@ -228,7 +228,7 @@ def test_who_stands_may_turn_there():
 
 def test_the_two_reasons_to_be_lost_are_told_apart():
     state, rng = begun()
-    held = HeldOtherwise(beside(state.belief, 200.0), Hold(1.0, 3.0), 3.0, 0.0)
+    held = HeldOtherwise(beside(state.belief, 200.0), Hold(1.0, 3.0), 3.0, 0.0, ahead_m=-7.0)
     rest = (1.0, 0.0, 0.0)
     state, output = walked(replace(state, held=(held,)), rng, rest)
     assert (output.fix.status, state.unclear, state.contested) == (Status.LOST, False, True)
