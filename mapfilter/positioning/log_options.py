@@ -90,7 +90,7 @@ def _whose_motion(log: TrackLog) -> tuple[bool | None, str]:
         return log.vehicle, f"motion: {whose}, as the log states it (filter.bayes.vehicle)"
     signs = vehicle_signs(log)
     if signs is None:
-        fault = speed_fault(log.motion)
+        fault = speed_fault(log.motion) if log.imu is None else ""
         advice = "if a vehicle moved, set filter.bayes.vehicle = true"
         return None, f"motion: {fault}; {advice}" if fault else ""
     if not signs.fast:

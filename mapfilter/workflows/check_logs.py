@@ -8,6 +8,7 @@ from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
 from mapfilter.geodesy import Lattice, same_crs, short_crs
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -43,8 +44,8 @@ def check_logs(
         for note in opened.log.notes:
             if ", heading_rad: " in note:
                 findings.add("log-headings", str(path), f"{note}.", "warning")
-        stated = config.filter.bayes.vehicle is not None or opened.log.vehicle is not None
-        if not stated and (fault := speed_fault(opened.log.motion)):
+        whose = config.filter.bayes.of(BayesFilter).vehicle, opened.log.vehicle, opened.log.imu
+        if all(one is None for one in whose) and (fault := speed_fault(opened.log.motion)):
             findings.add("log-speeds", str(path), f"Motion: {fault}.", "warning")
         log = opened.log if lattice is None else in_frame(opened.log, lattice.crs)
         near = lattice is not None and _is_near(path, log, lattice, findings)

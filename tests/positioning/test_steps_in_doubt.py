@@ -147,7 +147,9 @@ def test_a_position_that_may_have_been_left_is_lost_with_a_reason():
     for name, positioner in (("doubt", AREA), ("none", without_doubt(AREA))):
         wrong = 0
         for seed in (1, 2, 3, 4):
-            found = followed(zero_after(walk_log(TOWN, seed, error_db=3.0), 100.0), seed, positioner)
+            found = followed(
+                zero_after(walk_log(TOWN, seed, error_db=3.0), 100.0), seed, positioner
+            )
             wrong += sum(
                 off_m > 50 and status in (Status.CONVERGED, Status.TRACKING)
                 for _, status, off_m, _, _ in found
