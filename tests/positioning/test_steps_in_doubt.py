@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_town import Town, walk_log
+from made_town import Town, slowed, walk_log
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.held import Hold
@@ -237,21 +237,18 @@ def test_when_an_alternative_in_another_unit_starts_and_holds_a_belief_back():
         assert hold_after_takeover(state) == Hold(step_unit_m=unit_m)
 
 
-def in_feet(log, slower):
+def in_feet(log):
     """A walk of a walker's speed, whose steps are in feet."""
-    tables = {}
-    for name in ("motion", "radio", "truth"):
-        table = getattr(log, name)
-        tables[name] = table.assign(time_s=table["time_s"] * slower)
-    motion = tables.pop("motion")
-    return make_log(log.crs, motion=motion.assign(step_m=motion["step_m"] / FOOT_M), **tables)
+    log = slowed(log)
+    motion = log.motion.assign(step_m=log.motion["step_m"] / FOOT_M)
+    return make_log(log.crs, motion=motion, radio=log.radio, truth=log.truth)
 
 
 def test_a_walk_in_feet_is_located_and_says_so():
     """Rows of 5 m every 4 s are a walker's; in feet they look like a cyclist's."""
     right, reasons, wrong = 0, set(), 0
     for seed in (1, 2, 3):
-        log = in_feet(walk_log(TOWN, seed, error_db=3.0), 4.0)
+        log = in_feet(walk_log(TOWN, seed, error_db=3.0))
         rng, truth = np.random.default_rng(seed), log.truth
         state, ends = AREA.begin(), []
         for epoch in epochs(log):
