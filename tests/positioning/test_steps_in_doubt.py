@@ -11,7 +11,7 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.held import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.rest import Rest
-from mapfilter.positioning.bayes.sensors import SensorWatch
+from mapfilter.positioning.bayes.sensors import SensorWatch, watched
 from mapfilter.positioning.bayes.step_units import (
     asks_for_unit,
     hold_after_takeover,
@@ -19,7 +19,7 @@ from mapfilter.positioning.bayes.step_units import (
     log_odds_of_unit,
     unit_of_next_m,
 )
-from mapfilter.positioning.epochs import ReportRow, epochs
+from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
 
@@ -195,6 +195,18 @@ def test_a_measured_position_leaves_no_doubt():
 def test_the_unit_with_which_a_speed_is_a_walkers(speed_mps, unit_m):
     assert SensorWatch(rows=30, speed_mps=speed_mps).other_unit_m == pytest.approx(unit_m)
     assert SensorWatch(rows=29, speed_mps=speed_mps).other_unit_m == 1.0
+    fast = SensorWatch(rows=30, speed_mps=speed_mps, fastest_mps=9.1)
+    assert fast.other_unit_m == 1.0
+
+
+def test_a_row_of_a_vehicle_ends_the_question_of_the_unit():
+    """But not rows of 2.2 m that come two at a time, a millisecond apart."""
+    watch, times = SensorWatch(), [k + apart for k in range(40) for apart in (0.0, 0.001)]
+    for time_s in times:
+        watch, _, _ = watched(watch, Epoch(time_s, (MotionStep(2.2, 0.1 * time_s),)))
+    assert watch.other_unit_m == pytest.approx(FOOT_M)
+    watch, _, _ = watched(watch, Epoch(40.0, (MotionStep(12.0, 0.0),)))
+    assert watch.other_unit_m == 1.0
 
 
 def test_lengths_are_read_in_the_unit():
@@ -233,7 +245,9 @@ def test_when_an_alternative_in_another_unit_starts_and_holds_a_belief_back():
     for nats, unit_m, is_open in ((-9.0, FOOT_M, True), (-11.0, FOOT_M, False), (-1.0, 1.0, False)):
         other = SimpleNamespace(step_unit_m=unit_m, log_bayes_factor=lambda _, nats=nats: nats)
         state = unit_state(alternative=other)
-        assert is_unit_open(state, SEARCH) == is_open
+        assert is_unit_open(state, SEARCH, FOOT_M) == is_open
+        # A row has been faster than any walker's, in feet or not.
+        assert not is_unit_open(state, SEARCH, 1.0)
         assert hold_after_takeover(state) == Hold(step_unit_m=unit_m)
 
 

@@ -52,10 +52,13 @@ def log_odds_of_unit(unit_m: float) -> float:
     return 0.0 if unit_m == 1.0 else _OTHER_UNIT_NATS
 
 
-def is_unit_open(state: BayesState, main: MapBelief) -> bool:
-    """Return whether an alternative that reads lengths in another unit keeps up."""
-    other = state.alternative
-    if other is None or other.step_unit_m == state.hold.step_unit_m:
+def is_unit_open(state: BayesState, main: MapBelief, other_m: float) -> bool:
+    """Return whether an alternative that reads lengths in another unit keeps up.
+
+    ``other_m`` is the unit in which the speed would be a walker's; 1 for metres.
+    """
+    other, unit_m = state.alternative, state.hold.step_unit_m
+    if other is None or other.step_unit_m == unit_m or (other_m == unit_m == 1.0):
         return False
     return other.log_bayes_factor(main) > _OPEN_NATS
 

@@ -136,7 +136,8 @@ class Weighing:
         else:
             plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
-        doubt = doubt or _at_edge(area, before) or is_unit_open(state, before)
+        other_m = beliefs.other_unit_m(state)
+        doubt = doubt or _at_edge(area, before) or is_unit_open(state, before, other_m)
         reading = replace(_tracked(evidence, before, measured=measured), doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
@@ -168,7 +169,7 @@ class Weighing:
             sources = {**sources, **alternative.sources}
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
-        disputed = disputed or asks_for_unit(state, now.belief, beliefs.other_unit_m(state))
+        disputed = disputed or asks_for_unit(state, now.belief, other_m)
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
