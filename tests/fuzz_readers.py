@@ -18,7 +18,7 @@ from made_recordings import MADE
 
 from mapfilter.config.load import load_config
 from mapfilter.geodesy import Lattice
-from mapfilter.gnss.orbits import read_yuma
+from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
 from mapfilter.radio.cells import read_cell_plan
 from mapfilter.radio.msi import read_msi
@@ -27,7 +27,7 @@ from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.layers import read_layer_roads
 from mapfilter.roads.osm import read_ways
-from mapfilter.survey.measurements import read_measurements
+from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.store import read_log, write_log

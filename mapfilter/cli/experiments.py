@@ -130,12 +130,15 @@ def bench(
             "--peers", help="Filter: a step beside NumPy, particles, Stone Soup and filterpy."
         ),
     ] = False,
+    memory: Annotated[
+        bool, typer.Option("--memory", help="The most memory that the stage's tasks take.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure how fast a stage is on this machine."""
+    """Measure how fast a stage is on this machine, or what memory it takes."""
     from mapfilter.workflows.bench import run_bench
 
-    print_result(run_bench(stage, runs=runs, peers=peers), as_json)
+    print_result(run_bench(stage, runs=runs, peers=peers, memory=memory), as_json)
 
 
 def evaluate(

@@ -69,7 +69,13 @@ def check_filter_name(value: str) -> str:
     return value
 
 
+def listed_file(value: Any) -> Any:
+    """Let one file stand for a list of one."""
+    return [value] if isinstance(value, str) else value
+
+
 FilePath = Annotated[Path, BeforeValidator(resolve_path)]
+Files = Annotated[tuple[FilePath, ...], BeforeValidator(listed_file), Field(strict=False)]
 MapName = Annotated[str, BeforeValidator(resolve_map)]
 Box = Annotated[
     tuple[float, float, float, float],

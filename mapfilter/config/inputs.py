@@ -1,11 +1,11 @@
-"""The sections of a configuration about its inputs: area, cells, roads, rasters, database."""
+"""The sections of a configuration about its inputs: area, cells, rasters, database."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import model_validator
 
 from mapfilter.config.fields import (
     EMBEDDED_MAP,
@@ -13,34 +13,18 @@ from mapfilter.config.fields import (
     SYNTHETIC_MAPS,
     Box,
     Columns,
-    Count,
     FilePath,
     MapName,
     Pair,
     Section,
     Size,
     with_columns,
-    with_options,
 )
 from mapfilter.database.build import MARGIN_DB, TILE_PX
 from mapfilter.options import NotNegative, Positive, Seed
-from mapfilter.propagation.models import GroundTruthErrors, ModelName, PredictionModel
 from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
-from mapfilter.roads.buildings import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
-from mapfilter.roads.corridors import MAX_ACCURACY_M, MAX_GAP_M
-from mapfilter.survey.measured_map import SurveyOptions
-from mapfilter.survey.measurement_rows import FIELDS as MEASUREMENT_COLUMNS
-from mapfilter.survey.measurements import SESSION_GAP_S
 
 _PLACE_OF_A_MADE_CITY = {"southwest": (3.0, 0.0), "size_m": (3000.0, 3000.0)}
-
-
-def _listed(value: Any) -> Any:
-    """Let one file stand for a list of one."""
-    return [value] if isinstance(value, str) else value
-
-
-Files = Annotated[tuple[FilePath, ...], BeforeValidator(_listed), Field(strict=False)]
 
 
 class Area(Section):
@@ -159,211 +143,6 @@ class Cells(Section):
     height_m: Positive = 30.0
     seed: Seed = 0
     columns: CellColumns = CellColumns()
-
-
-@with_columns(*MEASUREMENT_COLUMNS)
-class SurveyColumns(Columns):
-    """``[prediction.survey.columns]``: names of the columns of a CSV file with others.
-
-    Each key is a field of a measurement; its value is the name of its column. Cells are named by
-    ``cell``, or by ``mcc``, ``mnc``, ``lac`` and ``ci``.
-    """
-
-
-@with_options(SurveyOptions, without=("most_points",))
-class SurveySection(Section):
-    """``[prediction.survey]``: measurements, and how they become rasters (model "survey").
-
-    Parameters
-    ----------
-    files : list of Path
-        Files of measurements, or folders of them.
-    format : {"auto", "csv", "opencellid", "towercollector", "antennas"}
-        Format of the files; "auto" detects it from each, and reads recordings of other programs
-        with cells and positions, too.
-    session_gap_s : float
-        A longer silence begins a new session.
-    max_accuracy_m : float
-        Rows with less accurate positions are left out.
-    calibrate : Path, optional
-        Predicted rasters whose offset, slope and residuals are fitted in place of a path loss;
-        ``[rasters]`` then gives what their files lack.
-    fill : bool
-        Keep the trend, or the prediction, where nothing was measured.
-    cross_validate : bool
-        Leave each session out in turn, and stretch the deviations to the errors found.
-    """
-
-    files: Files = ()
-    format: Literal["auto", "csv", "opencellid", "towercollector", "antennas"] = "auto"
-    session_gap_s: Positive = SESSION_GAP_S
-    max_accuracy_m: Positive = 50.0
-    calibrate: FilePath | None = None
-    fill: bool = False
-    cross_validate: bool = True
-    columns: SurveyColumns = SurveyColumns()
-
-
-class BuildingsSection(Section):
-    """``[buildings]``: where buildings come from, and how high they are.
-
-    Parameters
-    ----------
-    default_height_m : float
-        Height of a building without height and storeys.
-    storey_m : float
-        Height of a storey.
-    layer : Path, optional
-        Vector file, in any format of GDAL, that replaces the buildings of the map.
-    layer_name : str, optional
-        Layer of a file with several.
-    height_column : str, optional
-        Column of heights in metres.
-    levels_column : str, optional
-        Column of numbers of storeys, used where there is no height.
-    """
-
-    default_height_m: Positive = DEFAULT_HEIGHT_M
-    storey_m: Positive = STOREY_HEIGHT_M
-    layer: FilePath | None = None
-    layer_name: str | None = None
-    height_column: str | None = None
-    levels_column: str | None = None
-
-    @model_validator(mode="after")
-    def _columns_go_with_a_layer(self) -> BuildingsSection:
-        named = (self.layer_name, self.height_column, self.levels_column)
-        if self.layer is None and named != (None, None, None):
-            raise ValueError("layer with layer_name, height_column and levels_column")
-        return self
-
-
-class Tracks(Section):
-    """``[roads.tracks]``: measurements whose tracks replace the ways, where there is no map.
-
-    Parameters
-    ----------
-    files : list of Path
-        Files or folders, in the format and with the columns of ``[prediction.survey]``.
-    max_accuracy_m : float
-        Less accurate positions are left out.
-    max_gap_m : float
-        Positions farther apart are not joined to a way.
-    min_sessions : int
-        Ways that fewer sessions passed are left out.
-    """
-
-    files: Files = ()
-    max_accuracy_m: Positive = MAX_ACCURACY_M
-    max_gap_m: Positive = MAX_GAP_M
-    min_sessions: Count = 1
-
-
-class Roads(Section):
-    """``[roads]``: ways and squares of the map.
-
-    Parameters
-    ----------
-    profile : {"walking", "driving"}
-        Ways that count.
-    half_width_m : float
-        Points as near as this to the centre line of a way belong to it.
-    half_width_by_class_m : dict
-        In place of ``half_width_m`` for some classes of way, such as ``steps``; 0 leaves a class
-        out.
-    squares : bool
-        Whether pedestrian squares count (walking).
-    cut_buildings : bool
-        Whether points inside buildings are removed.
-    cut_water : bool
-        Whether points in rivers and lakes are removed, except on bridges.
-    water_layer : Path, optional
-        Vector file of further water, such as the sea.
-    water_layer_name : str, optional
-        Layer of a file with several.
-    layer : Path, optional
-        Vector file, in any format of GDAL, that replaces the ways and squares of the map.
-    layer_name : str, optional
-        Layer of a file with several.
-    class_column : str, optional
-        Column of the class of way.
-    id_column : str, optional
-        Column of the number of the way; by default the file's own, from 1.
-    raster : Path, optional
-        Raster of roads that replaces the ways and squares of the map.
-    raster_classes : dict
-        Value of its pixels for each class of way, such as ``residential = 1``; others are no roads.
-    landuse : Path, optional
-        Land-use raster that alone decides which points belong to the map; ways only name them.
-    landuse_table : Path, optional
-        Table (CSV) of its codes.
-    """
-
-    profile: Literal["walking", "driving"] = "walking"
-    half_width_m: Positive = 6.0
-    half_width_by_class_m: dict[str, NotNegative] = Field(default_factory=dict)
-    squares: bool = True
-    cut_buildings: bool = True
-    cut_water: bool = True
-    water_layer: FilePath | None = None
-    water_layer_name: str | None = None
-    layer: FilePath | None = None
-    layer_name: str | None = None
-    class_column: str | None = None
-    id_column: str | None = None
-    raster: FilePath | None = None
-    raster_classes: dict[str, int] = Field(default_factory=dict)
-    landuse: FilePath | None = None
-    landuse_table: FilePath | None = None
-    tracks: Tracks = Tracks()
-
-    @model_validator(mode="after")
-    def _what_goes_together(self) -> Roads:
-        if (self.landuse is None) != (self.landuse_table is None):
-            raise ValueError("landuse and landuse_table together")
-        named = (self.layer_name, self.class_column, self.id_column)
-        if self.layer is None and named != (None, None, None):
-            raise ValueError("layer with layer_name, class_column and id_column")
-        if self.water_layer is None and self.water_layer_name is not None:
-            raise ValueError("water_layer with water_layer_name")
-        if (self.raster is None) != (not self.raster_classes):
-            raise ValueError("raster and raster_classes together")
-        if (self.layer is not None) + (self.raster is not None) + bool(self.tracks.files) > 1:
-            raise ValueError("one of layer, raster and tracks.files")
-        return self
-
-    @property
-    def replace_map(self) -> bool:
-        """Whether ways come from elsewhere than the map."""
-        return self.layer is not None or self.raster is not None or bool(self.tracks.files)
-
-
-@with_options(GroundTruthErrors)
-class GroundTruthSection(Section):
-    """``[prediction.ground_truth]``: how the simulated ground truth differs from the prediction.
-
-    Parameters
-    ----------
-    write : bool
-        Whether predict also writes rasters of the ground truth.
-    """
-
-    write: bool = True
-
-
-@with_options(PredictionModel)
-class Prediction(Section):
-    """``[prediction]``: the propagation model, or a survey.
-
-    Parameters
-    ----------
-    model : str
-        Propagation model, or "survey" for rasters from measurements (``[prediction.survey]``).
-    """
-
-    model: ModelName | Literal["survey"] = "cost231_walfisch_ikegami"
-    ground_truth: GroundTruthSection = GroundTruthSection()
-    survey: SurveySection = SurveySection()
 
 
 class Rasters(Section):

@@ -14,22 +14,16 @@ from mapfilter.config.fields import (
     Columns,
     Count,
     FilePath,
+    Files,
     FilterName,
     Pair,
     Section,
     with_columns,
     with_options,
 )
-from mapfilter.config.inputs import (
-    Area,
-    BuildingsSection,
-    Cells,
-    Database,
-    Files,
-    Prediction,
-    Rasters,
-    Roads,
-)
+from mapfilter.config.inputs import Area, Cells, Database, Rasters
+from mapfilter.config.prediction import Prediction
+from mapfilter.config.ways import BuildingsSection, Roads
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter

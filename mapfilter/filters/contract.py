@@ -83,12 +83,16 @@ class MotionStep:
     spread_m : float
         Root mean square of the displacement, to all sides, of a step without heading; NaN for the
         distance itself.
+    sampling_sd_m : float
+        Deviation of the displacement, east as north, of a step that was made of velocities seconds
+        apart; besides the errors that a filter assumes of every step.
     """
 
     step_m: float
     heading_rad: float
     turn_rad: float = float("nan")
     spread_m: float = float("nan")
+    sampling_sd_m: float = 0.0
 
     @property
     def all_sides_m(self) -> float:

@@ -262,6 +262,7 @@ class GridFilter(Generic[PriorT, ReadingT]):
         if reason is Reason.USED:
             east_m += motion.step_m * cos(motion.heading_rad)
             north_m += motion.step_m * sin(motion.heading_rad)
+            spread_m2 += motion.sampling_sd_m**2
         else:
             spread_m2 += motion.all_sides_m**2 / 2
         waiting = (east_m, north_m, length_m + abs(motion.step_m), spread_m2)

@@ -112,10 +112,15 @@ def bound_table() -> Floats32:
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def pixels(state: Floats32, raster: RasterFrame) -> Ints32:
     """Return the flat pixel of each hypothesis; beyond the raster that of its edge."""
+    return pixels_up_to(state, raster, raster.rows - 1, raster.cols - 1)
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def pixels_up_to(state: Floats32, raster: RasterFrame, last_row: int, last_col: int) -> Ints32:
+    """Return the flat pixel of each hypothesis; rows and columns beyond the last ones are these."""
     east, north = state[0], state[1]
     w, n, k, zero = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m), _F(0.0)
-    last_col, last_row = np.int32(raster.cols - 1), np.int32(raster.rows - 1)
-    width = np.int32(raster.cols)
+    lower, right, width = np.int32(last_row), np.int32(last_col), np.int32(raster.cols)
     pixel = np.empty(state.shape[1], dtype=np.int32)
     for i in range(pixel.size):
         x = (east[i] - w) * k
@@ -123,8 +128,8 @@ def pixels(state: Floats32, raster: RasterFrame) -> Ints32:
         x = x if x > zero else zero
         y = y if y > zero else zero
         col, row = np.int32(x), np.int32(y)
-        col = col if col < last_col else last_col
-        row = row if row < last_row else last_row
+        col = col if col < right else right
+        row = row if row < lower else lower
         pixel[i] = np.int32(np.int32(row * width) + col)
     return pixel
 

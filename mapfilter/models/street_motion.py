@@ -21,7 +21,7 @@ for each hypothesis and summed out exactly, so that no hypotheses are spent on i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, pi, radians, sqrt
+from math import exp, hypot, pi, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -167,12 +167,17 @@ def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
 
 
 def move(
-    state: Floats32, step_m: float, heading_rad: float, errors: MotionErrors, key: np.uint64
+    state: Floats32,
+    step_m: float,
+    heading_rad: float,
+    errors: MotionErrors,
+    key: np.uint64,
+    sampling_sd_m: float = 0.0,
 ) -> Floats32:
     """Return all hypotheses (8 or more, N) after one measured step; further rows stay.
 
     The errors are added to the heading. A step of length 0 changes nothing. ``key`` is from
-    :func:`mapfilter._kernels.draw_key`.
+    :func:`mapfilter._kernels.draw_key`; ``sampling_sd_m`` is the step's own error, to each side.
     """
     length = abs(step_m)
     root = length**0.5
@@ -181,8 +186,8 @@ def move(
     parts = max(errors.typical_step_m / length, 1.0) ** 0.5 if length > 0 else 1.0
     turned, stretched = exp(-length / errors.heading_m), exp(-length / errors.stretch_m)
     noise = _Noise(
-        errors.step_sd_m * (length / errors.typical_step_m) ** 0.5,
-        length * white_rad * parts,
+        hypot(errors.step_sd_m * (length / errors.typical_step_m) ** 0.5, sampling_sd_m),
+        hypot(length * white_rad * parts, sampling_sd_m),
         errors.bias_drift_rad_per_sqrt_m * root,
         errors.scale_drift_per_sqrt_m * root,
         turned,

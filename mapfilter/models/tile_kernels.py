@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from mapfilter._types import Bytes, Floats32, Ints, Ints32
-from mapfilter.models.fingerprint import RasterFrame
+from mapfilter.models.fingerprint import RasterFrame, pixels_up_to
 
 _F = np.float32
 
@@ -76,22 +76,7 @@ def upper_left(state: Floats32, raster: RasterFrame) -> Ints32:
 
     ``raster`` is from the centre of its first pixel.
     """
-    zero = _F(0.0)
-    west, top, k = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m)
-    last_col, last_row = np.int32(raster.cols - 2), np.int32(raster.rows - 2)
-    width = np.int32(raster.cols)
-    east, north = state[0], state[1]
-    first = np.empty(state.shape[1], dtype=np.int32)
-    for i in range(first.size):
-        x = (east[i] - west) * k
-        y = (top - north[i]) * k
-        x = x if x > zero else zero
-        y = y if y > zero else zero
-        col, row = np.int32(x), np.int32(y)
-        col = col if col < last_col else last_col
-        row = row if row < last_row else last_row
-        first[i] = np.int32(row * width) + col
-    return first
+    return pixels_up_to(state, raster, raster.rows - 2, raster.cols - 2)
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
 from math import isfinite, isnan, nan
 from typing import Any, NamedTuple
 
@@ -155,6 +155,12 @@ def epochs(log: TrackLog) -> list[Epoch]:
     return merged
 
 
+def epoch_columns(table: str) -> tuple[str, ...]:
+    """Return the columns of a log's table that rows of an epoch have; optional ones come last."""
+    usual = (known.name for known in SCHEMA[table][1:] if not known.optional)
+    return (*usual, *_FIELDS[table].more)
+
+
 def make_epoch(time_s: float, rows: Mapping[str, Sequence[Sequence[Any]]]) -> Epoch:
     """Make one epoch of rows as they arrive.
 
@@ -162,13 +168,13 @@ def make_epoch(time_s: float, rows: Mapping[str, Sequence[Sequence[Any]]]) -> Ep
     ----------
     rows : mapping of str to sequences
         By table of :data:`mapfilter.tracks.schema.TABLES`; the values of a row are those of the
-        table's columns after ``time_s`` that are not optional, in their order. Missing numbers are
-        NaN, missing integers and texts None.
+        table's columns after ``time_s`` by :func:`epoch_columns`, without those at the end that
+        may be missing. Missing numbers are NaN, missing integers and texts None.
 
     Examples
     --------
     >>> make_epoch(1.0, {"motion": [(1.4, 0.5, nan)]}).motion
-    (MotionStep(step_m=1.4, heading_rad=0.5, turn_rad=nan, spread_m=nan),)
+    (MotionStep(step_m=1.4, heading_rad=0.5, turn_rad=nan, spread_m=nan, sampling_sd_m=0.0),)
     """
     made = {name: [_FIELDS[name].row(*values) for values in rows[name]] for name in rows}
     return Epoch(
@@ -188,7 +194,7 @@ class _Timed(NamedTuple):
 def _by_time(log: TrackLog, name: str) -> _Timed:
     """Return the rows of a table; equal ones, as reports repeat themselves, are one object."""
     table: pd.DataFrame = getattr(log, name)
-    columns = [known.name for known in SCHEMA[name][1:] if not known.optional]
+    columns = [column for column in epoch_columns(name) if column in table]
     rows: list[Any] = []
     made: dict[tuple[Any, ...], Any] = {}
     for begin in range(0, len(table), _AT_ONCE):
@@ -222,6 +228,13 @@ def _report_row(
     return ReportRow(role, cell, arfcn, bsic, level_dbm, censored or 0, advance)
 
 
+def _motion_step(
+    step_m: float, heading_rad: float, turn_rad: float, sampling_sd_m: float = 0.0
+) -> MotionStep:
+    known_m = 0.0 if isnan(sampling_sd_m) else sampling_sd_m
+    return MotionStep(step_m, heading_rad, turn_rad, sampling_sd_m=known_m)
+
+
 def _pseudorange(name: str, range_m: float, sigma_m: float, *place_m: float) -> Pseudorange:
     return Pseudorange(name, range_m, sigma_m, (place_m[0], place_m[1], place_m[2]))
 
@@ -231,15 +244,19 @@ def _last(rows: list[Any]) -> Any:
 
 
 class _Field(NamedTuple):
-    """A field of an epoch: its name, a row by the columns of its table, and the rows of a time."""
+    """A field of an epoch: its name, a row by the columns of its table, and the rows of a time.
+
+    ``more`` are columns that a table may lack.
+    """
 
     name: str
     row: Callable[..., Any]
     of_rows: Callable[[list[Any]], Any] = tuple
+    more: tuple[str, ...] = ()
 
 
 _FIELDS = {
-    "motion": _Field("motion", MotionStep),
+    "motion": _Field("motion", _motion_step, more=("sampling_sd_m",)),
     "radio": _Field("radio", _report_row),
     "gnss": _Field("fix", GnssFix, _last),
     "pseudoranges": _Field("ranges", _pseudorange),
@@ -272,7 +289,7 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
         heading_rad = 0.0
     else:
         return step, heading_rad
-    return MotionStep(step.step_m, heading_rad, step.turn_rad), heading_rad
+    return replace(step, heading_rad=heading_rad), heading_rad
 
 
 def serving_cell(epoch: Epoch) -> str | None:

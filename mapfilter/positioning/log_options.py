@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.models.street_motion import MotionErrors
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
@@ -22,12 +23,15 @@ OptionsT = TypeVar("OptionsT")
 _LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG = 0.05, 0.5
 """Least errors that a filter assumes: particles need some spread."""
 _STANDING_MPS = 0.2
+_LONG_ROW_M = 15.0
+"""Rows that are usually longer are a vehicle's, seconds apart."""
 
 
 def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str, ...]]:
     """Return options with what a log states in place of defaults, and notes on the changes.
 
-    Errors of motion that were measured (``log.imu``) are those that the filter assumes; the step of
+    Errors of motion that were measured (``log.imu``) are those that the filter assumes, the map
+    filter those of a typical step where rows are longer; the step of
     timing advance is that of the technology of all reports that have one; a step of levels (the
     column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of levels. The
     motion of wheels is a vehicle's (``log.vehicle``); where a log does not state it, turns without
@@ -56,9 +60,12 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         if vehicle is not None:
             changes["vehicle"] = vehicle
         notes += [note] if note else []
+    stated = _motion_errors(log)
+    if isinstance(options, BayesFilter) and stated:
+        stated["step_sd_m"] = _by_typical_step(stated["step_sd_m"], log)
     measured = {
         name: value
-        for name, value in _motion_errors(log).items()
+        for name, value in stated.items()
         if _is_default(options, default, name) and value != default[name]
     }
     if measured:
@@ -125,6 +132,21 @@ def _motion_errors(log: TrackLog) -> dict[str, float]:
     if walk_deg > 0 and moving.size:
         found["drift_deg_per_sqrt_m"] = walk_deg / float(np.median(moving)) ** 0.5
     return found
+
+
+def _by_typical_step(row_sd_m: float, log: TrackLog) -> float:
+    """Return the deviation of the map filter's typical step, by that of a vehicle's long rows.
+
+    The filter's white error grows with the root of the distance from that of a typical step; a row
+    of a vehicle may be 50 m long. Shorter rows count as steps.
+    """
+    step_m = log.motion["step_m"].abs().to_numpy()
+    moving = step_m[step_m > _LEAST_STEP_SD_M]
+    usual_m = float(np.median(moving)) if moving.size else 0.0
+    if usual_m <= _LONG_ROW_M:
+        return row_sd_m
+    share = float((MotionErrors().typical_step_m / usual_m) ** 0.5)
+    return max(share * row_sd_m, _LEAST_STEP_SD_M)
 
 
 def timing_step_m(log: TrackLog) -> float | None:

@@ -22,6 +22,7 @@ from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.ascii_grids import open_ascii_grid
 from mapfilter.rasters.atoll import INDEX_SUFFIXES, IndexRow, find_index, read_index
 from mapfilter.rasters.files import (
     Declared,
@@ -32,7 +33,7 @@ from mapfilter.rasters.files import (
     check_plausible,
 )
 from mapfilter.rasters.geotiff import open_geotiff
-from mapfilter.rasters.plain_grids import open_ascii_grid, open_raw_grid
+from mapfilter.rasters.raw_grids import open_raw_grid
 from mapfilter.rasters.resampling import Resampling, common_lattice, read_on
 
 Opener = Callable[[Path, str, Declared], RasterFile]

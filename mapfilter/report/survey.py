@@ -38,7 +38,7 @@ from mapfilter.report.canvas import (
     single_axes,
     styled,
 )
-from mapfilter.survey.measured_map import rms
+from mapfilter.survey.leave_out import rms
 
 MAX_CELLS = 4
 

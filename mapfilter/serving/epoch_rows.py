@@ -9,7 +9,7 @@ from typing import Any
 from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import wrap_rad
-from mapfilter.positioning.epochs import Epoch, make_epoch
+from mapfilter.positioning.epochs import Epoch, epoch_columns, make_epoch
 from mapfilter.radio.identities import LIMITS
 from mapfilter.serving.documents import (
     RequestError,
@@ -37,7 +37,6 @@ MOST_EPOCHS = 300
 _MOST_ROWS = 200
 _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
-_USUAL = {name: [c for c in SCHEMA[name][1:] if not c.optional] for name in _TABLES}
 _COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
 _LEAST_PLACE_M, _MOST_PLACE_M = 2.0e7, 5.5e7
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
@@ -109,7 +108,7 @@ def _rows(
         if table == "motion" and isfinite(values["heading_rad"]):
             values["heading_rad"] = float(wrap_rad(values["heading_rad"]))
         # Rows that repeat another one exactly count once, as in a log.
-        found[tuple(values[column.name] for column in _USUAL[table])] = None
+        found[tuple(values[name] for name in epoch_columns(table))] = None
     return list(found)
 
 

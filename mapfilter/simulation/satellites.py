@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
+from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.noise import correlated_along, multipath_bias_m
-from mapfilter.gnss.orbits import Almanac, gps_time, satellite_positions_m
+from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.gnss.sky import Directions, GridFrame, Skyline, directions, ecef_from_lonlat
 from mapfilter.models.motion import clock_noise
 from mapfilter.options import NotNegative, Options, Positive, Share

@@ -19,7 +19,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import minimize
 
 from mapfilter._types import Floats, Ints
-from mapfilter.survey.measurements import Points
+from mapfilter.survey.measured_points import Points
 
 Covariate = Callable[[Floats, Floats], Floats]
 """From east and north (m) to a value for each place."""

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from mapfilter._html import html_table, shortened
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
+from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.broadcast import UNPLACED
-from mapfilter.gnss.orbits import Almanac
 from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import check_clocks, check_start, check_steps, early_ends

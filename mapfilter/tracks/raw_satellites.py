@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
+from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.atmosphere import directions, ionosphere_m, receiver_m, troposphere_m
 from mapfilter.gnss.broadcast import gps_from_utc_s, place_by_broadcast
-from mapfilter.gnss.orbits import WEEK_S
 from mapfilter.tracks.readers.recording import Recording
 
 PLACE = ("x_m", "y_m", "z_m")

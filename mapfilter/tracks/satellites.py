@@ -11,8 +11,9 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
+from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.earth_rotation import LIGHT_MPS, in_frame_of_reception
-from mapfilter.gnss.orbits import Almanac, gps_time, satellite_positions_m
+from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.tracks.schema import PLACE
 
 _USUAL_M = 2.25e7

@@ -94,6 +94,7 @@ TABLES: dict[str, Table] = {
             Column("step_m", -1e6, 1e6, "metres"),
             Column("heading_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
             Column("turn_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
+            Column("sampling_sd_m", 0, 1e6, "metres >= 0", optional=True),
         ),
     ),
     "radio": Table(

@@ -29,7 +29,7 @@ from mapfilter._io import (
     write_json,
 )
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
-from mapfilter.gnss.orbits import read_yuma
+from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.tracks.imu_noise import parse_imu_noise
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES

@@ -40,6 +40,7 @@ from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:
     from mapfilter.workflows.bench_filter import FilterBench
+    from mapfilter.workflows.bench_memory import MemoryBench
     from mapfilter.workflows.bench_peers import PeersBench
     from mapfilter.workflows.bench_sweep import SweepBench
 
@@ -98,13 +99,21 @@ def run_bench(
     points: int = 100_000,
     runs: int = 5,
     peers: bool = False,
-) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench:
+    memory: bool = False,
+) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench | MemoryBench:
     """Measure a stage on generated inputs; a filter and a sweep on the embedded map.
 
-    ``peers`` is whether a step of the filter is compared with other packages instead.
+    ``peers`` is whether a step of the filter is compared with other packages instead, ``memory``
+    whether the memory of the stage's tasks is measured instead.
     """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
+    if peers and memory:
+        raise fail(ConfigError, "bench", "--peers or --memory", "both")
+    if memory:
+        from mapfilter.workflows.bench_memory import bench_memory
+
+        return bench_memory(stage)
     if peers:
         if stage != "filter":
             raise fail(ConfigError, "bench --peers", "the stage filter", stage)

@@ -24,14 +24,8 @@ from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 from mapfilter.survey.cell_model import Covariate
-from mapfilter.survey.measured_map import (
-    LeftOut,
-    Survey,
-    SurveyOptions,
-    Validation,
-    fit_survey,
-    leave_out,
-)
+from mapfilter.survey.leave_out import LeftOut, Validation, leave_out
+from mapfilter.survey.measured_map import Survey, SurveyOptions, fit_survey
 from mapfilter.survey.measurements import Measurements, named_after
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.workflows.pictures import clear_pictures

@@ -31,11 +31,12 @@ from mapfilter.roads.maps import map_bounds_deg, resolve_map
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
-from mapfilter.workflows.streets import LARGEST_AREA_PX as LARGEST_AREA_PX
-from mapfilter.workflows.streets import Streets, pixels_on
-from mapfilter.workflows.streets import area_lattice as area_lattice
-from mapfilter.workflows.streets import check_scale as check_scale
-from mapfilter.workflows.streets import roads_lattice as roads_lattice
+from mapfilter.workflows.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX
+from mapfilter.workflows.area_lattice import area_lattice as area_lattice
+from mapfilter.workflows.area_lattice import check_scale as check_scale
+from mapfilter.workflows.area_lattice import pixels_on
+from mapfilter.workflows.area_lattice import roads_lattice as roads_lattice
+from mapfilter.workflows.streets import Streets
 
 FARTHEST_M = 50_000.0
 """No cell is received from farther away."""

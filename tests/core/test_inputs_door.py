@@ -234,7 +234,7 @@ from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.maps import map_bounds_deg
 from mapfilter.roads.vector import read_layer
 from mapfilter.roads.raster import raster_lattice
-from mapfilter.survey.measurements import read_measurements
+from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.table_files import read_table as read_log_table
 from mapfilter.workflows.info import run_info

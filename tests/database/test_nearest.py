@@ -41,7 +41,7 @@ def test_same_as_brute_force(chosen, offsets):
     index = index_of(chosen)
     east = LATTICE.west_m + np.array([x for x, _ in offsets])
     north = LATTICE.north_m - np.array([y for _, y in offsets])
-    for reach in (np.inf, 5.0, 12.5):
+    for reach in (np.inf, 2.0, 3.5, 5.0, 12.5):
         which, distance = index.nearest(east, north, reach)
         expected, expected_m = brute_force(index, east, north, reach)
         np.testing.assert_array_equal(which, expected)

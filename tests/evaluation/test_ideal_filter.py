@@ -5,7 +5,7 @@ from math import erfc
 import numpy as np
 import pytest
 
-from mapfilter.evaluation.first_fix import (
+from mapfilter.evaluation.first_fix_kernels import (
     Judgement,
     Levels,
     _entropy_bits,

@@ -19,6 +19,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.tracks.sampling import sampling_sd_m
 
 # On the central meridian grid north is north.
 CRS = "EPSG:32618"
@@ -99,6 +100,17 @@ def test_half_of_an_interval_goes_by_each_of_its_ends(tmp_path):
     assert log.radio["cell"].tolist() == list(one.cell)
     np.testing.assert_allclose(log.truth["east_m"] - EAST_M, [0, 20, 40], atol=1e-3)
     np.testing.assert_allclose(log.truth["north_m"], NORTH_M, atol=1e-3)
+
+
+def test_the_longer_half_has_the_error_of_the_sampling(tmp_path):
+    one = session(tmp_path, times_s=(0.0, 6.0, 12.0), speed=[9.0, 4.0, 4.0], direction=90.0)
+    log = session_log(one, CRS, EXACT, np.random.default_rng(0), step_factor=2.0)
+    first_m, second_m = 2 * sampling_sd_m(one.time_s, one.speed_mps, np.zeros(3))
+    assert second_m > 0
+    np.testing.assert_allclose(log.motion["sampling_sd_m"], [first_m, 0.0, second_m, 0.0])
+    faster = session(tmp_path, times_s=(0.0, 6.0), places=((0, 0), (9, 9)), speed=[4.0, 9.0])
+    log = session_log(faster, CRS, EXACT, np.random.default_rng(0))
+    assert log.motion["sampling_sd_m"].gt(0).tolist() == [False, True]
 
 
 def test_thirty_seconds_are_no_silence_yet(tmp_path):

@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.gnss.orbits import (
-    joined,
-    nominal_galileo,
-    nominal_gps,
-    read_yuma,
-    satellite_positions_m,
-)
+from mapfilter.gnss.almanacs import joined, nominal_galileo, nominal_gps, read_yuma
+from mapfilter.gnss.orbits import satellite_positions_m
 from mapfilter.gnss.sky import LocalFrame, directions
 
 BLOCK = """******** Week 190 almanac for PRN-{prn:02d} ********

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.atmosphere import directions, ionosphere_m, receiver_m, troposphere_m
 from mapfilter.gnss.broadcast import (
     LIGHT_MPS,
@@ -11,7 +12,7 @@ from mapfilter.gnss.broadcast import (
     place_by_broadcast,
     satellite_states,
 )
-from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, nominal_gps, satellite_positions_m
+from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, satellite_positions_m
 from mapfilter.tracks.readers.times import utc_from_gps_s
 
 WEEK = 2416

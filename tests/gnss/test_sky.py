@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from pyproj import Transformer
 
 from mapfilter.errors import InputError
+from mapfilter.gnss.almanacs import Almanac, nominal_gps
 from mapfilter.gnss.noise import correlated_along, elevation_sigma_m, multipath_bias_m
-from mapfilter.gnss.orbits import Almanac, gps_time, nominal_gps, satellite_positions_m
+from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.gnss.sky import (
     Directions,
     LocalFrame,

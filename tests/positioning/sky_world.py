@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 from cross_world import CRS, walk_log
 
-from mapfilter.gnss.orbits import gps_time, joined, nominal_galileo, nominal_gps
+from mapfilter.gnss.almanacs import joined, nominal_galileo, nominal_gps
+from mapfilter.gnss.orbits import gps_time
 from mapfilter.simulation.satellites import ReceptionModel, receive
 from mapfilter.tracks.log import make_log
 

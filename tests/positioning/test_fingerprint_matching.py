@@ -9,14 +9,9 @@ from scipy.stats import multivariate_normal
 from sklearn.metrics import pairwise_distances
 from sklearn.neighbors import NearestNeighbors
 
+from mapfilter.positioning.fingerprints.likelihoods import LevelErrors, Likelihoods, _Excess
 from mapfilter.positioning.fingerprints.matches import Received, located_once, locator
-from mapfilter.positioning.fingerprints.matching import (
-    Distances,
-    LevelErrors,
-    Likelihoods,
-    Scale,
-    _Excess,
-)
+from mapfilter.positioning.fingerprints.matching import Distances, Scale
 from mapfilter.positioning.fingerprints.options import Centroid, Neighbours, Probabilistic
 from mapfilter.positioning.fingerprints.reports import make_reports
 

@@ -8,11 +8,8 @@ from hypothesis import strategies as st
 from made_fingerprints import CRS, reports_at
 
 from mapfilter.errors import InputError
-from mapfilter.positioning.fingerprints.reports import (
-    joined_reports,
-    make_reports,
-    reports_of_log,
-)
+from mapfilter.positioning.fingerprints.log_reports import reports_of_log
+from mapfilter.positioning.fingerprints.reports import joined_reports, make_reports
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.scans import SCAN_S, scan_of_rows
 

@@ -11,6 +11,7 @@ from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import STATES, STRETCH, TURN, MotionErrors
 from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.bayes.smoothing import BayesSmoother, Kept
 from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
 from mapfilter.positioning.estimate_columns import EstimateColumns
@@ -169,6 +170,13 @@ def test_a_far_ancestor_counts_by_its_fit_as_long_as_a_jump_is_less_likely():
     assert abs(places(estimate)[0, 0] - 19.0 - share) < 5 * sqrt(share * (1 - share) / 4000)
 
 
+def test_a_far_ancestor_counts_by_the_sampling_of_the_way_too():
+    """Half a kilometre of samples seconds apart: both ancestors fit alike."""
+    first = kept(0, cloud((20.0, 15.0, 0.0, 0.0), (19.0, 15.0, 0.0, 0.0)))
+    last = kept(4, cloud((50.92, 26.0, 0.0, 0.0)))._replace(sampling_m2=400.0)
+    assert places(hindsight(first, last, paths=4000))[0, 0] - 19.0 == pytest.approx(0.5, abs=0.05)
+
+
 def test_positions_ways_and_masses_are_those_of_the_paths():
     # On the way along row 4, two thirds; off it, too near to be another place.
     last = kept(4, cloud((45.0, 25.0, 0.0, 0.0), (45.0, 5.0, 0.0, 0.0)), [2 / 3, 1 / 3])
@@ -184,7 +192,7 @@ def at(epoch, state, alternative=None, takeovers=0, hold=None, held=()):
     """The part of the filter's state after an epoch that the history uses."""
     east_m, north_m, travelled_m = MOVED[epoch]
     state = np.vstack([state, np.zeros((STATES - 5, state.shape[1]), np.float32)])
-    reckoning = SimpleNamespace(east_m=east_m, north_m=north_m, travelled_m=travelled_m)
+    reckoning = DeadReckoning(travelled_m, east_m, north_m, 0.5 * epoch)
     belief = SimpleNamespace(state=state, log_weight=np.zeros(state.shape[1]))
     return SimpleNamespace(
         reckoning=reckoning,
@@ -208,7 +216,8 @@ def test_beliefs_are_kept_every_few_metres_and_at_the_end():
     assert [float(k.state[0, 0]) for k in history.kept] == [20.0, 23.0, 24.0]
     assert [k.moved_m for k in history.kept] == [MOVED[k][:2] for k in (0, 3, 4)]
     assert [k.travelled_m for k in history.kept] == [MOVED[k][2] for k in (0, 3, 4)]
-    assert history.moved == MOVED
+    assert [k.sampling_m2 for k in history.kept] == [0.0, 1.5, 2.0]
+    assert history.moved == [(*moved, 0.5 * k) for k, moved in enumerate(MOVED)]
 
 
 def test_what_leads_on_is_the_lasting_error_with_its_deviation():

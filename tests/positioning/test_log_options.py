@@ -131,6 +131,19 @@ def test_measured_errors_of_motion_are_those_that_are_assumed():
     assert (kalman.step_sd_m, kalman.heading_sd_deg) == (0.1, 8.0)
 
 
+@pytest.mark.parametrize(("row_m", "assumed_m"), [(15.0, 9.0), (35.0, 1.8)])
+def test_errors_of_long_rows_are_those_of_their_whole_length(row_m, assumed_m):
+    """Of 35 m, which are 25 typical steps of the map filter."""
+    step_m = np.full(50, row_m)
+    step_m[:20] = 0.0
+    motion = pd.DataFrame({"time_s": 6.0 * np.arange(50.0), "step_m": step_m, "heading_rad": 0.0})
+    given = make_log(CRS, motion=motion, imu=ImuNoise(sigma_trans_m=9.0))
+    assert fitted_to_log(BayesFilter(), given)[0].step_sd_m == pytest.approx(assumed_m)
+    # A Kalman filter's is that of a row.
+    assert fitted_to_log(KalmanFilter(), given)[0].step_sd_m == 9.0
+    assert fitted_to_log(BayesFilter(step_sd_m=0.7), given)[0].step_sd_m == 0.7
+
+
 def test_errors_of_a_gyroscope_are_a_drift():
     given = moving(turns="gyro", gyro_noise_deg_per_sqrt_s=0.3, sigma_trans_m=0.0)
     fitted, _ = fitted_to_log(BayesFilter(), given)

@@ -25,7 +25,12 @@ from mapfilter.models.measured_map import MeasuredMapOptions
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.bayes.over_survey import filled_field, site_of
+from mapfilter.positioning.bayes.over_survey import (
+    SurveyedEvidence,
+    filled_field,
+    over_survey,
+    site_of,
+)
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.fingerprints.locating import fit_locator
@@ -354,3 +359,50 @@ def test_single_reports_are_compared_with_the_readings(surveyed):
     fitted = fit_locator(reports, "probabilistic", validated=30)
     assert fitted.validations[0].blocks == "logs"
     assert fitted.validations[0].reports <= 30
+
+
+@pytest.mark.parametrize(("usual_db", "lasting_db"), [(5.0, 4.0), (7.0, 40**0.5), (2.0, 1.0)])
+def test_the_lasting_errors_are_what_the_usual_deviation_leaves(surveyed, usual_db, lasting_db):
+    """Besides white noise of 3 dB, at least 1 dB; slow and fast ones keep their ratio."""
+    database, _, _ = surveyed
+    parts, bound = database.measured(), BayesFilter().over(database)
+    count = len(parts.deviations)
+    spread = np.linspace(-1.0, 1.0, count) ** 3
+    values = (usual_db + spread - np.median(spread)).astype(np.float32)
+    given = replace(parts, deviations=replace(parts.deviations, deviation_db=values))
+    before = bound.model.evidence.levels
+    found = over_survey(bound, database, given).model.evidence.levels
+    assert found.white_db == 3.0
+    assert np.hypot(found.slow_db, found.fast_db) == pytest.approx(lasting_db, rel=1e-5)
+    assert found.slow_db / found.fast_db == pytest.approx(before.slow_db / before.fast_db)
+    quieter = SurveyedEvidence(measurement_db=1.5, unmeasured_db=6.5, serving_weight_per_m=0.02)
+    model = over_survey(bound, database, given, quieter).model
+    assert model.evidence.levels.white_db == 1.5
+    lasting_db = max(usual_db**2 - 1.5**2, 1.0) ** 0.5
+    levels = model.evidence.levels
+    assert np.hypot(levels.slow_db, levels.fast_db) == pytest.approx(lasting_db, rel=1e-5)
+    assert model.evidence.serving.weight_per_m == 0.02
+    assert set(np.unique(model.level_sd_db)) <= {*values.tolist(), 6.5}
+    none = replace(
+        parts, deviations=Deviations((), *[np.empty(0, np.int32)] * 3, np.empty(0, "f4"))
+    )
+    kept = over_survey(bound, database, none).model
+    assert (kept.evidence.levels.slow_db, kept.evidence.levels.fast_db) == (
+        before.slow_db, before.fast_db,
+    )  # fmt: skip
+    assert (kept.level_sd_db == 8.0).all()
+
+
+@pytest.mark.parametrize(("count", "told"), [(19, False), (20, True)])
+def test_twenty_reports_of_serving_cells_are_enough_for_statistics(surveyed, count, told):
+    database, _, _ = surveyed
+    parts, bound = database.measured(), BayesFilter().over(database)
+    serving = np.flatnonzero(parts.readings.serving)
+    kept = np.isin(np.arange(len(parts.readings)), serving[:count])
+    assert kept.sum() == count
+    given = replace(parts, readings=parts.readings.some(kept))
+    model = over_survey(bound, database, given).model
+    assert (model.serving_model is not None) == told
+    others = replace(parts.readings, serving=kept)
+    model = over_survey(bound, database, replace(parts, readings=others)).model
+    assert (model.serving_model is not None) == told

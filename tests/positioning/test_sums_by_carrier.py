@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_fingerprints import CRS
 
-from mapfilter.positioning.fingerprints.matching import LevelErrors, Likelihoods
+from mapfilter.positioning.fingerprints.likelihoods import LevelErrors, Likelihoods
 from mapfilter.positioning.fingerprints.planned import Planned
 from mapfilter.positioning.fingerprints.reports import make_reports
 

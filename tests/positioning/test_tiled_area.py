@@ -16,7 +16,8 @@ from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels
 from mapfilter.errors import StoreError
 from mapfilter.geodesy import Lattice
-from mapfilter.gnss.orbits import gps_time, nominal_gps
+from mapfilter.gnss.almanacs import nominal_gps
+from mapfilter.gnss.orbits import gps_time
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES, interpolate
 from mapfilter.positioning.bayes import options

@@ -8,13 +8,13 @@ from mapfilter.check.lobes import (
     best_labels,
     find_lobe,
 )
+from mapfilter.check.place_fits import peak_m
 from mapfilter.check.raster_checks import (
     RasterSample,
     above_free_space_db,
     falls_with_distance,
     nodata_taken_as_level,
 )
-from mapfilter.check.site_checks import peak_m
 from mapfilter.geodesy import Lattice, heading_from_azimuth_rad
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import simulate_ground_truth

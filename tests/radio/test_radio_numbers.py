@@ -4,7 +4,7 @@ import pytest
 from msi_files import panel
 
 from mapfilter.errors import InputError
-from mapfilter.gnss.orbits import read_yuma
+from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.radio.cells import read_cell_plan
 from mapfilter.radio.msi import read_msi
 from mapfilter.radio.tables import number

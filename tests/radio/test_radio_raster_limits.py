@@ -6,8 +6,9 @@ from raster_files import write_ascii, write_bil
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
+from mapfilter.rasters.ascii_grids import open_ascii_grid
 from mapfilter.rasters.files import Declared, check_plausible, without_nodata
-from mapfilter.rasters.plain_grids import GridHeader, open_ascii_grid
+from mapfilter.rasters.plain_grids import GridHeader
 from mapfilter.rasters.raster_set import open_rasters
 
 CRS = "EPSG:32635"

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_radio_lobes import LATTICE, SITE, sector
 
+from mapfilter.check.place_fits import MeanLevels, best_place, in_squares, place_fits
 from mapfilter.check.raster_checks import RasterSample
-from mapfilter.check.site_checks import MeanLevels, best_place, in_squares, place_fits
 
 
 def test_squares_are_means_at_their_middles():

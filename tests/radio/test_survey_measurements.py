@@ -10,7 +10,8 @@ from mapfilter.errors import InputError
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.survey.measurement_files import DIALECTS, read_antennas_log, read_csv
 from mapfilter.survey.measurement_rows import unix_seconds
-from mapfilter.survey.measurements import named_after, read_measurements
+from mapfilter.survey.measurements import named_after
+from mapfilter.survey.read_measurements import read_measurements
 
 OPENCELLID = """\
 mcc,mnc,lac,cellid,lat,lon,signal,measured_at,rating,speed,direction,act,ta,psc,tac,pci,sid,nid,bid

@@ -9,8 +9,9 @@ from mapfilter.geodesy import Lattice
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Ways
-from mapfilter.survey.measured_map import SurveyOptions, fit_survey, leave_out
-from mapfilter.survey.measurements import read_measurements
+from mapfilter.survey.leave_out import leave_out
+from mapfilter.survey.measured_map import SurveyOptions, fit_survey
+from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.survey.survey_rasters import surveyed_plan, write_survey
 
 

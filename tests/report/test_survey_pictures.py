@@ -11,12 +11,8 @@ from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
-from mapfilter.survey.measured_map import (
-    LeftOut,
-    SurveyOptions,
-    fit_survey,
-    leave_out,
-)
+from mapfilter.survey.leave_out import LeftOut, leave_out
+from mapfilter.survey.measured_map import SurveyOptions, fit_survey
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.survey_rasters import write_survey
 from mapfilter.workflows import served

@@ -173,7 +173,7 @@ def test_what_does_not_fit_is_refused():
 
 
 def test_real_sessions(shared_data):
-    from mapfilter.survey.measurements import read_measurements
+    from mapfilter.survey.read_measurements import read_measurements
 
     read = read_measurements([shared_data / "cell-ottawa-lte" / "carling"])
     sessions = [

@@ -15,7 +15,7 @@ from positioning.cross_world import CRS
 
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.fingerprints.locating import locate_by
-from mapfilter.positioning.fingerprints.reports import reports_of_log
+from mapfilter.positioning.fingerprints.log_reports import reports_of_log
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.serving import door as door_module
 from mapfilter.serving.documents import RequestError
@@ -88,6 +88,7 @@ WRONG = {
     "rows": epoch(radio={"role": "serving"}),
     "degrees": epoch(motion=[{"step_m": 1, "heading_rad": 90}]),
     "missing sign": epoch(motion=[{"step_m": -9999}]),
+    "deviation below 0": epoch(motion=[{"step_m": 1, "sampling_sd_m": -1}]),
     "column": epoch(motion=[{"step": 1}]),
     "role": epoch(radio=[{**SERVING, "role": "best"}]),
     "no role": epoch(radio=[{"cell": "W"}]),
@@ -142,7 +143,7 @@ def test_epochs_are_those_of_a_log_with_the_same_rows():
         ),
     )  # fmt: skip
     tables = {
-        "motion": [{"step_m": 1.5, "heading_rad": 6.0}, {"turn_rad": 0.1}],
+        "motion": [{"step_m": 1.5, "heading_rad": 6.0, "sampling_sd_m": 2.5}, {"turn_rad": 0.1}],
         "radio": [
             {"role": "serving", "mcc": 262, "mnc": 1, "lac": 5, "ci": 77, "timing_advance": 2},
             {"role": "neighbour", "cell": "b", "level_dbm": -80.5, "censored": -1},
@@ -160,6 +161,7 @@ def test_epochs_are_those_of_a_log_with_the_same_rows():
     expected = epochs(name_by_plan(make_log(CRS, **frames), plan))
     found = read_epochs({"epochs": [{"time_s": 3, **tables}]}, PlanNames(plan), nan)
     assert repr(found) == repr(expected)
+    assert [step.sampling_sd_m for step in found[0].motion] == [2.5, 0.0]
 
 
 def test_bodies_are_limited_in_size_type_and_time(made):

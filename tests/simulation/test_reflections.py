@@ -7,7 +7,8 @@ import shapely
 
 from mapfilter.errors import ConfigError
 from mapfilter.geodesy import unproject
-from mapfilter.gnss.orbits import gps_time, nominal_gps
+from mapfilter.gnss.almanacs import nominal_gps
+from mapfilter.gnss.orbits import gps_time
 from mapfilter.gnss.sky import Skyline, ecef_from_lonlat
 from mapfilter.simulation.satellites import (
     NlosModel,

@@ -7,7 +7,8 @@ import shapely
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import unproject
-from mapfilter.gnss.orbits import gps_time, nominal_gps, satellite_positions_m
+from mapfilter.gnss.almanacs import nominal_gps
+from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.gnss.sky import GridFrame, Skyline, directions, ecef_from_lonlat
 from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 from mapfilter.tracks.log import make_log

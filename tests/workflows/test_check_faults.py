@@ -7,8 +7,9 @@ from check_world import base_levels, box_deg, make_world, shifted
 from command_line import mapfilter
 from rasterio.transform import Affine
 
+from mapfilter.check import place_fits as places
 from mapfilter.check import site_checks as check_peaks
-from mapfilter.check.site_checks import place_fits
+from mapfilter.check.place_fits import place_fits
 from mapfilter.geodesy import Lattice
 
 
@@ -189,11 +190,12 @@ def test_planted_doubts(code, plant, world):
 def test_of_many_sites_only_those_about_the_best_place_are_tried(world, monkeypatch):
     tried = []
     monkeypatch.setattr(check_peaks, "_SITES", 1)
-    monkeypatch.setattr(
-        check_peaks,
-        "place_fits",
-        lambda squares, places_m: tried.extend(places_m) or place_fits(squares, places_m),
-    )
+    for module in (check_peaks, places):
+        monkeypatch.setattr(
+            module,
+            "place_fits",
+            lambda squares, places_m: tried.extend(places_m) or place_fits(squares, places_m),
+        )
     exchange_sites(world)
     assert [f["code"] for f in check(world)] == ["site-labels-swapped"]
     on_a_grid_and_at_the_peak = 10 * 10 + 1

@@ -7,7 +7,7 @@ import pytest
 import rasterio
 from command_line import assert_done, assert_refused, mapfilter, settings
 
-from mapfilter.config.inputs import Prediction
+from mapfilter.config.prediction import Prediction
 from mapfilter.propagation import models as _models
 from mapfilter.propagation.models import PredictionModel
 

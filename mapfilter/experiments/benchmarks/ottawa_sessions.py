@@ -19,6 +19,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, project
 from mapfilter.tracks.log import TrackLog, make_log
+from mapfilter.tracks.sampling import sampling_sd_m
 from mapfilter.tracks.schema import SERVING
 
 LONGEST_GAP_S = 30.0
@@ -148,7 +149,12 @@ def session_log(
     step_m = step_factor * step_m * (1 + errors.step_share * rng.standard_normal(ends.size))
     measured = heading + bias + errors.heading_sd_rad * rng.standard_normal(ends.size)
     motion = pd.DataFrame(
-        {"time_s": ends, "step_m": step_m, "heading_rad": np.angle(np.exp(1j * measured))}
+        {
+            "time_s": ends,
+            "step_m": step_m,
+            "heading_rad": np.angle(np.exp(1j * measured)),
+            "sampling_sd_m": step_factor * _sampling_sd_m(session),
+        }
     )
     radio = pd.DataFrame(
         {
@@ -195,6 +201,15 @@ def _reckoned(session: Session, crs: str) -> tuple[Floats, Floats]:
     length_s = np.repeat(half_s, 2)
     step_m = np.where(2 * length_s <= LONGEST_GAP_S, session.speed_mps[of] * length_s, np.nan)
     return step_m, heading[of]
+
+
+def _sampling_sd_m(session: Session) -> Floats:
+    """Return the deviation of both halves of each interval; all of it is that of the longer one."""
+    speed_mps, azimuth = session.speed_mps, np.radians(session.azimuth_deg)
+    velocity = speed_mps * np.sin(azimuth), speed_mps * np.cos(azimuth)
+    both_m = sampling_sd_m(session.time_s, *velocity)
+    first_longer = speed_mps[:-1] >= speed_mps[1:]
+    return np.column_stack([both_m * first_longer, both_m * ~first_longer]).ravel()
 
 
 def centroids(others: Sequence[Session], crs: str, accuracy_m: float) -> dict[str, Floats]:

@@ -13,13 +13,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import nan
+from math import log, nan
 from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
+from mapfilter.models.level_memory import OTHER_DBM, OTHER_SD_DB
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.state import BayesState
@@ -109,7 +110,21 @@ class RadioReading:
         ``other_log_likelihood`` is that of its levels if the prediction is wrong about all cells.
         """
         each = self.serving_under_null if self.serving >= 0 else _UNKNOWN_NATS
-        return other_log_likelihood + each * self.serving_weight
+        bounds = sum(bound_under_null(bound) for bound in self.bounds)
+        return other_log_likelihood + each * self.serving_weight + bounds
+
+
+def bound_under_null(bound: BoundReading) -> float:
+    """Return the log-likelihood, under the null hypothesis, of a bound or of an ambiguous level.
+
+    A level is then a draw from those that phones report, of each of its cells with equal
+    probability, as on the map. Ends of the scale are as probable as on the map where they agree.
+    """
+    if bound.censored != 0:
+        return 0.0
+    variance_db2 = OTHER_SD_DB**2 + bound.sd_db**2
+    density = log(bound.sd_db**2 / variance_db2) - (bound.level_dbm - OTHER_DBM) ** 2 / variance_db2
+    return bound.weight * (0.5 * density - log(bound.cells.size))
 
 
 class Context(NamedTuple):

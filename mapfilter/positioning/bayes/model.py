@@ -122,7 +122,14 @@ class BayesModel:
         """Move by one step and weigh by the map, by the metre."""
         length_m = abs(motion.step_m)
         if isfinite(motion.heading_rad):
-            moved = move(state, motion.step_m, motion.heading_rad, self.motion, key)
+            moved = move(
+                state,
+                motion.step_m,
+                motion.heading_rad,
+                self.motion,
+                key,
+                motion.sampling_sd_m,
+            )
         else:
             # To all sides.
             moved = move(state, 0.0, 0.0, self.motion, key)

@@ -7,8 +7,9 @@ from math import isfinite, nan
 
 import numpy as np
 
-from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
+from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.held import Hold, as_measured, forked, jumps, own_rng, still_open
 from mapfilter.positioning.bayes.mirrored import mirrored_step
@@ -109,16 +110,18 @@ def moved(
                     replace(one, belief=predict(one.belief, one.hold.read(measured), held_rng)[0])
                     for one in held
                 )
-            belief, why = predict(belief, step, rng)
+            belief, why = predict(belief, _assumed(step, belief), rng)
             belief = beliefs.remounted(belief, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
             if alternative is not None:
                 # It began anew, and nothing says that the phone is held otherwise.
+                other = alternative.belief
                 as_read = Hold(step_unit_m=alternative.step_unit_m).read(measured)
-                other, _ = predict(alternative.belief, as_read, rng)
+                other, _ = predict(other, _assumed(as_read, other), rng)
                 alternative = replace(alternative, belief=other)
             if twin is not None:
-                other, _ = predict(twin.belief, mirrored_step(step), rng)
+                other = twin.belief
+                other, _ = predict(other, _assumed(mirrored_step(step), other), rng)
                 twin = replace(twin, belief=other)
         if isfinite(raw.heading_rad) and raw.step_m > 0:
             walking_rad = raw.heading_rad
@@ -148,3 +151,13 @@ def moved(
         held=held,
         alternatives=state.alternatives,
     ), unused
+
+
+def _assumed(step: MotionStep, belief: MapBelief) -> MotionStep:
+    """Return a step with the errors that a belief assumes: that of its sampling once it is tracked.
+
+    With it a belief that still searches would be too wide to be in one place for some way.
+    """
+    if step.sampling_sd_m == 0 or belief.status is Status.TRACKING:
+        return step
+    return replace(step, sampling_sd_m=0.0)

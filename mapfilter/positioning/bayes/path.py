@@ -23,11 +23,15 @@ distinctive."""
 
 @dataclass(frozen=True, slots=True)
 class DeadReckoning:
-    """Distance and displacement since the start, in the frame of the headings."""
+    """Distance and displacement since the start, in the frame of the headings.
+
+    ``sampling_m2`` is the sum of the variances that steps have by their sampling.
+    """
 
     travelled_m: float = 0.0
     east_m: float = 0.0
     north_m: float = 0.0
+    sampling_m2: float = 0.0
 
     def moved(self, step: MotionStep) -> DeadReckoning:
         """Add a step; without a heading the displacement stays."""
@@ -35,11 +39,12 @@ class DeadReckoning:
             return self
         if not isfinite(step.heading_rad):
             return replace(self, travelled_m=self.travelled_m + abs(step.step_m))
-        heading = step.heading_rad
+        heading, sampling_m2 = step.heading_rad, self.sampling_m2 + step.sampling_sd_m**2
         return DeadReckoning(
             self.travelled_m + abs(step.step_m),
             self.east_m + step.step_m * cos(heading),
             self.north_m + step.step_m * sin(heading),
+            sampling_m2,
         )
 
 

@@ -40,13 +40,17 @@ _SMOOTHED = (*_PLACE, "way_id", "way_probability")
 
 
 class Kept(NamedTuple):
-    """A belief of the forward pass: states, shape (5, N), weights, and dead reckoning so far."""
+    """A belief of the forward pass: states, shape (5, N), weights, and dead reckoning so far.
+
+    ``sampling_m2`` is the variance of its sampling.
+    """
 
     epoch: int
     state: Floats32
     log_weight: Floats32
     moved_m: tuple[float, float]
     travelled_m: float
+    sampling_m2: float = 0.0
 
 
 @dataclass(eq=False)
@@ -61,8 +65,8 @@ class BayesSmoother:
         Distance between two beliefs that are kept; doubles when they take too much memory.
     kept, alternative : list of Kept
         Of the main belief and, since its start, of the present alternative.
-    moved : list of (float, float, float)
-        East, north and distance by dead reckoning at each epoch.
+    moved : list of (float, float, float, float)
+        East, north and distance by dead reckoning at each epoch, and the variance of its sampling.
     last : BayesState or None
         After the last epoch.
     """
@@ -72,13 +76,13 @@ class BayesSmoother:
     every_m: float = 5.0
     kept: list[Kept] = field(default_factory=list)
     alternative: list[Kept] = field(default_factory=list)
-    moved: list[tuple[float, float, float]] = field(default_factory=list)
+    moved: list[tuple[float, float, float, float]] = field(default_factory=list)
     last: BayesState | None = None
 
     def add(self, before: BayesState, after: BayesState) -> None:
         """Record the states before and after one epoch; a takeover replaces beliefs kept since."""
         self.last, now = after, after.reckoning
-        self.moved.append((now.east_m, now.north_m, now.travelled_m))
+        self.moved.append((now.east_m, now.north_m, now.travelled_m, now.sampling_m2))
         taken_over, held_anew = after.takeovers > before.takeovers, after.hold != before.hold
         if taken_over and held_anew:
             # The dead reckoning since the start of what has taken over was read otherwise.
@@ -103,14 +107,14 @@ class BayesSmoother:
             self.kept, self.every_m = self.kept[::2], 2 * self.every_m
 
     def _keep(self, belief: MapBelief) -> Kept:
-        east_m, north_m, travelled_m = self.moved[-1]
+        east_m, north_m, travelled_m, sampling_m2 = self.moved[-1]
         weight = belief.log_weight.astype(np.float32)
         epoch = len(self.moved) - 1
         # Lasting errors and deviations together are what leads a hypothesis on.
         state = belief.state[:_ROWS].copy()
         state[BIAS] += belief.state[TURN]
         state[LOG_SCALE] += belief.state[STRETCH]
-        return Kept(epoch, state, weight, (east_m, north_m), travelled_m)
+        return Kept(epoch, state, weight, (east_m, north_m), travelled_m, sampling_m2)
 
     def close(self) -> None:
         """Keep the last belief, from which paths go back."""
@@ -182,6 +186,7 @@ def _paths(
         turn_var = errors.turn_sd_rad**2 * _new_share(length_m, errors.heading_m)
         stretch_var = errors.stretch_sd**2 * _new_share(length_m, errors.stretch_m)
         place_var += length_m**2 * max(turn_var, stretch_var) / 3
+        place_var += later.sampling_m2 - earlier.sampling_m2
         bias_var = errors.bias_drift_rad_per_sqrt_m**2 * length_m + turn_var + jitter[2] ** 2
         scale_var = errors.scale_drift_per_sqrt_m**2 * length_m + stretch_var + jitter[3] ** 2
         moved_m = (later.moved_m[0] - earlier.moved_m[0], later.moved_m[1] - earlier.moved_m[1])

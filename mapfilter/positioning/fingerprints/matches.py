@@ -12,14 +12,8 @@ import numpy as np
 from mapfilter._types import Floats, Ints, Ints8, Ints32
 from mapfilter.errors import InputError, fail
 from mapfilter.positioning.fingerprints.censoring import likely
-from mapfilter.positioning.fingerprints.matching import (
-    ByCell,
-    Distances,
-    LevelErrors,
-    Likelihoods,
-    Scale,
-    usual_levels,
-)
+from mapfilter.positioning.fingerprints.likelihoods import LevelErrors, Likelihoods
+from mapfilter.positioning.fingerprints.matching import ByCell, Distances, Scale, usual_levels
 from mapfilter.positioning.fingerprints.options import (
     Centroid,
     Method,

@@ -276,7 +276,7 @@ class GnssGate:
         if used is None:
             names = sky.names
         else:
-            kept, result = used
+            kept, receiver, result = used
             names = tuple(name for name in sky.names if name not in kept.names)
             receiver = replace(receiver, covariance=result.covariance, used_at_m=travelled_m)
             rows, state = result.rows, replace(state, rejected_since_s=nan)
@@ -294,8 +294,11 @@ class GnssGate:
         rows: Floats,
         *,
         fresh: bool,
-    ) -> tuple[Sky, Weighed] | None:
-        """Return the satellites that agree with a belief, and the belief weighed by them."""
+    ) -> tuple[Sky, Receiver, Weighed] | None:
+        """Return the satellites that agree with a belief, and the belief weighed by them.
+
+        The receiver is the one given, or, where its clock jumped, one with another clock.
+        """
         gate, place, log_weight = self._gate(belief), belief.state[:2], belief.log_weight
         searching = belief.status is Status.SEARCHING
         # Echoes that last reduce the weight of readings, but do not explain larger innovations.
@@ -311,19 +314,19 @@ class GnssGate:
             return found if found.score >= -gate else None
 
         every = np.ones(len(sky.names), dtype=np.bool_)
-        whole = weigh(every, receiver, int(fresh), gate)
+        whole, clock = weigh(every, receiver, int(fresh), gate), receiver
         if whole is None:
-            jumped = near_clock(sky, clock_reset(self.options, receiver))
-            whole = weigh(every, jumped, 1, _RESET_GATE * gate)
+            clock = near_clock(sky, clock_reset(self.options, receiver))
+            whole = weigh(every, clock, 1, _RESET_GATE * gate)
         if whole is not None:
-            return sky, whole
+            return sky, clock, whole
         if len(sky.names) < 3:
             return None
         good = np.array([weigh(one, receiver, 0, gate) is not None for one in np.diag(every)])
         if 2 * good.sum() <= good.size:
             return None
         rest = weigh(good, receiver, 0, gate)
-        return (sky.only(good), rest) if rest is not None else None
+        return (sky.only(good), receiver, rest) if rest is not None else None
 
     def _mixed(self, gain: Floats) -> Floats:
         """Mix log-likelihoods with a share of readings that carry no information."""

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from mapfilter._types import Ints
-from mapfilter.gnss.orbits import WEEK_S
+from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.tracks.readers.columns import Columns, line_columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks

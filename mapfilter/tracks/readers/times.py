@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, fail
-from mapfilter.gnss.orbits import LEAPS_UTC_S, WEEK_S
+from mapfilter.gnss.almanacs import WEEK_S
+from mapfilter.gnss.orbits import LEAPS_UTC_S
 
 GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
 DAY_S = 86_400.0

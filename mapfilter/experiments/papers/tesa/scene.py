@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mapfilter._types import Bools, Floats
+from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.noise import elevation_sigma_m
-from mapfilter.gnss.orbits import nominal_gps, satellite_positions_m
+from mapfilter.gnss.orbits import satellite_positions_m
 from mapfilter.gnss.sky import LocalFrame, directions
 from mapfilter.simulation.drives import (
     Drive,

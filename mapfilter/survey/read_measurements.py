@@ -1,0 +1,250 @@
+"""Files of measurements in any of the formats, read and joined to one table."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mapfilter._types import Bools, Floats, Ints, Ints32
+from mapfilter.errors import Fault, InputError, fail, listed
+from mapfilter.geodesy import project, projected_crs, utm_crs
+from mapfilter.survey.measurement_files import (
+    DIALECTS,
+    header_of,
+    mapped,
+    read_antennas_log,
+    read_csv,
+)
+from mapfilter.survey.measurement_rows import Rows
+from mapfilter.survey.measurements import Measurements
+
+Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
+SESSION_GAP_S = 1800.0
+"""A longer silence begins a new session."""
+_FILES_NAMED = 3
+_SUFFIXES = (".csv", ".log", ".tsv")
+_RECORDED_SUFFIXES = (".txt", ".gz")
+_HEAD_OF_LOG = "log.json"
+
+
+def read_measurements(
+    files: Sequence[Path | str],
+    crs: str | None = None,
+    *,
+    format: Format = "auto",  # noqa: A002
+    columns: Mapping[str, str] | None = None,
+    session_gap_s: float = SESSION_GAP_S,
+    recorded: Callable[[Path], Rows | None] | None = None,
+) -> Measurements:
+    """Read files of measurements; each file, session column and long silence begins a session.
+
+    Bad rows are counted in the notes, and lose nothing else. Exact repetitions are left out.
+
+    Parameters
+    ----------
+    files : sequence of Path or str
+        Files, or folders whose .csv, .tsv and .log files are taken; with ``recorded`` track logs
+        and folders of them, too.
+    crs : str, optional
+        Projected CRS for the positions; the UTM zone of the measurements when left out.
+    format : {"auto", "csv", "opencellid", "towercollector", "antennas"}
+        ``auto`` recognises each file by its first line.
+    columns : mapping of str to str, optional
+        For "csv": which column holds which of :data:`~mapfilter.survey.measurement_rows.FIELDS`.
+    session_gap_s : float
+        A longer silence begins a new session.
+    recorded : callable, optional
+        With "auto": reads files that are none of these formats; None for those that it does not
+        know.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, is of another kind, or has no good row; with the first faults of
+        each.
+    """
+    tables = []
+    faults: list[Fault] = []
+    for path in _expanded(files, recorded):
+        try:
+            table = _read(path, format, columns, recorded)
+        except InputError as error:
+            faults.extend(error.faults)
+            continue
+        tables.append(table)
+        if not table.cell:
+            aside = "; ".join(f"{count} {what}" for what, count in table.aside.items())
+            got = f"{table.read} rows" + (f": {aside}" if aside else "")
+            expected = "at least one level with cell and position"
+            faults.extend(table.faults or (Fault(str(path), expected, got),))
+    if faults:
+        raise InputError(tuple(faults))
+    if crs is None:
+        lat_deg, lon_deg = np.median(np.concatenate([t.columns[1:3] for t in tables], 1), axis=1)
+        crs = utm_crs(float(lon_deg), float(lat_deg))
+    return _joined(tables, projected_crs(crs), session_gap_s)
+
+
+def _read(
+    path: Path,
+    kind: Format,
+    columns: Mapping[str, str] | None,
+    recorded: Callable[[Path], Rows | None] | None,
+) -> Rows:
+    if columns:
+        return read_csv(path, mapped(columns))
+    if kind == "auto":
+        own = _kind_of(path)
+        if own is None and recorded is not None and (rows := recorded(path)) is not None:
+            return rows
+        kind = own or "csv"
+    return read_antennas_log(path) if kind == "antennas" else read_csv(path, DIALECTS[kind])
+
+
+def _kind_of(path: Path) -> Format | None:
+    """Return the format of a file by its first line; None for none of the own ones."""
+    try:
+        header = header_of(path)
+    except InputError:
+        return None
+    if header[:1] == ["begin"]:
+        return "antennas"
+    names = set(header)
+    kinds: tuple[tuple[Format, set[str]], ...] = (
+        ("opencellid", {"cellid", "signal", "lat"}),
+        ("towercollector", {"cell_id", "dbm", "lat"}),
+        ("csv", {"level_dbm", "lat", "lon"}),
+    )
+    return next((kind for kind, needed in kinds if needed <= names), None)
+
+
+def _expanded(
+    files: Sequence[Path | str], recorded: Callable[[Path], Rows | None] | None
+) -> list[Path]:
+    suffixes = _SUFFIXES if recorded is None else (*_SUFFIXES, *_RECORDED_SUFFIXES)
+    found: list[Path] = []
+
+    def is_read(path: Path) -> bool:
+        if path.is_dir():
+            return recorded is not None and _is_log(path)
+        return path.suffix.lower() in suffixes
+
+    for path in map(Path, files):
+        if path.is_dir() and not is_read(path):
+            inside = sorted(filter(is_read, path.iterdir()))
+            if not inside:
+                raise fail(InputError, str(path), f"files {', '.join(suffixes)}", "none")
+            found += inside
+        else:
+            found.append(path)
+    if not found:
+        raise fail(InputError, "measurements", "at least one file", "none")
+    return found
+
+
+def _is_log(folder: Path) -> bool:
+    return (folder / _HEAD_OF_LOG).is_file()
+
+
+def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
+    cells = tuple(sorted({cell for table in tables for cell in table.cells}))
+    places = {cell: i for i, cell in enumerate(cells)}
+    names: list[str] = []
+    session: list[Ints32] = []
+    for table in tables:
+        own = _sessions(table, gap_s)
+        session.append((own + len(names)).astype(np.int32))
+        count = int(own.max()) + 1
+        stem = table.path.stem
+        names += [stem] if count == 1 else [f"{stem}#{i + 1}" for i in range(count)]
+    cell = [np.array([places[c] for c in t.cells], dtype=np.int32)[t.cell] for t in tables]
+    columns = np.ascontiguousarray(np.concatenate([table.columns for table in tables], axis=1))
+    time_s, lat_deg, lon_deg, level_dbm, accuracy_m, timing_advance, role = columns
+    east_m, north_m = project(crs, lon_deg, lat_deg)
+    of_session = np.concatenate(session)
+    joined = Measurements(
+        crs,
+        cells,
+        {cell: identity for table in tables for cell, identity in table.identities.items()},
+        tuple(names),
+        np.concatenate(cell),
+        of_session,
+        time_s,
+        east_m,
+        north_m,
+        level_dbm,
+        accuracy_m,
+        _notes(tables),
+        np.where(np.isnan(role), _alone(of_session, time_s), role > 0).astype(np.bool_),
+        timing_advance,
+    )
+    placed = np.isfinite(east_m) & np.isfinite(north_m)
+    if not placed.all():
+        count = int((~placed).sum())
+        if count == len(placed):
+            got = f"{lat_deg[0]:g}, {lon_deg[0]:g} and {count - 1} more"
+            hint = "latitude and longitude swapped, or another area"
+            raise fail(InputError, "measurements", f"places where {crs} is used", got, hint)
+        joined = joined.where(placed, f"{count} rows left out: {crs} has no such places")
+    return _once(joined)
+
+
+def _alone(session: Ints32, time_s: Floats) -> Bools:
+    """Return which rows are the only ones of their session and time."""
+    known = np.isfinite(time_s)
+    keys = np.column_stack([session[known], time_s[known]])
+    _, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    found = np.zeros(len(time_s), dtype=np.bool_)
+    found[known] = count[which] == 1
+    return found
+
+
+def _notes(tables: Sequence[Rows]) -> tuple[str, ...]:
+    """Return remarks by file; what more than three files share is summed up."""
+    files = Counter(what for table in tables for what in table.aside)
+    shared = [what for what, count in files.items() if count > _FILES_NAMED]
+    found = []
+    for what in shared:
+        of = [table for table in tables if what in table.aside]
+        total, names = sum(table.aside[what] for table in of), [table.path.name for table in of]
+        found.append(f"{total} {what} in {len(of)} files ({listed(names)})")
+        example = next((note for note in of[0].notes() if what in note), "")
+        if (at := example.find(", such as ")) >= 0:
+            found[-1] += example[at:]
+    kept = (
+        replace(t, aside=Counter({w: n for w, n in t.aside.items() if w not in shared}))
+        for t in tables
+    )
+    return (*found, *(note for table in kept for note in table.notes()))
+
+
+def _sessions(table: Rows, gap_s: float) -> Ints:
+    """Return the session of each row of a file, counted from 0 in the order of the rows."""
+    named = np.array(table.session)
+    time_s = table.columns[0]
+    order = np.lexsort((time_s, named))
+    with np.errstate(invalid="ignore"):
+        begins = (np.diff(named[order]) != 0) | (np.diff(time_s[order]) > gap_s)
+    ranks = np.empty(len(order), dtype=np.int64)
+    ranks[order] = np.concatenate([[0], np.cumsum(begins)])
+    return ranks
+
+
+def _once(rows: Measurements) -> Measurements:
+    """Leave out rows that repeat another in everything."""
+    table = np.column_stack(
+        [rows.session, rows.cell, rows.time_s, rows.east_m, rows.north_m, rows.level_dbm]
+    )
+    # A row without a time may be a second, equal reading.
+    table[np.isnan(rows.time_s), 2] = -1.0 - np.flatnonzero(np.isnan(rows.time_s))
+    _, first = np.unique(table, axis=0, return_index=True)
+    if len(first) == len(rows):
+        return rows
+    kept = np.zeros(len(rows), dtype=np.bool_)
+    kept[first] = True
+    return rows.where(kept, f"{len(rows) - len(first)} rows left out: given twice")

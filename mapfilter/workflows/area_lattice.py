@@ -1,0 +1,127 @@
+"""The lattice of a configuration's area."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapfilter.config.inputs import Area
+from mapfilter.config.sections import Config
+from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unproject, utm_crs
+from mapfilter.roads.maps import check_on_map, map_bounds_deg
+from mapfilter.roads.raster import raster_lattice
+
+LARGEST_AREA_PX = 400_000_000
+EARTH_RADIUS_M = 6_371_000.0
+_SHORT_M = 100.0
+_SCALE_TOLERANCE = 0.03
+
+
+def area_lattice(area: Area, *, on_map: bool = True) -> Lattice:
+    """Return the lattice over an area; without ``on_map`` the map need not cover it.
+
+    Raises
+    ------
+    InputError, ConfigError
+        There is neither box nor map, the box or the CRS is wrong, the map is missing or of
+        another place, or the lattice would be absurdly large.
+    """
+    if not area.has_extent:
+        expected = "bbox, or southwest with size_m, where map is none"
+        raise fail(ConfigError, "area", expected, "neither")
+    if area.southwest is not None and area.size_m is not None:
+        lon, lat = area.southwest
+        check_bbox((lon, lat, lon + 1e-6, lat + 1e-6), "area.southwest")
+        crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(lon, lat)
+        # Snapped first, so that the size asked for is the size of the lattice.
+        corner = np.concatenate(project(crs, [lon], [lat])) // area.resolution_m * area.resolution_m
+        bounds_m = (*corner, *(corner + area.size_m))
+        if max(area.size_m) < area.resolution_m:
+            expected = f"metres, at least {area.resolution_m:g}"
+            raise fail(InputError, "area.size_m", expected, area.size_m, "degrees given for metres")
+    else:
+        box = area.bbox or map_bounds_deg(area.map)
+        check_bbox(box, "area.bbox")
+        west, south, east, north = box
+        centre = (west + east) / 2, (south + north) / 2
+        crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(*centre)
+        edges = project(crs, [west, east, east, west], [south, south, north, north])
+        bounds_m = (*np.min(edges, axis=1), *np.max(edges, axis=1))
+    if not np.all(np.isfinite(bounds_m)):
+        expected = f"a box that {crs} can show"
+        raise fail(InputError, "area", expected, bounds_m, "a CRS of another region")
+    faults = Faults()
+    width_m, height_m = bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1]
+    if max(width_m, height_m) < area.resolution_m:
+        expected = f"metres, at most the area's {max(width_m, height_m):.0f}"
+        faults.add("area.resolution_m", expected, area.resolution_m, "a resolution in another unit")
+    pixels = width_m * height_m / area.resolution_m**2
+    if pixels > LARGEST_AREA_PX:
+        expected, got = f"at most {LARGEST_AREA_PX:.0e} pixels", f"{pixels:.1e}"
+        hint = "a box or a resolution in the wrong unit"
+        faults.add("area", expected, f"{got} at {area.resolution_m:g} m", hint)
+    faults.raise_if_any(ConfigError)
+    if on_map and area.map_is_a_file:
+        check_on_map(area.map, crs, bounds_m)
+    check_scale(crs, bounds_m, "area.crs")
+    return Lattice.covering(crs, bounds_m, area.resolution_m)
+
+
+def roads_lattice(config: Config) -> Lattice:
+    """Return the lattice of a configuration's area; without box and map, that of a road raster.
+
+    Errors are those of :func:`area_lattice` and of the raster.
+    """
+    area, raster = config.area, config.roads.raster
+    if area.has_extent or raster is None:
+        return area_lattice(area)
+    lattice = raster_lattice(raster, area.resolution_m)
+    if lattice.rows * lattice.cols > LARGEST_AREA_PX:
+        expected = f"at most {LARGEST_AREA_PX:.0e} pixels"
+        got = f"{lattice.rows * lattice.cols:.1e} at {area.resolution_m:g} m"
+        raise fail(ConfigError, f"{raster}, area.resolution_m", expected, got, "a large raster")
+    return lattice
+
+
+def pixels_on(
+    lattice: Lattice, bounds_m: tuple[float, float, float, float]
+) -> tuple[int, int, int, int] | None:
+    """Return the pixels of a lattice that a box in its CRS touches, or None where there are none.
+
+    Examples
+    --------
+    >>> lattice = Lattice("EPSG:32635", 0.0, 100.0, 5.0, 20, 20)
+    >>> pixels_on(lattice, (10.0, 50.0, 30.0, 200.0))
+    (0, 2, 10, 4)
+    >>> pixels_on(lattice, (100.0, 0.0, 200.0, 100.0)) is None
+    True
+    """
+    west, south, east, north = bounds_m
+    # A hair inside, so that an edge on a pixel's edge takes no pixel beyond it.
+    hair_m = 1e-6 * lattice.resolution_m
+    top, left = lattice.row_col(west + hair_m, north - hair_m)
+    bottom, right = lattice.row_col(east - hair_m, south + hair_m)
+    top, left = max(int(top), 0), max(int(left), 0)
+    rows = min(int(bottom), lattice.rows - 1) - top + 1
+    cols = min(int(right), lattice.cols - 1) - left + 1
+    return None if rows < 1 or cols < 1 else (top, left, rows, cols)
+
+
+def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
+    """Check that metres of a CRS are metres on the ground in the middle of an area.
+
+    Raises
+    ------
+    InputError
+        They differ by more than 3 %: the CRS is made for another region or is Web Mercator.
+    """
+    west, south, east, north = bounds_m
+    middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
+    ends_m = middle_m + np.array([[0.0, _SHORT_M], [0.0, 0.0]])
+    lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
+    along_rad = np.hypot(np.diff(lon_rad) * np.cos(lat_rad[0]), np.diff(lat_rad))
+    ground_m = float(along_rad[0] * EARTH_RADIUS_M)
+    if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:
+        expected = "a CRS whose metres are metres on the ground in this area"
+        got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
+        raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")

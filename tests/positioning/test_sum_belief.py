@@ -1,0 +1,131 @@
+"""Gaussian sums: their moments, and which parts are dropped or merged after an update."""
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.gaussian import EKF
+from mapfilter.models.ranging import position_fix
+from mapfilter.models.state import POSITION
+from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.models import compiled
+
+COVARIANCE = np.array([[25.0, 6.0], [6.0, 16.0]])
+
+
+def parts(*means, weights=None, covariances=None):
+    count = len(means)
+    weights = np.full(count, 1 / count) if weights is None else np.array(weights)
+    covariances = np.tile(COVARIANCE, (count, 1, 1)) if covariances is None else covariances
+    return SumBelief(weights, np.array(means, dtype=float), np.array(covariances),
+                     10 + np.arange(count))  # fmt: skip
+
+
+def updated(belief, place_m=(0.0, 0.0), sd_m=1e6):
+    """A belief after a fix; one as wide as usual changes hardly anything."""
+    model = compiled(position_fix(POSITION, np.eye(2) * sd_m**2))
+    return belief.update(model, place_m, EKF)
+
+
+def test_moments_are_those_of_the_mixture():
+    belief = parts((0.0, 0.0), (30.0, -10.0), (5.0, 40.0), weights=(0.5, 0.3, 0.2))
+    mean = 0.5 * belief.means[0] + 0.3 * belief.means[1] + 0.2 * belief.means[2]
+    second = sum(
+        w * (COVARIANCE + np.outer(m, m)) for w, m in zip(belief.weights, belief.means, strict=True)
+    )
+    np.testing.assert_allclose(belief.moments.mean, mean)
+    np.testing.assert_allclose(belief.moments.covariance, second - np.outer(mean, mean))
+    np.testing.assert_array_equal(belief.leading.mean, [0.0, 0.0])
+    np.testing.assert_array_equal(parts((1.0, 2.0), (3.0, 4.0), weights=(0.1, 0.9)).leading.mean,
+                                  [3.0, 4.0])  # fmt: skip
+
+
+def test_linear_motion_moves_each_part():
+    belief = parts((1.0, 2.0), (-4.0, 5.0))
+    transition, noise = np.array([[1.0, 0.5], [0.0, 1.0]]), np.array([[2.0, 0.3], [0.3, 1.0]])
+    found = belief.predict(transition, noise, [7.0, -1.0])
+    for k in range(2):
+        np.testing.assert_allclose(found.means[k], transition @ belief.means[k] + [7.0, -1.0])
+        np.testing.assert_allclose(
+            found.covariances[k], transition @ COVARIANCE @ transition.T + noise
+        )
+    np.testing.assert_array_equal(found.parts, belief.parts)
+
+
+@pytest.mark.parametrize("place_m", [(3.0, 1.0), (60.0, -20.0)])
+def test_parts_are_weighed_by_their_evidence(place_m):
+    sd_m = 12.0
+    belief = parts((0.0, 0.0), (30.0, -10.0), (5.0, 40.0), weights=(0.5, 0.3, 0.2))
+    found, taken = updated(belief, place_m, sd_m)
+    whole = COVARIANCE + sd_m**2 * np.eye(2)
+    off = np.array(place_m) - belief.means
+    nis = np.einsum("ci,ij,cj->c", off, np.linalg.inv(whole), off)
+    evidence = np.exp(-0.5 * nis) / (2 * np.pi * np.sqrt(np.linalg.det(whole)))
+    share = belief.weights * evidence / (belief.weights @ evidence)
+    order = np.argsort(-share)
+    order = order[share[order] > 1e-6]
+    np.testing.assert_array_equal(found.parts, 10 + order)
+    np.testing.assert_allclose(found.weights, share[order], rtol=1e-5)
+    assert taken.used
+    assert taken.nis == pytest.approx(share @ nis)
+    assert taken.evidence == pytest.approx(np.log(belief.weights @ evidence))
+    gain = COVARIANCE @ np.linalg.inv(whole)
+    np.testing.assert_allclose(found.means, (belief.means + off @ gain.T)[order])
+    np.testing.assert_allclose(found.covariances[0], COVARIANCE - gain @ COVARIANCE)
+
+
+@pytest.mark.parametrize(("square", "count"), [(0.095, 1), (0.105, 2)])
+def test_a_part_that_lies_on_a_heavier_one_is_merged_into_it(square, count):
+    """Within a tenth of a squared deviation; the heavier one stays where it is."""
+    away = np.linalg.cholesky(COVARIANCE) @ np.array([0.6, -0.8]) * square**0.5
+    belief = parts((3.0, 4.0), np.array([3.0, 4.0]) + away, (200.0, 0.0), weights=(0.3, 0.2, 0.5))
+    found, _ = updated(belief)
+    assert found.weights.size == count + 1
+    np.testing.assert_allclose(found.means[0], [200.0, 0.0], atol=1e-3)
+    np.testing.assert_allclose(found.means[1], [3.0, 4.0], atol=1e-3)
+    assert found.weights[1] == pytest.approx(0.5 if count == 1 else 0.3, rel=1e-6)
+    assert found.parts[:2].tolist() == [12, 10]
+    assert found.weights.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("log_volume", "count"), [(0.19, 1), (-0.19, 1), (0.21, 2), (-0.21, 2)])
+def test_parts_of_other_volumes_stay(log_volume, count):
+    wider = COVARIANCE * np.exp(log_volume / 2)
+    belief = parts((3.0, 4.0), (3.0, 4.0), weights=(0.6, 0.4), covariances=[COVARIANCE, wider])
+    found, _ = updated(belief)
+    assert found.weights.size == count
+
+
+@pytest.mark.parametrize(("weight", "count"), [(0.9e-6, 1), (1.1e-6, 2), (0.0, 1)])
+def test_parts_without_weight_are_dropped(weight, count):
+    belief = parts((0.0, 0.0), (300.0, 0.0), weights=(1 - weight, weight))
+    found, _ = updated(belief)
+    assert found.weights.size == count
+    assert found.weights.sum() == pytest.approx(1.0)
+    assert found.parts[0] == 10
+
+
+def test_many_parts_that_lie_on_one_another_become_one():
+    """In steps: one that is far from the heaviest is a heavier one of those beside it."""
+    means = [(0.0, 0.0), (0.5, 0.0), (100.0, 0.0), (100.4, 0.0), (0.0, 0.3)]
+    belief = parts(*means, weights=(0.3, 0.1, 0.25, 0.2, 0.15))
+    found, _ = updated(belief)
+    np.testing.assert_allclose(found.means, [(0.0, 0.0), (100.0, 0.0)], atol=1e-3)
+    np.testing.assert_allclose(found.weights, [0.55, 0.45], rtol=1e-6)
+    assert found.parts.tolist() == [10, 12]
+
+
+def test_a_start_around_a_place_has_equal_parts():
+    places = {0: np.array([1.0, 2.0, 3.0, 4.0]), 1: np.array([5.0, 6.0, 7.0, 8.0])}
+    found = SumBelief.around(np.array([9.0, 9.0]), COVARIANCE, places)
+    np.testing.assert_allclose(found.weights, 0.25)
+    np.testing.assert_array_equal(found.means, np.column_stack([places[0], places[1]]))
+    np.testing.assert_array_equal(found.covariances, np.tile(COVARIANCE, (4, 1, 1)))
+    assert found.parts.tolist() == [0, 1, 2, 3]
+    some = SumBelief.around(np.array([9.0, 8.0]), COVARIANCE, {1: places[1]})
+    np.testing.assert_array_equal(some.means, np.column_stack([np.full(4, 9.0), places[1]]))
+
+
+def test_a_reading_that_no_part_can_take_changes_nothing():
+    belief = parts((0.0, 0.0), (30.0, 0.0))
+    found, taken = updated(belief, (np.nan, np.nan), 5.0)
+    assert not taken.used or np.array_equal(found.weights, belief.weights)

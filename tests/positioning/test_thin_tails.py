@@ -1,0 +1,39 @@
+"""Shares of thin Gaussians beyond a radius, whose inner integral is nearly a step."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from mapfilter.positioning.integrity import GaussianTail
+
+
+def share_beyond(radius_m, along_m, across_m, long_m, short_m):
+    """By quadrature, cut where the circle meets the middle of the belief."""
+
+    def inside(x):
+        half_m = np.sqrt(max(radius_m**2 - x**2, 0.0))
+        held = norm.cdf((half_m - across_m) / short_m) - norm.cdf((-half_m - across_m) / short_m)
+        return held * norm.pdf(x, along_m, long_m)
+
+    step_m = np.sqrt(max(radius_m**2 - across_m**2, 0.0))
+    near = [s * step_m + k * short_m for s in (-1, 1) for k in (-40, -10, -3, -1, 0, 1, 3, 10, 40)]
+    edges = np.unique(np.clip([-radius_m, *near, along_m, radius_m], -radius_m, radius_m))
+    parts = pairwise(edges)
+    return 1 - sum(quad(inside, a, b, epsabs=1e-12, epsrel=1e-10, limit=200)[0] for a, b in parts)
+
+
+@pytest.mark.parametrize("radius_m", [9.0, 10.5, 12.0, 20.0, 45.0])
+@pytest.mark.parametrize(("along_m", "across_m"), [(0.0, 10.0), (6.0, 10.0), (15.0, 4.0)])
+@pytest.mark.parametrize("thin", [0.01, 0.03])
+def test_thin_beliefs_beside_the_position(radius_m, along_m, across_m, thin):
+    long_m = 12.0
+    short_m = thin * long_m
+    turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+    covariance = turn @ np.diag([long_m**2, short_m**2]) @ turn.T
+    offset = turn @ np.array([along_m, -across_m])
+    tail = GaussianTail(np.ones(1), offset[np.newaxis], covariance[np.newaxis])
+    expected = share_beyond(radius_m, along_m, across_m, long_m, short_m)
+    assert tail.outside(radius_m) == pytest.approx(expected, abs=2e-4)

@@ -1,0 +1,166 @@
+"""Beliefs with a turned phone as they begin: their odds, their hypotheses and their draws."""
+
+from dataclasses import replace
+from math import log, pi
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.hypotheses import Bins
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.geodesy import wrap_rad
+from mapfilter.models.street_motion import BIAS, STATES
+from mapfilter.positioning.bayes.alternative import NullHypothesis
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold, as_measured, forked, own_rng
+from mapfilter.positioning.bayes.hold_rules import HoldRules
+
+RULES = HoldRules(
+    jump_deg=60.0, around_deg=150.0, probability=0.01, around_probability=0.2, mirrored_odds=0.3,
+    particles=300,
+)  # fmt: skip
+NULL = NullHypothesis(-2.5)
+RARE, USUAL = log(0.01 / 0.99), log(0.2 / 0.8)
+MIRRORED = log(0.3)
+
+
+def belief(count=1000, seed=2):
+    rng = np.random.default_rng(seed)
+    state = rng.standard_normal((STATES, count)).astype(np.float32)
+    state[BIAS] = 3.0
+    # Nearly all of the weight lies at the first tenth.
+    weight = np.where(np.arange(count) < count // 10, 9.0, 0.1)
+    return ParticleBelief(
+        state, np.log(weight / weight.sum()) - 40.0, Bins.over((0.0, 0.0, 100.0, 100.0)),
+        np.arange(2.0 * count, dtype=np.float32).reshape(2, count), log_evidence=-70.0,
+    )  # fmt: skip
+
+
+def forks(hold, before_rad, after_rad, rules=RULES, white_rad=0.0, main=None):
+    rng = np.random.default_rng(4)
+    headings = (before_rad, after_rad)
+    return forked(rules, main or belief(), NULL, hold, headings, 123.0, white_rad, rng)
+
+
+@pytest.mark.parametrize(
+    ("hold", "jump_rad", "odds"),
+    [
+        # A jump of a right angle is rarely the phone's, one right round often.
+        (Hold(), 1.6, (RARE, RARE + MIRRORED)),
+        (Hold(), -1.6, (RARE, RARE + MIRRORED)),
+        (Hold(), np.radians(149.0), (RARE, RARE + MIRRORED)),
+        (Hold(), np.radians(151.0), (USUAL, USUAL + MIRRORED)),
+        (Hold(), np.radians(209.0), (USUAL, USUAL + MIRRORED)),
+        (Hold(), np.radians(211.0), (RARE, RARE + MIRRORED)),
+        # Turned back, which is likely: by as much as it was turned.
+        (Hold(1.0, 1.6), 1.6, (USUAL, RARE + MIRRORED)),
+        (Hold(1.0, 1.6), 1.6 - np.radians(29.0), (USUAL, RARE + MIRRORED)),
+        (Hold(1.0, 1.6), 1.6 - np.radians(31.0), (RARE, RARE + MIRRORED)),
+        # From usual to usual is no turning back.
+        (Hold(1.0, 0.3), 0.3, (RARE, RARE + MIRRORED)),
+    ],
+)
+def test_the_odds_of_a_phone_that_was_turned(hold, jump_rad, odds):
+    before_rad = 0.7
+    found = forks(hold, before_rad, float(wrap_rad(before_rad + jump_rad)))
+    assert [one.log_prior for one in found] == pytest.approx(odds)
+    assert [one.hold.sign for one in found] == [hold.sign, -hold.sign]
+    for one in found:
+        assert (one.start_m, one.null) == (123.0, NULL)
+        ahead_rad = hold.direction_rad(before_rad)
+        assert one.hold.direction_rad(before_rad + jump_rad) == pytest.approx(ahead_rad)
+        assert one.belief.log_evidence == -70.0
+        assert one.log_bayes_factor(belief()) == 0.0
+
+
+def test_mirrored_back_to_the_usual_reading_is_likely():
+    """From a mirrored reading the other sign is the mirrored one of the two."""
+    hold = Hold(-1.0, 2.0)
+    _, other = forks(hold, 0.5, hold.direction_rad(0.5))
+    assert other.hold.is_usual
+    assert other.log_prior == pytest.approx(USUAL + MIRRORED)
+
+
+def test_the_belief_in_which_headings_are_as_measured():
+    found = as_measured(RULES, belief(), NULL, 55.0, 0.0, np.random.default_rng(1))
+    assert found.hold == Hold()
+    assert found.log_prior == pytest.approx(USUAL)
+    assert (found.start_m, found.null) == (55.0, NULL)
+    assert found.belief.state.shape == (STATES, 300)
+
+
+def test_smaller_beliefs_have_hypotheses_by_weight_and_equal_weights():
+    """With what they keep; their number is no larger than that of the main belief."""
+    main = belief()
+    for one in forks(Hold(), 0.0, 1.6):
+        own = one.belief
+        assert own.state.shape == (STATES, 300)
+        np.testing.assert_allclose(own.log_weight, -log(300))
+        from_ = own.kept[0].astype(int)
+        np.testing.assert_array_equal(own.kept, main.kept[:, from_])
+        others = np.arange(STATES) != BIAS
+        np.testing.assert_array_equal(own.state[others], main.state[others][:, from_])
+        # 9 in 10 of 1000 by weight are among the first 100: five standard errors.
+        share = np.mean(from_ < 100)
+        assert abs(share - 900 / 990) < 5 * (0.0827 / 300) ** 0.5
+    few = belief(40)
+    assert forks(Hold(), 0.0, 1.6, main=few)[0].belief.state.shape == (STATES, 40)
+    np.testing.assert_array_equal(main.state, belief().state)
+
+
+def test_the_white_noise_of_two_headings_is_in_their_bias():
+    """Wrapped; the main belief keeps its own."""
+    main = belief()
+    rules = replace(RULES, particles=1000)
+    (one, other) = forks(Hold(), 0.0, 1.6, rules, white_rad=0.2, main=main)
+    for own in (one.belief, other.belief):
+        added = wrap_rad(own.state[BIAS].astype(float) - 3.0)
+        assert abs(added.mean()) < 5 * 0.2 * (2 / 1000) ** 0.5
+        assert added.std() == pytest.approx(0.2 * 2**0.5, rel=5 / 2000**0.5)
+        assert np.all(np.abs(own.state[BIAS]) <= pi + 1e-6)
+    assert np.all(main.state[BIAS] == 3.0)
+
+
+def test_draws_are_of_the_time_and_of_what_they_are_for():
+    def drawn(time_s, salt):
+        return own_rng(time_s, salt).random(3).tolist()
+
+    assert drawn(12.345, 7) == drawn(12.345, 7) == drawn(12.3451, 7)
+    assert drawn(12.345, 7) not in (drawn(12.346, 7), drawn(12.345, 8))
+    # Any time has one, also before 0 and beyond what a seed holds.
+    assert drawn(-3.0, 1) != drawn(1e15, 1)
+
+
+def test_a_reading_of_headings_by_hand():
+    """Direction and turn change their sign together; lengths stay, and what is missing."""
+    step = MotionStep(1.4, 0.5, 0.2, 3.0)
+    found = Hold(-1.0, 2.0).read(step)
+    assert (found.step_m, found.spread_m) == (1.4, 3.0)
+    assert (found.heading_rad, found.turn_rad) == pytest.approx((1.5, -0.2))
+    found = Hold(1.0, 3.0).read(step)
+    assert (found.heading_rad, found.turn_rad) == pytest.approx((3.5 - 2 * pi, 0.2))
+    nothing = MotionStep(1.4, np.nan, 0.2)
+    assert Hold(-1.0, 2.0).read(nothing) is nothing
+    assert Hold(-1.0, 0.0).read(step).heading_rad == -0.5
+    assert Hold(1.0, np.radians(29.9)).is_usual
+    assert not Hold(1.0, np.radians(30.1)).is_usual
+    assert not Hold(-1.0, 0.0).is_usual
+
+
+@pytest.mark.parametrize(
+    ("other_m", "elsewhere"),
+    [((30.0, 40.0), False), ((31.0, 40.0), True), ((-30.0, -41.0), True), ((30.0, -39.0), False)],
+)
+def test_a_position_is_another_one_from_fifty_metres_on(other_m, elsewhere):
+    def at(place_m):
+        return SimpleNamespace(summary=SimpleNamespace(mean=place_m), log_evidence=-9.0)
+
+    one = HeldOtherwise(at((700.0, 500.0)), Hold(), -1.0, 0.0)
+    main = at((700.0 + other_m[0], 500.0 + other_m[1]))
+    assert one.is_elsewhere(main) is elsewhere
+    assert one.log_odds(replace_evidence(main, -12.0)) == pytest.approx(2.0)
+
+
+def replace_evidence(belief, log_evidence):
+    return SimpleNamespace(summary=belief.summary, log_evidence=log_evidence)
