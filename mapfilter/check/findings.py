@@ -56,6 +56,7 @@ REMEDIES = {
     "log-invalid": "Correct the log or recording, or its settings in [track].",
     "log-outside-area": "Take a log of this area, or the area of this log.",
     "log-rows-unused": "Look at the lines named; mapfilter convert lists all reasons.",
+    "log-speeds": "Give lengths in metres; if a vehicle moved, set filter.bayes.vehicle = true.",
     "log-without-motion": "Add a recording of steps, odometry or a fused track (track.recordings), "
     "or set track.course_motion; without motion only GNSS locates.",
     "lon-lat-swapped": "Exchange longitude and latitude.",

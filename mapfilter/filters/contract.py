@@ -53,6 +53,7 @@ class Reason(StrEnum):
     MOTION_STUCK = "motion_stuck"
     HEADING_STUCK = "heading_stuck"
     PHONE_TURNED = "phone_turned"
+    OTHER_UNIT = "other_unit"
     DELIVERED_TWICE = "delivered_twice"
     STALE_RADIO = "stale_radio"
     NOT_STARTED = "not_started"

@@ -14,6 +14,7 @@ from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.speeds import speed_fault
 
 STREETS_ALONE = "no cells and no positions in the log: located by the streets alone"
 
@@ -35,7 +36,8 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
     column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of levels. The
     motion of wheels is a vehicle's (``log.vehicle``); where a log does not state it, turns without
     headings are taken for a vehicle's odometry by several signs
-    (:class:`mapfilter.positioning.vehicle_signs.VehicleSigns`).
+    (:class:`mapfilter.positioning.vehicle_signs.VehicleSigns`). Steps with headings whose speed is
+    no walker's are noted.
     Options that are no dataclass, lack these fields, or have other values than the defaults, are
     not changed.
     """
@@ -94,7 +96,11 @@ def _whose_motion(log: TrackLog) -> tuple[bool | None, str]:
         whose = "a vehicle's" if log.vehicle else "no vehicle's"
         return log.vehicle, f"motion: {whose}, as the log states it (filter.bayes.vehicle)"
     signs = vehicle_signs(log)
-    if signs is None or not signs.fast:
+    if signs is None:
+        fault = speed_fault(log.motion) if log.imu is None else ""
+        advice = "if a vehicle moved, set filter.bayes.vehicle = true"
+        return None, f"motion: {fault}; {advice}" if fault else ""
+    if not signs.fast:
         return None, ""
     whose = "a vehicle's" if signs.vehicle else "a cyclist's, no vehicle's"
     return (

@@ -22,6 +22,7 @@ REASONS: Mapping[Reason, str] = {
     Reason.MOTION_STUCK: "the motion sensor repeats itself",
     Reason.HEADING_STUCK: "the heading repeats itself while one walks",
     Reason.PHONE_TURNED: "the heading has jumped as that of a phone that is turned",
+    Reason.OTHER_UNIT: "lengths of steps are read in another unit from here on",
     Reason.DELIVERED_TWICE: "the same rows of motion were delivered again",
     Reason.STALE_RADIO: "the modem repeats an old report",
     Reason.NOT_STARTED: "there is no belief yet",

@@ -8,12 +8,14 @@ from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
 from mapfilter.geodesy import Lattice, same_crs, short_crs
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.world import outside_m
 
@@ -42,6 +44,9 @@ def check_logs(
         for note in opened.log.notes:
             if ", heading_rad: " in note:
                 findings.add("log-headings", str(path), f"{note}.", "warning")
+        whose = config.filter.bayes.of(BayesFilter).vehicle, opened.log.vehicle, opened.log.imu
+        if all(one is None for one in whose) and (fault := speed_fault(opened.log.motion)):
+            findings.add("log-speeds", str(path), f"Motion: {fault}.", "warning")
         log = opened.log if lattice is None else in_frame(opened.log, lattice.crs)
         near = lattice is not None and _is_near(path, log, lattice, findings)
         # Motion without any reports is located by the streets alone.

@@ -4,7 +4,7 @@ Streets run along both axes, from 70 to 150 m apart. Levels fall off with the di
 their prediction they wander along the way as a sum of sines does: no process of the filter's.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -117,3 +117,10 @@ def walk_log(town, seed, length_m=1200.0, *, turned_rad=0.0, levels=True, error_
     truth = pd.DataFrame({"time_s": time_s, "east_m": WEST_M + place_m[:, 0],
                           "north_m": SOUTH_M + place_m[:, 1]})  # fmt: skip
     return make_log(CRS, motion=motion, radio=radio, truth=truth, start_utc_s=1.7e9)
+
+
+def slowed(log, times=4.0):
+    """Return a walk at a fraction of its 5 m/s, which are no walker's speed."""
+    tables = {name: getattr(log, name) for name in ("motion", "radio", "truth")}
+    slow = {name: rows.assign(time_s=times * rows["time_s"]) for name, rows in tables.items()}
+    return replace(log, **slow)

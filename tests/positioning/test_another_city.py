@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_town import Town, walk_log
+from made_town import Town, slowed, walk_log
 
 from mapfilter.filters.contract import Status
 from mapfilter.models.street_motion import OFF, STATES
@@ -26,6 +26,7 @@ def positioner():
 
 
 def found(positioner, log, seed=0):
+    log = slowed(log)
     estimate = locate(log, positioner, np.random.default_rng(seed)).estimate
     truth = log.truth
     off_m = np.hypot(estimate.east_m - truth["east_m"], estimate.north_m - truth["north_m"])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import small_area
-from made_town import CRS, PIXEL_M, SIDE_M, SOUTH_M, WEST_M, Town, walk_log
+from made_town import CRS, PIXEL_M, SIDE_M, SOUTH_M, WEST_M, Town, slowed, walk_log
 from small_area import BANDS, HEIGHT_M, OPTIONS, WIDTH_M, make_area
 
 from mapfilter.filters.contract import MotionStep, Status
@@ -104,7 +104,7 @@ def walk_in(town, seed):
         inside = np.flatnonzero(east_m > 0)
         stays = inside.size > 130 and (east_m[inside[0] :] > 0).all()
         if east_m[0] < -100 and stays:
-            return log, inside[0]
+            return slowed(log), inside[0]
     raise AssertionError("no such walk")
 
 

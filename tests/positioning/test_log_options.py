@@ -185,7 +185,9 @@ def test_turns_without_headings_at_a_vehicles_speed_are_a_vehicles(options):
     ],
 )
 def test_other_motion_is_not_taken_for_a_vehicles(given):
-    assert fitted_to_log(BayesFilter(), given) == (BayesFilter(), ())
+    fitted, notes = fitted_to_log(BayesFilter(), given)
+    assert fitted == BayesFilter()
+    assert not any("taken for a" in note for note in notes)
 
 
 def riding(sway_dps, speed_mps=7.0, frequency_hz=0.8, lasts_s=300, launches=0, gains_mps=9.0):
@@ -257,3 +259,37 @@ def test_what_a_log_states_of_its_vehicle_counts_more_than_signs(options):
     assert notes == ("motion: no vehicle's, as the log states it (filter.bayes.vehicle)",)
     own = replace(options, vehicle=False)
     assert fitted_to_log(own, replace(walked, vehicle=True)) == (own, ())
+
+
+def headed_rows(step_m):
+    return make_log(
+        CRS,
+        motion=pd.DataFrame({"time_s": np.arange(60.0), "step_m": step_m, "heading_rad": 0.3}),
+    )
+
+
+@pytest.mark.parametrize(
+    ("step_m", "mistake"),
+    [(4.4, "lengths in feet"), (0.41, "metres taken for feet"), (14.0, "of a walker;")],
+)
+def test_steps_with_headings_whose_speed_is_no_walkers_are_noted(step_m, mistake):
+    options, notes = fitted_to_log(BayesFilter(), headed_rows(step_m))
+    assert options == BayesFilter()
+    (note,) = notes
+    assert note.startswith(f"motion: steps of {step_m:.1f} m/s, expected 0.6 to 2.6 m/s")
+    assert mistake in note
+    assert note.endswith("if a vehicle moved, set filter.bayes.vehicle = true")
+
+
+def test_speeds_of_walkers_and_of_stated_vehicles_are_not_noted():
+    assert fitted_to_log(BayesFilter(), headed_rows(1.3))[1] == ()
+    assert fitted_to_log(BayesFilter(vehicle=True), headed_rows(4.4))[1] == ()
+    driven = replace(headed_rows(4.4), vehicle=True)
+    assert "a vehicle's, as the log states it" in fitted_to_log(BayesFilter(), driven)[1][0]
+    # Who has measured the errors of steps knows their unit.
+    measured = replace(headed_rows(4.4), imu=ImuNoise(sigma_trans_m=0.3))
+    assert not any("m/s" in note for note in fitted_to_log(BayesFilter(), measured)[1])
+    # Rests count neither way.
+    rows = headed_rows(1.3).motion
+    rows.loc[rows.index % 5 > 0, "step_m"] = 0.0
+    assert fitted_to_log(BayesFilter(), make_log(CRS, motion=rows))[1] == ()

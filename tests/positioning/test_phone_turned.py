@@ -228,7 +228,7 @@ def test_who_stands_may_turn_there():
 
 def test_the_two_reasons_to_be_lost_are_told_apart():
     state, rng = begun()
-    held = HeldOtherwise(beside(state.belief, 200.0), Hold(1.0, 3.0), 3.0, 0.0)
+    held = HeldOtherwise(beside(state.belief, 200.0), Hold(1.0, 3.0), 3.0, 0.0, ahead_m=-7.0)
     rest = (1.0, 0.0, 0.0)
     state, output = walked(replace(state, held=(held,)), rng, rest)
     assert (output.fix.status, state.unclear, state.contested) == (Status.LOST, False, True)
@@ -303,22 +303,40 @@ RULES = HoldRules(max_beliefs=2)
 
 def test_which_beliefs_stay_open():
     low, high, mid = one_of(-3.0), one_of(2.0), one_of(1.0, start_m=300.0)
-    assert still_open(RULES, (low, high, mid), MAIN, 399.0) == (high, mid)
-    assert still_open(RULES, (low, high, mid), MAIN, 400.0) == (mid,)
+
+    def left(travelled_m):
+        return [one.belief for one in still_open(RULES, (low, high, mid), MAIN, travelled_m)]
+
+    assert left(399.0) == [high.belief, mid.belief]
+    assert left(400.0) == [mid.belief]
     # The Bayes factor refutes, whatever the odds before.
     assert still_open(RULES, (one_of(-3.0, prior=1.5),), MAIN, 0.0) == ()
 
 
 def test_when_a_belief_is_ahead_and_when_it_takes_over():
-    assert is_ahead(RULES, (one_of(0.9), one_of(1.1)), MAIN)
-    assert not is_ahead(RULES, (one_of(0.9), one_of(9.0, east_m=40.0)), MAIN)
-    assert not is_ahead(RULES, (), MAIN)
+    held = still_open(RULES, (one_of(0.9), one_of(1.1)), MAIN, 20.0)
+    assert is_ahead(RULES, held, MAIN, 27.0)
+    near = still_open(RULES, (one_of(0.9), one_of(9.0, east_m=40.0)), MAIN, 20.0)
+    assert not is_ahead(RULES, near, MAIN, 27.0)
+    assert not is_ahead(RULES, (), MAIN, 27.0)
     best = one_of(9.0)
     assert winner(RULES, (one_of(8.5), best), MAIN, -3.0) is best
     assert winner(RULES, (one_of(7.9),), MAIN, -3.0) is None
     assert winner(RULES, (one_of(9.0, null=-2.0),), MAIN, -3.0) is None
     assert winner(RULES, (one_of(9.0, status=Status.SEARCHING),), MAIN, -3.0) is None
     assert winner(RULES, (), MAIN, -3.0) is None
+
+
+def test_odds_that_come_and_go_leave_a_position():
+    """A belief has to stay ahead for 7 m before the position is LOST."""
+    held = still_open(RULES, (one_of(1.1),), MAIN, 20.0)
+    assert not is_ahead(RULES, held, MAIN, 26.9)
+    later = still_open(RULES, held, MAIN, 26.0)
+    assert is_ahead(RULES, later, MAIN, 27.0)
+    behind = still_open(RULES, (replace(held[0], log_prior=-1.0),), MAIN, 26.0)
+    again = still_open(RULES, (replace(behind[0], log_prior=0.0),), MAIN, 30.0)
+    assert not is_ahead(RULES, again, MAIN, 36.0)
+    assert is_ahead(RULES, again, MAIN, 37.0)
 
 
 def test_the_other_beliefs_keep_their_odds_after_a_takeover():

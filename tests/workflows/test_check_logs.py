@@ -117,3 +117,14 @@ def test_notes_that_many_files_share_are_summed_up(tmp_path):
     assert len(of_times) == 1
     assert of_times[0].startswith("110 times not understood (levels kept) in 5 files (")
     assert "such as 'soon' in line 2" in of_times[0]
+
+
+def test_steps_in_feet_are_a_finding(check, log):
+    rows = pd.read_csv(log / "motion.csv")
+    speed_mps = rows["step_m"].iloc[1:].sum() / (rows["time_s"].iloc[-1] - rows["time_s"].iloc[0])
+    change(log / "motion.csv", step_m=lambda step_m: step_m * 4.4 / speed_mps)
+    found = check(log)
+    assert found["log-speeds"]["severity"] == "warning"
+    assert "steps of 4.4 m/s, expected 0.6 to 2.6 m/s" in found["log-speeds"]["evidence"]
+    assert "filter.bayes.vehicle" in found["log-speeds"]["remedy"]
+    assert "log-speeds" not in check(log, "--set", "filter.bayes.vehicle=true")

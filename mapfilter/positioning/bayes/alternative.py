@@ -185,6 +185,8 @@ class AlternativeHypothesis:
         Contribution of rejected satellites to the log Bayes factor; bounded, as all may be faulty.
     null : NullHypothesis
         Beside the alternative itself.
+    step_unit_m : float
+        Unit in which it reads lengths of steps.
     """
 
     belief: MapBelief
@@ -194,6 +196,7 @@ class AlternativeHypothesis:
     sources: Mapping[str, Any] = field(default_factory=dict)
     gnss_log_bayes_factor: float = 0.0
     null: NullHypothesis = field(default_factory=NullHypothesis)
+    step_unit_m: float = 1.0
 
     def log_bayes_factor(self, main: MapBelief) -> float:
         """Return the logarithm of the Bayes factor in favour of the alternative."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from mapfilter.filters.contract import BeliefFilter, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
-from mapfilter.models.street_motion import remounted
+from mapfilter.models.street_motion import NORTH, remounted
 from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -20,6 +21,7 @@ from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.held import is_ahead
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.sensors import spread_m2
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
@@ -151,7 +153,43 @@ class BeliefFilters:
         main = state.belief
         if not state.held or not isinstance(main, ParticleBelief):
             return False
-        return is_ahead(self.holds, state.held, main)
+        return is_ahead(self.holds, state.held, main, state.reckoning.travelled_m)
+
+    def other_unit_m(self, state: BayesState) -> float:
+        """Return a further unit in which steps may be given, by their speed; 1 for none.
+
+        That is where they are a walker's by all that is stated, but not by their speed.
+        """
+        gnss: GnssState = state.sources[GnssSource.name]
+        if not self.holds.watched or not state.compass or gnss.met:
+            return 1.0
+        return state.watch.other_unit_m
+
+    def may_have_left(self, state: BayesState) -> bool:
+        """Return whether a walker may have left its position though no step is counted."""
+        rest = state.watch.rest
+        if rest is None or not self.holds.watched or not rest.is_doubtful:
+            return False
+        gnss: GnssState = state.sources[GnssSource.name]
+        return state.reckoning.travelled_m > gnss.used_at_m
+
+    def carried_on(
+        self, state: BayesState, belief: MapBelief, gone_s: float, rng: np.random.Generator
+    ) -> MapBelief:
+        """Move some hypotheses to where they may be by now, once steps are counted again.
+
+        ``state`` is that before, ``gone_s`` the time without steps. A rest whose levels were in
+        doubt may have been a way.
+        """
+        rest = state.watch.rest
+        if rest is None or not isinstance(belief, ParticleBelief):
+            return belief
+        count = belief.log_weight.size
+        gone = rng.random(count) < rest.left_probability
+        far_m = sqrt(spread_m2(rest.pace_mps, gone_s) / 2)
+        moved = belief.state.copy()
+        moved[: NORTH + 1, gone] += far_m * rng.standard_normal((NORTH + 1, int(gone.sum())))
+        return replace(belief, state=moved)
 
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""

@@ -154,6 +154,8 @@ class BayesPositioner(Filter[BayesState]):
         heard = epoch.radio
         watch, epoch, (motion, radio) = watched(state.watch, epoch)
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
+        # Hypotheses that were carried on have to gather first.
+        unclear = unclear or state.unclear
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         if radio is not Reason.USED:
@@ -183,9 +185,14 @@ class BayesPositioner(Filter[BayesState]):
                 if belief is not state.belief or status is not state.status:
                     state = replace(state, belief=belief, status=status)
                 state = weighing.in_one_place(state, measured=measured, was_unclear=unclear)
-        taken_over = state.hold not in (hold, Hold())
-        if motion is Reason.USED and epoch.motion and (state.contested or taken_over):
+        other_unit = state.hold.step_unit_m != hold.step_unit_m
+        taken_over = state.hold not in (hold, Hold()) and not other_unit
+        if motion is Reason.USED and state.contested and self.beliefs.may_have_left(state):
+            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.MOTION_STUCK))
+        elif motion is Reason.USED and epoch.motion and (state.contested or taken_over):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
+        elif other_unit and epoch.motion:
+            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.OTHER_UNIT))
         gnss: GnssState = state.sources[GnssSource.name]
         if epoch.fix is not None and gnss.was_used(epoch.time_s):
             state = replace(state, last_fix=epoch.fix)

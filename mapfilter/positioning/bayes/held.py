@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import hypot, isfinite, log, radians
+from math import hypot, isfinite, log, nan, radians
 
 import numpy as np
 
@@ -31,13 +31,22 @@ _MILLISECONDS, _SEEDS = 1000.0, 2**32
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """How headings are read: their sign, and the angle that is added."""
+    """How motion is read: the sign of headings, the angle that is added, the unit of steps in m."""
 
     sign: float = 1.0
     offset_rad: float = 0.0
+    step_unit_m: float = 1.0
 
     def read(self, step: MotionStep) -> MotionStep:
-        """Return a step with the direction that its heading stands for."""
+        """Return a step with the length and the direction that it stands for."""
+        if self.step_unit_m != 1.0:
+            unit_m = self.step_unit_m
+            step = replace(
+                step,
+                step_m=unit_m * step.step_m,
+                spread_m=unit_m * step.spread_m,
+                sampling_sd_m=unit_m * step.sampling_sd_m,
+            )
         if (self.sign == 1.0 and self.offset_rad == 0.0) or not isfinite(step.heading_rad):
             return step
         direction_rad = self.direction_rad(step.heading_rad)
@@ -69,8 +78,9 @@ class Hold:
         '0.6, 0.4'
         """
         ahead_rad, sign = self.direction_rad(before_rad), self.sign
-        turned = Hold(sign, float(wrap_rad(ahead_rad - sign * after_rad)))
-        return turned, Hold(-sign, float(wrap_rad(ahead_rad + sign * after_rad)))
+        unit_m = self.step_unit_m
+        turned = Hold(sign, float(wrap_rad(ahead_rad - sign * after_rad)), unit_m)
+        return turned, Hold(-sign, float(wrap_rad(ahead_rad + sign * after_rad)), unit_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +99,8 @@ class HeldOtherwise:
         Distance travelled at the jump.
     null : NullHypothesis
         Beside this belief.
+    ahead_m : float
+        Distance travelled since which it is ahead of the main belief, and elsewhere; NaN if not.
     """
 
     belief: ParticleBelief
@@ -96,6 +108,7 @@ class HeldOtherwise:
     log_prior: float
     start_m: float
     null: NullHypothesis = field(default_factory=NullHypothesis)
+    ahead_m: float = nan
 
     def log_bayes_factor(self, main: ParticleBelief) -> float:
         """Return the logarithm of the Bayes factor against the main belief."""
@@ -223,12 +236,28 @@ def still_open(
         and travelled_m - one.start_m < rules.abandon_after_m
     ]
     kept.sort(key=lambda one: -one.log_odds(main))
-    return tuple(kept[: rules.max_beliefs])
+    return tuple(_compared(rules, one, main, travelled_m) for one in kept[: rules.max_beliefs])
 
 
-def is_ahead(rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief) -> bool:
-    """Return whether one of the beliefs is ahead of the main one, and elsewhere."""
-    return any(one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main) for one in held)
+def _compared(
+    rules: HoldRules, one: HeldOtherwise, main: ParticleBelief, travelled_m: float
+) -> HeldOtherwise:
+    """Return a belief with the distance since which it is ahead."""
+    if not (one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main)):
+        return replace(one, ahead_m=nan)
+    return one if isfinite(one.ahead_m) else replace(one, ahead_m=travelled_m)
+
+
+def is_ahead(
+    rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
+) -> bool:
+    """Return whether one of the beliefs is ahead of the main one, and elsewhere, for some way."""
+    return any(
+        travelled_m - one.ahead_m >= rules.lost_after_m
+        and one.log_odds(main) > rules.lost_log_odds
+        and one.is_elsewhere(main)
+        for one in held
+    )
 
 
 def winner(

@@ -34,6 +34,8 @@ class HoldRules(Options):
         Odds of its being mirrored against its being turned.
     lost_log_odds : float
         Log odds from which on the main belief is LOST.
+    lost_after_m : float
+        Distance for which they last before it is: odds about that value come and go.
     win_log_odds : float
         Log odds from which on it is replaced.
     abandon_threshold : float
@@ -55,6 +57,7 @@ class HoldRules(Options):
     around_probability: Probability = 0.25
     mirrored_odds: Positive = 0.25
     lost_log_odds: float = 1.0
+    lost_after_m: NotNegative = 7.0
     win_log_odds: float = 8.0
     abandon_threshold: float = -4.0
     abandon_after_m: NotNegative = 400.0

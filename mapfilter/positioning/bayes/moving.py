@@ -20,8 +20,8 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import UnusedReading
 
-_FORKED, _MOVED = 1, 2
-"""Salts of the draws of beliefs in which the phone was turned."""
+_FORKED, _MOVED, _AWAY = 1, 2, 4
+"""Salts of the draws of beliefs in which the phone was turned, and of hypotheses carried on."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,11 @@ def moved(
         gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
         if state.status is belief.status is Status.TRACKING:
             held = (as_measured(rules, belief, state.null, gone_m, white_rad, own.forking),)
+    unclear = state.unclear
+    if belief is not None and watch.rest is None and beliefs.may_have_left(state):
+        gone_s = epoch.time_s - state.watch.moving_s
+        away = beliefs.carried_on(state, belief, gone_s, own_rng(epoch.time_s, _AWAY))
+        belief, unclear = away, unclear or away is not belief
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         measured = step
@@ -132,7 +137,8 @@ def moved(
             if alternative is not None:
                 # It began anew, and nothing says that the phone is held otherwise.
                 other = alternative.belief
-                other, _ = predict(other, _assumed(measured, other), rng)
+                as_read = Hold(step_unit_m=alternative.step_unit_m).read(measured)
+                other, _ = predict(other, _assumed(as_read, other), rng)
                 alternative = replace(alternative, belief=other)
             if twin is not None:
                 other = twin.belief
@@ -147,7 +153,7 @@ def moved(
     return BayesState(
         belief=belief,
         status=state.status,
-        unclear=state.unclear,
+        unclear=unclear,
         contested=state.contested,
         sources=state.sources,
         reckoning=reckoning,
@@ -164,6 +170,7 @@ def moved(
         hold=hold,
         walking_rad=walking_rad,
         held=held,
+        alternatives=state.alternatives,
     ), unused
 
 

@@ -3,13 +3,17 @@
 At rest levels change by fading alone. Each block of a rest is compared with its first one, by the
 likelihoods of "still there" and "carried elsewhere", and their ratio is added up from zero (a
 CUSUM; Page, 1954).
+
+A walker on whose steps are no longer counted is 50 m away before that ratio can be large. So the
+rest itself has to be shown, too: where levels could have shown it, and did not, the position is in
+doubt from 45 m on, at the pace before. How levels change then depends on the distance.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite, log, nan
+from math import exp, isfinite, log, nan, sqrt
 
 from mapfilter.positioning.epochs import ReportRow
 from mapfilter.tracks.schema import SERVING
@@ -25,6 +29,17 @@ _NATS_PER_S = 1 / 300
 """Serving cells that are usual at rest, gain from each further one that has not served for so long,
 and what is forgotten with time: now and then others serve, also at rest."""
 _CARRIED_NATS = 6.0
+_FADING_DB, _WHITE_DB = 2.7, 3.3
+"""Deviation of a level at rest from its earlier mean, and of a single level besides."""
+_WAY_DB, _WAY_M = 10.5, 60.0
+"""Deviation of a level far along a way from that at its start; the distance of 1 - 1/e of its
+variance."""
+_MOST_NATS, _LEAST_NATS = 3.0, -12.0
+"""The most that a block gains, either way, and the least sum."""
+_LEFT_M, _SHOWABLE_NATS = 45.0, -2.5
+_SHOWN_NATS, _SHOWN_AGAIN_NATS = -1.0, -5.0
+"""Way from which on a position is in doubt, and sum of levels that do not change at all above which
+levels could not show a rest; the sum at or below which they do, and do again after a doubt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +60,16 @@ class Rest:
         Time of the last report.
     carried_nats : float
         How much the levels speak for being carried on.
+    pace_mps : float
+        Speed before the rest.
+    began_s : float
+        When the first block began.
+    left_nats : float
+        How much the levels speak for walking on at that pace against a rest; below 0 for the rest.
+    still_nats : float
+        The same, had no level changed.
+    is_doubtful : bool
+        Whether levels could have shown the rest by now, and did not.
     """
 
     since_s: float
@@ -54,6 +79,11 @@ class Rest:
     served: Mapping[str, float] = field(default_factory=dict)
     heard_s: float = nan
     carried_nats: float = 0.0
+    pace_mps: float = 0.0
+    began_s: float = nan
+    left_nats: float = 0.0
+    still_nats: float = 0.0
+    is_doubtful: bool = False
 
     def heard(self, time_s: float, rows: tuple[ReportRow, ...]) -> Rest:
         """Add a report; a phone that was carried on stays so until a step is measured."""
@@ -67,20 +97,47 @@ class Rest:
         nats = min(kept + _NATS_PER_CELL * max(all_cells - known, 0), _CARRIED_NATS)
         served = recent | dict.fromkeys(cells, time_s)
         block_s, first, present = self.block_s, self.first, dict(self.present)
+        began_s, left_nats, still_nats = self.began_s, self.left_nats, self.still_nats
         if not isfinite(block_s):
-            block_s = time_s
+            block_s = began_s = time_s
         elif time_s - block_s >= _BLOCK_S:
             nats = min(max(nats + _BLOCK_SHARE * _carried(first, present), 0.0), _CARRIED_NATS)
+            gained, unchanged = _left(first, present, self.pace_mps * (block_s - began_s))
+            left_nats, still_nats = _added(left_nats, gained), _added(still_nats, unchanged)
             block_s, first, present = time_s, {**present, **first}, {}
         for name, level_dbm in levels_of(rows):
             total, count = present.get(name, (0.0, 0))
             present[name] = (total + level_dbm, count + 1)
-        return Rest(self.since_s, block_s, first, present, served, time_s, nats)
+        return Rest(
+            self.since_s,
+            block_s,
+            first,
+            present,
+            served,
+            time_s,
+            nats,
+            self.pace_mps,
+            began_s,
+            left_nats,
+            still_nats,
+            self._in_doubt(time_s, left_nats, still_nats) and nats < _CARRIED_NATS,
+        )
+
+    def _in_doubt(self, time_s: float, left_nats: float, still_nats: float) -> bool:
+        """Return whether the rest is in doubt at a time, with these sums."""
+        far = self.pace_mps * (time_s - self.since_s) >= _LEFT_M
+        shown_nats = _SHOWN_AGAIN_NATS if self.is_doubtful else _SHOWN_NATS
+        return far and still_nats <= _SHOWABLE_NATS and left_nats > shown_nats
 
     @property
     def is_carried(self) -> bool:
         """Whether the phone is carried on though no motion is reported."""
         return self.carried_nats >= _CARRIED_NATS
+
+    @property
+    def left_probability(self) -> float:
+        """Probability that the phone was carried on at the pace before, by its levels alone."""
+        return 1 / (1 + exp(-self.left_nats))
 
 
 def levels_of(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:
@@ -102,6 +159,31 @@ def _carried(first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[flo
     if not changes:
         return 0.0
     return _log_density(changes, _ELSEWHERE_DB) - _log_density(changes, _AT_REST_DB)
+
+
+def _left(
+    first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[float, int]], way_m: float
+) -> tuple[float, float]:
+    """Return the log-likelihood ratio of a way to a rest, and that of levels without a change."""
+    pairs = [(now[name], first[name]) for name in now if name in first]
+    if not pairs or way_m <= 0:
+        return 0.0, 0.0
+    changes = [own[0] / own[1] - other[0] / other[1] for own, other in pairs]
+    per_mean = sum(1 / own[1] + 1 / other[1] for own, other in pairs) / len(pairs)
+    at_rest_db2 = _FADING_DB**2 + _WHITE_DB**2 * per_mean
+    at_rest_db = sqrt(at_rest_db2)
+    on_way_db = sqrt(at_rest_db2 + _WAY_DB**2 * (1 - exp(-way_m / _WAY_M)))
+    ratios = (
+        _log_density(seen, on_way_db) - _log_density(seen, at_rest_db)
+        for seen in (changes, [0.0] * len(changes))
+    )
+    gained, unchanged = (_BLOCK_SHARE * ratio for ratio in ratios)
+    return gained, unchanged
+
+
+def _added(nats: float, gained: float) -> float:
+    """Return a bounded sum with what a block gains."""
+    return max(nats + min(max(gained, -_MOST_NATS), _MOST_NATS), _LEAST_NATS)
 
 
 def _log_density(changes_db: list[float], sd_db: float) -> float:

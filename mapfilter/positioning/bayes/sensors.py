@@ -31,6 +31,11 @@ _WALK_MPS = 1.4
 _STRAIGHT_S = 60.0
 """Time after which the direction of an unmeasured way is forgotten by 1/e."""
 
+_SPEED_ROWS, _SLOW_MPS, _FAST_MPS, _MOTOR_MPS = 30, 0.6, 2.6, 8.0
+_FOOT_M, _FASTEST_MPS = 0.3048, 9.0
+"""Rows by which the speed is known; bounds of the speed of a walker, and that from which on it is
+none in feet either, as a mean; the same of a single row."""
+
 _NATS_PER_M, _MOST_ROWS = 0.12, 3
 """Gain, for each level of at most three, from a report that repeats the last one: by the metres
 between them."""
@@ -73,6 +78,8 @@ class SensorWatch:
         How much repeated reports speak for a radio that stands still.
     repeats : MotionRepeats
         How motion rows repeat each other.
+    fastest_mps : float
+        Largest speed of a row.
     """
 
     motion_s: float = nan
@@ -89,6 +96,7 @@ class SensorWatch:
     moved_m: float = 0.0
     repeated_nats: float = 0.0
     repeats: MotionRepeats = field(default_factory=MotionRepeats)
+    fastest_mps: float = 0.0
 
     @property
     def reports_always(self) -> bool:
@@ -96,6 +104,15 @@ class SensorWatch:
         if self.rows < _KNOWN_ROWS:
             return False
         return self.rests or self.irregular_s < _REGULAR * self.interval_s
+
+    @property
+    def other_unit_m(self) -> float:
+        """Unit of steps with which the speed is a walker's where it is not in metres; else 1."""
+        if self.rows < _SPEED_ROWS or self.fastest_mps > _FASTEST_MPS:
+            return 1.0
+        if _FAST_MPS < self.speed_mps < _MOTOR_MPS:
+            return _FOOT_M
+        return 1 / _FOOT_M if self.speed_mps < _SLOW_MPS else 1.0
 
 
 UNMEASURED = frozenset(
@@ -119,13 +136,15 @@ def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple
     repeats, motion, repeated = without_repeats(watch.repeats, epoch.time_s, epoch.motion)
     if motion is not epoch.motion:
         epoch = replace(epoch, motion=motion)
+    steps = epoch.motion
     way, epoch, why = _followed(watch, epoch)
     why = repeated if why is Reason.USED else why
     report, moved_m, nats = watch.report, way.moved_m, watch.repeated_nats
     if epoch.radio:
         nats = _repeated(watch, moved_m, epoch.radio)
         report, moved_m = epoch.radio, 0.0
-    watch = SensorWatch(*way[:-1], report, moved_m, nats, repeats)
+    fastest_mps = max(watch.fastest_mps, _row_mps(watch, epoch.time_s, steps))
+    watch = SensorWatch(*way[:-1], report, moved_m, nats, repeats, fastest_mps)
     if epoch.radio and nats >= _STALE_NATS:
         return watch, replace(epoch, radio=()), (why, Reason.STALE_RADIO)
     return watch, epoch, (why, Reason.USED)
@@ -162,7 +181,8 @@ def _followed(watch: SensorWatch, epoch: Epoch) -> tuple[_Way, Epoch, Reason]:
         return _Way(*way[:6], time_s, time_s, None, 0.0, moved_m), epoch, why
     if not isfinite(way.moving_s):
         return way, epoch, why
-    rest = (way.rest or Rest(way.moving_s)).heard(time_s, epoch.radio)
+    rest = way.rest or Rest(way.moving_s, pace_mps=way.speed_mps)
+    rest = rest.heard(time_s, epoch.radio)
     # A measured rest is none of the way, unless it was a counter that stood still.
     unmeasured_s = way.unmeasured_s + time_s - way.known_s
     if rest.is_carried:
@@ -182,6 +202,13 @@ def _followed(watch: SensorWatch, epoch: Epoch) -> tuple[_Way, Epoch, Reason]:
     moved_m = way.moved_m + step.step_m
     way = _Way(*way[:7], time_s, rest, unmeasured_s, moved_m)
     return way, replace(epoch, motion=(*turned, step)), why
+
+
+def _row_mps(watch: SensorWatch, time_s: float, steps: tuple[MotionStep, ...]) -> float:
+    """Return the speed of an epoch's rows; of rows soon after others, over the usual interval."""
+    gone_m = sum(abs(step.step_m) for step in steps if isfinite(step.step_m))
+    lasted_s = max(time_s - watch.motion_s, watch.interval_s)
+    return gone_m / lasted_s if watch.rows > 1 and lasted_s > 0 else 0.0
 
 
 def _usual_s(watch: SensorWatch, dt_s: float) -> float:
@@ -232,11 +259,11 @@ def _timed(
 
 def _unmeasured(speed_mps: float, from_s: float, to_s: float) -> MotionStep:
     """Return the step to all sides between two times since the last measured one."""
-    spread_m2 = _spread_m2(speed_mps, to_s) - _spread_m2(speed_mps, from_s)
-    return MotionStep(speed_mps * (to_s - from_s), nan, nan, sqrt(max(spread_m2, 0.0)))
+    more_m2 = spread_m2(speed_mps, to_s) - spread_m2(speed_mps, from_s)
+    return MotionStep(speed_mps * (to_s - from_s), nan, nan, sqrt(max(more_m2, 0.0)))
 
 
-def _spread_m2(speed_mps: float, time_s: float) -> float:
+def spread_m2(speed_mps: float, time_s: float) -> float:
     """Return the mean square of the distance of a way that forgets its direction."""
     lasts_s = _STRAIGHT_S
     return 2 * speed_mps**2 * lasts_s * (time_s - lasts_s * (1 - exp(-time_s / lasts_s)))

@@ -41,7 +41,8 @@ class BayesState:
     unclear : bool
         LOST only because the belief is spread over more than one place.
     contested : bool
-        LOST only because a belief in which the phone was turned is ahead.
+        LOST only because a belief in which the phone was turned is ahead, or because the phone may
+        have been carried on though no step is counted.
     sources : mapping of str to object
         State of each source of evidence by its name.
     reckoning : DeadReckoning
@@ -72,6 +73,8 @@ class BayesState:
         Heading of the last row of a walk, as measured.
     held : tuple of HeldOtherwise
         Beliefs in which the phone was turned, tested against the belief.
+    alternatives : int
+        Number of alternatives that were started.
     """
 
     belief: MapBelief | None = None
@@ -93,6 +96,7 @@ class BayesState:
     hold: Hold = field(default_factory=Hold)
     walking_rad: float = nan
     held: tuple[HeldOtherwise, ...] = ()
+    alternatives: int = 0
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -116,6 +120,7 @@ class BayesState:
             hold=self.hold,
             walking_rad=self.walking_rad,
             held=self.held,
+            alternatives=self.alternatives,
         )
 
     @property

@@ -30,10 +30,17 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import Hold, after_takeover, own_rng, still_open, winner
+from mapfilter.positioning.bayes.held import after_takeover, own_rng, still_open, winner
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.bayes.step_units import (
+    asks_for_unit,
+    hold_after_takeover,
+    is_unit_open,
+    log_odds_of_unit,
+    unit_of_next_m,
+)
 from mapfilter.positioning.epochs import Epoch
 
 _WEIGHED = 3
@@ -129,6 +136,8 @@ class Weighing:
         else:
             plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
         doubt = plain or doubted(rules, before, state.null, state.alternative)
+        other_m = beliefs.other_unit_m(state)
+        doubt = doubt or is_unit_open(state, before, other_m)
         tracked = measured and before.status is Status.TRACKING
         reading = replace(evidence, tracked=tracked, doubted=doubt, belief=before)
         belief, info = update(before, reading, rng)
@@ -161,6 +170,7 @@ class Weighing:
             sources = {**sources, **alternative.sources}
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
+        disputed = disputed or asks_for_unit(state, now.belief, other_m)
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
@@ -176,8 +186,9 @@ class Weighing:
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
             # An alternative reads headings as they are.
-            hold=Hold() if now.taken_over else state.hold,
+            hold=hold_after_takeover(state) if now.taken_over else state.hold,
             held=() if now.taken_over else state.held,
+            alternatives=state.alternatives + (alternative is not now.alternative),
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
@@ -256,7 +267,8 @@ class Weighing:
         least = 0.0 if measured else rules.unclear_below_mass
         if was_unclear:
             least = rules.clear_from_mass
-        unclear, contested = mass < least, self.beliefs.is_contested(state)
+        contested = self.beliefs.is_contested(state) or self.beliefs.may_have_left(state)
+        unclear = mass < least
         if not (unclear or contested):
             return state
         return replace(state, status=Status.LOST, unclear=unclear, contested=contested)
@@ -275,13 +287,15 @@ class Weighing:
             # Many alternatives may follow each other, and each begins with the streets that fit
             # best: what speaks for a position off the map must not be forgotten with each.
             null = NullHypothesis(max(state.null.log_odds, null.log_odds))
+        unit_m = unit_of_next_m(state, main, self.beliefs.other_unit_m(state))
         return AlternativeHypothesis(
             belief,
             state.reckoning.travelled_m,
-            main.log_evidence,
+            main.log_evidence + log_odds_of_unit(unit_m),
             epoch.time_s,
             sources,
             null=null,
+            step_unit_m=unit_m,
         )
 
 
