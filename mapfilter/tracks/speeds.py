@@ -5,11 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-SLOWEST_MPS, FASTEST_MPS = 0.6, 2.6
-"""Bounds of the speed of a walker, as a mean while it moves."""
+SLOWEST_MPS, FASTEST_MPS, MOTOR_MPS = 0.6, 2.6, 8.0
+"""Bounds of the speed of a walker, as a mean while it moves; that which is none in feet either."""
 
 _STANDING_MPS, _LEAST_ROWS, _LONGEST_S = 0.1, 30, 10.0
 _FOOT_M = 0.3048
+
+
+def walkers_unit_m(speed_mps: float) -> float:
+    """Return the unit of steps in which a mean speed may be a walker's; 1 also where it is in none.
+
+    Parameters
+    ----------
+    speed_mps : float
+        With steps taken for metres.
+
+    Examples
+    --------
+    >>> [round(walkers_unit_m(speed_mps), 4) for speed_mps in (0.4, 1.3, 4.4, 8.2)]
+    [3.2808, 1.0, 0.3048, 1.0]
+    """
+    if speed_mps < SLOWEST_MPS:
+        return 1 / _FOOT_M
+    return _FOOT_M if FASTEST_MPS < speed_mps < MOTOR_MPS else 1.0
 
 
 def speed_fault(motion: pd.DataFrame) -> str:
@@ -46,8 +64,7 @@ def speed_fault(motion: pd.DataFrame) -> str:
     if SLOWEST_MPS <= speed_mps <= FASTEST_MPS:
         return ""
     found = f"steps of {speed_mps:.1f} m/s, expected {SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s of a "
-    if SLOWEST_MPS <= speed_mps * _FOOT_M <= FASTEST_MPS:
-        return f"{found}walker (lengths in feet?)"
-    if SLOWEST_MPS <= speed_mps / _FOOT_M <= FASTEST_MPS:
-        return f"{found}walker (metres taken for feet?)"
-    return f"{found}walker"
+    unit_m = walkers_unit_m(speed_mps)
+    if unit_m == 1.0:
+        return f"{found}walker"
+    return f"{found}walker ({'lengths in feet' if unit_m < 1 else 'metres taken for feet'}?)"

@@ -1,6 +1,7 @@
 """Headings that jump in a walk: the walker has turned, or the phone was turned or mirrored."""
 
 from dataclasses import replace
+from math import isnan
 from types import SimpleNamespace
 
 import numpy as np
@@ -37,6 +38,7 @@ WATCHED = replace(AREA, holds=replace(AREA.holds, longest_row_m=6.0))
 UNWATCHED = replace(AREA, holds=HoldRules(watched=False))
 SEEDS = range(1, 7)
 TURNED_S = 120.0
+FOOT_M = 0.3048
 
 
 def log_of(seed, change=None, until_s=np.inf):
@@ -198,6 +200,41 @@ def test_an_alternative_reads_headings_as_they_are_also_once_it_takes_over():
     assert Reason.PHONE_TURNED not in {one.reason for one in output.unused}
 
 
+def test_takeovers_are_reported_also_where_reports_have_times_of_their_own():
+    """Here half a second after the row of motion."""
+    state, rng = begun()
+    state, _ = walked(state, rng, (1.0, 5.0, 0.0))
+    other = beside(state.belief, -250.0, log_evidence=100.0)
+    sure = NullHypothesis(-40.0)
+    in_feet = AlternativeHypothesis(other, 0.0, 0.0, null=sure, step_unit_m=FOOT_M)
+    turned = HeldOtherwise(other, Hold(1.0, np.pi), 3.0, 0.0, sure)
+    for beside_it, reason in (
+        ({"alternative": in_feet}, Reason.OTHER_UNIT),
+        ({"held": (turned,)}, Reason.PHONE_TURNED),
+    ):
+        after, output = WATCHED.step(replace(state, **beside_it), Epoch(1.5, (), RADIO), rng)
+        assert after.takeovers == 1
+        assert reason in {one.reason for one in output.unused}
+
+
+def test_steps_in_feet_are_no_other_reading_of_headings():
+    """With a position there is nothing to compare, and a phone turned back is no turned phone."""
+    in_feet, turned = Hold(step_unit_m=FOOT_M), Hold(1.0, np.pi, FOOT_M)
+    state, rng = begun()
+    row = (MotionStep(5.0, 0.0),)
+    for hold, found in ((in_feet, []), (turned, [in_feet])):
+        measured = Epoch(1.0, row, fix=GnssFix(*START_M, 25.0, 25.0))
+        after, _ = WATCHED.step(replace(state, hold=hold), measured, rng)
+        assert [one.hold for one in after.held] == found
+    other = beside(state.belief, -250.0, log_evidence=100.0)
+    held = HeldOtherwise(other, in_feet, 3.0, 0.0, NullHypothesis(-40.0))
+    after, output = WATCHED.step(
+        replace(state, hold=turned, held=(held,)), Epoch(1.0, row, RADIO), rng
+    )
+    assert (after.takeovers, after.hold) == (1, in_feet)
+    assert not [one for one in output.unused if one.kind == "motion"]
+
+
 def test_few_hypotheses_are_enough_for_beliefs_in_which_the_phone_was_turned():
     few = BayesFilter(max_particles=600, min_search_particles=300, min_particles=200)
     positioner = few.over_area(TOWN.area())
@@ -340,9 +377,11 @@ def test_odds_that_come_and_go_leave_a_position():
 
 
 def test_the_other_beliefs_keep_their_odds_after_a_takeover():
-    best, other = one_of(9.0, prior=-1.0), one_of(4.0, prior=-5.0)
+    best, other = one_of(9.0, prior=-1.0), replace(one_of(4.0, prior=-5.0), ahead_m=20.0)
     (left,) = after_takeover((best, other), best)
     assert left.log_odds(best.belief) == pytest.approx(4.0 - 9.0)
+    # It was ahead of the belief that is no more.
+    assert isnan(left.ahead_m)
 
 
 def test_what_a_jump_is():

@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from made_town import Town, slowed, walk_log
 
@@ -22,6 +23,7 @@ from mapfilter.positioning.bayes.step_units import (
 from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.speeds import speed_fault
 
 CELLS = tuple("ABCDEFG")
 FOOT_M = 0.3048
@@ -176,6 +178,46 @@ def test_once_steps_are_counted_again_some_hypotheses_were_carried_on():
     assert again.watch.rest == rest
 
 
+@pytest.mark.parametrize("status", [Status.SEARCHING, Status.OUTSIDE])
+def test_a_search_stays_one_after_a_rest_in_doubt(status):
+    rng = np.random.default_rng(1)
+    state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
+    state, _ = AREA.step(state, Epoch(1.0, (MotionStep(5.0, 0.0),)), rng)
+    rest = replace(Rest(1.0, pace_mps=1.4), is_doubtful=True)
+    belief = replace(state.belief, status=Status.SEARCHING)
+    state = replace(state, belief=belief, status=status, watch=replace(state.watch, rest=rest))
+    before_m = state.belief.state[:2].std()
+    for time_s in (30.0, 31.0):
+        state, output = AREA.step(state, Epoch(time_s, (MotionStep(5.0, 0.0),)), rng)
+        assert state.belief.state[:2].std() > before_m + 5
+        assert (output.fix.status, state.unclear) == (status, False)
+
+
+def test_the_doubt_of_a_rest_ends_where_its_levels_have_shown_it():
+    """Next to no hypothesis is carried on, and nothing of the doubt remains."""
+    rng = np.random.default_rng(1)
+    state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
+    state, _ = AREA.step(state, Epoch(1.0, (MotionStep(5.0, 0.0),)), rng)
+    doubtful = replace(Rest(1.0, pace_mps=1.4), is_doubtful=True)
+    for left_nats, status in ((9.0, Status.LOST), (-9.0, Status.TRACKING)):
+        rest = replace(doubtful, left_nats=left_nats)
+        rested = replace(state, watch=replace(state.watch, rest=rest))
+        after, output = AREA.step(rested, Epoch(30.0, (MotionStep(5.0, 0.0),)), rng)
+        assert output.fix.status is status
+        assert after.unclear is (status is Status.LOST)
+
+
+def test_the_pace_before_a_rest_is_in_metres():
+    rng = np.random.default_rng(1)
+    state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
+    state = replace(state, hold=Hold(step_unit_m=FOOT_M))
+    for second in range(62):
+        step = MotionStep(4.4 if second < 60 else 0.0, 0.0)
+        state, _ = AREA.step(state, Epoch(float(second), (step,)), rng)
+    assert state.watch.speed_mps == pytest.approx(4.4, rel=0.05)
+    assert state.watch.rest.pace_mps == pytest.approx(FOOT_M * state.watch.speed_mps)
+
+
 def test_a_measured_position_leaves_no_doubt():
     state = SimpleNamespace(
         watch=SimpleNamespace(rest=replace(Rest(0.0), is_doubtful=True)),
@@ -197,6 +239,15 @@ def test_the_unit_with_which_a_speed_is_a_walkers(speed_mps, unit_m):
     assert SensorWatch(rows=29, speed_mps=speed_mps).other_unit_m == 1.0
     fast = SensorWatch(rows=30, speed_mps=speed_mps, fastest_mps=9.1)
     assert fast.other_unit_m == 1.0
+
+
+@pytest.mark.parametrize("speed_mps", [0.15, 0.41, 0.7, 2.5, 2.7, 4.4, 7.9, 8.2, 9.0])
+def test_notes_on_a_log_name_the_unit_that_the_filter_tries(speed_mps):
+    rows = pd.DataFrame({"time_s": np.arange(60.0), "step_m": speed_mps, "heading_rad": 0.0})
+    unit_m = SensorWatch(rows=60, speed_mps=speed_mps).other_unit_m
+    fault = speed_fault(rows)
+    assert ("lengths in feet" in fault) == (unit_m < 1)
+    assert ("metres taken for feet" in fault) == (unit_m > 1)
 
 
 def test_a_row_of_a_vehicle_ends_the_question_of_the_unit():

@@ -83,8 +83,9 @@ def test_mirrored_back_to_the_usual_reading_is_likely():
 
 
 def test_the_belief_in_which_headings_are_as_measured():
-    found = as_measured(RULES, belief(), NULL, 55.0, 0.0, np.random.default_rng(1))
-    assert found.hold == Hold()
+    hold = Hold(-1.0, 2.0, 0.3048)
+    found = as_measured(RULES, belief(), NULL, hold, 55.0, 0.0, np.random.default_rng(1))
+    assert found.hold == Hold(step_unit_m=0.3048)
     assert found.log_prior == pytest.approx(USUAL)
     assert (found.start_m, found.null) == (55.0, NULL)
     assert found.belief.state.shape == (STATES, 300)

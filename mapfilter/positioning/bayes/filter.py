@@ -32,7 +32,6 @@ from mapfilter.positioning.bayes.evidence import (
     RadioReading,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import Hold
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
@@ -152,10 +151,11 @@ class BayesPositioner(Filter[BayesState]):
             state = replace(state, status=Status.TRACKING, unclear=False, contested=False)
         before, weighing = state.status, self._weighing
         heard = epoch.radio
-        watch, epoch, (motion, radio) = watched(state.watch, epoch)
+        watch, epoch, (motion, radio) = watched(state.watch, epoch, hold.step_unit_m)
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
-        # Hypotheses that were carried on have to gather first.
-        unclear = unclear or state.unclear
+        if state.unclear:
+            # Hypotheses that were carried on have to gather first; what searches goes on so.
+            unclear, state = True, replace(state, unclear=False)
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         if radio is not Reason.USED:
@@ -186,12 +186,13 @@ class BayesPositioner(Filter[BayesState]):
                     state = replace(state, belief=belief, status=status)
                 state = weighing.in_one_place(state, measured=measured, was_unclear=unclear)
         other_unit = state.hold.step_unit_m != hold.step_unit_m
-        taken_over = state.hold not in (hold, Hold()) and not other_unit
+        read_anew = state.hold != hold and not other_unit
+        taken_over = read_anew and not state.hold.is_as_measured
         if motion is Reason.USED and state.contested and self.beliefs.may_have_left(state):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.MOTION_STUCK))
-        elif motion is Reason.USED and epoch.motion and (state.contested or taken_over):
+        elif motion is Reason.USED and (taken_over or (epoch.motion and state.contested)):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
-        elif other_unit and epoch.motion:
+        elif other_unit:
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.OTHER_UNIT))
         gnss: GnssState = state.sources[GnssSource.name]
         if epoch.fix is not None and gnss.was_used(epoch.time_s):
@@ -213,7 +214,7 @@ class BayesPositioner(Filter[BayesState]):
         """
         epoch, _ = _with_a_new_fix(state, epoch)
         spacing_m = state.particle_spacing_m
-        watch, epoch, (motion, _) = watched(state.watch, epoch)
+        watch, epoch, (motion, _) = watched(state.watch, epoch, state.hold.step_unit_m)
         state, _ = moved(self.beliefs, state, watch, epoch, rng)
         return *self._weighing.collected(state, epoch, spacing_m), motion not in UNMEASURED
 

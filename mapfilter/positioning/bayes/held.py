@@ -47,7 +47,7 @@ class Hold:
                 spread_m=unit_m * step.spread_m,
                 sampling_sd_m=unit_m * step.sampling_sd_m,
             )
-        if (self.sign == 1.0 and self.offset_rad == 0.0) or not isfinite(step.heading_rad):
+        if self.is_as_measured or not isfinite(step.heading_rad):
             return step
         direction_rad = self.direction_rad(step.heading_rad)
         return replace(step, heading_rad=direction_rad, turn_rad=self.sign * step.turn_rad)
@@ -55,6 +55,11 @@ class Hold:
     def direction_rad(self, heading_rad: float) -> float:
         """Return the direction that a heading stands for."""
         return wrap_one_rad(self.sign * heading_rad + self.offset_rad)
+
+    @property
+    def is_as_measured(self) -> bool:
+        """Whether headings are read as they are, whatever the unit of steps."""
+        return self.sign == 1.0 and self.offset_rad == 0.0
 
     @property
     def is_usual(self) -> bool:
@@ -192,6 +197,7 @@ def as_measured(
     rules: HoldRules,
     belief: ParticleBelief,
     null: NullHypothesis,
+    hold: Hold,
     travelled_m: float,
     white_rad: float,
     rng: np.random.Generator,
@@ -199,7 +205,8 @@ def as_measured(
     """Return the belief in which headings are as measured; parameters as of :func:`forked`."""
     log_prior = log(rules.around_probability / (1 - rules.around_probability))
     own = _smaller(rules, belief, white_rad, rng)
-    return HeldOtherwise(own, Hold(), log_prior, travelled_m, null)
+    plain = Hold(step_unit_m=hold.step_unit_m)
+    return HeldOtherwise(own, plain, log_prior, travelled_m, null)
 
 
 def _smaller(
@@ -285,7 +292,7 @@ def winner(
 
 
 def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[HeldOtherwise, ...]:
-    """Return the other beliefs, with their odds against the one that has taken over."""
-    return tuple(
-        replace(one, log_prior=one.log_prior - best.log_prior) for one in held if one is not best
-    )
+    """Return the others, with odds against the one that has taken over; none is ahead of it yet."""
+    gained = best.log_prior
+    others = (one for one in held if one is not best)
+    return tuple(replace(one, log_prior=one.log_prior - gained, ahead_m=nan) for one in others)

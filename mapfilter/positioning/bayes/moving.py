@@ -80,15 +80,17 @@ def moved(
     held = state.held
     if positioned:
         # Positions leave no doubt of a jump, and tell whether headings are still read rightly.
-        held = () if hold == Hold() else tuple(one for one in held if one.hold == Hold())
+        plain = (one for one in held if one.hold.is_as_measured)
+        held = () if hold.is_as_measured else tuple(plain)
     if not epoch.time_s - state.watch.moving_s <= rules.longest_pause_s:
         # Who stood may have turned there.
         walking_rad = nan
     own = _OwnDraws(epoch.time_s)
-    if positioned and not held and hold != Hold() and isinstance(belief, ParticleBelief):
+    otherwise = positioned and not held and not hold.is_as_measured
+    if otherwise and isinstance(belief, ParticleBelief):
         gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
         if state.status is belief.status is Status.TRACKING:
-            held = (as_measured(rules, belief, state.null, gone_m, white_rad, own.forking),)
+            held = (as_measured(rules, belief, state.null, hold, gone_m, white_rad, own.forking),)
     unclear = state.unclear
     if belief is not None and watch.rest is None and beliefs.may_have_left(state):
         gone_s = epoch.time_s - state.watch.moving_s

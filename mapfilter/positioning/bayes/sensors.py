@@ -20,6 +20,7 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
 from mapfilter.positioning.bayes.rest import Rest, levels_of
 from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.tracks.speeds import walkers_unit_m
 
 _GAP_S, _GAP_INTERVALS, _REGULAR = 5.0, 3.0, 0.02
 """After so long, in seconds and in intervals of the log, motion rows are missing; intervals of rows
@@ -31,10 +32,8 @@ _WALK_MPS = 1.4
 _STRAIGHT_S = 60.0
 """Time after which the direction of an unmeasured way is forgotten by 1/e."""
 
-_SPEED_ROWS, _SLOW_MPS, _FAST_MPS, _MOTOR_MPS = 30, 0.6, 2.6, 8.0
-_FOOT_M, _FASTEST_MPS = 0.3048, 9.0
-"""Rows by which the speed is known; bounds of the speed of a walker, and that from which on it is
-none in feet either, as a mean; the same of a single row."""
+_SPEED_ROWS, _FASTEST_MPS = 30, 9.0
+"""Rows by which the mean speed is known; speed of one row that is no walker's in feet either."""
 
 _NATS_PER_M, _MOST_ROWS = 0.12, 3
 """Gain, for each level of at most three, from a report that repeats the last one: by the metres
@@ -110,9 +109,7 @@ class SensorWatch:
         """Unit of steps with which the speed is a walker's where it is not in metres; else 1."""
         if self.rows < _SPEED_ROWS or self.fastest_mps > _FASTEST_MPS:
             return 1.0
-        if _FAST_MPS < self.speed_mps < _MOTOR_MPS:
-            return _FOOT_M
-        return 1 / _FOOT_M if self.speed_mps < _SLOW_MPS else 1.0
+        return walkers_unit_m(self.speed_mps)
 
 
 UNMEASURED = frozenset(
@@ -121,8 +118,10 @@ UNMEASURED = frozenset(
 """Reasons for which the way of an epoch is not known."""
 
 
-def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple[Reason, Reason]]:
-    """Look at the sensors of an epoch.
+def watched(
+    watch: SensorWatch, epoch: Epoch, step_unit_m: float = 1.0
+) -> tuple[SensorWatch, Epoch, tuple[Reason, Reason]]:
+    """Look at the sensors of an epoch, whose steps are read in a unit.
 
     Returns
     -------
@@ -137,7 +136,7 @@ def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple
     if motion is not epoch.motion:
         epoch = replace(epoch, motion=motion)
     steps = epoch.motion
-    way, epoch, why = _followed(watch, epoch)
+    way, epoch, why = _followed(watch, epoch, step_unit_m)
     why = repeated if why is Reason.USED else why
     report, moved_m, nats = watch.report, way.moved_m, watch.repeated_nats
     if epoch.radio:
@@ -166,7 +165,7 @@ class _Way(NamedTuple):
     moved_m: float
 
 
-def _followed(watch: SensorWatch, epoch: Epoch) -> tuple[_Way, Epoch, Reason]:
+def _followed(watch: SensorWatch, epoch: Epoch, step_unit_m: float) -> tuple[_Way, Epoch, Reason]:
     """Follow the motion rows; add the way that they lack."""
     time_s, why = epoch.time_s, Reason.USED
     steps = [abs(step.step_m) for step in epoch.motion]
@@ -181,7 +180,7 @@ def _followed(watch: SensorWatch, epoch: Epoch) -> tuple[_Way, Epoch, Reason]:
         return _Way(*way[:6], time_s, time_s, None, 0.0, moved_m), epoch, why
     if not isfinite(way.moving_s):
         return way, epoch, why
-    rest = way.rest or Rest(way.moving_s, pace_mps=way.speed_mps)
+    rest = way.rest or Rest(way.moving_s, pace_mps=step_unit_m * way.speed_mps)
     rest = rest.heard(time_s, epoch.radio)
     # A measured rest is none of the way, unless it was a counter that stood still.
     unmeasured_s = way.unmeasured_s + time_s - way.known_s
