@@ -47,7 +47,7 @@ def place_satellites(
 
     Examples
     --------
-    >>> from mapfilter.gnss.orbits import nominal_gps
+    >>> from mapfilter.gnss.almanacs import nominal_gps
     >>> start_utc_s = 1_700_000_000.0
     >>> week, _ = gps_time(start_utc_s)
     >>> rows = pd.DataFrame({"time_s": [0.0], "satellite": ["G01"], "pseudorange_m": [2.2e7],

@@ -223,7 +223,7 @@ from pathlib import Path
 import mapfilter as mf
 from mapfilter.errors import MapfilterError
 from mapfilter.config.load import load_config
-from mapfilter.gnss.orbits import read_yuma
+from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.learning.patch import read_patch
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.radio.cells import read_cell_plan

@@ -11,6 +11,7 @@ from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.street_motion import STATES, MotionErrors
 from mapfilter.positioning.bayes import smoothing
 from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 
 COUNT = 10
@@ -19,7 +20,7 @@ KEPT_BYTES = COUNT * (5 * 4 + 4)
 
 
 def state_at(travelled_m):
-    reckoning = SimpleNamespace(east_m=travelled_m, north_m=0.0, travelled_m=travelled_m)
+    reckoning = DeadReckoning(travelled_m, travelled_m)
     belief = SimpleNamespace(
         state=np.full((STATES, COUNT), travelled_m, dtype=np.float32), log_weight=np.zeros(COUNT)
     )

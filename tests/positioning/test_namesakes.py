@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from made_town import CRS, FLOOR_DBM, NAMES, WEST_M, Town, walk_log
+from made_town import CRS, FLOOR_DBM, NAMES, WEST_M, Town, slowed, walk_log
 
 from mapfilter.database.radioroutes import RadioField
 from mapfilter.filters.contract import Status
@@ -105,7 +105,7 @@ def test_walks_are_tracked_where_codes_are_used_again_far_away(each):
     town = Town.of(3)
     positioner = BayesFilter().over_area(with_namesakes(town, each))
     for seed in (21, 22):
-        log = by_code(walk_log(town, seed, error_db=3.0))
+        log = by_code(slowed(walk_log(town, seed, error_db=3.0)))
         rng, state = np.random.default_rng(5), positioner.begin()
         for epoch in epochs(log):
             state, output = positioner.step(state, epoch, rng)

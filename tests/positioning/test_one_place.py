@@ -36,12 +36,13 @@ class State:
     reckoning: object = field(default_factory=lambda: SimpleNamespace(travelled_m=40.0))
 
 
-def weighing(contested=False):
+def weighing(contested=False, left=False):
     rules = SimpleNamespace(unclear_below_mass=0.8, clear_from_mass=0.95)
     beliefs = SimpleNamespace(
         options=SimpleNamespace(split_mass=0.4),
         rules_of=lambda _: rules,
         is_contested=lambda _: contested,
+        may_have_left=lambda _: left,
     )
     return Weighing(beliefs, None, ())
 
@@ -174,3 +175,8 @@ def test_terms_of_timing_are_clipped_normal_densities(weight):
     assert square[3] > 18 > square[2]
     assert term.under_null == pytest.approx(-0.5 * 1.5 * weight * 2)
     assert TimingState() == (-inf, -inf)
+
+
+def test_a_rest_in_doubt_makes_it_contested():
+    found = weighing(left=True).in_one_place(State(Belief(0.99)), measured=True, was_unclear=False)
+    assert (found.status, found.unclear, found.contested) == (Status.LOST, False, True)

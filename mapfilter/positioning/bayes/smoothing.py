@@ -84,7 +84,10 @@ class BayesSmoother:
         self.last, now = after, after.reckoning
         self.moved.append((now.east_m, now.north_m, now.travelled_m, now.sampling_m2))
         taken_over, held_anew = after.takeovers > before.takeovers, after.hold != before.hold
-        if taken_over and held_anew:
+        unit = after.hold.step_unit_m / before.hold.step_unit_m
+        if taken_over and unit != 1.0:
+            self._read_in_another_unit(unit)
+        elif taken_over and held_anew:
             # The dead reckoning since the start of what has taken over was read otherwise.
             starts_m = [one.start_m for one in before.held if one.hold == after.hold]
             if not starts_m and before.alternative is not None:
@@ -105,6 +108,23 @@ class BayesSmoother:
             self.alternative.append(self._keep(after.alternative.belief))
         if sum(k.state.nbytes + k.log_weight.nbytes for k in self.kept) > _MAX_BYTES:
             self.kept, self.every_m = self.kept[::2], 2 * self.every_m
+
+    def _read_in_another_unit(self, factor: float) -> None:
+        """Lengthen all dead reckoning so far, and keep the beliefs that were moved in this unit.
+
+        The last dead reckoning stays, as what follows is added to it.
+        """
+        end = np.array(self.moved[-1])
+        scale = np.array([factor, factor, factor, factor**2])
+        lengthened = end - scale * (end - np.array(self.moved))
+        self.moved = [(float(e), float(n), float(s), float(v)) for e, n, s, v in lengthened]
+        self.kept, self.alternative = [self._moved_as(k) for k in self.alternative], []
+
+    def _moved_as(self, kept: Kept) -> Kept:
+        east_m, north_m, travelled_m, sampling_m2 = self.moved[kept.epoch]
+        return kept._replace(
+            moved_m=(east_m, north_m), travelled_m=travelled_m, sampling_m2=sampling_m2
+        )
 
     def _keep(self, belief: MapBelief) -> Kept:
         east_m, north_m, travelled_m, sampling_m2 = self.moved[-1]
