@@ -60,6 +60,13 @@ def test_rows_as_they_arrive_may_have_it():
     assert [one.sampling_sd_m for one in steps] == [4.5, 0.0]
 
 
+def test_a_table_without_a_usual_column_is_not_read_by_the_next_one():
+    log = make_log(CRS, motion=motion(sampling_sd_m=4.5))
+    lacking = replace(log, motion=log.motion.drop(columns="turn_rad"))
+    with pytest.raises(KeyError, match="turn_rad"):
+        epochs(lacking)
+
+
 def test_turns_keep_it():
     step, heading_rad = headed(MotionStep(9.0, nan, 0.25, sampling_sd_m=4.5), 1.0)
     assert step == MotionStep(9.0, heading_rad, 0.25, step.spread_m, 4.5)
@@ -107,6 +114,17 @@ def test_a_belief_that_is_tracked_assumes_it_and_one_that_searches_does_not(posi
             assert rough_m > 3 * fine_m
         else:
             assert rough_m == fine_m
+
+
+def test_a_row_of_length_0_is_a_rest_without_such_an_error(positioner):
+    rest = replace(STEP, step_m=0.0)
+    still = np.zeros((STATES, 100), dtype=np.float32)
+    assert np.array_equal(move(still, 0.0, 0.4, MotionErrors(), np.uint64(5), ROUGH), still)
+    assert DeadReckoning().moved(rest) == DeadReckoning()
+    _, _, after = radius_m(positioner, 2.0, rest)
+    _, _, fine = radius_m(positioner, 2.0, replace(rest, sampling_sd_m=0.0))
+    assert after.reckoning.sampling_m2 == 0.0
+    assert np.array_equal(after.belief.state, fine.belief.state)
 
 
 def test_variances_of_steps_add_up():
