@@ -273,7 +273,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             belief.status,
             belief.travelled_m,
             belief.agreement_start_m,
-            # Of a belief that has been found nobody asks.
+            # Whether all agrees counts only while the filter searches.
             agrees=belief.status is Status.SEARCHING
             and summary.mass_50m >= options.switch_mass
             and self.model.can_converge(summary, reading),

@@ -177,9 +177,11 @@ def move(
     """Return all hypotheses (8 or more, N) after one measured step; further rows stay.
 
     The errors are added to the heading. A step of length 0 changes nothing. ``key`` is from
-    :func:`mapfilter._kernels.draw_key`; ``sampling_sd_m`` is the step's own error, to each side.
+    :func:`mapfilter._kernels.draw_key`; ``sampling_sd_m`` is the step's own error, to each side,
+    which a step of length 0 does not have.
     """
     length = abs(step_m)
+    sampling_sd_m = sampling_sd_m if length > 0 else 0.0
     root = length**0.5
     white_rad = errors.white_rad
     # A step shorter than the typical one is a part of it, with the same noise over its length.

@@ -194,7 +194,8 @@ class _Timed(NamedTuple):
 def _by_time(log: TrackLog, name: str) -> _Timed:
     """Return the rows of a table; equal ones, as reports repeat themselves, are one object."""
     table: pd.DataFrame = getattr(log, name)
-    columns = [column for column in epoch_columns(name) if column in table]
+    may_lack = _FIELDS[name].more
+    columns = [one for one in epoch_columns(name) if one in table or one not in may_lack]
     rows: list[Any] = []
     made: dict[tuple[Any, ...], Any] = {}
     for begin in range(0, len(table), _AT_ONCE):

@@ -8,13 +8,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.speeds import speed_fault
+from mapfilter.tracks.speeds import FASTEST_MPS, speed_fault
 
 STREETS_ALONE = "no cells and no positions in the log: located by the streets alone"
 
@@ -24,7 +25,7 @@ _LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG = 0.05, 0.5
 """Least errors that a filter assumes: particles need some spread."""
 _STANDING_MPS = 0.2
 _LONG_ROW_M = 15.0
-"""Rows that are usually longer are a vehicle's, seconds apart."""
+"""Rows that are usually longer are no steps, whatever their speed."""
 
 
 def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str, ...]]:
@@ -60,16 +61,19 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         if vehicle is not None:
             changes["vehicle"] = vehicle
         notes += [note] if note else []
-    stated = _motion_errors(log)
-    if isinstance(options, BayesFilter) and stated:
+    stated, units = _motion_errors(log), {}
+    if isinstance(options, BayesFilter) and stated and _has_long_rows(log):
         stated["step_sd_m"] = _by_typical_step(stated["step_sd_m"], log)
+        units["step_sd_m"] = f" (of a step of {MotionErrors().typical_step_m:g} m)"
     measured = {
         name: value
         for name, value in stated.items()
         if _is_default(options, default, name) and value != default[name]
     }
     if measured:
-        shown = ", ".join(f"{name} = {value:.3g}" for name, value in measured.items())
+        shown = ", ".join(
+            f"{name} = {value:.3g}{units.get(name, '')}" for name, value in measured.items()
+        )
         notes.append(f"errors of motion as the log states them: {shown}")
         changes |= measured
     if not changes:
@@ -125,28 +129,49 @@ def _motion_errors(log: TrackLog) -> dict[str, float]:
         found["bias_sd_deg"] = imu.bias_sd_deg
     else:
         walk_deg = hypot(walk_deg, imu.gyro_noise_deg_per_sqrt_s)
-    step_m, time_s = log.motion["step_m"].to_numpy(), log.motion["time_s"].to_numpy()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        speed_mps = np.abs(step_m[1:]) / np.diff(time_s)
-    moving = speed_mps[np.isfinite(speed_mps) & (speed_mps > _STANDING_MPS)]
-    if walk_deg > 0 and moving.size:
-        found["drift_deg_per_sqrt_m"] = walk_deg / float(np.median(moving)) ** 0.5
+    usual_mps = _usual_mps(log)
+    if walk_deg > 0 and usual_mps > 0:
+        found["drift_deg_per_sqrt_m"] = walk_deg / usual_mps**0.5
     return found
 
 
+def _has_long_rows(log: TrackLog) -> bool:
+    """Return whether rows of motion are longer than the map filter's typical step, and no steps.
+
+    They are a vehicle's by what the log states, or by a speed that is no walker's, or are longer
+    than a walker's rows, which count as steps.
+    """
+    row_m = _usual_row_m(log)
+    driven = bool(log.vehicle) or _usual_mps(log) > FASTEST_MPS
+    return row_m > (MotionErrors().typical_step_m if driven else _LONG_ROW_M)
+
+
 def _by_typical_step(row_sd_m: float, log: TrackLog) -> float:
-    """Return the deviation of the map filter's typical step, by that of a vehicle's long rows.
+    """Return the deviation of the map filter's typical step, by that of longer rows.
 
     The filter's white error grows with the root of the distance from that of a typical step; a row
-    of a vehicle may be 50 m long. Shorter rows count as steps.
+    of a vehicle may be 50 m long.
     """
-    step_m = log.motion["step_m"].abs().to_numpy()
-    moving = step_m[step_m > _LEAST_STEP_SD_M]
-    usual_m = float(np.median(moving)) if moving.size else 0.0
-    if usual_m <= _LONG_ROW_M:
-        return row_sd_m
-    share = float((MotionErrors().typical_step_m / usual_m) ** 0.5)
+    share = float((MotionErrors().typical_step_m / _usual_row_m(log)) ** 0.5)
     return max(share * row_sd_m, _LEAST_STEP_SD_M)
+
+
+def _usual_row_m(log: TrackLog) -> float:
+    """Return the median length of rows that move; 0 without any."""
+    step_m = log.motion["step_m"].abs().to_numpy()
+    return _median(step_m[step_m > _LEAST_STEP_SD_M])
+
+
+def _usual_mps(log: TrackLog) -> float:
+    """Return the median speed of rows that move; 0 without any."""
+    step_m, time_s = log.motion["step_m"].to_numpy(), log.motion["time_s"].to_numpy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        speed_mps = np.abs(step_m[1:]) / np.diff(time_s)
+    return _median(speed_mps[np.isfinite(speed_mps) & (speed_mps > _STANDING_MPS)])
+
+
+def _median(values: Floats) -> float:
+    return float(np.median(values)) if values.size else 0.0
 
 
 def timing_step_m(log: TrackLog) -> float | None:

@@ -41,7 +41,7 @@ from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.integrity import SampleTail
 
-FORMAT, VERSION = "mapfilter session", 1
+FORMAT, VERSION = "mapfilter session", 2
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000

@@ -1,6 +1,6 @@
 """Errors of steps that are made of velocities sampled seconds apart.
 
-Between two samples nothing says when the velocity changed. Had it changed at once, at any moment of
+When the velocity changed between two samples is not known. Had it changed at once, at any moment of
 the interval, the displacement by the mean of both would have the deviation ``T |Δv| / √12``. Real
 velocities change gradually, over some seconds, so short intervals err by a small part of that and
 long ones by most of it.
@@ -31,7 +31,8 @@ def sampling_sd_m(time_s: Floats, east_mps: Floats, north_mps: Floats) -> Floats
     Returns
     -------
     (N - 1,) array
-        To the east as to the north; 0 where a velocity is not known.
+        To the east as to the north; 0 where a velocity is not known at either end. Such an interval
+        adds nothing to its neighbours.
 
     Examples
     --------
@@ -40,10 +41,12 @@ def sampling_sd_m(time_s: Floats, east_mps: Floats, north_mps: Floats) -> Floats
     [4.3, 6.0, 4.3]
     """
     lasted_s = np.diff(np.asarray(time_s, dtype=np.float64))
-    square = np.nan_to_num(np.diff(east_mps) ** 2 + np.diff(north_mps) ** 2)
+    square = np.diff(east_mps) ** 2 + np.diff(north_mps) ** 2
     if not square.size:
-        return square
+        return np.empty(0)
+    known = np.isfinite(square)
+    square = np.where(known, square, 0.0)
     beside = np.pad(square, 1, mode="edge")
     usual = square / 2 + (beside[:-2] + beside[2:]) / 4
     share = lasted_s / (lasted_s + _LASTS_S)
-    return np.asarray(share * lasted_s * np.sqrt(usual / 12))
+    return np.where(known, share * lasted_s * np.sqrt(usual / 12), 0.0)

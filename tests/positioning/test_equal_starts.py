@@ -1,5 +1,7 @@
 """Filters for scores give the same positions, and equal reports are weighed at all points once."""
 
+import pickle
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -61,12 +63,26 @@ def test_for_scores_all_that_is_left_is_the_same_to_the_bit(area):
 
 def test_a_second_log_is_located_as_by_a_new_filter(area):
     shared = positioner(area)
-    first, again = located(shared, 5), located(shared, 6)
+    first = located(shared, 5)
+    before = shared.model.kept_likelihoods.cache_info()
+    again = located(shared, 6)
+    after = shared.model.kept_likelihoods.cache_info()
     assert first.equals(located(positioner(area), 5))
     assert again.equals(located(positioner(area), 6))
-    counts = shared.model.kept_likelihoods.cache_info()
-    assert counts.hits >= 1
-    assert counts.misses < counts.hits + counts.misses
+    assert after.hits > before.hits
+    assert after.misses == before.misses
+
+
+@pytest.mark.parametrize("copied", [lambda one: pickle.loads(pickle.dumps(one)), deepcopy])
+def test_a_filter_that_was_used_can_be_copied_and_locates_the_same(area, copied):
+    used = positioner(area)
+    expected = located(used, 5)
+    assert used.model.kept_likelihoods.cache_info().currsize
+    copy = copied(used)
+    assert copy.model is not used.model
+    assert copy.model.kept_likelihoods is not used.model.kept_likelihoods
+    assert copy.model.kept_likelihoods.cache_info().currsize == 0
+    assert located(copy, 5).equals(expected)
 
 
 def test_points_are_as_likely_from_memory_as_weighed_anew(area):

@@ -119,16 +119,45 @@ def test_measured_errors_of_motion_are_those_that_are_assumed():
     )
     fitted, notes = fitted_to_log(BayesFilter(), given)
     found = (fitted.step_sd_m, fitted.heading_sd_deg, fitted.bias_sd_deg, fitted.scale)
-    assert found == (0.1, 8.0, 12.0, 0.07)
+    # Rows of 4 m at 4 m/s, of which a step of 1.4 m is a part.
+    assert found == (pytest.approx(0.1 * (1.4 / 4.0) ** 0.5), 8.0, 12.0, 0.07)
     # 0.4 degrees per root second at 4 m/s.
     assert fitted.drift_deg_per_sqrt_m == pytest.approx(0.2)
     assert notes[0].startswith(
-        "errors of motion as the log states them: step_sd_m = 0.1, scale = 0.07"
+        "errors of motion as the log states them: step_sd_m = 0.0592 (of a step of 1.4 m), "
+        "scale = 0.07"
     )
     kept, _ = fitted_to_log(BayesFilter(heading_sd_deg=2.0), given)
     assert (kept.heading_sd_deg, kept.bias_sd_deg) == (2.0, 12.0)
     kalman, _ = fitted_to_log(KalmanFilter(), given)
     assert (kalman.step_sd_m, kalman.heading_sd_deg) == (0.1, 8.0)
+
+
+def rows_of(row_m, period_s, vehicle=None):
+    """Rows with an error of 9 m each."""
+    rows = {"time_s": period_s * np.arange(50.0), "step_m": row_m, "heading_rad": 0.0}
+    given = make_log(CRS, motion=pd.DataFrame(rows), imu=ImuNoise(sigma_trans_m=9.0))
+    return replace(given, vehicle=vehicle)
+
+
+@pytest.mark.parametrize("period_s", [1.0, 0.5])
+def test_errors_of_a_vehicles_rows_do_not_jump_with_their_length(period_s):
+    for row_m in (2.0, 5.6, 13.9, 14.9, 15.1):
+        fitted, notes = fitted_to_log(BayesFilter(), rows_of(row_m, period_s, vehicle=True))
+        assert fitted.step_sd_m == pytest.approx(9.0 * (1.4 / row_m) ** 0.5)
+        assert f"step_sd_m = {fitted.step_sd_m:.3g} (of a step of 1.4 m)" in notes[-1]
+        unsaid, _ = fitted_to_log(BayesFilter(), rows_of(row_m, row_m / 2.7))
+        assert unsaid.step_sd_m == fitted.step_sd_m
+
+
+@pytest.mark.parametrize(
+    "given", [rows_of(0.7, 0.5), rows_of(1.4, 1.0), rows_of(8.4, 6.0), rows_of(1.2, 0.1, True)]
+)
+def test_rows_of_walks_and_short_rows_count_as_steps(given):
+    fitted, notes = fitted_to_log(BayesFilter(), given)
+    assert fitted.step_sd_m == 9.0
+    assert "step_sd_m = 9" in notes[-1]
+    assert "of a step" not in notes[-1]
 
 
 @pytest.mark.parametrize(("row_m", "assumed_m"), [(15.0, 9.0), (35.0, 1.8)])

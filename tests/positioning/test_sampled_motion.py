@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import hypot, nan, pi
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,8 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, epoch_columns, epochs, headed, make_epoch
+from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.kalman.step import KalmanStep
 from mapfilter.tracks.log import make_log
 
 EXACT = MotionErrors(
@@ -58,6 +61,13 @@ def test_rows_as_they_arrive_may_have_it():
     with_it, without = ((9.0, 0.5, 0.1, 4.5), (9.0, 0.5, 0.1))
     steps = make_epoch(1.0, {"motion": [with_it, without]}).motion
     assert [one.sampling_sd_m for one in steps] == [4.5, 0.0]
+
+
+def test_a_table_without_a_usual_column_is_not_read_by_the_next_one():
+    log = make_log(CRS, motion=motion(sampling_sd_m=4.5))
+    lacking = replace(log, motion=log.motion.drop(columns="turn_rad"))
+    with pytest.raises(KeyError, match="turn_rad"):
+        epochs(lacking)
 
 
 def test_turns_keep_it():
@@ -107,6 +117,25 @@ def test_a_belief_that_is_tracked_assumes_it_and_one_that_searches_does_not(posi
             assert rough_m > 3 * fine_m
         else:
             assert rough_m == fine_m
+
+
+def test_a_row_of_length_0_is_a_rest_without_such_an_error(positioner):
+    rest = replace(STEP, step_m=0.0)
+    still = np.zeros((STATES, 100), dtype=np.float32)
+    assert np.array_equal(move(still, 0.0, 0.4, MotionErrors(), np.uint64(5), ROUGH), still)
+    assert DeadReckoning().moved(rest) == DeadReckoning()
+    _, _, after = radius_m(positioner, 2.0, rest)
+    _, _, fine = radius_m(positioner, 2.0, replace(rest, sampling_sd_m=0.0))
+    assert after.reckoning.sampling_m2 == 0.0
+    assert np.array_equal(after.belief.state, fine.belief.state)
+
+
+def test_kalman_filters_add_it_to_steps_and_not_to_rests():
+    filter_ = SimpleNamespace(options=KalmanFilter())
+    for step, expected in ((STEP, ROUGH**2), (replace(STEP, step_m=0.0), 0.0)):
+        _, rough = KalmanStep._step(filter_, Epoch(1.0), step)
+        _, fine = KalmanStep._step(filter_, Epoch(1.0), replace(step, sampling_sd_m=0.0))
+        np.testing.assert_allclose(rough - fine, expected * np.eye(2), atol=1e-9)
 
 
 def test_variances_of_steps_add_up():

@@ -107,15 +107,18 @@ def test_cut_files_and_other_files_are_refused(states):
     for other in (b"\n", b"[]\n", b"{}\n", b"null\n{}", pickle.dumps(1), b"[" * 5000):
         with pytest.raises(StoreError):
             decode(other, "made")
-    newer = data.replace(b'"version": 1', b'"version": 2', 1)
-    with pytest.raises(StoreError, match="newer mapfilter"):
-        decode(newer, "made")
+    written = f'"version": {state_file.VERSION}'.encode()
+    for version, hint in ((1, "older mapfilter"), (state_file.VERSION + 1, "newer mapfilter")):
+        other = data.replace(written, f'"version": {version}'.encode(), 1)
+        with pytest.raises(StoreError, match=hint):
+            decode(other, "made")
 
 
 def forged(document, arrays=b""):
     """A file with a right checksum, as one who can write there makes it."""
     rest = json.dumps(document).encode()
-    head = {"format": "mapfilter session", "version": 1, "document_bytes": len(rest)}
+    head = {"format": "mapfilter session", "version": state_file.VERSION}
+    head["document_bytes"] = len(rest)
     head["sha256"] = hashlib.sha256(rest + arrays).hexdigest()
     return json.dumps(head).encode() + b"\n" + rest + arrays
 

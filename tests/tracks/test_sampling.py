@@ -38,6 +38,10 @@ def test_unknown_velocities_say_nothing():
     assert np.isfinite(found).all()
     assert found[0] == 0.0
     assert found[2] > 0
+    # A velocity of the neighbours that changes does not count for an interval without one.
+    beside = deviations((0, 6, 12, 18, 24), (0, 0), (9, 0), (np.nan, 0), (0, 9), (9, 0))
+    assert beside[[1, 2]].tolist() == [0.0, 0.0]
+    assert (beside[[0, 3]] > 0).all()
     assert deviations((0.0,), (1, 1)).size == 0
 
 

@@ -132,8 +132,9 @@ class RadioReading:
 def bound_under_null(bound: BoundReading) -> float:
     """Return the log-likelihood, under the null hypothesis, of a bound or of an ambiguous level.
 
-    A level is then a draw from those that phones report, of each of its cells with equal
-    probability, as on the map. Ends of the scale are as probable as on the map where they agree.
+    A level is then a draw from those that phones report. On the map the likelihood is the mean over
+    the n cells that it may be of, most of which do not fit it: ``-log n`` makes up for that mean.
+    Ends of the scale are as probable as on the map where they agree.
     """
     if bound.censored != 0:
         return 0.0

@@ -113,6 +113,11 @@ class BayesModel:
         """Likelihoods of all points on ways, of the last few reports that beliefs started from."""
         return lru_cache(maxsize=KEPT_REPORTS)(partial(_likelihoods_on_ways, self))
 
+    def __getstate__(self) -> dict[str, object]:
+        # What was computed is neither sent to other processes nor shared with copies: the
+        # likelihoods kept are those of this object.
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
+
     def start(self, prior: Start, most: int, rng: np.random.Generator) -> tuple[Cloud, Floats]:
         """Draw the first hypotheses: by the first evidence, or about a known start."""
         cloud, log_weight = first_hypotheses(self, prior, most, rng)

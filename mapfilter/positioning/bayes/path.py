@@ -34,8 +34,8 @@ class DeadReckoning:
     sampling_m2: float = 0.0
 
     def moved(self, step: MotionStep) -> DeadReckoning:
-        """Add a step; without a heading the displacement stays."""
-        if not isfinite(step.step_m):
+        """Add a step; without a heading the displacement stays, at rest all of it."""
+        if not isfinite(step.step_m) or step.step_m == 0:
             return self
         if not isfinite(step.heading_rad):
             return replace(self, travelled_m=self.travelled_m + abs(step.step_m))

@@ -68,7 +68,7 @@ class BayesState:
     twin : MirroredTwin or None
         The mirrored motion, while a belief by the map alone has to prove itself.
     hold : Hold
-        How headings are read.
+        How headings are read, and the unit of steps.
     walking_rad : float
         Heading of the last row of a walk, as measured.
     held : tuple of HeldOtherwise

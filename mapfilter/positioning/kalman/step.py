@@ -166,7 +166,7 @@ class KalmanStep:
         across = np.array([-along[1], along[0]])
         cross_m = step.step_m * radians(self.options.heading_sd_deg)
         noise = self.options.step_sd_m**2 * np.outer(along, along)
-        noise += step.sampling_sd_m**2 * np.eye(2)
+        noise += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
         return step.step_m * along, noise + cross_m**2 * np.outer(across, across)
 
     def _measure(self, epoch: Epoch, given: SiteReadings) -> Reason:
