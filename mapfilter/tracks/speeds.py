@@ -6,14 +6,15 @@ import numpy as np
 import pandas as pd
 
 SLOWEST_MPS, FASTEST_MPS, MOTOR_MPS = 0.6, 2.6, 8.0
-"""Bounds of the speed of a walker, as a mean while it moves; that which is none in feet either."""
+"""Bounds of the mean speed of a walker that moves; speed from which on it is not a walker's even if
+lengths are in feet."""
 
 _STANDING_MPS, _LEAST_ROWS, _LONGEST_S = 0.1, 30, 10.0
 _FOOT_M = 0.3048
 
 
 def walkers_unit_m(speed_mps: float) -> float:
-    """Return the unit of steps in which a mean speed may be a walker's; 1 also where it is in none.
+    """Return the unit of steps in which a mean speed may be a walker's; 1 if there is none.
 
     Parameters
     ----------

@@ -250,7 +250,7 @@ def _compared(
     rules: HoldRules, one: HeldOtherwise, main: ParticleBelief, travelled_m: float
 ) -> HeldOtherwise:
     """Return a belief with the distance since which it is ahead."""
-    if not (one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main)):
+    if not _leads(rules, one, main):
         return replace(one, ahead_m=nan)
     return one if isfinite(one.ahead_m) else replace(one, ahead_m=travelled_m)
 
@@ -260,11 +260,13 @@ def is_ahead(
 ) -> bool:
     """Return whether one of the beliefs is ahead of the main one, and elsewhere, for some way."""
     return any(
-        travelled_m - one.ahead_m >= rules.lost_after_m
-        and one.log_odds(main) > rules.lost_log_odds
-        and one.is_elsewhere(main)
-        for one in held
+        travelled_m - one.ahead_m >= rules.lost_after_m and _leads(rules, one, main) for one in held
     )
+
+
+def _leads(rules: HoldRules, one: HeldOtherwise, main: ParticleBelief) -> bool:
+    """Return whether a belief is ahead of the main one by its odds, and elsewhere."""
+    return one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main)
 
 
 def winner(

@@ -4,7 +4,7 @@ At rest levels change by fading alone. Each block of a rest is compared with its
 likelihoods of "still there" and "carried elsewhere", and their ratio is added up from zero (a
 CUSUM; Page, 1954).
 
-A walker on whose steps are no longer counted is 50 m away before that ratio can be large. So the
+A walker whose steps are no longer counted is 50 m away before that ratio can be large. So the
 rest itself has to be shown, too: where levels could have shown it, and did not, the position is in
 doubt from 45 m on, at the pace before. How levels change then depends on the distance.
 """

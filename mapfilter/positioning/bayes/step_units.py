@@ -1,9 +1,10 @@
-"""The unit of steps, where a walker's speed is none in metres.
+"""The unit of steps whose speed in metres is not that of a walker.
 
-Steps in feet make a walker a cyclist, and the belief fits nothing for long. Where the speed is no
-walker's, and nothing states that a vehicle moves, an alternative reads lengths in the other unit.
-The two are compared as any alternative is with its belief; until one is far behind, nothing
-converges. Once an alternative in another unit has taken over, lengths are read in that unit.
+Steps in feet that are read in metres have the speed of a cyclist, and no position fits the reports
+for long. Where the speed is not a walker's, and nothing states that a vehicle moves, an alternative
+reads lengths in the other unit. The two are compared as any alternative is with its belief; until
+the alternative is far behind, the belief does not converge. Once an alternative in another unit
+has taken over, lengths are read in that unit.
 """
 
 from __future__ import annotations
