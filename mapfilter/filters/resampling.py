@@ -10,14 +10,16 @@ import numpy as np
 from numba import njit
 
 from mapfilter._kernels import exp32, hashed, normals
+from mapfilter._threads import ONE, Threads
 from mapfilter._types import Floats, Floats32, Ints32
 
 _BLOCK = 1024
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
+def normalise(log_weight: Floats, weight: Floats32, threads: Threads = ONE) -> tuple[float, float]:
     """Normalise log weights (N,) in place, and fill the weights (N,), which sum to one.
+
+    Particles are divided among ``threads``, but for the sums.
 
     Returns
     -------
@@ -25,32 +27,84 @@ def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
         Logarithm of the sum before, and the effective sample size, one over the sum of squares;
         minus infinity and 0 where no weight is left.
     """
+    size = log_weight.size
+    if not threads.divide(size):
+        at_once: tuple[float, float] = _normalise(log_weight, weight)
+        return at_once
+    highest = _highest(log_weight)
+    if not np.isfinite(highest):
+        return -np.inf, 0.0
+    threads.over(size, _exponentials, log_weight, highest, weight)
+    log_total, share, effective = _totals(weight, highest)
+    threads.over(size, _scale, log_weight, log_total, share, weight)
+    return log_total, effective
+
+
+@njit(error_model="numpy", cache=True)
+def _normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
+    highest = _highest(log_weight)
+    if not np.isfinite(highest):
+        return -np.inf, 0.0
+    _exponentials(0, log_weight.size, log_weight, highest, weight)
+    log_total, share, effective = _totals(weight, highest)
+    _scale(0, log_weight.size, log_weight, log_total, share, weight)
+    return log_total, effective
+
+
+@njit(error_model="numpy", cache=True)
+def _highest(log_weight: Floats) -> float:
     highest = -np.inf
     for i in range(log_weight.size):
         highest = log_weight[i] if log_weight[i] > highest else highest
-    if not np.isfinite(highest):
-        return -np.inf, 0.0
-    for i in range(log_weight.size):
-        weight[i] = exp32(np.float32(log_weight[i] - highest))
+    return highest
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
+def _exponentials(
+    first: int, stop: int, log_weight: Floats, highest: float, weight: Floats32
+) -> None:
+    """Fill weights relative to the highest one."""
+    log_of, found = log_weight[first:stop], weight[first:stop]
+    for i in range(found.size):
+        found[i] = exp32(np.float32(log_of[i] - highest))
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def _totals(weight: Floats32, highest: float) -> tuple[float, float, float]:
+    """Return the logarithm of the sum of weights, one over the sum, and the effective size.
+
+    ``highest`` is the logarithm that weights are relative to.
+    """
     # Eight sums side by side: one alone would wait for itself, and lose digits.
     sums, squares = np.zeros(8), np.zeros(8)
-    whole = log_weight.size // 8 * 8
+    whole = weight.size // 8 * 8
     for i in range(0, whole, 8):
         for j in range(8):
             w = np.float64(weight[i + j])
             sums[j] += w
             squares[j] += w * w
-    for i in range(whole, log_weight.size):
+    for i in range(whole, weight.size):
         w = np.float64(weight[i])
         sums[0] += w
         squares[0] += w * w
     total = sums.sum()
-    log_total = highest + np.log(total)
-    share = np.float32(1.0 / total)
-    for i in range(log_weight.size):
-        weight[i] *= share
-        log_weight[i] -= log_total
-    return log_total, total * total / squares.sum()
+    return highest + np.log(total), 1.0 / total, total * total / squares.sum()
+
+
+@njit(error_model="numpy", cache=True, nogil=True)
+def _scale(
+    first: int,
+    stop: int,
+    log_weight: Floats,
+    log_total: float,
+    share: float,
+    weight: Floats32,
+) -> None:
+    factor = np.float32(share)
+    log_of, found = log_weight[first:stop], weight[first:stop]
+    for i in range(found.size):
+        found[i] *= factor
+        log_of[i] -= log_total
 
 
 def log_sum(log_weight: Floats) -> float:
@@ -101,25 +155,35 @@ def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
         chosen[j] = max(chosen[j], chosen[j - 1])
 
 
-@njit(error_model="numpy", cache=True)
+@njit(error_model="numpy", cache=True, nogil=True)
 def taken(
-    log_weight: Floats, weight: Floats32, chosen: Ints32, log_of: Floats, weight_of: Floats32
+    first: int,
+    stop: int,
+    log_weight: Floats,
+    weight: Floats32,
+    chosen: Ints32,
+    log_of: Floats,
+    weight_of: Floats32,
 ) -> None:
-    """Fill ``log_of`` and ``weight_of`` (M,) with the weights of the chosen particles."""
-    for j in range(chosen.size):
-        i = np.uint32(chosen[j])
+    """Fill ``log_of`` and ``weight_of`` (M,) with the weights of the chosen particles.
+
+    As below, ``first`` and ``stop`` are the part of the M copies that is filled.
+    """
+    at, log_of, weight_of = chosen[first:stop], log_of[first:stop], weight_of[first:stop]
+    for j in range(at.size):
+        i = np.uint32(at[j])
         log_of[j] = log_weight[i]
         weight_of[j] = weight[i]
 
 
-@njit(error_model="numpy", cache=True)
-def copied(kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
+@njit(error_model="numpy", cache=True, nogil=True)
+def copied(begin: int, stop: int, kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
     """Copy the chosen columns of ``kept`` (W, N) to ``copies`` (W, M)."""
     rows = kept.shape[0]
     fours = rows // 4 * 4
     # A block of indices stays in the cache; each is loaded once for four rows.
-    for first in range(0, chosen.size, _BLOCK):
-        at = chosen[first : first + _BLOCK]
+    for first in range(begin, stop, _BLOCK):
+        at = chosen[first : min(first + _BLOCK, stop)]
         for r in range(0, fours, 4):
             a, b, c, d = kept[r], kept[r + 1], kept[r + 2], kept[r + 3]
             to_a, to_b = copies[r, first:], copies[r + 1, first:]
@@ -136,28 +200,34 @@ def copied(kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
                 to[j] = row[np.uint32(at[j])]
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def copy_with_jitter(
-    state: Floats32, chosen: Ints32, jitter: Floats32, key: np.uint64, copies: Floats32
+    first: int,
+    stop: int,
+    state: Floats32,
+    chosen: Ints32,
+    jitter: Floats32,
+    key: np.uint64,
+    copies: Floats32,
 ) -> None:
     """Copy the chosen particles of ``state`` (R, N) and move each copy by normal noise.
 
     ``jitter`` has the standard deviation for each row; rows of 0, and rows beyond, are copied as
     they are. The noise is drawn from ``key``.
     """
-    rows = state.shape[0]
+    rows, at = state.shape[0], chosen[first:stop]
     for r in range(0, rows, 2):
         # Normal numbers come in pairs: one for each of two rows.
         one, other = state[r], state[min(r + 1, rows - 1)]
-        to_one, to_other = copies[r], copies[min(r + 1, rows - 1)]
+        to_one, to_other = copies[r, first:stop], copies[min(r + 1, rows - 1), first:stop]
         sd = jitter[r] if r < jitter.size else np.float32(0.0)
         other_sd = jitter[r + 1] if r + 1 < min(rows, jitter.size) else np.float32(0.0)
-        for j in range(chosen.size):
-            to_one[j] = one[np.uint32(chosen[j])]
-            to_other[j] = other[np.uint32(chosen[j])]
-        first = np.uint64(r) << np.uint64(40)
+        for j in range(at.size):
+            to_one[j] = one[np.uint32(at[j])]
+            to_other[j] = other[np.uint32(at[j])]
+        drawn = (np.uint64(r) << np.uint64(40)) + np.uint64(first)
         if sd > 0 or other_sd > 0:
-            for j in range(chosen.size):
-                a, b = normals(hashed(key, first + np.uint64(j)))
+            for j in range(at.size):
+                a, b = normals(hashed(key, drawn + np.uint64(j)))
                 to_one[j] += sd * a
                 to_other[j] += other_sd * b

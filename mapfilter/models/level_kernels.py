@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from mapfilter._kernels import exp32, log32
+from mapfilter._threads import ONE, Threads
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
 from mapfilter.models.cell_faults import mixed
 from mapfilter.models.fingerprint import REACH_SD, STEPS_PER_SD
@@ -51,31 +52,46 @@ class Prediction(NamedTuple):
     share: float
 
 
-def decayed(kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float) -> Floats32:
-    """Return what hypotheses keep, (W, N), after a distance."""
+def decayed(
+    kept: Floats32,
+    decay: Floats32,
+    fault_keep: float,
+    fault_log_odds: float,
+    threads: Threads = ONE,
+) -> Floats32:
+    """Return what hypotheses keep, (W, N), after a distance; they are divided among ``threads``."""
     # NumPy asks for large pages, numba for many small ones.
     now = np.empty_like(kept)
-    _decay(kept, decay, fault_keep, fault_log_odds, now)
+    threads.over(kept.shape[1], _decay, kept, decay, fault_keep, fault_log_odds, now)
     return now
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def _decay(
-    kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float, now: Floats32
+    first: int,
+    stop: int,
+    kept: Floats32,
+    decay: Floats32,
+    fault_keep: float,
+    fault_log_odds: float,
+    now: Floats32,
 ) -> None:
     means = decay.size
     keep, usual = _F(fault_keep), _F(fault_log_odds)
     for d in range(means):
-        factor = decay[d]
-        for i in range(kept.shape[1]):
-            now[d, i] = factor * kept[d, i]
+        factor, row, to = decay[d], kept[d, first:stop], now[d, first:stop]
+        for i in range(row.size):
+            to[i] = factor * row[i]
     for d in range(means, kept.shape[0]):
-        for i in range(kept.shape[1]):
-            now[d, i] = usual + (kept[d, i] - usual) * keep
+        row, to = kept[d, first:stop], now[d, first:stop]
+        for i in range(row.size):
+            to[i] = usual + (row[i] - usual) * keep
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def weigh_by_levels(
+    begin: int,
+    stop: int,
     kept: Floats32,
     pixel: Ints32,
     predicted: Prediction,
@@ -83,13 +99,16 @@ def weigh_by_levels(
     weight: float,
     log_weight: Floats,
 ) -> None:
-    """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
+    """Add the log-likelihood of levels to weights and update what hypotheses keep, in place.
+
+    Of hypotheses ``begin`` to ``stop``; none of the others is read or written.
+    """
     means = terms.gain.shape[1]
     w = _F(weight)
     steps, more = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
     total, upon = np.empty(_BLOCK, np.float32), _gain_of_sums(terms)
-    for first in range(0, pixel.size, _BLOCK):
-        count = min(_BLOCK, pixel.size - first)
+    for first in range(begin, stop, _BLOCK):
+        count, into = min(_BLOCK, stop - first), log_weight[first:]
         total[:] = _ZERO
         for k in range(terms.cell.size):
             s, cell, innovation = terms.slot[k], terms.cell[k], steps[k]
@@ -110,11 +129,13 @@ def weigh_by_levels(
                 innovation[j] = fine * innovation[j]
         _corrected(kept, first, count, terms.gain, steps)
         for j in range(count):
-            log_weight[first + j] += w * total[j]
+            into[j] += w * total[j]
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def weigh_by_absence(
+    begin: int,
+    stop: int,
     kept: Floats32,
     pixel: Ints32,
     predicted: Prediction,
@@ -134,8 +155,8 @@ def weigh_by_absence(
     steps, per_sd = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
     right, total = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
     place, upon = np.empty(_BLOCK, np.int32), _gain_of_sums(terms)
-    for first in range(0, pixel.size, _BLOCK):
-        count = min(_BLOCK, pixel.size - first)
+    for first in range(begin, stop, _BLOCK):
+        count, into = min(_BLOCK, stop - first), log_weight[first:]
         total[:] = _ZERO
         for k in range(terms.cell.size):
             s, cell, below = terms.slot[k], terms.cell[k], steps[k]
@@ -163,7 +184,7 @@ def weigh_by_absence(
                 below[j] = -fine * hazard * own * per_sd[j]
         _corrected(kept, first, count, terms.gain, steps)
         for j in range(count):
-            log_weight[first + j] += w * total[j]
+            into[j] += w * total[j]
 
 
 @njit(error_model="numpy", cache=True)

@@ -220,14 +220,14 @@ def whole_step(
     model, count = given.model, belief.log_weight.size
     state, log_weight = model.move(belief.state, belief.log_weight, given.motion, draw_key(rng))
     cloud, _ = model.weigh(Cloud(state, belief.kept, belief.shared), log_weight, given.reading)
-    weight = np.empty(count, dtype=np.float32)
-    normalise(log_weight, weight)
+    weight, threads = np.empty(count, dtype=np.float32), model.threads
+    normalise(log_weight, weight, threads)
     chosen = np.empty(count, dtype=np.int32)
     systematic(weight, rng.random(), chosen)
     copies = np.empty_like(state)
-    copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
+    threads.over(count, copy_with_jitter, state, chosen, jitter, draw_key(rng), copies)
     kept = np.empty_like(cloud.kept)
-    copied(cloud.kept, chosen, kept)
+    threads.over(count, copied, cloud.kept, chosen, kept)
     return copies, kept
 
 

@@ -48,11 +48,11 @@ def weighed(memory, kept, pixel, table, given, rough_db=None):
     rough = np.zeros(table.size, np.uint8) if rough_db is None else rough_db.ravel()
     pixel, flat, bands = pixel.astype(np.int32), table.ravel(), table.shape[1]
     predicted = Prediction(flat, rough, bands, errors.roughness)
-    weigh_by_levels(kept, pixel, predicted, terms, errors.weight, log_weight)
+    weigh_by_levels(0, pixel.size, kept, pixel, predicted, terms, errors.weight, log_weight)
     if given.absent.size:
         absent = memory.absence(given)
         table, weight = bound_table(), errors.weight
-        weigh_by_absence(kept, pixel, predicted, absent, table, weight, log_weight)
+        weigh_by_absence(0, pixel.size, kept, pixel, predicted, absent, table, weight, log_weight)
     return memory, kept, log_weight
 
 

@@ -13,6 +13,7 @@ from math import exp, isfinite, log, nan, sqrt
 
 import numpy as np
 
+from mapfilter._threads import ONE, Threads
 from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
@@ -58,7 +59,8 @@ class BayesModel:
     """Ways and radio maps of an area, and the errors of measurements.
 
     ``remember`` is whether hypotheses keep the errors of levels from one report to the next; else
-    each report counts by the share of its errors that is new.
+    each report counts by the share of its errors that is new. Hypotheses are divided among
+    ``threads``.
     """
 
     area: AreaFrame
@@ -66,6 +68,7 @@ class BayesModel:
     weights: MapWeights = field(default_factory=MapWeights)
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
     remember: bool = True
+    threads: Threads = ONE
 
     @property
     def timed_by_sites(self) -> bool:
@@ -141,10 +144,11 @@ class BayesModel:
                 self.motion,
                 key,
                 motion.sampling_sd_m,
+                self.threads,
             )
         else:
             # To all sides.
-            moved = move(state, 0.0, 0.0, self.motion, key)
+            moved = move(state, 0.0, 0.0, self.motion, key, threads=self.threads)
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
             moved[: NORTH + 1] += (motion.all_sides_m / sqrt(2.0) * noise).astype(np.float32)
         # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
@@ -159,7 +163,7 @@ class BayesModel:
                 moved, on_map, self.area.size_m, factors, beyond, log_weight
             )
         else:
-            weighed = weighed_by_ways(moved, self._ways, factors, beyond, log_weight)
+            weighed = weighed_by_ways(moved, self._ways, factors, beyond, log_weight, self.threads)
         return moved, weighed
 
     def weigh(
@@ -172,21 +176,23 @@ class BayesModel:
         """
         kept_back: Floats | None = None
         counted: Floats | None = None
+        withholds = reading.tracked and self.remember
         # A serving cell that the map lacks weighs all hypotheses in the area alike.
         used = reading.serving_weight > 0
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
             pixel, beyond = self._pixels(cloud.state), self.area.beyond(cloud.state)
             some_beyond = bool(beyond.any())
             used = True
-            cloud, before = self._aged(cloud, reading), log_weight.copy()
+            cloud = self._aged(cloud, reading)
+            before = log_weight.copy() if some_beyond else log_weight
             other = 0.0
             if reading.serving >= 0 and reading.serving_weight > 0:
                 self._weigh_serving(cloud, pixel, log_weight, reading)
             if reading.levels is not None:
-                start = log_weight.copy()
+                start = log_weight.copy() if withholds else log_weight
                 cloud = self._weigh_levels(cloud, pixel, log_weight, reading)
                 other = cloud.shared.other_log_likelihood
-                if reading.tracked and self.remember:
+                if withholds:
                     withheld_share = 1 - self.evidence.levels.tracking_share
                     kept_back = gained(start, log_weight, withheld_share)
             for bound in reading.bounds:
@@ -249,7 +255,7 @@ class BayesModel:
         return len(self.area.cell_ids) + 2
 
     def _pixels(self, state: Floats32) -> Ints32:
-        return np.asarray(fingerprint.pixels(state, self.area.frame))
+        return np.asarray(fingerprint.pixels(state, self.area.frame, self.threads))
 
     def _aged(self, cloud: Cloud, reading: RadioReading) -> Cloud:
         """Return hypotheses with what they keep of the cells' errors, as a reading finds it."""
@@ -260,7 +266,7 @@ class BayesModel:
         else:
             memory, decay = memory.after(length_m)
             keep = exp(-length_m / errors.fault_m)
-            kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds)
+            kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds, self.threads)
         served = [reading.serving] if reading.serving >= 0 else []
         memory, kept = memory.with_cells(np.array(served, dtype=np.int32), kept, in_place=True)
         return Cloud(cloud.state, kept, memory)
@@ -275,9 +281,8 @@ class BayesModel:
         cells = np.array([reading.serving, self._bands - 2, self._bands - 1], dtype=np.int32)
         predicted, pixel, cells = self._looked_up(pixel, cells, rough=False)
         flat, bands, cell = predicted.level_dbm, predicted.bands, int(cells[0])
-        fingerprint.weigh_by_serving(
-            pixel, flat, bands, cell, table, weight, odds, other, log_weight
-        )
+        given = pixel, flat, bands, cell, table, weight, odds, other, log_weight
+        self.threads.over(pixel.size, fingerprint.weigh_by_serving, *given)
 
     def _weigh_levels(
         self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
@@ -300,11 +305,13 @@ class BayesModel:
         rough_db2 = mean_rough_db2(predicted, own, cells)
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
-        weigh_by_levels(kept, own, predicted, terms._replace(cell=cells), weight, log_weight)
+        over, count = self.threads.over, log_weight.size
+        terms = terms._replace(cell=cells)
+        over(count, weigh_by_levels, kept, own, predicted, terms, weight, log_weight)
         if absent.cell.size:
             predicted, own, cells = self._looked_up(pixel, absent.cell)
-            table, expected = self._bound_table, absent._replace(cell=cells)
-            weigh_by_absence(kept, own, predicted, expected, table, weight, log_weight)
+            expected = absent._replace(cell=cells), self._bound_table
+            over(count, weigh_by_absence, kept, own, predicted, *expected, weight, log_weight)
         other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
         memory = replace(memory, other_log_likelihood=other)
         return Cloud(cloud.state, kept, memory)
