@@ -1,16 +1,15 @@
 """Kernels over particles, divided among threads of this process.
 
-A kernel takes the first particle of its part and the end of it, then its other arguments. It writes
-nothing beyond that part, and is compiled with ``nogil``. Each particle goes through the same
-arithmetic whatever the number of threads is. Sums over particles, of which the order counts, are
-left to one thread.
+A kernel takes the first particle of its part and the end of it, then its other arguments. It reads
+and writes what particles of this part have, and is compiled with ``nogil``. Each particle goes
+through the same arithmetic whatever the number of threads is. Sums over particles, of which the
+order counts, are left to one thread.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -22,7 +21,8 @@ LEAST_PARTICLES = 32_768
 _BLOCK = 1024
 """Parts begin at multiples of it, at which the vectorised loops of kernels come out even."""
 
-Kernel = Callable[..., None]
+Call = tuple[Any, ...]
+"""A kernel, and its arguments behind the first particle and the end of a part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,21 +63,21 @@ class Threads:
         ends = [blocks * k // count * _BLOCK for k in range(1, count)]
         return list(zip([0, *ends], [*ends, size], strict=True))
 
-    def over(self, size: int, kernel: Kernel, *arguments: Any) -> None:
-        """Call a kernel for all of so many particles, and return when all parts are done.
+    def over(self, size: int, *calls: Call) -> None:
+        """Make calls one after another for each part of so many particles, and await them.
 
         An error in a part is raised once no other part is under way: that of the calling thread, or
         else of the first part that has one.
         """
         if not self.divide(size):
-            kernel(0, size, *arguments)
+            _make(0, size, calls)
             return
         (first, stop), *others = self.parts(size)
         tasks: list[Future[None]] = []
         try:
             for begin, end in others:
-                tasks.append(_pool(os.getpid(), self.count).submit(kernel, begin, end, *arguments))
-            kernel(first, stop, *arguments)
+                tasks.append(_pool(os.getpid(), self.count).submit(_make, begin, end, calls))
+            _make(first, stop, calls)
         finally:
             errors = [task.exception() for task in tasks]
         for error in errors:
@@ -87,6 +87,11 @@ class Threads:
 
 ONE = Threads()
 """The calling thread alone."""
+
+
+def _make(first: int, stop: int, calls: tuple[Call, ...]) -> None:
+    for kernel, *arguments in calls:
+        kernel(first, stop, *arguments)
 
 
 @cache

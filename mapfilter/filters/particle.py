@@ -299,16 +299,19 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             sd = np.array(options.searching_jitter if searching else options.jitter, np.float32)
             copies = np.empty((state.shape[0], wanted), dtype=np.float32)
             key = draw_key(rng)
-            threads.over(wanted, copy_with_jitter, state, chosen, sd, key, copies)
             # Copies keep the part of their weight that they were not chosen by. Rounding may choose
             # the last one though its weight is none.
             log_of, chosen_by = np.empty(wanted), np.empty(wanted, dtype=np.float32)
-            threads.over(wanted, taken, log_weight, weight, chosen, log_of, chosen_by)
+            before, kept = kept, np.empty((kept.shape[0], wanted), dtype=np.float32)
+            threads.over(
+                wanted,
+                (copy_with_jitter, state, chosen, sd, key, copies),
+                (taken, log_weight, weight, chosen, log_of, chosen_by),
+                (copied, before, chosen, kept),
+            )
+            state = copies
             np.maximum(chosen_by, _LEAST_WEIGHT, out=chosen_by)
             log_weight = np.subtract(log_of, np.log(chosen_by, out=chosen_by), out=log_of)
-            state, before = copies, kept
-            kept = np.empty((before.shape[0], wanted), dtype=np.float32)
-            threads.over(wanted, copied, before, chosen, kept)
             normalise(log_weight, np.empty(wanted, dtype=np.float32), threads)
         now = ParticleBelief(
             state,

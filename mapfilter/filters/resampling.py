@@ -34,9 +34,9 @@ def normalise(log_weight: Floats, weight: Floats32, threads: Threads = ONE) -> t
     highest = _highest(log_weight)
     if not np.isfinite(highest):
         return -np.inf, 0.0
-    threads.over(size, _exponentials, log_weight, highest, weight)
+    threads.over(size, (_exponentials, log_weight, highest, weight))
     log_total, share, effective = _totals(weight, highest)
-    threads.over(size, _scale, log_weight, log_total, share, weight)
+    threads.over(size, (_scale, log_weight, log_total, share, weight))
     return log_total, effective
 
 

@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike
 from scipy.special import log_ndtr
 
 from mapfilter._kernels import exp32, log32
-from mapfilter._threads import ONE, Threads
 from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.models.cell_faults import mixed
 from mapfilter.options import NotNegative, Options, Positive
@@ -110,14 +109,10 @@ def bound_table() -> Floats32:
     return np.asarray(log_ndtr(sds), dtype=np.float32)
 
 
-def pixels(state: Floats32, raster: RasterFrame, threads: Threads = ONE) -> Ints32:
-    """Return the flat pixel of each hypothesis; beyond the raster that of its edge.
-
-    Hypotheses are divided among ``threads``.
-    """
+def pixels(state: Floats32, raster: RasterFrame) -> Ints32:
+    """Return the flat pixel of each hypothesis; beyond the raster that of its edge."""
     pixel = np.empty(state.shape[1], dtype=np.int32)
-    last = raster.rows - 1, raster.cols - 1
-    threads.over(pixel.size, _pixels, state, raster, *last, pixel)
+    fill_pixels(0, pixel.size, state, raster, raster.rows - 1, raster.cols - 1, pixel)
     return pixel
 
 
@@ -125,12 +120,12 @@ def pixels(state: Floats32, raster: RasterFrame, threads: Threads = ONE) -> Ints
 def pixels_up_to(state: Floats32, raster: RasterFrame, last_row: int, last_col: int) -> Ints32:
     """Return the flat pixel of each hypothesis; rows and columns beyond the last ones are these."""
     pixel = np.empty(state.shape[1], dtype=np.int32)
-    _pixels(0, pixel.size, state, raster, last_row, last_col, pixel)
+    fill_pixels(0, pixel.size, state, raster, last_row, last_col, pixel)
     return pixel
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
-def _pixels(
+def fill_pixels(
     first: int,
     stop: int,
     state: Floats32,
@@ -139,6 +134,7 @@ def _pixels(
     last_col: int,
     pixel: Ints32,
 ) -> None:
+    """Fill the flat pixels of hypotheses ``first`` to ``stop``, as :func:`pixels_up_to`."""
     east, north, found = state[0, first:stop], state[1, first:stop], pixel[first:stop]
     w, n, k, zero = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m), _F(0.0)
     lower, right, width = np.int32(last_row), np.int32(last_col), np.int32(raster.cols)

@@ -3,6 +3,7 @@
 Hypotheses go through in blocks that stay in the cache; within a block each loop runs over its
 hypotheses, so that the arithmetic is vectorised. What hypotheses keep has shape (W, N): a row for
 each slot's slow error, each fast one, that of the device, then the log odds of each slot's fault.
+Those that change hypotheses take the first of them, and the end, before other arguments.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ import numpy as np
 from numba import njit
 
 from mapfilter._kernels import exp32, log32
-from mapfilter._threads import ONE, Threads
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
 from mapfilter.models.cell_faults import mixed
 from mapfilter.models.fingerprint import REACH_SD, STEPS_PER_SD
@@ -52,22 +52,8 @@ class Prediction(NamedTuple):
     share: float
 
 
-def decayed(
-    kept: Floats32,
-    decay: Floats32,
-    fault_keep: float,
-    fault_log_odds: float,
-    threads: Threads = ONE,
-) -> Floats32:
-    """Return what hypotheses keep, (W, N), after a distance; they are divided among ``threads``."""
-    # NumPy asks for large pages, numba for many small ones.
-    now = np.empty_like(kept)
-    threads.over(kept.shape[1], _decay, kept, decay, fault_keep, fault_log_odds, now)
-    return now
-
-
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
-def _decay(
+def age(
     first: int,
     stop: int,
     kept: Floats32,
@@ -76,6 +62,7 @@ def _decay(
     fault_log_odds: float,
     now: Floats32,
 ) -> None:
+    """Fill what hypotheses keep, (W, N), after a distance."""
     means = decay.size
     keep, usual = _F(fault_keep), _F(fault_log_odds)
     for d in range(means):
@@ -99,10 +86,7 @@ def weigh_by_levels(
     weight: float,
     log_weight: Floats,
 ) -> None:
-    """Add the log-likelihood of levels to weights and update what hypotheses keep, in place.
-
-    Of hypotheses ``begin`` to ``stop``; none of the others is read or written.
-    """
+    """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
     means = terms.gain.shape[1]
     w = _F(weight)
     steps, more = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)

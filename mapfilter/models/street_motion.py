@@ -28,7 +28,7 @@ import numpy as np
 from numba import njit
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
-from mapfilter._threads import ONE, Threads
+from mapfilter._threads import ONE, Call
 from mapfilter._types import Floats, Floats32
 from mapfilter.geodesy import wrap_rad
 from mapfilter.options import NotNegative, Options, Positive, Share
@@ -174,14 +174,27 @@ def move(
     errors: MotionErrors,
     key: np.uint64,
     sampling_sd_m: float = 0.0,
-    threads: Threads = ONE,
 ) -> Floats32:
     """Return all hypotheses (8 or more, N) after one measured step; further rows stay.
 
     The errors are added to the heading. A step of length 0 changes nothing. ``key`` is from
     :func:`mapfilter._kernels.draw_key`; ``sampling_sd_m`` is the step's own error, to each side,
-    which a step of length 0 does not have. Hypotheses are divided among ``threads``.
+    which a step of length 0 does not have.
     """
+    call, moved = moving(state, step_m, heading_rad, errors, key, sampling_sd_m)
+    ONE.over(state.shape[1], call)
+    return moved
+
+
+def moving(
+    state: Floats32,
+    step_m: float,
+    heading_rad: float,
+    errors: MotionErrors,
+    key: np.uint64,
+    sampling_sd_m: float = 0.0,
+) -> tuple[Call, Floats32]:
+    """Return the call that does what :func:`move` does, and the array that it fills."""
     length = abs(step_m)
     sampling_sd_m = sampling_sd_m if length > 0 else 0.0
     root = length**0.5
@@ -203,9 +216,7 @@ def move(
     )
     long_m = step_m * exp(0.5 * white_rad**2)
     moved = np.empty_like(state)
-    given = state, long_m, length, heading_rad, noise, key, moved
-    threads.over(state.shape[1], _move, *given)
-    return moved
+    return (_move, state, long_m, length, heading_rad, noise, key, moved), moved
 
 
 class _Noise(NamedTuple):

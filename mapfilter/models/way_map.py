@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mapfilter._threads import ONE, Threads
 from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.models.street_motion import OFF, MapFactors, interpolate, weigh_by_map
 
@@ -54,27 +53,8 @@ def all_inside(east_m: Floats32, north_m: Floats32, width_m: float, height_m: fl
     return inside
 
 
-def weighed_by_ways(
-    moved: Floats32,
-    ways: WayMap,
-    factors: MapFactors,
-    beyond: float,
-    log_weight: Floats,
-    threads: Threads = ONE,
-) -> Floats:
-    """Return log weights (N,) after a step, and update the probability of being off in ``moved``.
-
-    ``beyond`` is the map's log-likelihood beyond the area; NaN for that of the area's edge.
-    Hypotheses are divided among ``threads``.
-    """
-    weighed = np.empty_like(log_weight)
-    given = moved, ways, factors, beyond, log_weight, weighed
-    threads.over(weighed.size, _weigh_by_ways, *given)
-    return weighed
-
-
 @njit(error_model="numpy", cache=True, nogil=True)
-def _weigh_by_ways(
+def weigh_by_ways(
     first: int,
     stop: int,
     moved: Floats32,
@@ -84,6 +64,11 @@ def _weigh_by_ways(
     log_weight: Floats,
     weighed: Floats,
 ) -> None:
+    """Fill log weights (N,) after a step, and update the probability of being off in ``moved``.
+
+    That is done for hypotheses ``first`` to ``stop``. ``beyond`` is the map's log-likelihood beyond
+    the area; NaN for that of the area's edge.
+    """
     east, north = moved[0, first:stop], moved[1, first:stop]
     rows, pixel_m = ways.log_likelihood.shape[0], ways.pixel_m
     first_m, north_m = pixel_m / 2, (rows - 0.5) * pixel_m
@@ -105,7 +90,7 @@ def weighed_at_places(
     beyond: float,
     log_weight: Floats,
 ) -> Floats:
-    """Return log weights as :func:`weighed_by_ways` does, where the map's were looked up, (N,).
+    """Return log weights as :func:`weigh_by_ways` fills them, where the map's were looked up, (N,).
 
     Those of hypotheses beyond the area are replaced in place.
     """

@@ -224,10 +224,12 @@ def whole_step(
     normalise(log_weight, weight, threads)
     chosen = np.empty(count, dtype=np.int32)
     systematic(weight, rng.random(), chosen)
-    copies = np.empty_like(state)
-    threads.over(count, copy_with_jitter, state, chosen, jitter, draw_key(rng), copies)
-    kept = np.empty_like(cloud.kept)
-    threads.over(count, copied, cloud.kept, chosen, kept)
+    copies, kept = np.empty_like(state), np.empty_like(cloud.kept)
+    threads.over(
+        count,
+        (copy_with_jitter, state, chosen, jitter, draw_key(rng), copies),
+        (copied, cloud.kept, chosen, kept),
+    )
     return copies, kept
 
 

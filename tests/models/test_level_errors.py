@@ -13,7 +13,7 @@ from scipy.stats import norm, truncnorm
 from mapfilter.errors import ConfigError
 from mapfilter.models.fingerprint import bound_table
 from mapfilter.models.level_errors import LevelErrors, LevelReport, roughness
-from mapfilter.models.level_kernels import Prediction, decayed, weigh_by_absence, weigh_by_levels
+from mapfilter.models.level_kernels import Prediction, age, weigh_by_absence, weigh_by_levels
 from mapfilter.models.level_memory import SLOTS, LevelMemory
 
 SITE = np.array([0, 0, 1, 1, 1, 2])
@@ -60,7 +60,9 @@ def moved(memory, kept, length_m):
     errors = memory.errors
     memory, decay = memory.after(length_m)
     keep = exp(-length_m / errors.fault_m)
-    return memory, decayed(kept, decay, keep, errors.fault_log_odds)
+    now = np.empty_like(kept)
+    age(0, kept.shape[1], kept, decay, keep, errors.fault_log_odds, now)
+    return memory, now
 
 
 class Walk:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.models.street_motion import OFF, STATES, MapWeights, interpolate, weigh_by_map
-from mapfilter.models.way_map import WayMap, all_inside, places_beyond, weighed_by_ways
+from mapfilter.models.way_map import WayMap, all_inside, places_beyond, weigh_by_ways
 
 ROWS, COLS, PIXEL_M = 12, 9, 5.0
 WIDTH_M, HEIGHT_M = COLS * PIXEL_M, ROWS * PIXEL_M
@@ -25,7 +25,8 @@ def test_one_call_is_look_up_and_weighing(beyond):
     state, log_weight = hypotheses(rng), rng.normal(0.0, 1.0, 401)
     ways, factors = WayMap(raster, PIXEL_M, WIDTH_M, HEIGHT_M), MapWeights().over(1.4)
     moved, given = state.copy(), log_weight.copy()
-    weighed = weighed_by_ways(moved, ways, factors, beyond, log_weight)
+    weighed = np.empty(401)
+    weigh_by_ways(0, 401, moved, ways, factors, beyond, log_weight, weighed)
     np.testing.assert_array_equal(log_weight, given)
     found = interpolate(*state[:2], raster, PIXEL_M / 2, (ROWS - 0.5) * PIXEL_M, 1 / PIXEL_M)
     if np.isfinite(beyond):

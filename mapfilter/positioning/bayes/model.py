@@ -13,7 +13,7 @@ from math import exp, isfinite, log, nan, sqrt
 
 import numpy as np
 
-from mapfilter._threads import ONE, Threads
+from mapfilter._threads import ONE, Call, Threads
 from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
@@ -23,7 +23,7 @@ from mapfilter.models import fingerprint
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import (
     Prediction,
-    decayed,
+    age,
     gained,
     rough_squares,
     shares_above,
@@ -37,8 +37,9 @@ from mapfilter.models.street_motion import (
     MapWeights,
     MotionErrors,
     move,
+    moving,
 )
-from mapfilter.models.way_map import WayMap, weighed_at_places, weighed_by_ways
+from mapfilter.models.way_map import WayMap, weigh_by_ways, weighed_at_places
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import SERVING_UNDER_NULL, RadioReading
@@ -135,20 +136,21 @@ class BayesModel:
         self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
     ) -> tuple[Floats32, Floats]:
         """Move by one step and weigh by the map, by the metre."""
-        length_m = abs(motion.step_m)
+        length_m, count = abs(motion.step_m), log_weight.size
+        calls: list[Call] = []
         if isfinite(motion.heading_rad):
-            moved = move(
+            call, moved = moving(
                 state,
                 motion.step_m,
                 motion.heading_rad,
                 self.motion,
                 key,
                 motion.sampling_sd_m,
-                self.threads,
             )
+            calls.append(call)
         else:
             # To all sides.
-            moved = move(state, 0.0, 0.0, self.motion, key, threads=self.threads)
+            moved = move(state, 0.0, 0.0, self.motion, key)
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
             moved[: NORTH + 1] += (motion.all_sides_m / sqrt(2.0) * noise).astype(np.float32)
         # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
@@ -158,12 +160,15 @@ class BayesModel:
         factors = self.weights.over(length_m)
         weighed: Floats
         if isinstance(self.area, TiledArea):
+            self.threads.over(count, *calls)
             on_map = self.area.log_map_at(moved, self.weights.sd_m)
             weighed = weighed_at_places(
                 moved, on_map, self.area.size_m, factors, beyond, log_weight
             )
         else:
-            weighed = weighed_by_ways(moved, self._ways, factors, beyond, log_weight, self.threads)
+            weighed = np.empty_like(log_weight)
+            calls.append((weigh_by_ways, moved, self._ways, factors, beyond, log_weight, weighed))
+            self.threads.over(count, *calls)
         return moved, weighed
 
     def weigh(
@@ -180,10 +185,9 @@ class BayesModel:
         # A serving cell that the map lacks weighs all hypotheses in the area alike.
         used = reading.serving_weight > 0
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
-            pixel, beyond = self._pixels(cloud.state), self.area.beyond(cloud.state)
+            beyond, used = self.area.beyond(cloud.state), True
             some_beyond = bool(beyond.any())
-            used = True
-            cloud = self._aged(cloud, reading)
+            cloud, pixel = self._aged(cloud, reading)
             before = log_weight.copy() if some_beyond else log_weight
             other = 0.0
             if reading.serving >= 0 and reading.serving_weight > 0:
@@ -254,22 +258,25 @@ class BayesModel:
     def _bands(self) -> int:
         return len(self.area.cell_ids) + 2
 
-    def _pixels(self, state: Floats32) -> Ints32:
-        return np.asarray(fingerprint.pixels(state, self.area.frame, self.threads))
-
-    def _aged(self, cloud: Cloud, reading: RadioReading) -> Cloud:
-        """Return hypotheses with what they keep of the cells' errors, as a reading finds it."""
+    def _aged(self, cloud: Cloud, reading: RadioReading) -> tuple[Cloud, Ints32]:
+        """Return hypotheses with what they keep as a reading finds it, and their pixels."""
         errors, memory, length_m = self.evidence.levels, cloud.shared, reading.length_m
+        frame, count = self.area.frame, cloud.state.shape[1]
+        pixel, last = np.empty(count, dtype=np.int32), (frame.rows - 1, frame.cols - 1)
+        calls: list[Call] = [(fingerprint.fill_pixels, cloud.state, frame, *last, pixel)]
         if memory is None or not self.remember:
             memory = LevelMemory.empty(errors, self.area.site_of)
-            kept = memory.start(cloud.state.shape[1])
+            kept = memory.start(count)
         else:
             memory, decay = memory.after(length_m)
             keep = exp(-length_m / errors.fault_m)
-            kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds, self.threads)
+            # NumPy asks for large pages, numba for many small ones.
+            kept = np.empty_like(cloud.kept)
+            calls.append((age, cloud.kept, decay, keep, errors.fault_log_odds, kept))
+        self.threads.over(count, *calls)
         served = [reading.serving] if reading.serving >= 0 else []
         memory, kept = memory.with_cells(np.array(served, dtype=np.int32), kept, in_place=True)
-        return Cloud(cloud.state, kept, memory)
+        return Cloud(cloud.state, kept, memory), pixel
 
     def _weigh_serving(
         self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
@@ -282,7 +289,7 @@ class BayesModel:
         predicted, pixel, cells = self._looked_up(pixel, cells, rough=False)
         flat, bands, cell = predicted.level_dbm, predicted.bands, int(cells[0])
         given = pixel, flat, bands, cell, table, weight, odds, other, log_weight
-        self.threads.over(pixel.size, fingerprint.weigh_by_serving, *given)
+        self.threads.over(pixel.size, (fingerprint.weigh_by_serving, *given))
 
     def _weigh_levels(
         self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
@@ -305,13 +312,13 @@ class BayesModel:
         rough_db2 = mean_rough_db2(predicted, own, cells)
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
-        over, count = self.threads.over, log_weight.size
-        terms = terms._replace(cell=cells)
-        over(count, weigh_by_levels, kept, own, predicted, terms, weight, log_weight)
+        by_levels = predicted, terms._replace(cell=cells), weight, log_weight
+        calls: list[Call] = [(weigh_by_levels, kept, own, *by_levels)]
         if absent.cell.size:
             predicted, own, cells = self._looked_up(pixel, absent.cell)
-            expected = absent._replace(cell=cells), self._bound_table
-            over(count, weigh_by_absence, kept, own, predicted, *expected, weight, log_weight)
+            terms_of = absent._replace(cell=cells), self._bound_table
+            calls.append((weigh_by_absence, kept, own, predicted, *terms_of, weight, log_weight))
+        self.threads.over(log_weight.size, *calls)
         other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
         memory = replace(memory, other_log_likelihood=other)
         return Cloud(cloud.state, kept, memory)
