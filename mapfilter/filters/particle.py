@@ -216,7 +216,7 @@ class ParticleBelief:
 class ParticleFilter(Generic[PriorT, ReadingT]):
     """A regularised particle filter for a model.
 
-    Weights and copies are divided among ``threads``; a model has its own.
+    Copies are divided among ``threads``; a model has its own.
     """
 
     model: ParticleModel[PriorT, ReadingT]
@@ -262,13 +262,13 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         self, belief: ParticleBelief, reading: ReadingT, rng: np.random.Generator
     ) -> tuple[ParticleBelief, UpdateInfo]:
         """Weigh all particles, apply the switch rule, and resample where that is due."""
-        options, threads, log_weight = self.options, self.threads, belief.log_weight.copy()
+        options, log_weight = self.options, belief.log_weight.copy()
         (state, kept, shared, withheld), reason = self.model.weigh(
             belief.cloud, log_weight, reading
         )
         weight = np.empty(log_weight.size, dtype=np.float32)
         if reason is Reason.USED:
-            log_total, effective = normalise(log_weight, weight, threads)
+            log_total, effective = normalise(log_weight, weight)
             if not isfinite(log_total):
                 reason = Reason.NO_CANDIDATES_LEFT
         if reason is not Reason.USED:
@@ -303,7 +303,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             # the last one though its weight is none.
             log_of, chosen_by = np.empty(wanted), np.empty(wanted, dtype=np.float32)
             before, kept = kept, np.empty((kept.shape[0], wanted), dtype=np.float32)
-            threads.over(
+            self.threads.over(
                 wanted,
                 (copy_with_jitter, state, chosen, sd, key, copies),
                 (taken, log_weight, weight, chosen, log_of, chosen_by),
@@ -312,7 +312,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             state = copies
             np.maximum(chosen_by, _LEAST_WEIGHT, out=chosen_by)
             log_weight = np.subtract(log_of, np.log(chosen_by, out=chosen_by), out=log_of)
-            normalise(log_weight, np.empty(wanted, dtype=np.float32), threads)
+            normalise(log_weight, np.empty(wanted, dtype=np.float32))
         now = ParticleBelief(
             state,
             log_weight,

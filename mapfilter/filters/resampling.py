@@ -10,16 +10,14 @@ import numpy as np
 from numba import njit
 
 from mapfilter._kernels import exp32, hashed, normals
-from mapfilter._threads import ONE, Threads
 from mapfilter._types import Floats, Floats32, Ints32
 
 _BLOCK = 1024
 
 
-def normalise(log_weight: Floats, weight: Floats32, threads: Threads = ONE) -> tuple[float, float]:
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
     """Normalise log weights (N,) in place, and fill the weights (N,), which sum to one.
-
-    Particles are divided among ``threads``, but for the sums.
 
     Returns
     -------
@@ -27,84 +25,32 @@ def normalise(log_weight: Floats, weight: Floats32, threads: Threads = ONE) -> t
         Logarithm of the sum before, and the effective sample size, one over the sum of squares;
         minus infinity and 0 where no weight is left.
     """
-    size = log_weight.size
-    if not threads.divide(size):
-        at_once: tuple[float, float] = _normalise(log_weight, weight)
-        return at_once
-    highest = _highest(log_weight)
-    if not np.isfinite(highest):
-        return -np.inf, 0.0
-    threads.over(size, (_exponentials, log_weight, highest, weight))
-    log_total, share, effective = _totals(weight, highest)
-    threads.over(size, (_scale, log_weight, log_total, share, weight))
-    return log_total, effective
-
-
-@njit(error_model="numpy", cache=True)
-def _normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
-    highest = _highest(log_weight)
-    if not np.isfinite(highest):
-        return -np.inf, 0.0
-    _exponentials(0, log_weight.size, log_weight, highest, weight)
-    log_total, share, effective = _totals(weight, highest)
-    _scale(0, log_weight.size, log_weight, log_total, share, weight)
-    return log_total, effective
-
-
-@njit(error_model="numpy", cache=True)
-def _highest(log_weight: Floats) -> float:
     highest = -np.inf
     for i in range(log_weight.size):
         highest = log_weight[i] if log_weight[i] > highest else highest
-    return highest
-
-
-@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
-def _exponentials(
-    first: int, stop: int, log_weight: Floats, highest: float, weight: Floats32
-) -> None:
-    """Fill weights relative to the highest one."""
-    log_of, found = log_weight[first:stop], weight[first:stop]
-    for i in range(found.size):
-        found[i] = exp32(np.float32(log_of[i] - highest))
-
-
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def _totals(weight: Floats32, highest: float) -> tuple[float, float, float]:
-    """Return the logarithm of the sum of weights, one over the sum, and the effective size.
-
-    ``highest`` is the logarithm that weights are relative to.
-    """
+    if not np.isfinite(highest):
+        return -np.inf, 0.0
+    for i in range(log_weight.size):
+        weight[i] = exp32(np.float32(log_weight[i] - highest))
     # Eight sums side by side: one alone would wait for itself, and lose digits.
     sums, squares = np.zeros(8), np.zeros(8)
-    whole = weight.size // 8 * 8
+    whole = log_weight.size // 8 * 8
     for i in range(0, whole, 8):
         for j in range(8):
             w = np.float64(weight[i + j])
             sums[j] += w
             squares[j] += w * w
-    for i in range(whole, weight.size):
+    for i in range(whole, log_weight.size):
         w = np.float64(weight[i])
         sums[0] += w
         squares[0] += w * w
     total = sums.sum()
-    return highest + np.log(total), 1.0 / total, total * total / squares.sum()
-
-
-@njit(error_model="numpy", cache=True, nogil=True)
-def _scale(
-    first: int,
-    stop: int,
-    log_weight: Floats,
-    log_total: float,
-    share: float,
-    weight: Floats32,
-) -> None:
-    factor = np.float32(share)
-    log_of, found = log_weight[first:stop], weight[first:stop]
-    for i in range(found.size):
-        found[i] *= factor
-        log_of[i] -= log_total
+    log_total = highest + np.log(total)
+    share = np.float32(1.0 / total)
+    for i in range(log_weight.size):
+        weight[i] *= share
+        log_weight[i] -= log_total
+    return log_total, total * total / squares.sum()
 
 
 def log_sum(log_weight: Floats) -> float:

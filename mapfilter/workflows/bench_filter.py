@@ -220,12 +220,12 @@ def whole_step(
     model, count = given.model, belief.log_weight.size
     state, log_weight = model.move(belief.state, belief.log_weight, given.motion, draw_key(rng))
     cloud, _ = model.weigh(Cloud(state, belief.kept, belief.shared), log_weight, given.reading)
-    weight, threads = np.empty(count, dtype=np.float32), model.threads
-    normalise(log_weight, weight, threads)
+    weight = np.empty(count, dtype=np.float32)
+    normalise(log_weight, weight)
     chosen = np.empty(count, dtype=np.int32)
     systematic(weight, rng.random(), chosen)
     copies, kept = np.empty_like(state), np.empty_like(cloud.kept)
-    threads.over(
+    model.threads.over(
         count,
         (copy_with_jitter, state, chosen, jitter, draw_key(rng), copies),
         (copied, cloud.kept, chosen, kept),

@@ -14,7 +14,7 @@ from math import exp, isfinite, log, nan, sqrt
 import numpy as np
 
 from mapfilter._threads import ONE, Call, Threads
-from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints32
+from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import Cloud
@@ -185,10 +185,9 @@ class BayesModel:
         # A serving cell that the map lacks weighs all hypotheses in the area alike.
         used = reading.serving_weight > 0
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
-            beyond, used = self.area.beyond(cloud.state), True
-            some_beyond = bool(beyond.any())
+            beyond, used = np.flatnonzero(self.area.beyond(cloud.state)), True
+            before = log_weight[beyond]
             cloud, pixel = self._aged(cloud, reading)
-            before = log_weight.copy() if some_beyond else log_weight
             other = 0.0
             if reading.serving >= 0 and reading.serving_weight > 0:
                 self._weigh_serving(cloud, pixel, log_weight, reading)
@@ -212,9 +211,9 @@ class BayesModel:
             if kept_back is not None:
                 counted = log_weight - kept_back
                 share = self.evidence.levels.tracking_share
-                if some_beyond:
+                if beyond.size:
                     _weigh_beyond(beyond, before, counted, reading, share * other)
-            if some_beyond:
+            if beyond.size:
                 _weigh_beyond(beyond, before, log_weight, reading, other)
         for term in reading.terms:
             log_likelihood = term.log_likelihood(cloud.state)
@@ -363,12 +362,15 @@ def _every(pixel: Ints32) -> int:
 
 
 def _weigh_beyond(
-    beyond: Bools,
+    beyond: Ints,
     before: Floats,
     log_weight: Floats,
     reading: RadioReading,
     other_log_likelihood: float,
 ) -> None:
-    """Mix what a report says beyond the area: predictions at the edge may hold, or not."""
-    unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
+    """Mix what a report says beyond the area: predictions at the edge may hold, or not.
+
+    ``beyond`` (M,) are the hypotheses there, ``before`` (M,) their log weights before the report.
+    """
+    unknown = before + reading.radio_under_null(other_log_likelihood)
     log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
