@@ -2,12 +2,15 @@
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from time import sleep
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -91,12 +94,47 @@ def test_an_error_is_raised_once_and_after_all_parts(failing):
 
 
 def test_there_are_no_more_threads_than_asked():
-    four = Threads(4, least=0)
-    four.over(SIZE, (lambda *_: None,))
-    before = len(names())
-    for _ in range(50):
+    four, before = Threads(4, least=0), len(names())
+    for _ in range(200):
         four.over(SIZE, (lambda *_: None,))
-    assert len(names()) <= max(before, 3) + 2
+    assert len(names()) == max(before, 3)
+
+
+def test_callers_side_by_side_do_not_share_a_thread():
+    def count(one):
+        for _ in range(100):
+            found = np.zeros(SIZE)
+            three.over(SIZE, (add, found, one))
+            assert found.min() == found.max() == one
+
+    def add(first, stop, found, one):
+        found[first:stop] += one
+
+    three = Threads(3, least=0)
+    with ThreadPoolExecutor(3) as callers:
+        assert list(callers.map(count, (1.0, 2.0, 3.0))) == [None] * 3
+
+
+def test_an_interrupt_is_raised_after_all_parts():
+    done = []
+
+    def call(first, _):
+        if first == 0:
+            # While the calling thread waits for the other part.
+            signal.setitimer(signal.ITIMER_REAL, 0.05)
+        else:
+            sleep(0.3)
+            done.append(first)
+
+    two, before = Threads(2, least=0), signal.getsignal(signal.SIGALRM)
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            two.over(SIZE, (call,))
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert done == [two.parts(SIZE)[1][0]]
+    two.over(SIZE, (lambda *_: None,))
 
 
 def test_threads_can_be_pickled():
