@@ -133,12 +133,17 @@ def bench(
     memory: Annotated[
         bool, typer.Option("--memory", help="The most memory that the stage's tasks take.")
     ] = False,
+    threads: Annotated[
+        int,
+        typer.Option("--threads", min=1, max=64, help="Filter: a step divided among threads."),
+    ] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Measure how fast a stage is on this machine, or what memory it takes."""
     from mapfilter.workflows.bench import run_bench
 
-    print_result(run_bench(stage, runs=runs, peers=peers, memory=memory), as_json)
+    found = run_bench(stage, runs=runs, peers=peers, memory=memory, threads=threads)
+    print_result(found, as_json)
 
 
 def evaluate(

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from mapfilter.workflows.bench_memory import MemoryBench
     from mapfilter.workflows.bench_peers import PeersBench
     from mapfilter.workflows.bench_sweep import SweepBench
+    from mapfilter.workflows.bench_threads import ThreadsBench
 
 CRS = "EPSG:32629"
 STAGES = ("build", "filter", "fusion", "sweep")
@@ -100,23 +101,30 @@ def run_bench(
     runs: int = 5,
     peers: bool = False,
     memory: bool = False,
-) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench | MemoryBench:
+    threads: int = 1,
+) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench | MemoryBench | ThreadsBench:
     """Measure a stage on generated inputs; a filter and a sweep on the embedded map.
 
     ``peers`` is whether a step of the filter is compared with other packages instead, ``memory``
-    whether the memory of the stage's tasks is measured instead.
+    whether the memory of the stage's tasks is measured instead. With ``threads`` above 1 a step of
+    the filter is divided among as many instead.
     """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
-    if peers and memory:
-        raise fail(ConfigError, "bench", "--peers or --memory", "both")
+    if peers + memory + (threads > 1) > 1:
+        raise fail(ConfigError, "bench", "one of --peers, --memory and --threads", "several")
     if memory:
         from mapfilter.workflows.bench_memory import bench_memory
 
         return bench_memory(stage)
+    if (peers or threads > 1) and stage != "filter":
+        given = "--peers" if peers else "--threads"
+        raise fail(ConfigError, f"bench {given}", "the stage filter", stage)
+    if threads > 1:
+        from mapfilter.workflows.bench_threads import bench_threads
+
+        return bench_threads(threads, runs=runs)
     if peers:
-        if stage != "filter":
-            raise fail(ConfigError, "bench --peers", "the stage filter", stage)
         from mapfilter.workflows.bench_peers import bench_peers
 
         return bench_peers(runs=runs)

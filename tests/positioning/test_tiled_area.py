@@ -135,7 +135,7 @@ def test_every_value_is_that_of_the_whole_area(database, whole, side):
     assert np.array_equal(points_everywhere(tiled), whole.points)
     state, ways = places(whole), BayesFilter().over_area(whole).model._ways
     middle = PIXEL_M / 2, (whole.lattice.rows - 0.5) * PIXEL_M
-    expected = interpolate(state, ways.log_likelihood, *middle, 1 / PIXEL_M)
+    expected = interpolate(*state[:2], ways.log_likelihood, *middle, 1 / PIXEL_M)
     assert np.array_equal(tiled.log_map_at(state, 3.0), expected)
     weight = np.random.default_rng(2).random(50, dtype=np.float32)
     for first in range(0, 5000, 50):
