@@ -79,7 +79,8 @@ def _leaders(mass: Floats, touched: Ints, bins: Bins) -> tuple[tuple[float, floa
 
     One of the bins in ``touched`` leads, the first of equal ones.
     """
-    left, found = mass.copy(), []
+    left = mass.copy()
+    found: list[tuple[float, float, float]] = []
     for _ in range(3):
         around = _neighbourhoods(left).ravel()[touched]
         best = int(around.argmax())

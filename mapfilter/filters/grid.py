@@ -67,7 +67,7 @@ def taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
 
 def shifted(mass: Floats32, first: int, taps: Floats32, *, axis: int) -> Floats32:
     """Spread mass along an axis; what leaves the lattice is lost."""
-    spread = arrays_of(mass).zeros_like(mass)
+    spread: Floats32 = arrays_of(mass).zeros_like(mass)
     size = mass.shape[axis]
     for k, tap in enumerate(taps, start=first):
         if abs(k) >= size or tap < 1e-7:
@@ -83,9 +83,10 @@ def turned(mass: Floats32, first: int, taps: Floats32, *, circular: bool) -> Flo
     """Spread mass over the bins of an angle, around the circle where they go around."""
     if not circular:
         return shifted(mass, first, taps, axis=0)
-    roll, spread = arrays_of(mass).roll, arrays_of(mass).zeros_like(mass)
+    arrays = arrays_of(mass)
+    spread: Floats32 = arrays.zeros_like(mass)
     for k, tap in enumerate(taps, start=first):
-        spread += roll(mass, k, axis=0) * float(tap)
+        spread += arrays.roll(mass, k, axis=0) * float(tap)
     return spread
 
 

@@ -11,6 +11,7 @@ from math import exp, log
 
 import numpy as np
 
+from mapfilter._device import arrays_of
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.models.level_covariance import (
     absence_gains,
@@ -160,9 +161,11 @@ class LevelMemory:
         prior[-1, -1] = self.errors.device_db**2
         if not in_place:
             kept = kept.copy()
+        placed = arrays_of(kept).asarray
         for part in (0, slots):
-            kept[part + at] = by.astype(np.float32) @ kept[part + rest] if rest.size else 0.0
-        kept[2 * slots + 1 + at] = self.errors.fault_log_odds
+            now = placed(by.astype(np.float32)) @ kept[placed(part + rest)] if rest.size else 0.0
+            kept[placed(part + at)] = now
+        kept[placed(2 * slots + 1 + at)] = self.errors.fault_log_odds
         other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
         other_dbm[at], other_db2[at], used[at] = OTHER_DBM, OTHER_SD_DB**2, self.reports
         return replace(

@@ -180,6 +180,16 @@ def move(
     :func:`mapfilter._kernels.draw_key`; ``sampling_sd_m`` is the step's own error, to each side,
     which a step of length 0 does not have.
     """
+    long_m, length, noise = noise_of_step(step_m, errors, sampling_sd_m)
+    moved = np.empty_like(state)
+    _move(state, long_m, length, heading_rad, noise, key, moved)
+    return moved
+
+
+def noise_of_step(
+    step_m: float, errors: MotionErrors, sampling_sd_m: float
+) -> tuple[float, float, StepNoise]:
+    """Return the mean step (m), the length travelled (m), and the noise of a step."""
     length = abs(step_m)
     sampling_sd_m = sampling_sd_m if length > 0 else 0.0
     root = length**0.5
@@ -187,7 +197,7 @@ def move(
     # A step shorter than the typical one is a part of it, with the same noise over its length.
     parts = max(errors.typical_step_m / length, 1.0) ** 0.5 if length > 0 else 1.0
     turned, stretched = exp(-length / errors.heading_m), exp(-length / errors.stretch_m)
-    noise = _Noise(
+    noise = StepNoise(
         hypot(errors.step_sd_m * (length / errors.typical_step_m) ** 0.5, sampling_sd_m),
         hypot(length * white_rad * parts, sampling_sd_m),
         errors.bias_drift_rad_per_sqrt_m * root,
@@ -199,13 +209,10 @@ def move(
         1 - exp(-errors.disturbances_per_m * length),
         errors.disturbed_rad,
     )
-    long_m = step_m * exp(0.5 * white_rad**2)
-    moved = np.empty_like(state)
-    _move(state, long_m, length, heading_rad, noise, key, moved)
-    return moved
+    return step_m * exp(0.5 * white_rad**2), length, noise
 
 
-class _Noise(NamedTuple):
+class StepNoise(NamedTuple):
     """Standard deviations and factors of one step."""
 
     along_m: float
@@ -226,7 +233,7 @@ def _move(
     step_m: float,
     length_m: float,
     heading_rad: float,
-    noise: _Noise,
+    noise: StepNoise,
     key: np.uint64,
     moved: Floats32,
 ) -> None:

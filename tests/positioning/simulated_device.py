@@ -1,0 +1,176 @@
+"""Kernels of a graphics processor in numba's simulator, beside those of the processor.
+
+Run by :mod:`test_device_kernels` in a process of its own, which sets NUMBA_ENABLE_CUDASIM: the
+simulator has to be asked for before numba is loaded.
+"""
+
+from dataclasses import replace
+from math import nan, radians
+
+import numpy as np
+import pytest
+from numba import config
+from small_area import HEIGHT_M, WIDTH_M, make_area
+
+from mapfilter._device import Device
+from mapfilter._kernels import draw_key
+from mapfilter.filters import cuda_copies
+from mapfilter.filters.array_resampling import normalise_arrays, systematic_arrays
+from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.particle import Cloud
+from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
+from mapfilter.models import cuda_motion
+from mapfilter.models.level_errors import LevelReport
+from mapfilter.models.street_motion import MapWeights, MotionErrors, move
+from mapfilter.models.way_map import WayMap, weighed_by_ways
+from mapfilter.positioning.bayes.device_step import DeviceStep
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.model import BayesModel
+
+assert config.ENABLE_CUDASIM
+DEVICE = Device("gpu", np)
+"""Kernels are simulated; the simulator takes NumPy's arrays."""
+COUNT = 150
+"""More than one block of threads, the last of which is not full."""
+JITTER = np.array([0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4], np.float32)
+
+
+def particles(rows=8, seed=3):
+    """Particles in the area and around it, some off the map."""
+    rng = np.random.default_rng(seed)
+    state = np.zeros((rows, COUNT), dtype=np.float32)
+    state[0] = rng.uniform(-15.0, WIDTH_M + 15.0, COUNT)
+    state[1] = rng.uniform(-15.0, HEIGHT_M + 15.0, COUNT)
+    state[2] = rng.uniform(-np.pi, np.pi, COUNT)
+    state[3:7] = 0.05 * rng.standard_normal((4, COUNT))
+    state[4] = rng.random(COUNT)
+    state[7:] = 1e-3 * rng.standard_normal((rows - 7, COUNT))
+    return state, np.log(rng.dirichlet(np.ones(COUNT)))
+
+
+def report(limit_dbm=-95.0, offset_db=3.0, cells=(0, 2)):
+    cell = np.array(cells, dtype=np.int32)
+    level = np.array([-71.5, -88.25, -80.0, -90.0][: cell.size], dtype=np.float32)
+    absent = np.setdiff1d(np.arange(4, dtype=np.int32), cell)
+    return LevelReport(cell, level, absent, limit_dbm, offset_db)
+
+
+@pytest.mark.parametrize(("rows", "step_m"), [(8, 1.4), (9, -0.7), (8, 0.0)])
+def test_motion(rows, step_m):
+    state, _ = particles(rows)
+    errors, key = MotionErrors(disturbances_per_m=0.3), np.uint64(2**63 + 11)
+    found = np.empty_like(state)
+    cuda_motion.move(state, step_m, 2.5, errors, key, found, 0.2)
+    expected = move(state, step_m, 2.5, errors, key, 0.2)
+    np.testing.assert_allclose(found, expected, rtol=2e-6, atol=1e-5)
+    assert step_m == 0 or np.abs(found[:2] - state[:2]).max() > 0.5
+
+
+@pytest.mark.parametrize("beyond", [-0.2, nan])
+def test_map(beyond):
+    state, log_weight = particles()
+    area, weights = make_area(), MapWeights()
+    log_map, factors = area.log_map(weights.sd_m), weights.over(9.0)
+    found, weighed = state.copy(), log_weight.copy()
+    cuda_motion.weigh_by_ways(found, log_map, 10.0, area.size_m, factors, beyond, weighed)
+    expected = state.copy()
+    ways = WayMap(log_map, 10.0, *area.size_m)
+    expected_weight = weighed_by_ways(expected, ways, factors, beyond, log_weight)
+    np.testing.assert_allclose(found, expected, rtol=2e-6, atol=1e-6)
+    np.testing.assert_allclose(weighed, expected_weight, rtol=0, atol=5e-6)
+    assert np.ptp(weighed - log_weight) > 0.1
+
+
+@pytest.mark.parametrize("remember", [True, False])
+def test_reports(remember):
+    """Two reports one after the other: aged errors, a new cell, absent ones."""
+    state, log_weight = particles()
+    model = BayesModel(make_area(), remember=remember)
+    step = DeviceStep(model, DEVICE)
+    here = there = Cloud(state, np.empty((0, COUNT), np.float32))
+    for reading in (
+        RadioReading(0, 0.2, report(), length_m=0.0),
+        RadioReading(1, 0.5, report(cells=(0, 1, 3)), length_m=12.0),
+        RadioReading(-1, 0.0, report(cells=()), length_m=5.0),
+        RadioReading(2, 0.5, None, length_m=5.0),
+    ):
+        expected, found = log_weight.copy(), log_weight.copy()
+        here, _ = model.weigh(here, expected, reading)
+        there = step.weigh(there, found, reading)
+        assert np.ptp(expected - log_weight) > 0.05
+        np.testing.assert_allclose(found, expected, rtol=0, atol=5e-5)
+        np.testing.assert_allclose(there.kept, here.kept, rtol=1e-4, atol=2e-4)
+        for name in ("covariance_db2", "other_dbm", "other_log_likelihood"):
+            one, other = getattr(there.shared, name), getattr(here.shared, name)
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("wanted", [1, COUNT // 3, 2 * COUNT])
+def test_choice_and_copies(wanted):
+    state, log_weight = particles()
+    log_weight[::7] = -np.inf
+    log_weight += 3.0
+    expected_weight, expected_log = np.empty(COUNT, np.float32), log_weight.copy()
+    log_total, effective = normalise(expected_log, expected_weight)
+    weight, found_total, found_effective = normalise_arrays(log_weight)
+    assert (found_total, found_effective) == pytest.approx((log_total, effective), rel=1e-5)
+    np.testing.assert_allclose(weight, expected_weight, rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(log_weight, expected_log, rtol=0, atol=1e-6)
+    expected = np.empty(wanted, dtype=np.int32)
+    systematic(expected_weight, 0.37, expected)
+    chosen = systematic_arrays(expected_weight, 0.37, wanted)
+    assert chosen.dtype == np.int32
+    np.testing.assert_array_equal(chosen, expected)
+    copies, noisy = np.empty((8, wanted), np.float32), np.empty((8, wanted), np.float32)
+    cuda_copies.copy_with_jitter(state, chosen, JITTER, np.uint64(5), noisy)
+    copy_with_jitter(state, chosen, JITTER, np.uint64(5), copies)
+    np.testing.assert_allclose(noisy, copies, rtol=2e-6, atol=1e-5)
+
+
+def test_weights_of_none_are_none():
+    weight, log_total, effective = normalise_arrays(np.full(4, -np.inf))
+    assert (weight.tolist(), log_total, effective) == ([0.0] * 4, -np.inf, 0.0)
+
+
+def test_a_whole_step_gives_the_estimate_of_the_processor():
+    state, log_weight = particles()
+    model = BayesModel(make_area())
+    step, motion = DeviceStep(model, DEVICE), MotionStep(1.4, radians(37.0))
+    reading = RadioReading(0, 0.2, report(cells=(0, 1, 3)), length_m=5.0)
+    memory, _ = model.weigh(Cloud(state, np.empty((0, COUNT), np.float32)), log_weight, reading)
+    results = []
+    for mover, weigh in ((model.move, model.weigh), (step.move, step.weigh)):
+        moved, weighed = mover(state, log_weight, motion, np.uint64(9))
+        cloud = memory._replace(state=moved, kept=memory.kept.copy())
+        cloud = weigh(cloud, weighed, reading)
+        cloud = cloud[0] if weigh == model.weigh else cloud
+        results.append((cloud, weighed))
+    (here, expected), (there, found) = results
+    means = []
+    for cloud, log_of in ((here, expected), (there, found)):
+        weight = np.exp(log_of - log_of.max())
+        means.append((cloud.state[:2] * weight).sum(axis=1) / weight.sum())
+    np.testing.assert_allclose(means[1], means[0], rtol=0, atol=1e-3)
+    copies, kept = step.resample(there, found, JITTER, np.random.default_rng(2))
+    rng, weight = np.random.default_rng(2), np.empty(COUNT, np.float32)
+    normalise(expected, weight)
+    chosen = np.empty(COUNT, np.int32)
+    systematic(weight, rng.random(), chosen)
+    same, same_kept = np.empty_like(state), np.empty_like(here.kept)
+    copy_with_jitter(here.state, chosen, JITTER, draw_key(rng), same)
+    copied(here.kept, chosen, same_kept)
+    np.testing.assert_allclose(copies, same, rtol=1e-5, atol=1e-4)
+    np.testing.assert_allclose(kept, same_kept, rtol=1e-4, atol=5e-4)
+
+
+def test_more_levels_than_slots_are_left_out():
+    state, log_weight = particles()
+    area = make_area()
+    model = BayesModel(replace(area, sites={}))
+    step = DeviceStep(model, DEVICE)
+    reading = RadioReading(3, 0.4, report(cells=(0, 1, 2, 3)), length_m=2.0)
+    expected, found = log_weight.copy(), log_weight.copy()
+    nothing = Cloud(state, np.empty((0, COUNT), np.float32))
+    model.weigh(nothing, expected, reading)
+    step.weigh(nothing, found, reading)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=5e-5)
