@@ -26,6 +26,7 @@ class Array:
     def __array_function__(self, func, *_):
         raise TypeError(f"numpy.{func.__name__} of an array on a device")
 
+    held = property(lambda self: self._held)
     shape = property(lambda self: self._held.shape)
     size = property(lambda self: self._held.size)
     ndim = property(lambda self: self._held.ndim)
@@ -94,7 +95,7 @@ def _operator(name):
     return apply
 
 
-for _name in ("add", "sub", "mul", "truediv", "and", "or", "pow"):
+for _name in ("add", "sub", "mul", "truediv", "and", "or", "pow", "matmul"):
     setattr(Array, f"__{_name}__", _operator(f"__{_name}__"))
     setattr(Array, f"__r{_name}__", _operator(f"__r{_name}__"))
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):

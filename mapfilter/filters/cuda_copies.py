@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba import cuda
 
-from mapfilter._cuda import start
+from mapfilter import _cuda
 from mapfilter._kernels import hashed, normals
 
 _ZERO = np.float32(0.0)
@@ -15,7 +15,7 @@ _ZERO = np.float32(0.0)
 
 def copy_with_jitter(state: Any, chosen: Any, jitter: Any, key: np.uint64, copies: Any) -> None:
     """Fill noisy copies (R, M), as :func:`mapfilter.filters.resampling.copy_with_jitter` does."""
-    start(_copy_with_jitter, chosen.size, state, chosen, jitter, key, copies)
+    _cuda.start(_copy_with_jitter, chosen.size, state, chosen, jitter, key, copies)
 
 
 @cuda.jit

@@ -1,7 +1,7 @@
 """Motion and the map of ways on a graphics processor: kernels with a thread for each hypothesis.
 
-They are those of :mod:`mapfilter.models.street_motion` and :mod:`mapfilter.models.way_map`, with the
-same random numbers and elementary functions; results differ by rounding.
+They are those of :mod:`mapfilter.models.street_motion` and :mod:`mapfilter.models.way_map`, with
+the same random numbers and elementary functions; results differ by rounding.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import cuda
 
-from mapfilter._cuda import start
+from mapfilter import _cuda
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
 from mapfilter.models.street_motion import MapFactors, MotionErrors, noise_of_step
 
@@ -32,7 +32,7 @@ def move(
     """Fill all hypotheses (R, N) after one measured step, as :func:`street_motion.move` does."""
     long_m, length_m, noise = noise_of_step(step_m, errors, sampling_sd_m)
     given = state, long_m, length_m, heading_rad, noise, key, moved
-    start(_move, state.shape[1], *given)
+    _cuda.start(_move, state.shape[1], *given)
 
 
 def weigh_by_ways(
@@ -49,7 +49,7 @@ def weigh_by_ways(
     As :func:`mapfilter.models.way_map.weighed_by_ways`, for an area of ``size_m``, east and north.
     """
     given = moved, log_map, pixel_m, size_m, factors, beyond, log_weight
-    start(_weigh_by_ways, moved.shape[1], *given)
+    _cuda.start(_weigh_by_ways, moved.shape[1], *given)
 
 
 @cuda.jit

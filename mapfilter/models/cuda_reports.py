@@ -1,8 +1,8 @@
 """Reports as evidence on a graphics processor: kernels with a thread for each hypothesis.
 
-They are those of :mod:`mapfilter.models.fingerprint` and :mod:`mapfilter.models.level_kernels`, with
-the same elementary functions; results differ by rounding. Levels and their roughness are flat over
-pixels and bands, as there, and what hypotheses keep has the same rows.
+They are those of :mod:`mapfilter.models.fingerprint` and :mod:`mapfilter.models.level_kernels`,
+with the same elementary functions; results differ by rounding. Levels and their roughness are flat
+over pixels and bands, as there, and what hypotheses keep has the same rows.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import cuda, float32
 
-from mapfilter._cuda import start
+from mapfilter import _cuda
 from mapfilter._kernels import exp32, log32
 from mapfilter.models.cell_faults import mixed
 from mapfilter.models.fingerprint import (
@@ -21,6 +21,7 @@ from mapfilter.models.fingerprint import (
     REACH_SD,
     STEPS_PER_DB,
     STEPS_PER_SD,
+    BoundReading,
     RasterFrame,
 )
 from mapfilter.models.level_kernels import LOG_ROOT_TWO_PI, LevelTerms, Prediction
@@ -33,12 +34,12 @@ _HAZARD_FROM, _HAZARD_TO = _F(-8.0), _F(6.0)
 
 def pixels(state: Any, frame: RasterFrame, pixel: Any) -> None:
     """Fill the flat pixel (N,) of each hypothesis; beyond the raster that of its edge."""
-    start(_pixels, pixel.size, state, frame, pixel)
+    _cuda.start(_pixels, pixel.size, state, frame, pixel)
 
 
 def age(kept: Any, decay: Any, fault_keep: float, fault_log_odds: float) -> None:
     """Age what hypotheses keep, (W, N), by a distance, in place."""
-    start(_age, kept.shape[1], kept, decay, fault_keep, fault_log_odds)
+    _cuda.start(_age, kept.shape[1], kept, decay, fault_keep, fault_log_odds)
 
 
 def weigh_by_serving(
@@ -54,14 +55,14 @@ def weigh_by_serving(
     """Add the log-likelihood of the serving cell to weights, and update its fault, in place."""
     level, bands = predicted.level_dbm, predicted.bands
     given = pixel, level, bands, cell, table, weight, odds, other, log_weight
-    start(_weigh_by_serving, pixel.size, *given)
+    _cuda.start(_weigh_by_serving, pixel.size, *given)
 
 
 def weigh_by_levels(
     kept: Any, pixel: Any, predicted: Prediction, terms: LevelTerms, weight: float, log_weight: Any
 ) -> None:
     """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
-    start(_weigh_by_levels, pixel.size, kept, pixel, *predicted, *terms, weight, log_weight)
+    _cuda.start(_weigh_by_levels, pixel.size, kept, pixel, *predicted, *terms, weight, log_weight)
 
 
 def weigh_by_absence(
@@ -75,7 +76,19 @@ def weigh_by_absence(
 ) -> None:
     """Add the log-likelihood that cells are below a level, and update as above, in place."""
     given = kept, pixel, *predicted, *terms, table, weight, log_weight
-    start(_weigh_by_absence, pixel.size, *given)
+    _cuda.start(_weigh_by_absence, pixel.size, *given)
+
+
+def weigh_by_bound(
+    pixel: Any, predicted: Prediction, bound: BoundReading, cells: Any, table: Any, log_weight: Any
+) -> None:
+    """Add the log-likelihood of one bound or ambiguous level to weights, in place.
+
+    ``cells`` are those of the bound, on the device.
+    """
+    given = bound.level_dbm, bound.censored, bound.sd_db, bound.weight
+    level, bands = predicted.level_dbm, predicted.bands
+    _cuda.start(_weigh_by_bound, pixel.size, pixel, level, bands, cells, *given, table, log_weight)
 
 
 @cuda.jit
@@ -119,6 +132,29 @@ def _weigh_by_serving(pixel, level_dbm, bands, cell, table, weight, odds, other,
     _, gained, after = mixed(odds[i], _F(weight * other), w * table[np.int32(place)])
     odds[i] = after
     log_weight[i] += gained
+
+
+@cuda.jit
+def _weigh_by_bound(  # type: ignore[no-untyped-def]
+    pixel, predicted_dbm, bands, cell, level_dbm, censored, sd_db, weight, table, log_weight
+):
+    i = cuda.grid(1)
+    if i >= pixel.size:
+        return
+    at, per_db, total, four = pixel[i] * bands, _F(1.0 / sd_db), _ZERO, _F(4.0)
+    middle, last = _F(REACH_SD * STEPS_PER_SD), _F(2 * REACH_SD * STEPS_PER_SD)
+    for k in range(cell.size):
+        v = (_F(level_dbm) - predicted_dbm[at + cell[k]]) * per_db
+        if censored == 0:
+            v = v if v < four else four
+            v = v if v > -four else -four
+            total += exp32(-_HALF * v * v)
+        else:
+            place = (v if censored < 0 else -v) * _F(STEPS_PER_SD) + middle + _HALF
+            place = place if place > _ZERO else _ZERO
+            place = place if place < last else last
+            total += exp32(table[np.int32(place)])
+    log_weight[i] += _F(weight) * log32(_F(total) * _F(1.0 / cell.size))
 
 
 @cuda.jit

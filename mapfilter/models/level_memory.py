@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import exp, log
+from typing import Any
 
 import numpy as np
 
@@ -102,9 +103,9 @@ class LevelMemory:
         """Slot of each band that has one."""
         return {band: slot for slot, band in enumerate(self.band.tolist()) if band >= 0}
 
-    def start(self, count: int) -> Floats32:
-        """Return what hypotheses keep before the first report, shape (width, count)."""
-        kept = np.zeros((self.width, count), dtype=np.float32)
+    def start(self, count: int, arrays: Any = np) -> Floats32:
+        """Return what hypotheses keep before the first report, (width, count), by a module."""
+        kept: Floats32 = arrays.zeros((self.width, count), dtype=np.float32)
         kept[2 * self.slots + 1 :] = self.errors.fault_log_odds
         return kept
 

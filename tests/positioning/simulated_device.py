@@ -9,23 +9,31 @@ from math import nan, radians
 
 import numpy as np
 import pytest
+import strict_arrays
 from numba import config
-from small_area import HEIGHT_M, WIDTH_M, make_area
+from small_area import HEIGHT_M, SOUTH_M, WEST_M, WIDTH_M, make_area
 
-from mapfilter._device import Device
+from mapfilter import _cuda
+from mapfilter._device import PROCESSOR, Device
 from mapfilter._kernels import draw_key
 from mapfilter.filters import cuda_copies
 from mapfilter.filters.array_resampling import normalise_arrays, systematic_arrays
-from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.filters.grid import GridFilter as BeliefGrid
 from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
 from mapfilter.models import cuda_motion
+from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import MapWeights, MotionErrors, move
 from mapfilter.models.way_map import WayMap, weighed_by_ways
 from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.epochs import GnssFix
+from mapfilter.positioning.gnss.gate import FixTerm
 
 assert config.ENABLE_CUDASIM
 DEVICE = Device("gpu", np)
@@ -96,7 +104,8 @@ def test_reports(remember):
     ):
         expected, found = log_weight.copy(), log_weight.copy()
         here, _ = model.weigh(here, expected, reading)
-        there = step.weigh(there, found, reading)
+        there, reason = step.weigh(there, found, reading)
+        assert reason is Reason.USED
         assert np.ptp(expected - log_weight) > 0.05
         np.testing.assert_allclose(found, expected, rtol=0, atol=5e-5)
         np.testing.assert_allclose(there.kept, here.kept, rtol=1e-4, atol=2e-4)
@@ -142,8 +151,7 @@ def test_a_whole_step_gives_the_estimate_of_the_processor():
     for mover, weigh in ((model.move, model.weigh), (step.move, step.weigh)):
         moved, weighed = mover(state, log_weight, motion, np.uint64(9))
         cloud = memory._replace(state=moved, kept=memory.kept.copy())
-        cloud = weigh(cloud, weighed, reading)
-        cloud = cloud[0] if weigh == model.weigh else cloud
+        cloud, _ = weigh(cloud, weighed, reading)
         results.append((cloud, weighed))
     (here, expected), (there, found) = results
     means = []
@@ -174,3 +182,60 @@ def test_more_levels_than_slots_are_left_out():
     model.weigh(nothing, expected, reading)
     step.weigh(nothing, found, reading)
     np.testing.assert_allclose(found, expected, rtol=0, atol=5e-5)
+
+
+def test_bounds_and_ambiguous_levels():
+    state, log_weight = particles()
+    model = BayesModel(make_area())
+    step, nothing = DeviceStep(model, DEVICE), Cloud(state, np.empty((0, COUNT), np.float32))
+    for censored in (-1, 0, 1):
+        bounds = (
+            BoundReading(np.array([1, 2], np.int32), -84.0, censored, 8.0, 0.4),
+            BoundReading(np.array([3], np.int32), -110.0, censored, 8.0, 0.7),
+        )
+        reading = RadioReading(-1, 0.0, None, bounds)
+        expected, found = log_weight.copy(), log_weight.copy()
+        model.weigh(nothing, expected, reading)
+        _, reason = step.weigh(nothing, found, reading)
+        assert reason is Reason.USED
+        assert np.ptp(expected - log_weight) > 0.5
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-5)
+
+
+def test_terms_of_other_sources_and_none():
+    state, log_weight = particles()
+    step, nothing = DeviceStep(BayesModel(make_area()), DEVICE), np.empty((0, COUNT), np.float32)
+    term = FixTerm(GnssFix(WEST_M + 40.0, SOUTH_M + 30.0), (WEST_M, SOUTH_M))
+    found = log_weight.copy()
+    _, reason = step.weigh(Cloud(state, nothing), found, RadioReading(terms=(term,)))
+    assert reason is Reason.USED
+    np.testing.assert_allclose(found, log_weight + term.log_likelihood(state), atol=1e-12)
+    same = log_weight.copy()
+    _, reason = step.weigh(Cloud(state, nothing), same, RadioReading())
+    assert reason is Reason.NO_READING
+    np.testing.assert_array_equal(same, log_weight)
+
+
+def test_a_grid_on_a_device_computes_the_likelihood_there(monkeypatch):
+    """Kernels are handed what the arrays of the stand-in hold; nothing else is converted."""
+    real = _cuda.start
+
+    def started(kernel, count, *given):
+        real(kernel, count, *(getattr(one, "held", one) for one in given))
+
+    monkeypatch.setattr(_cuda, "start", started)
+    model = BayesModel(make_area(), MotionErrors(bias_sd_rad=0.02), remember=False)
+    tracks = []
+    for device in (PROCESSOR, Device("gpu", strict_arrays)):
+        grid = StreetGrid(model, device=device)
+        filter_, rng = BeliefGrid(grid, device=device), np.random.default_rng(0)
+        belief, track = filter_.init(Start(RadioReading(0, 0.2, report())), rng), []
+        for k in range(3):
+            belief, _ = filter_.predict(belief, MotionStep(7.0, 0.9 * k), rng)
+            reading = RadioReading(1, 0.3, report(cells=(0, 1, k + 1)[: 2 + k]), length_m=7.0)
+            belief, info = filter_.update(belief, reading, rng)
+            assert info.reason is Reason.USED
+            summary = belief.summary
+            track.append([*summary.mean[:2], *summary.radii_m, belief.log_evidence])
+        tracks.append(track)
+    np.testing.assert_allclose(tracks[1], tracks[0], rtol=0, atol=1e-3)

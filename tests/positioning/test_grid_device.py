@@ -9,8 +9,10 @@ import strict_arrays
 from cross_world import CRS, EAST, NORTH, make_database, walk_log
 from small_area import make_area
 
-from mapfilter._device import PROCESSOR, Device
+from mapfilter._device import PROCESSOR, Device, on_host
 from mapfilter.errors import ConfigError
+from mapfilter.filters.particle import Cloud
+from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.options import GridFilter, open_area
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate
@@ -23,6 +25,20 @@ DEVICE = Device("gpu", strict_arrays)
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory):
     return GridFilter().over_area(open_area(make_database(tmp_path_factory.mktemp("device"))))
+
+
+@pytest.fixture(autouse=True)
+def _likelihoods_without_kernels(monkeypatch):
+    """Kernels need a device or the simulator; here the processor takes their place."""
+
+    def weigh(step, cloud, log_weight, reading):
+        host = np.zeros(log_weight.size)
+        here = Cloud(on_host(cloud.state), on_host(cloud.kept), cloud.shared)
+        weighed, reason = step.model.weigh(here, host, reading)
+        log_weight += step.device.placed(host)
+        return weighed, reason
+
+    monkeypatch.setattr(DeviceStep, "weigh", weigh)
 
 
 def without_compass(log):

@@ -1,8 +1,8 @@
-"""A step of the map filter's particles on a graphics processor.
+"""Motion and reports of the map filter's hypotheses on a graphics processor.
 
-Particles and what they keep stay on the device from one step to the next. What all of them share,
+Hypotheses and what they keep stay on the device from one step to the next. What all of them share,
 small matrices once per report, is computed by the processor, which is given the pixels of some
-hundred particles for it.
+hundred of them for it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mapfilter._kernels import draw_key
 from mapfilter._types import Ints32
 from mapfilter.filters import cuda_copies
 from mapfilter.filters.array_resampling import normalise_arrays, systematic_arrays
-from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.particle import Cloud
 from mapfilter.models import cuda_motion, cuda_reports, fingerprint
 from mapfilter.models.level_errors import LevelReport
@@ -39,7 +39,8 @@ from mapfilter.positioning.bayes.model import (
 class DeviceStep:
     """The motion and the reports of a model, over arrays of a device.
 
-    Steps have headings; reports have a serving cell and levels, and the belief is not tracked yet.
+    Steps have headings. Of hypotheses that keep the errors of levels nothing is withheld, as it is
+    where they are tracked.
     """
 
     model: BayesModel
@@ -90,11 +91,22 @@ class DeviceStep:
         )
         return moved, weighed
 
-    def weigh(self, cloud: Cloud, log_weight: Any, reading: RadioReading) -> Cloud:
-        """Add the log-likelihood of a report in place, as :meth:`BayesModel.weigh` does.
+    def weigh(self, cloud: Cloud, log_weight: Any, reading: RadioReading) -> tuple[Cloud, Reason]:
+        """Add the log-likelihood of a reading in place, as :meth:`BayesModel.weigh` does.
 
-        Returns the hypotheses with what they keep afterwards.
+        Terms of other sources are computed by the processor, for the states of all hypotheses.
         """
+        used = reading.serving_weight > 0
+        if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
+            cloud, used = self._reported(cloud, log_weight, reading), True
+        if reading.terms:
+            state, used = on_host(cloud.state), True
+            for term in reading.terms:
+                log_weight += self.device.placed(np.asarray(term.log_likelihood(state)))
+        return cloud, Reason.USED if used else Reason.NO_READING
+
+    def _reported(self, cloud: Cloud, log_weight: Any, reading: RadioReading) -> Cloud:
+        """Add the log-likelihood of a report in place; return what hypotheses keep afterwards."""
         arrays, model, area = self.device.arrays, self.model, self.model.area
         pixel = arrays.empty(log_weight.size, dtype=np.int32)
         cuda_reports.pixels(cloud.state, area.frame, pixel)
@@ -109,6 +121,9 @@ class DeviceStep:
             weight = model.level_weight(reading)
             cloud = self._weigh_levels(cloud, pixel, some, log_weight, reading.levels, weight)
             other = cloud.shared.other_log_likelihood
+        for bound in reading.bounds:
+            cells, table = self.device.placed(bound.cells), self._bound_table
+            cuda_reports.weigh_by_bound(pixel, self._prediction, bound, cells, table, log_weight)
         (wide, high), (east, north) = area.size_m, (cloud.state[0], cloud.state[1])
         beyond = (east < np.float32(0.0)) | (east > np.float32(wide))
         beyond = beyond | (north < np.float32(0.0)) | (north > np.float32(high))
@@ -134,7 +149,7 @@ class DeviceStep:
         errors, memory, length_m = self.model.evidence.levels, cloud.shared, reading.length_m
         if memory is None or not self.model.remember:
             memory = LevelMemory.empty(errors, self.model.area.site_of)
-            kept = self.device.placed(memory.start(cloud.state.shape[1]))
+            kept = memory.start(cloud.state.shape[1], self.device.arrays)
         else:
             memory, decay = memory.after(length_m)
             keep, kept = exp(-length_m / errors.fault_m), cloud.kept.copy()

@@ -1,7 +1,7 @@
 """The map filter's model on a grid: the same likelihoods at the pixels of the area's lattice.
 
-On a device the likelihood of the map lies there; that of a report is computed by the processor, for
-the pixels that hold mass.
+On a device the likelihood of the map lies there, and that of a report is computed there; terms of
+other sources are computed by the processor, for the pixels that hold mass.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, exp, isfinite, pi
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapfilter._device import PROCESSOR, Device, arrays_of, on_host
+from mapfilter._device import PROCESSOR, Device, arrays_of
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.grid import Transport
@@ -26,6 +26,9 @@ from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.path_start import OFF_AT_START
+
+if TYPE_CHECKING:
+    from mapfilter.positioning.bayes.device_step import DeviceStep
 
 _CIRCLE_BINS = 72
 
@@ -66,6 +69,13 @@ class StreetGrid:
     def _log_map(self) -> Any:
         """Log-likelihood of the map at every pixel, on the device."""
         return self.device.placed(self.model.log_map)
+
+    @cached_property
+    def _on_device(self) -> DeviceStep:
+        # Its kernels take a while to import.
+        from mapfilter.positioning.bayes.device_step import DeviceStep
+
+        return DeviceStep(self.model, self.device)
 
     def start(self, prior: Start) -> tuple[Floats32, Floats32]:
         """Return mass on the ways and off them: by the first evidence, or about a known start."""
@@ -140,12 +150,8 @@ class StreetGrid:
         self, cloud: Cloud, log_weight: Floats, reading: RadioReading
     ) -> tuple[Cloud, Reason]:
         """Add the log-likelihood of a reading, in place."""
-        host = log_weight if self.device.is_host else np.zeros(log_weight.size)
-        state, kept = on_host(cloud.state), on_host(cloud.kept)
-        weighed, reason = self.model.weigh(Cloud(state, kept, cloud.shared), host, reading)
-        if host is not log_weight:
-            log_weight += self.device.placed(host)
-        return weighed, reason
+        weigher = self.model if self.device.is_host else self._on_device
+        return weigher.weigh(cloud, log_weight, reading)
 
     def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
         """Return whether the leading hypothesis is on the map, and nothing else is as probable."""
