@@ -10,7 +10,6 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
@@ -45,6 +44,19 @@ class Device:
     def placed(self, array: Any) -> Any:
         """Return an array on the device: itself if it lies there already."""
         return self.arrays.asarray(array)
+
+    @property
+    def title(self) -> str:
+        """The device's own name."""
+        if self.is_host:
+            return "processor"
+        runtime = self.arrays.cuda.runtime
+        return str(runtime.getDeviceProperties(runtime.getDevice())["name"].decode())
+
+    def wait(self) -> None:
+        """Wait until the device has done all that was started."""
+        if not self.is_host:
+            self.arrays.cuda.runtime.deviceSynchronize()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A module cannot be sent to another process, which opens its own device.
@@ -106,9 +118,11 @@ def open_device(name: str, where: str = "device") -> Device:
 @cache
 def _opened() -> Any:
     """Return CuPy, with a device that it and numba can use."""
-    arrays = import_module("cupy")
+    import cupy
+    from numba import cuda
+
     # CuPy's error, a RuntimeError, says what is missing.
-    arrays.cuda.runtime.getDeviceCount()
-    if not import_module("numba.cuda").is_available():
+    cupy.cuda.runtime.getDeviceCount()
+    if not cuda.is_available():
         raise RuntimeError("none that numba.cuda can use")
-    return arrays
+    return cupy

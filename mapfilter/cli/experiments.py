@@ -133,12 +133,19 @@ def bench(
     memory: Annotated[
         bool, typer.Option("--memory", help="The most memory that the stage's tasks take.")
     ] = False,
+    device: Annotated[
+        str,
+        typer.Option(
+            "--device", help="Filter: gpu for a step on a graphics processor beside the processor."
+        ),
+    ] = "cpu",
     as_json: JsonOption = False,
 ) -> None:
     """Measure how fast a stage is on this machine, or what memory it takes."""
     from mapfilter.workflows.bench import run_bench
 
-    print_result(run_bench(stage, runs=runs, peers=peers, memory=memory), as_json)
+    found = run_bench(stage, runs=runs, peers=peers, memory=memory, device=device)
+    print_result(found, as_json)
 
 
 def evaluate(

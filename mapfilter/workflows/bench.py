@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mapfilter._device import open_device
 from mapfilter._parallel import local_executor
 from mapfilter._types import Floats
 from mapfilter.database.build import BuildJob, build
@@ -39,6 +40,7 @@ from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:
+    from mapfilter.workflows.bench_device import DeviceBench
     from mapfilter.workflows.bench_filter import FilterBench
     from mapfilter.workflows.bench_memory import MemoryBench
     from mapfilter.workflows.bench_peers import PeersBench
@@ -100,16 +102,28 @@ def run_bench(
     runs: int = 5,
     peers: bool = False,
     memory: bool = False,
-) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench | MemoryBench:
+    device: str = "cpu",
+) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench | MemoryBench | DeviceBench:
     """Measure a stage on generated inputs; a filter and a sweep on the embedded map.
 
     ``peers`` is whether a step of the filter is compared with other packages instead, ``memory``
-    whether the memory of the stage's tasks is measured instead.
+    whether the memory of the stage's tasks is measured instead. With the ``device`` ``gpu`` a step
+    of the filter on a graphics processor is compared with the processor's instead.
     """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
     if peers and memory:
         raise fail(ConfigError, "bench", "--peers or --memory", "both")
+    if device != "cpu":
+        if stage != "filter" or peers or memory:
+            got = "--peers" if peers else "--memory" if memory else stage
+            raise fail(
+                ConfigError, "bench --device", "the stage filter, without other options", got
+            )
+        opened = open_device(device, "bench --device")
+        from mapfilter.workflows.bench_device import bench_device
+
+        return bench_device(opened, runs=runs)
     if memory:
         from mapfilter.workflows.bench_memory import bench_memory
 

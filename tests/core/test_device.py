@@ -1,6 +1,5 @@
 """The device of arrays: the processor unless asked for, and errors that say what is missing."""
 
-import importlib
 import pickle
 import sys
 from types import ModuleType, SimpleNamespace
@@ -71,9 +70,7 @@ def test_a_missing_extra_is_named(monkeypatch):
 def test_a_missing_processor_is_named(monkeypatch, found):
     """Neither for CuPy nor, as on any machine without a driver, for numba."""
     monkeypatch.setitem(sys.modules, "cupy", made_cupy(found))
-    unable = SimpleNamespace(is_available=lambda: False)
-    monkeypatch.setattr(_device, "import_module", lambda name: (
-        unable if name == "numba.cuda" else importlib.import_module(name)))  # fmt: skip
+    monkeypatch.setattr("numba.cuda.is_available", lambda: False)
     why = "cudaErrorNoDevice" if isinstance(found, Exception) else r"numba\.cuda"
     with pytest.raises(ConfigError, match=rf"{why}.*no driver of NVIDIA"):
         open_device("gpu")
@@ -82,9 +79,7 @@ def test_a_missing_processor_is_named(monkeypatch, found):
 def test_a_processor_that_is_there_is_taken(monkeypatch):
     cupy = made_cupy(1)
     monkeypatch.setitem(sys.modules, "cupy", cupy)
-    able = SimpleNamespace(is_available=lambda: True)
-    monkeypatch.setattr(_device, "import_module", lambda name: (
-        able if name == "numba.cuda" else importlib.import_module(name)))  # fmt: skip
+    monkeypatch.setattr("numba.cuda.is_available", lambda: True)
     found = open_device("gpu")
     assert (found.name, found.arrays, found.is_host) == ("gpu", cupy, False)
     assert pickle.loads(pickle.dumps(found)) == found

@@ -6,8 +6,10 @@ simulator has to be asked for before numba is loaded.
 
 from dataclasses import replace
 from math import nan, radians
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 import strict_arrays
 from numba import config
@@ -34,6 +36,7 @@ from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.gate import FixTerm
+from mapfilter.workflows import bench_device
 
 assert config.ENABLE_CUDASIM
 DEVICE = Device("gpu", np)
@@ -239,3 +242,14 @@ def test_a_grid_on_a_device_computes_the_likelihood_there(monkeypatch):
             track.append([*summary.mean[:2], *summary.radii_m, belief.log_evidence])
         tracks.append(track)
     np.testing.assert_allclose(tracks[1], tracks[0], rtol=0, atol=1e-3)
+
+
+def test_a_small_bench_of_a_device(monkeypatch):
+    monkeypatch.setattr(bench_device, "_PER_RUN", 1)
+    truth = pd.DataFrame({"east_m": [WEST_M + 45.0], "north_m": [SOUTH_M + 30.0]})
+    log = SimpleNamespace(truth=truth)
+    found = bench_device.measured(BayesModel(make_area()), log, DEVICE, COUNT, 1)
+    assert found.particles == COUNT
+    assert min(found.cpu_ns, found.gpu_ns) > 0
+    assert found.speedup == found.cpu_ns / found.gpu_ns
+    assert found.difference_m < 1e-3

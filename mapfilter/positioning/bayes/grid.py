@@ -107,7 +107,7 @@ class StreetGrid:
     ) -> Floats32:
         """Return pixels as states of the particle model."""
         lattice = self.model.area.lattice
-        state = arrays_of(row).zeros((STATES, row.size), dtype=np.float32)
+        state: Floats32 = arrays_of(row).zeros((STATES, row.size), dtype=np.float32)
         state[EAST] = (col + 0.5) * lattice.resolution_m
         state[NORTH] = (lattice.rows - row - 0.5) * lattice.resolution_m
         state[BIAS] = bias_rad
