@@ -8,6 +8,7 @@ unless :meth:`Device.placed` or :func:`on_host` is called.
 from __future__ import annotations
 
 import sys
+import warnings
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -125,4 +126,6 @@ def _opened() -> Any:
     cupy.cuda.runtime.getDeviceCount()
     if not cuda.is_available():
         raise RuntimeError("none that numba.cuda can use")
+    # A narrow belief does not fill a device; numba would warn at each kernel.
+    warnings.filterwarnings("ignore", message="Grid size")
     return cupy

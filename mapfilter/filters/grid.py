@@ -222,6 +222,11 @@ class GridBelief:
         return on_host(state), on_host(weight)
 
     @property
+    def count(self) -> int:
+        """Number of pixels that hold mass."""
+        return int(self._held[1].size)
+
+    @property
     def state(self) -> Floats32:
         """Pixels that hold mass, shape (R, N)."""
         return self._cloud[0]

@@ -11,6 +11,7 @@ from small_area import make_area
 
 from mapfilter._device import PROCESSOR, Device, on_host
 from mapfilter.errors import ConfigError
+from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.particle import Cloud
 from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.options import GridFilter, open_area
@@ -93,6 +94,16 @@ def test_mass_stays_on_the_device_from_step_to_step(grid):
     brought = again.placed(DEVICE)
     assert isinstance(brought.on, strict_arrays.Array)
     assert brought.placed(DEVICE) is brought
+
+
+def test_positions_for_scores_bring_back_no_more_than_summaries(grid, monkeypatch):
+    def brought(_):
+        raise AssertionError("all pixels were brought back")
+
+    monkeypatch.setattr(GridBelief, "_cloud", property(brought))
+    positioner = replace(grid, device=DEVICE).for_scores()
+    found = locate(walk_log(((EAST, 25.0),)), positioner, np.random.default_rng(0))
+    assert np.isfinite(found.estimate.east_m).all()
 
 
 def test_the_processor_is_the_default():
