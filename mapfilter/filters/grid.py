@@ -16,12 +16,12 @@ from typing import Any, Generic, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from mapfilter._device import PROCESSOR, Device, arrays_of, on_host
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.array_summary import summarise_arrays
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.filters.grid_transport import shifted, taps, turned
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
 from mapfilter.filters.particle import (
     Cloud,
@@ -32,62 +32,8 @@ from mapfilter.filters.particle import (
     switched,
 )
 
-_REACH_SD = 4.0
-_READ_INTO_PIXELS = 1 / 6
 _LEAST_MASS = 1e-9
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
-
-
-def taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
-    """Return how far the first tap shifts, and the share of each tap.
-
-    Their mean is the shift and their variance that of the displacement. Only where a shift falls
-    between pixels, f from the nearest, no less than f (1 - f) is possible.
-
-    Examples
-    --------
-    >>> taps(0.75, 0.0)
-    (0, array([0.25, 0.75, 0.  ], dtype=float32))
-    """
-    nearest = round(shift_px)
-    beside = shift_px - nearest
-    variance = max(sd_px**2, abs(beside) * (1 - abs(beside)))
-    if variance + beside**2 <= 1:
-        square = variance + beside**2
-        share = [(square - beside) / 2, 1 - square, (square + beside) / 2]
-        return nearest - 1, np.array(share, dtype=np.float32)
-    # A Gaussian over mass that is spread evenly in its pixel, read into pixels again.
-    narrower_px = float(np.sqrt(variance - _READ_INTO_PIXELS))
-    first = int(np.floor(shift_px - _REACH_SD * narrower_px)) - 1
-    last = int(np.ceil(shift_px + _REACH_SD * narrower_px)) + 1
-    beyond = (np.arange(first - 1, last + 2) - shift_px) / narrower_px
-    ramp = narrower_px * (beyond * ndtr(beyond) + np.exp(-0.5 * beyond**2) / np.sqrt(2 * np.pi))
-    return first, np.diff(ramp, 2).astype(np.float32)
-
-
-def shifted(mass: Floats32, first: int, taps: Floats32, *, axis: int) -> Floats32:
-    """Spread mass along an axis; what leaves the lattice is lost."""
-    spread: Floats32 = arrays_of(mass).zeros_like(mass)
-    size = mass.shape[axis]
-    for k, tap in enumerate(taps, start=first):
-        if abs(k) >= size or tap < 1e-7:
-            continue
-        target, source = [slice(None)] * mass.ndim, [slice(None)] * mass.ndim
-        target[axis] = slice(max(k, 0), size + min(k, 0))
-        source[axis] = slice(max(-k, 0), size - max(k, 0))
-        spread[tuple(target)] += mass[tuple(source)] * float(tap)
-    return spread
-
-
-def turned(mass: Floats32, first: int, taps: Floats32, *, circular: bool) -> Floats32:
-    """Spread mass over the bins of an angle, around the circle where they go around."""
-    if not circular:
-        return shifted(mass, first, taps, axis=0)
-    arrays = arrays_of(mass)
-    spread: Floats32 = arrays.zeros_like(mass)
-    for k, tap in enumerate(taps, start=first):
-        spread += arrays.roll(mass, k, axis=0) * float(tap)
-    return spread
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,15 +151,16 @@ class GridBelief:
     @cached_property
     def _held(self) -> tuple[Any, Any]:
         """Pixels that hold mass, as states, and their weights, on the device."""
-        now = self.moved
-        both = now.on + now.off
-        arrays = arrays_of(both)
-        bias, row, col = arrays.nonzero(both > _LEAST_MASS)
-        mass = both[bias, row, col]
-        off = now.off[bias, row, col] / mass
-        bias_rad = arrays.asarray(self.model.bias_rad)[bias].astype(np.float32)
-        state = self.model.states(row, col, bias_rad, off)
+        _, mass, state = self.moved.above(_LEAST_MASS)
         return state, (mass / mass.sum()).astype(np.float32)
+
+    def above(self, least: float, *, of_highest: bool = False) -> tuple[Any, Any, Any]:
+        """Return indices, masses and states of pixels with more mass, or share of the highest."""
+        arrays, both = arrays_of(self.on), self.on + self.off
+        at = arrays.nonzero(both > least * (float(both.max()) if of_highest else 1.0))
+        mass, (bias, row, col) = both[at], at
+        bias_rad = arrays.asarray(self.model.bias_rad)[bias].astype(np.float32)
+        return at, mass, self.model.states(row, col, bias_rad, self.off[at] / mass)
 
     @cached_property
     def _cloud(self) -> tuple[Floats32, Floats32]:
@@ -312,24 +259,20 @@ class GridFilter(Generic[PriorT, ReadingT]):
     ) -> tuple[GridBelief, UpdateInfo]:
         """Move the mass by what waits, weigh it, and apply the switch rule."""
         arrays, before = self.device.arrays, belief.placed(self.device).moved
-        both = before.on + before.off
-        bias, row, col = arrays.nonzero(both > _LEAST_MASS * float(both.max()))
-        off = before.off[bias, row, col] / both[bias, row, col]
-        bias_rad = arrays.asarray(self.model.bias_rad)[bias].astype(np.float32)
-        state = self.model.states(row, col, bias_rad, off)
-        log_weight = arrays.zeros(bias.size)
-        nothing = arrays.empty((0, bias.size), dtype=np.float32)
+        at, mass, state = before.above(_LEAST_MASS, of_highest=True)
+        log_weight = arrays.zeros(mass.size)
+        nothing = arrays.empty((0, mass.size), dtype=np.float32)
         cloud, reason = self.model.weigh(Cloud(state, nothing), log_weight, reading)
         if reason is not Reason.USED:
-            return belief, UpdateInfo(reason, belief.status, int(bias.size))
+            return belief, UpdateInfo(reason, belief.status, int(mass.size))
         highest = float(log_weight.max()) if log_weight.size else -inf
         likelihood = arrays.exp(log_weight - highest).astype(np.float32)
         on, off = arrays.zeros_like(before.on), arrays.zeros_like(before.off)
-        on[bias, row, col] = before.on[bias, row, col] * likelihood
-        off[bias, row, col] = before.off[bias, row, col] * likelihood
+        on[at] = before.on[at] * likelihood
+        off[at] = before.off[at] * likelihood
         total = float(on.sum(dtype=np.float64) + off.sum(dtype=np.float64))
         if not total > 0:
-            return belief, UpdateInfo(Reason.NO_CANDIDATES_LEFT, belief.status, int(bias.size))
+            return belief, UpdateInfo(Reason.NO_CANDIDATES_LEFT, belief.status, int(mass.size))
         weighed = replace(
             before,
             on=(on / np.float32(total)).astype(np.float32),
@@ -348,7 +291,7 @@ class GridFilter(Generic[PriorT, ReadingT]):
         if status is not Status.SEARCHING and weighed.summary.mass_50m < self.options.split_mass:
             status, agreement_start_m = Status.SEARCHING, nan
         now = replace(weighed, status=status, agreement_start_m=agreement_start_m)
-        return now, UpdateInfo(Reason.USED, status, int(bias.size))
+        return now, UpdateInfo(Reason.USED, status, int(mass.size))
 
     def locate(self, belief: GridBelief) -> Estimate:
         """Return the leading hypothesis."""
