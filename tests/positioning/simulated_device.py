@@ -33,6 +33,7 @@ from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
+from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.gate import FixTerm
@@ -253,3 +254,21 @@ def test_a_small_bench_of_a_device(monkeypatch):
     assert min(found.cpu_ns, found.gpu_ns) > 0
     assert found.speedup == found.cpu_ns / found.gpu_ns
     assert found.difference_m < 1e-3
+
+
+def test_serving_cells_of_a_measured_map_are_looked_up_by_the_processor():
+    state, log_weight = particles()
+    area = make_area()
+
+    class Statistics:
+        def log_serving(self, serving, pixel):
+            return (-0.1 * (serving + 1) * pixel).astype(np.float32)
+
+    model = MeasuredMapModel(area, serving_model=Statistics())
+    step, nothing = DeviceStep(model, DEVICE), Cloud(state, np.empty((0, COUNT), np.float32))
+    expected, found = log_weight.copy(), log_weight.copy()
+    reading = RadioReading(1, 0.5, report(), length_m=2.0)
+    model.weigh(nothing, expected, reading)
+    step.weigh(nothing, found, reading)
+    assert np.ptp(expected - log_weight) > 2
+    np.testing.assert_allclose(found, expected, rtol=0, atol=5e-5)

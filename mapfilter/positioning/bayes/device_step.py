@@ -161,6 +161,10 @@ class DeviceStep:
     def _weigh_serving(
         self, cloud: Cloud, pixel: Any, log_weight: Any, reading: RadioReading
     ) -> None:
+        if self.model.serving_is_measured:
+            measured = self.model.log_serving_at(on_host(pixel), reading)
+            log_weight += self.device.placed(np.asarray(measured))
+            return
         odds = cloud.shared.fault_odds(reading.serving, cloud.kept)
         cuda_reports.weigh_by_serving(
             pixel,

@@ -279,6 +279,15 @@ class BayesModel:
             pixel, flat, bands, cell, table, weight, odds, other, log_weight
         )
 
+    @property
+    def serving_is_measured(self) -> bool:
+        """Whether serving cells have statistics at each place, as :meth:`log_serving_at` tells."""
+        return False
+
+    def log_serving_at(self, pixel: Ints32, reading: RadioReading) -> Floats:
+        """Return the log-likelihood (N,) of a measured serving cell at pixels (N,)."""
+        raise NotImplementedError
+
     def level_weight(self, reading: RadioReading) -> float:
         """Return the exponent of the likelihood of a report's levels."""
         weight = self.evidence.levels.weight
