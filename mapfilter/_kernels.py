@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from math import pi
+from math import pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -154,6 +154,6 @@ def cos_sin32(angle_rad: np.float32) -> tuple[np.float32, np.float32]:
 def normals(bits: np.uint64) -> tuple[np.float32, np.float32]:
     """Return two standard normal numbers by Box and Muller (1958)."""
     u, v = uniforms(bits)
-    radius = np.sqrt(_F(-2.0) * log32(u))
+    radius = sqrt(_F(-2.0) * log32(u))
     c, s = cos_sin32((v - _HALF) * _TWO_PI)
     return radius * c, radius * s

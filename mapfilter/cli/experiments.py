@@ -137,12 +137,18 @@ def bench(
         int,
         typer.Option("--threads", min=1, max=64, help="Filter: a step divided among threads."),
     ] = 1,
+    device: Annotated[
+        str,
+        typer.Option(
+            "--device", help="Filter: gpu for a step on a graphics processor beside the processor."
+        ),
+    ] = "cpu",
     as_json: JsonOption = False,
 ) -> None:
     """Measure how fast a stage is on this machine, or what memory it takes."""
     from mapfilter.workflows.bench import run_bench
 
-    found = run_bench(stage, runs=runs, peers=peers, memory=memory, threads=threads)
+    found = run_bench(stage, runs=runs, peers=peers, memory=memory, threads=threads, device=device)
     print_result(found, as_json)
 
 

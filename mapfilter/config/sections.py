@@ -5,6 +5,7 @@ Each section is a noun. Lengths, angles and levels carry their unit in the name.
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -26,7 +27,7 @@ from mapfilter.config.prediction import Prediction
 from mapfilter.config.ways import BuildingsSection, Roads
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
-from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.simulation.reports import ReportModel
@@ -133,6 +134,11 @@ class SweepSection(Section):
 @with_options(BayesFilter, without=("smooth",))
 class BayesSection(Section):
     """``[filter.bayes]``: the filters "bayes" and "grid": assumed errors, weights, particles."""
+
+
+@with_options(GridFilter, without=[one.name for one in fields(BayesFilter)])
+class GridSection(Section):
+    """``[filter.grid]``: what the filter "grid" has besides the options of ``[filter.bayes]``."""
 
 
 @with_options(KalmanFilter, without=("method", "smooth"))
@@ -245,6 +251,7 @@ class FilterSection(Section):
     name: FilterName = "bayes"
     smooth: bool = False
     bayes: BayesSection = BayesSection()
+    grid: GridSection = GridSection()
     kalman: KalmanSection = KalmanSection()
 
 

@@ -3,21 +3,25 @@
 It sums over all positions where particles sample some, so it is the oracle that the particle filter
 is tested against, and a choice for small areas. Mass moves with the mean and the variance of each
 displacement; where that falls between pixels, it is smeared over them.
+
+Mass lies on the filter's device (:mod:`mapfilter._device`); summaries are brought back.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import cos, isfinite, nan, sin
+from math import cos, inf, isfinite, nan, sin
 from typing import Any, Generic, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
+from mapfilter._device import PROCESSOR, Device, arrays_of, on_host
 from mapfilter._types import Floats, Floats32
+from mapfilter.filters.array_summary import summarise_arrays
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.filters.grid_transport import shifted, taps, turned
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
 from mapfilter.filters.particle import (
     Cloud,
@@ -28,61 +32,8 @@ from mapfilter.filters.particle import (
     switched,
 )
 
-_REACH_SD = 4.0
-_READ_INTO_PIXELS = 1 / 6
 _LEAST_MASS = 1e-9
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
-
-
-def taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
-    """Return how far the first tap shifts, and the share of each tap.
-
-    Their mean is the shift and their variance that of the displacement. Only where a shift falls
-    between pixels, f from the nearest, no less than f (1 - f) is possible.
-
-    Examples
-    --------
-    >>> taps(0.75, 0.0)
-    (0, array([0.25, 0.75, 0.  ], dtype=float32))
-    """
-    nearest = round(shift_px)
-    beside = shift_px - nearest
-    variance = max(sd_px**2, abs(beside) * (1 - abs(beside)))
-    if variance + beside**2 <= 1:
-        square = variance + beside**2
-        share = [(square - beside) / 2, 1 - square, (square + beside) / 2]
-        return nearest - 1, np.array(share, dtype=np.float32)
-    # A Gaussian over mass that is spread evenly in its pixel, read into pixels again.
-    narrower_px = float(np.sqrt(variance - _READ_INTO_PIXELS))
-    first = int(np.floor(shift_px - _REACH_SD * narrower_px)) - 1
-    last = int(np.ceil(shift_px + _REACH_SD * narrower_px)) + 1
-    beyond = (np.arange(first - 1, last + 2) - shift_px) / narrower_px
-    ramp = narrower_px * (beyond * ndtr(beyond) + np.exp(-0.5 * beyond**2) / np.sqrt(2 * np.pi))
-    return first, np.diff(ramp, 2).astype(np.float32)
-
-
-def shifted(mass: Floats32, first: int, taps: Floats32, *, axis: int) -> Floats32:
-    """Spread mass along an axis; what leaves the lattice is lost."""
-    spread = np.zeros_like(mass)
-    size = mass.shape[axis]
-    for k, tap in enumerate(taps, start=first):
-        if abs(k) >= size or tap < 1e-7:
-            continue
-        target, source = [slice(None)] * mass.ndim, [slice(None)] * mass.ndim
-        target[axis] = slice(max(k, 0), size + min(k, 0))
-        source[axis] = slice(max(-k, 0), size - max(k, 0))
-        spread[tuple(target)] += tap * mass[tuple(source)]
-    return spread
-
-
-def turned(mass: Floats32, first: int, taps: Floats32, *, circular: bool) -> Floats32:
-    """Spread mass over the bins of an angle, around the circle where they go around."""
-    if not circular:
-        return shifted(mass, first, taps, axis=0)
-    return np.asarray(
-        sum(tap * np.roll(mass, k, axis=0) for k, tap in enumerate(taps, start=first)),
-        dtype=np.float32,
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,11 +130,14 @@ class GridBelief:
             return self
         model = self.model
         step = model.transport(*self.waiting)
-        on, off = np.empty_like(self.on), np.empty_like(self.off)
+        # A belief that comes from another process lies where it was read.
+        arrays = arrays_of(step.on)
+        before_on, before_off = arrays.asarray(self.on), arrays.asarray(self.off)
+        on, off = arrays.empty_like(before_on), arrays.empty_like(before_off)
         for b in range(on.shape[0]):
             right = taps(step.right_px[b], step.sd_right_px[b])
             down = taps(step.down_px[b], step.sd_down_px[b])
-            for source, target in ((self.on, on), (self.off, off)):
+            for source, target in ((before_on, on), (before_off, off)):
                 target[b] = shifted(shifted(source[b], *right, axis=1), *down, axis=0)
         if step.turned_bins > 0 and on.shape[0] > 1:
             spread = taps(0.0, step.turned_bins)
@@ -195,15 +149,29 @@ class GridBelief:
         return replace(self, on=stayed * step.on, off=away * off_cost, waiting=_NOTHING)
 
     @cached_property
-    def _cloud(self) -> tuple[Floats32, Floats32]:
-        """Pixels that hold mass, as states, and their weights."""
-        now = self.moved
-        both = now.on + now.off
-        bias, row, col = np.nonzero(both > _LEAST_MASS)
-        mass = both[bias, row, col]
-        off = now.off[bias, row, col] / mass
-        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32), off)
+    def _held(self) -> tuple[Any, Any]:
+        """Pixels that hold mass, as states, and their weights, on the device."""
+        _, mass, state = self.moved.above(_LEAST_MASS)
         return state, (mass / mass.sum()).astype(np.float32)
+
+    def above(self, least: float, *, of_highest: bool = False) -> tuple[Any, Any, Any]:
+        """Return indices, masses and states of pixels with more mass, or share of the highest."""
+        arrays, both = arrays_of(self.on), self.on + self.off
+        at = arrays.nonzero(both > least * (float(both.max()) if of_highest else 1.0))
+        mass, (bias, row, col) = both[at], at
+        bias_rad = arrays.asarray(self.model.bias_rad)[bias].astype(np.float32)
+        return at, mass, self.model.states(row, col, bias_rad, self.off[at] / mass)
+
+    @cached_property
+    def _cloud(self) -> tuple[Floats32, Floats32]:
+        """The same as NumPy's arrays."""
+        state, weight = self._held
+        return on_host(state), on_host(weight)
+
+    @property
+    def count(self) -> int:
+        """Number of pixels that hold mass."""
+        return int(self._held[1].size)
 
     @property
     def state(self) -> Floats32:
@@ -223,25 +191,39 @@ class GridBelief:
     @cached_property
     def summary(self) -> BeliefSummary:
         """Leading hypothesis, radii and runners-up."""
-        if not self.weight.size:
-            return empty_summary(self.state.shape[0])
-        return summarise(self.state, self.weight, self.bins)
+        state, weight = self._held
+        if not weight.size:
+            return empty_summary(state.shape[0])
+        if isinstance(weight, np.ndarray):
+            return summarise(state, weight, self.bins)
+        return summarise_arrays(state, weight, self.bins)
 
     def __getstate__(self) -> dict[str, object]:
-        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
+        kept = {name: self.__dict__[name] for name in self.__dataclass_fields__}
+        # Another process may have no device; a filter brings the mass to its own.
+        return kept | {"on": on_host(self.on), "off": on_host(self.off)}
+
+    def placed(self, device: Device) -> GridBelief:
+        """Return the belief with its mass on a device: itself if it lies there already."""
+        on, off = device.placed(self.on), device.placed(self.off)
+        return self if on is self.on and off is self.off else replace(self, on=on, off=off)
 
 
 @dataclass(frozen=True, slots=True)
 class GridFilter(Generic[PriorT, ReadingT]):
-    """The exact filter for a model; its switch rule is the particle filter's, with its options."""
+    """The exact filter for a model; its switch rule is the particle filter's, with its options.
+
+    The model takes and returns arrays of ``device``.
+    """
 
     model: GridModel[PriorT, ReadingT]
     options: ParticleOptions = field(default_factory=ParticleOptions)
+    device: Device = PROCESSOR
 
     def init(self, prior: PriorT, rng: np.random.Generator) -> GridBelief:  # noqa: ARG002
         """Return the first belief; nothing is drawn."""
         on, off = self.model.start(prior)
-        return GridBelief(on, off, self.model)
+        return GridBelief(on, off, self.model).placed(self.device)
 
     def predict(
         self,
@@ -276,24 +258,21 @@ class GridFilter(Generic[PriorT, ReadingT]):
         rng: np.random.Generator,  # noqa: ARG002
     ) -> tuple[GridBelief, UpdateInfo]:
         """Move the mass by what waits, weigh it, and apply the switch rule."""
-        before = belief.moved
-        both = before.on + before.off
-        bias, row, col = np.nonzero(both > _LEAST_MASS * float(both.max(initial=0.0)))
-        off = before.off[bias, row, col] / both[bias, row, col]
-        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32), off)
-        log_weight = np.zeros(bias.size)
-        nothing = np.empty((0, bias.size), dtype=np.float32)
+        arrays, before = self.device.arrays, belief.placed(self.device).moved
+        at, mass, state = before.above(_LEAST_MASS, of_highest=True)
+        log_weight = arrays.zeros(mass.size)
+        nothing = arrays.empty((0, mass.size), dtype=np.float32)
         cloud, reason = self.model.weigh(Cloud(state, nothing), log_weight, reading)
         if reason is not Reason.USED:
-            return belief, UpdateInfo(reason, belief.status, int(bias.size))
-        highest = float(log_weight.max(initial=-np.inf))
-        likelihood = np.exp(log_weight - highest).astype(np.float32)
-        on, off = np.zeros_like(before.on), np.zeros_like(before.off)
-        on[bias, row, col] = before.on[bias, row, col] * likelihood
-        off[bias, row, col] = before.off[bias, row, col] * likelihood
+            return belief, UpdateInfo(reason, belief.status, int(mass.size))
+        highest = float(log_weight.max()) if log_weight.size else -inf
+        likelihood = arrays.exp(log_weight - highest).astype(np.float32)
+        on, off = arrays.zeros_like(before.on), arrays.zeros_like(before.off)
+        on[at] = before.on[at] * likelihood
+        off[at] = before.off[at] * likelihood
         total = float(on.sum(dtype=np.float64) + off.sum(dtype=np.float64))
         if not total > 0:
-            return belief, UpdateInfo(Reason.NO_CANDIDATES_LEFT, belief.status, int(bias.size))
+            return belief, UpdateInfo(Reason.NO_CANDIDATES_LEFT, belief.status, int(mass.size))
         weighed = replace(
             before,
             on=(on / np.float32(total)).astype(np.float32),
@@ -312,7 +291,7 @@ class GridFilter(Generic[PriorT, ReadingT]):
         if status is not Status.SEARCHING and weighed.summary.mass_50m < self.options.split_mass:
             status, agreement_start_m = Status.SEARCHING, nan
         now = replace(weighed, status=status, agreement_start_m=agreement_start_m)
-        return now, UpdateInfo(Reason.USED, status, int(bias.size))
+        return now, UpdateInfo(Reason.USED, status, int(mass.size))
 
     def locate(self, belief: GridBelief) -> Estimate:
         """Return the leading hypothesis."""

@@ -19,8 +19,8 @@ from mapfilter.filters.contract import Estimate
 
 NEAR_M = 50.0
 SHARES = (0.50, 0.67, 0.95)
-_RADIUS_BINS = 4096
-_RINGS_PER_SQRT_M = 30.0
+RADIUS_BINS = 4096
+RINGS_PER_SQRT_M = 30.0
 
 
 class Bins(NamedTuple):
@@ -233,7 +233,7 @@ def _moments(
     size, count = state.shape[0], weight.size
     east, north = state[0], state[1]
     cx, cy, reach = np.float32(x), np.float32(y), np.float32(NEAR_M**2)
-    zero, rings = np.float32(0.0), np.float32(_RINGS_PER_SQRT_M)
+    zero, rings = np.float32(0.0), np.float32(RINGS_PER_SQRT_M)
     near = np.empty(count, dtype=np.float32)
     ring_of = np.empty(count, dtype=np.int32)
     mass, xx, yy, xy = 0.0, 0.0, 0.0, 0.0
@@ -254,9 +254,9 @@ def _moments(
         for i in range(count):
             total += float(near[i] * row[i])
         mean[r] = total
-    by_radius = np.zeros(_RADIUS_BINS + 1)
+    by_radius = np.zeros(RADIUS_BINS + 1)
     for i in range(count):
-        by_radius[min(ring_of[i], _RADIUS_BINS)] += weight[i]
+        by_radius[min(ring_of[i], RADIUS_BINS)] += weight[i]
     covariance = np.array([[xx, xy], [xy, yy]])
     if mass > 0:
         for r in range(size):
@@ -266,9 +266,9 @@ def _moments(
                 covariance[r, c] /= mass
     passed, ring = 0.0, 0
     for k in range(3):
-        while ring <= _RADIUS_BINS and passed + by_radius[ring] < SHARES[k]:
+        while ring <= RADIUS_BINS and passed + by_radius[ring] < SHARES[k]:
             passed += by_radius[ring]
             ring += 1
-        inside = (SHARES[k] - passed) / by_radius[ring] if ring <= _RADIUS_BINS else 1.0
-        radii[k] = ((ring + inside) / _RINGS_PER_SQRT_M) ** 2
+        inside = (SHARES[k] - passed) / by_radius[ring] if ring <= RADIUS_BINS else 1.0
+        radii[k] = ((ring + inside) / RINGS_PER_SQRT_M) ** 2
     return mean, covariance, radii, mass

@@ -190,6 +190,11 @@ class ParticleBelief:
     agreement_start_m: float = nan
 
     @property
+    def count(self) -> int:
+        """Number of particles."""
+        return self.log_weight.size
+
+    @property
     def cloud(self) -> Cloud:
         """The hypotheses as models weigh them."""
         return Cloud(self.state, self.kept, self.shared)

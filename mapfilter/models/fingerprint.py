@@ -26,7 +26,7 @@ from mapfilter.options import NotNegative, Options, Positive
 
 _F = np.float32
 STEPS_PER_SD, REACH_SD = 32, 8
-_STEPS_PER_DB, _REACH_DB = 4, 64
+STEPS_PER_DB, REACH_DB = 4, 64
 
 
 class BoundReading(NamedTuple):
@@ -97,8 +97,8 @@ def log_serving(margin_db: ArrayLike, weights: ServingWeights) -> Floats:
 
 def serving_table(weights: ServingWeights) -> Floats32:
     """Return the log-likelihood for margins of -64 to 64 dB in quarters, for the kernel."""
-    steps = _REACH_DB * _STEPS_PER_DB
-    margin_db = np.arange(-steps, steps + 1) / _STEPS_PER_DB
+    steps = REACH_DB * STEPS_PER_DB
+    margin_db = np.arange(-steps, steps + 1) / STEPS_PER_DB
     return log_serving(margin_db, weights).astype(np.float32)
 
 
@@ -205,9 +205,9 @@ def weigh_by_serving(
     ``other`` is the log-likelihood with a fault.
     """
     pixel, odds, log_weight = pixel[first:stop], odds[first:stop], log_weight[first:stop]
-    middle = _F(_REACH_DB * _STEPS_PER_DB)
-    zero, last = _F(0.0), _F(2 * _REACH_DB * _STEPS_PER_DB)
-    per_db, w, half, wrong = _F(_STEPS_PER_DB), _F(weight), _F(0.5), _F(weight * other)
+    middle = _F(REACH_DB * STEPS_PER_DB)
+    zero, last = _F(0.0), _F(2 * REACH_DB * STEPS_PER_DB)
+    per_db, w, half, wrong = _F(STEPS_PER_DB), _F(weight), _F(0.5), _F(weight * other)
     own, strongest, second = np.uint32(cell), np.uint32(bands - 2), np.uint32(bands - 1)
     width = np.uint32(bands)
     right = np.empty(pixel.size, dtype=np.float32)

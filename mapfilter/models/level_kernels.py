@@ -22,7 +22,7 @@ _F = np.float32
 _BLOCK = 128
 """Hypotheses of a block: what they keep, and the steps of a report, fit into the first cache."""
 _HALF, _ONE, _ZERO = _F(0.5), _F(1.0), _F(0.0)
-_LOG_ROOT_TWO_PI = _F(0.9189385)
+LOG_ROOT_TWO_PI = _F(0.9189385)
 
 
 class LevelTerms(NamedTuple):
@@ -163,7 +163,7 @@ def weigh_by_absence(
                 total[j] += gained
                 # Above six deviations the truncation moves nothing, and the density is none.
                 z = below[j] if below[j] > _F(-8.0) else _F(-8.0)
-                hazard = exp32(-_HALF * z * z - _LOG_ROOT_TWO_PI - right[j])
+                hazard = exp32(-_HALF * z * z - LOG_ROOT_TWO_PI - right[j])
                 hazard = hazard if z < _F(6.0) else _ZERO
                 below[j] = -fine * hazard * own * per_sd[j]
         _corrected(kept, first, count, terms.gain, steps)

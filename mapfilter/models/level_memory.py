@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import exp, log
+from typing import Any
 
 import numpy as np
 
+from mapfilter._device import arrays_of
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.models.level_covariance import (
     absence_gains,
@@ -101,9 +103,9 @@ class LevelMemory:
         """Slot of each band that has one."""
         return {band: slot for slot, band in enumerate(self.band.tolist()) if band >= 0}
 
-    def start(self, count: int) -> Floats32:
-        """Return what hypotheses keep before the first report, shape (width, count)."""
-        kept = np.zeros((self.width, count), dtype=np.float32)
+    def start(self, count: int, arrays: Any = np) -> Floats32:
+        """Return what hypotheses keep before the first report, (width, count), by a module."""
+        kept: Floats32 = arrays.zeros((self.width, count), dtype=np.float32)
         kept[2 * self.slots + 1 :] = self.errors.fault_log_odds
         return kept
 
@@ -160,9 +162,11 @@ class LevelMemory:
         prior[-1, -1] = self.errors.device_db**2
         if not in_place:
             kept = kept.copy()
+        placed = arrays_of(kept).asarray
         for part in (0, slots):
-            kept[part + at] = by.astype(np.float32) @ kept[part + rest] if rest.size else 0.0
-        kept[2 * slots + 1 + at] = self.errors.fault_log_odds
+            now = placed(by.astype(np.float32)) @ kept[placed(part + rest)] if rest.size else 0.0
+            kept[placed(part + at)] = now
+        kept[placed(2 * slots + 1 + at)] = self.errors.fault_log_odds
         other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
         other_dbm[at], other_db2[at], used[at] = OTHER_DBM, OTHER_SD_DB**2, self.reports
         return replace(

@@ -195,6 +195,15 @@ def moving(
     sampling_sd_m: float = 0.0,
 ) -> tuple[Call, Floats32]:
     """Return the call that does what :func:`move` does, and the array that it fills."""
+    long_m, length, noise = noise_of_step(step_m, errors, sampling_sd_m)
+    moved = np.empty_like(state)
+    return (_move, state, long_m, length, heading_rad, noise, key, moved), moved
+
+
+def noise_of_step(
+    step_m: float, errors: MotionErrors, sampling_sd_m: float
+) -> tuple[float, float, StepNoise]:
+    """Return the mean step (m), the length travelled (m), and the noise of a step."""
     length = abs(step_m)
     sampling_sd_m = sampling_sd_m if length > 0 else 0.0
     root = length**0.5
@@ -202,7 +211,7 @@ def moving(
     # A step shorter than the typical one is a part of it, with the same noise over its length.
     parts = max(errors.typical_step_m / length, 1.0) ** 0.5 if length > 0 else 1.0
     turned, stretched = exp(-length / errors.heading_m), exp(-length / errors.stretch_m)
-    noise = _Noise(
+    noise = StepNoise(
         hypot(errors.step_sd_m * (length / errors.typical_step_m) ** 0.5, sampling_sd_m),
         hypot(length * white_rad * parts, sampling_sd_m),
         errors.bias_drift_rad_per_sqrt_m * root,
@@ -214,12 +223,10 @@ def moving(
         1 - exp(-errors.disturbances_per_m * length),
         errors.disturbed_rad,
     )
-    long_m = step_m * exp(0.5 * white_rad**2)
-    moved = np.empty_like(state)
-    return (_move, state, long_m, length, heading_rad, noise, key, moved), moved
+    return step_m * exp(0.5 * white_rad**2), length, noise
 
 
-class _Noise(NamedTuple):
+class StepNoise(NamedTuple):
     """Standard deviations and factors of one step."""
 
     along_m: float
@@ -242,7 +249,7 @@ def _move(
     step_m: float,
     length_m: float,
     heading_rad: float,
-    noise: _Noise,
+    noise: StepNoise,
     key: np.uint64,
     moved: Floats32,
 ) -> None:

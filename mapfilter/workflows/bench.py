@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mapfilter._device import open_device
 from mapfilter._parallel import local_executor
 from mapfilter._types import Floats
 from mapfilter.database.build import BuildJob, build
@@ -39,6 +40,7 @@ from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:
+    from mapfilter.workflows.bench_device import DeviceBench
     from mapfilter.workflows.bench_filter import FilterBench
     from mapfilter.workflows.bench_memory import MemoryBench
     from mapfilter.workflows.bench_peers import PeersBench
@@ -102,17 +104,36 @@ def run_bench(
     peers: bool = False,
     memory: bool = False,
     threads: int = 1,
-) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench | MemoryBench | ThreadsBench:
+    device: str = "cpu",
+) -> (
+    BuildBench
+    | FilterBench
+    | FusionBench
+    | SweepBench
+    | PeersBench
+    | MemoryBench
+    | ThreadsBench
+    | DeviceBench
+):
     """Measure a stage on generated inputs; a filter and a sweep on the embedded map.
 
     ``peers`` is whether a step of the filter is compared with other packages instead, ``memory``
     whether the memory of the stage's tasks is measured instead. With ``threads`` above 1 a step of
-    the filter is divided among as many instead.
+    the filter is divided among as many instead; with the ``device`` ``gpu`` it is compared with
+    that on a graphics processor instead.
     """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
-    if peers + memory + (threads > 1) > 1:
-        raise fail(ConfigError, "bench", "one of --peers, --memory and --threads", "several")
+    if peers + memory + (threads > 1) + (device != "cpu") > 1:
+        expected = "one of --peers, --memory, --threads and --device"
+        raise fail(ConfigError, "bench", expected, "several")
+    if device != "cpu":
+        if stage != "filter":
+            raise fail(ConfigError, "bench --device", "the stage filter", stage)
+        opened = open_device(device, "bench --device")
+        from mapfilter.workflows.bench_device import bench_device
+
+        return bench_device(opened, runs=runs)
     if memory:
         from mapfilter.workflows.bench_memory import bench_memory
 

@@ -44,6 +44,8 @@ IMPORTED_AS = {
     "dask": "distributed",
     "import-linter": "importlinter",
     "pytest-xdist": "xdist",
+    "cupy-cuda12x": "cupy",
+    "numba-cuda": "numba import cuda",
 }
 COMMANDS = {"sphinx", "furo", "import-linter", "mypy", "pytest", "pytest-xdist", "ruff", "uvicorn"}
 """Tools, which are called by their names and not imported."""

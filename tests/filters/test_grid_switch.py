@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.filters.grid import GridBelief, GridFilter, Transport, shifted, taps, turned
+from mapfilter.filters.grid import GridBelief, GridFilter, Transport
+from mapfilter.filters.grid_transport import shifted, taps, turned
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleOptions
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.filters.grid import shifted, taps
+from mapfilter.filters.grid_transport import shifted, taps
 
 
 @given(st.floats(-7, 7), st.floats(0, 6))

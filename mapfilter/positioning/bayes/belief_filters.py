@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._device import PROCESSOR, Device, arrays_of
 from mapfilter.filters.contract import BeliefFilter, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
@@ -52,6 +53,8 @@ class BeliefFilters:
         the map locate it.
     holds : HoldRules
         When a phone may have been turned.
+    device : Device
+        Where masses on a grid lie.
     """
 
     model: BayesModel
@@ -61,6 +64,7 @@ class BeliefFilters:
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
     carriageways: CarriagewayFilters | None = None
     holds: HoldRules = field(default_factory=HoldRules)
+    device: Device = PROCESSOR
 
     @cached_property
     def map_may_start(self) -> bool:
@@ -114,10 +118,14 @@ class BeliefFilters:
     def by_compass(self) -> dict[bool, MapFilter]:
         """The filters of a single belief, for headings with and without a compass."""
         if self.grid:
-            model = replace(self.model, remember=False)
-            grids = {compass: StreetGrid(model, compass) for compass in (True, False)}
-            return {compass: GridFilter(grid, self.options) for compass, grid in grids.items()}
+            return {
+                compass: GridFilter(self._street_grid(compass=compass), self.options, self.device)
+                for compass in (True, False)
+            }
         return self._particle_filters(self.options)
+
+    def _street_grid(self, *, compass: bool) -> StreetGrid:
+        return StreetGrid(replace(self.model, remember=False), compass, device=self.device)
 
     @cached_property
     def _by_carriageways(self) -> MapFilter:
@@ -194,10 +202,10 @@ class BeliefFilters:
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""
         if isinstance(belief, GridBelief):
-            grid = StreetGrid(replace(self.model, remember=False), compass=False)
+            grid = self._street_grid(compass=False)
             count = grid.bias_rad.size
             on, off = (
-                np.repeat(mass.sum(axis=0, keepdims=True) / count, count, axis=0)
+                arrays_of(mass).repeat(mass.sum(axis=0, keepdims=True) / count, count, axis=0)
                 for mass in (belief.on, belief.off)
             )
             return replace(belief, on=on, off=off, model=grid)

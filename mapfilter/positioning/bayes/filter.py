@@ -14,6 +14,7 @@ from math import expm1, isfinite
 
 import numpy as np
 
+from mapfilter._device import PROCESSOR, Device
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleOptions
@@ -61,7 +62,7 @@ class BayesPositioner(Filter[BayesState]):
     holds the options and rules that take the place of the others as long as positions or satellites
     are measured; None for the same ones. ``carriageways`` locate a vehicle as long as nothing but
     its turns and the map do. ``holds`` says when a phone may have been turned. ``scored`` is
-    whether outputs leave out what scores do not need.
+    whether outputs leave out what scores do not need. Masses on a grid lie on ``device``.
     """
 
     model: BayesModel
@@ -76,6 +77,7 @@ class BayesPositioner(Filter[BayesState]):
     carriageways: CarriagewayFilters | None = None
     holds: HoldRules = field(default_factory=HoldRules)
     scored: bool = False
+    device: Device = PROCESSOR
 
     @property
     def crs(self) -> str:
@@ -101,7 +103,7 @@ class BayesPositioner(Filter[BayesState]):
     def beliefs(self) -> BeliefFilters:
         """Filters and rules of single beliefs."""
         known = self.model, self.options, self.rules, self.grid, self.positioned
-        return BeliefFilters(*known, self.carriageways, self.holds)
+        return BeliefFilters(*known, self.carriageways, self.holds, self.device)
 
     @cached_property
     def sources(self) -> tuple[EvidenceSource, ...]:

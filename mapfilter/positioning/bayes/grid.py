@@ -1,14 +1,20 @@
-"""The map filter's model on a grid: the same likelihoods at the pixels of the area's lattice."""
+"""The map filter's model on a grid: the same likelihoods at the pixels of the area's lattice.
+
+On a device the likelihood of the map lies there, and that of a report is computed there; terms of
+other sources are computed by the processor, for the pixels that hold mass.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, exp, isfinite, pi
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mapfilter._device import PROCESSOR, Device, arrays_of
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.grid import Transport
@@ -21,6 +27,9 @@ from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.path_start import OFF_AT_START
 
+if TYPE_CHECKING:
+    from mapfilter.positioning.bayes.device_step import DeviceStep
+
 _CIRCLE_BINS = 72
 
 
@@ -30,12 +39,13 @@ class StreetGrid:
 
     The step scale is no dimension of the grid, nor are deviations of headings and steps: they widen
     the motion. Errors of levels are not remembered from one report to the next. Without a compass
-    the heading error is uniform.
+    the heading error is uniform. Arrays are taken and returned on ``device``.
     """
 
     model: BayesModel
     compass: bool = True
     bin_rad: float = 0.04
+    device: Device = PROCESSOR
 
     @property
     def bins(self) -> Bins:
@@ -55,12 +65,24 @@ class StreetGrid:
         side = ceil(3 * self.model.motion.bias_sd_rad / self.bin_rad)
         return np.asarray(self.bin_rad * np.arange(-side, side + 1), dtype=np.float64)
 
+    @cached_property
+    def _log_map(self) -> Any:
+        """Log-likelihood of the map at every pixel, on the device."""
+        return self.device.placed(self.model.log_map)
+
+    @cached_property
+    def _on_device(self) -> DeviceStep:
+        # Its kernels take a while to import.
+        from mapfilter.positioning.bayes.device_step import DeviceStep
+
+        return DeviceStep(self.model, self.device)
+
     def start(self, prior: Start) -> tuple[Floats32, Floats32]:
         """Return mass on the ways and off them: by the first evidence, or about a known start."""
         area = self.model.whole
         row, col = np.indices(area.on_way.shape).reshape(2, -1)
-        nothing = np.zeros(row.size, dtype=np.float32)
-        state = self.states(row, col, nothing, nothing)
+        zeros = np.zeros(row.size, dtype=np.float32)
+        state = self.states(row, col, zeros, zeros)
         log_weight = np.zeros(row.size)
         on_map = area.on_way / max(area.on_way.sum(), 1)
         if isfinite(prior.east_m):
@@ -69,7 +91,8 @@ class StreetGrid:
             log_weight -= (dx**2 + dy**2) / (2 * prior.sd_m**2)
             on_map = np.full(on_map.shape, 1 / row.size)
         if prior.reading is not None:
-            self.weigh(Cloud(state, np.empty((0, row.size), np.float32)), log_weight, prior.reading)
+            nothing = np.empty((0, row.size), np.float32)
+            self.model.weigh(Cloud(state, nothing), log_weight, prior.reading)
         likely = np.exp(log_weight - log_weight.max()).reshape(on_map.shape)
         bias = np.ones(self.bias_rad.size)
         if self.compass and self.model.motion.bias_sd_rad > 0:
@@ -84,7 +107,7 @@ class StreetGrid:
     ) -> Floats32:
         """Return pixels as states of the particle model."""
         lattice = self.model.area.lattice
-        state = np.zeros((STATES, row.size), dtype=np.float32)
+        state: Floats32 = arrays_of(row).zeros((STATES, row.size), dtype=np.float32)
         state[EAST] = (col + 0.5) * lattice.resolution_m
         state[NORTH] = (lattice.rows - row - 0.5) * lattice.resolution_m
         state[BIAS] = bias_rad
@@ -117,7 +140,7 @@ class StreetGrid:
             np.sqrt(east_var) / pixel_m,
             np.sqrt(north_var) / pixel_m,
             motion.bias_drift_rad_per_sqrt_m * length_m**0.5 / width_rad,
-            np.exp(over.exponent * self.model.log_map),
+            self.device.arrays.exp(over.exponent * self._log_map),
             over.off,
             over.leave,
             over.come_back,
@@ -127,7 +150,8 @@ class StreetGrid:
         self, cloud: Cloud, log_weight: Floats, reading: RadioReading
     ) -> tuple[Cloud, Reason]:
         """Add the log-likelihood of a reading, in place."""
-        return self.model.weigh(cloud, log_weight, reading)
+        weigher = self.model if self.device.is_host else self._on_device
+        return weigher.weigh(cloud, log_weight, reading)
 
     def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
         """Return whether the leading hypothesis is on the map, and nothing else is as probable."""

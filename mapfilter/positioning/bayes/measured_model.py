@@ -83,12 +83,22 @@ class MeasuredMapModel(BayesModel):
     def _weigh_serving(
         self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
     ) -> None:
-        model = self.serving_model
-        if model is None:
+        if self.serving_is_measured:
+            log_weight += self.log_serving_at(pixel, reading)
+        else:
             super()._weigh_serving(cloud, pixel, log_weight, reading)
-            return
-        found = self._log_serving(model, reading.serving, reading.timing_advance, pixel)
-        log_weight += reading.serving_weight * found
+
+    @property
+    def serving_is_measured(self) -> bool:
+        """Whether serving cells have statistics at each place."""
+        return self.serving_model is not None
+
+    def log_serving_at(self, pixel: Ints32, reading: RadioReading) -> Floats:
+        """Return the log-likelihood (N,) of a measured serving cell at pixels (N,)."""
+        assert self.serving_model is not None, "a map without statistics of serving cells"
+        serving, advance = reading.serving, reading.timing_advance
+        found = self._log_serving(self.serving_model, serving, advance, pixel)
+        return np.asarray(reading.serving_weight * found)
 
     def _log_serving(
         self, model: ServingStatistics, serving: int, timing_advance: float, pixel: Ints32

@@ -48,11 +48,11 @@ from mapfilter.positioning.bayes.likely_points import KEPT_REPORTS, KnownReading
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 
-_BEYOND_COST_PER_M = 0.015
+BEYOND_COST_PER_M = 0.015
 """Negative log-likelihood of each metre beyond the area, in a database with cells."""
 _NEW_M = 50.0
 _LEAST_EXPECTED = 0.02
-_SAMPLE = 256
+SAMPLE = 256
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class BayesModel:
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
             moved[: NORTH + 1] += (motion.all_sides_m / sqrt(2.0) * noise).astype(np.float32)
         # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
-        cost = _BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
+        cost = BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
         per_m = self.weights.weight_per_m
         beyond = -cost / per_m if per_m > 0 else nan
         factors = self.weights.over(length_m)
@@ -290,15 +290,29 @@ class BayesModel:
         given = pixel, flat, bands, cell, table, weight, odds, other, log_weight
         self.threads.over(pixel.size, (fingerprint.weigh_by_serving, *given))
 
+    @property
+    def serving_is_measured(self) -> bool:
+        """Whether serving cells have statistics at each place, as :meth:`log_serving_at` tells."""
+        return False
+
+    def log_serving_at(self, pixel: Ints32, reading: RadioReading) -> Floats:
+        """Return the log-likelihood (N,) of a measured serving cell at pixels (N,)."""
+        raise NotImplementedError
+
+    def level_weight(self, reading: RadioReading) -> float:
+        """Return the exponent of the likelihood of a report's levels."""
+        weight = self.evidence.levels.weight
+        if not self.remember and reading.length_m > 0:
+            weight *= 1 - exp(-2 * reading.length_m / _NEW_M)
+        return weight
+
     def _weigh_levels(
         self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
     ) -> Cloud:
         """Add the log-likelihood of levels and absent cells; return what hypotheses keep now."""
-        errors, report = self.evidence.levels, reading.levels
+        report = reading.levels
         assert report is not None
-        memory, kept, weight = cloud.shared, cloud.kept, errors.weight
-        if not self.remember and reading.length_m > 0:
-            weight *= 1 - exp(-2 * reading.length_m / _NEW_M)
+        memory, kept, weight = cloud.shared, cloud.kept, self.level_weight(reading)
         # Cells that nobody expects say nothing, neither for the belief nor against it.
         report = report._replace(absent=self._expected_absent(pixel, report))
         cells = np.concatenate([report.cell, report.absent])
@@ -358,7 +372,7 @@ def _most_expected(absent: Ints32, share: Floats) -> Ints32:
 
 def _every(pixel: Ints32) -> int:
     """Return how many hypotheses one stands for, where some stand for all of them."""
-    return max(pixel.size // _SAMPLE, 1)
+    return max(pixel.size // SAMPLE, 1)
 
 
 def _weigh_beyond(

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from annotated_types import Ge, Gt, Le
 
+from mapfilter._device import DeviceName, open_device
 from mapfilter._threads import Threads
 from mapfilter.database.cell_levels import received_cells
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -314,10 +315,23 @@ class BayesFilter(Options):
 class GridFilter(BayesFilter):
     """The exact Bayes filter on the lattice in place of particles: slow, without the step scale.
 
-    Parameters are those of :class:`BayesFilter`.
+    Parameters are those of :class:`BayesFilter`, and:
+
+    Parameters
+    ----------
+    device : {"cpu", "gpu"}
+        Where the filter computes: ``gpu`` is a graphics processor with CUDA, which needs the extra
+        ``gpu``.
     """
+
+    device: DeviceName = "cpu"
 
     @property
     def name(self) -> str:
         """The filter's name."""
         return "grid"
+
+    def _over_area(self, area: AreaFrame) -> BayesPositioner:
+        device = open_device(self.device, "filter.grid.device")
+        # Without arguments super() does not work in a dataclass with slots.
+        return replace(BayesFilter._over_area(self, area), device=device)

@@ -127,10 +127,10 @@ class BayesState:
     def particle_spacing_m(self) -> float:
         """Distance between hypotheses along the streets that the belief covers."""
         belief = self.belief
-        if belief is None or not belief.log_weight.size:
+        if belief is None or not belief.count:
             return FIRST_SPACING_M
         area_m2 = _STREET_SHARE * belief.bins.size_m**2 * belief.summary.effective_bins
-        return max(sqrt(area_m2 / belief.log_weight.size), _MIN_SPACING_M)
+        return max(sqrt(area_m2 / belief.count), _MIN_SPACING_M)
 
 
 class Reported(NamedTuple):
@@ -180,7 +180,7 @@ def _output(
     if belief is None or state.status is Status.OUTSIDE:
         summary = empty_summary(STATES)
     else:
-        summary, count = belief.summary, belief.log_weight.size
+        summary, count = belief.summary, belief.count
         if not positions_only:
             places = belief.state[0], belief.state[1], belief.weight
             way = area.matched_way(*places)

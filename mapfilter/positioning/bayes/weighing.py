@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
@@ -318,6 +319,9 @@ def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> Rad
 
 def _holds(area: AreaFrame, belief: MapBelief) -> bool:
     """Return whether most of a belief lies in the area; weights take longer than all places."""
+    if isinstance(belief, GridBelief):
+        # Its pixels are the area's.
+        return belief.count > 0
     east_m, north_m = belief.state[0], belief.state[1]
     if east_m.size and area.holds_all(east_m, north_m):
         return True

@@ -208,7 +208,7 @@ class GnssGate:
         """
         state = replace(state, compared_at_s=epoch.time_s, compared_at_m=travelled_m)
         found = GnssComparison(belief, state)
-        if epoch.fix is not None and belief.log_weight.size:
+        if epoch.fix is not None and belief.count:
             found = self._compare_fix(found, epoch.fix, epoch.time_s, travelled_m)
         if epoch.ranges:
             found = self._compare_ranges(found, epoch, travelled_m, particle_spacing_m)
