@@ -265,7 +265,6 @@ def _move(
     to_east, to_north = moved[0, first:stop], moved[1, first:stop]
     to_bias, to_scale = moved[2, first:stop], moved[3, first:stop]
     to_turn, to_stretch = moved[5, first:stop], moved[6, first:stop]
-    moved[4, first:stop] = state[4, first:stop]
     drawn = np.uint64(4 * first)
     for i in range(east.size):
         a, b = normals(hashed(key, drawn + np.uint64(4 * i)))
@@ -286,8 +285,16 @@ def _move(
         to_stretch[i] = longer
         to_east[i] = east[i] + (along * cosine - across * sine)
         to_north[i] = north[i] + (along * sine + across * cosine)
-    for r in range(7, state.shape[0]):
-        moved[r, first:stop] = state[r, first:stop]
+    _copy_row(state[OFF, first:stop], moved[OFF, first:stop])
+    for r in range(RATE, state.shape[0]):
+        _copy_row(state[r, first:stop], moved[r, first:stop])
+
+
+@njit(inline="always")
+def _copy_row(row: Floats32, copy: Floats32) -> None:
+    # To assign one part of an array to another takes numba two seconds to compile.
+    for i in range(row.size):
+        copy[i] = row[i]
 
 
 def remounted(

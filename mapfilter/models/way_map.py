@@ -77,8 +77,10 @@ def weigh_by_ways(
         outside, instead = places_beyond(east, north, ways.width_m, ways.height_m), _F(beyond)
         for i in range(found.size):
             found[i] = instead if outside[i] else found[i]
-    weighed[first:stop] = log_weight[first:stop]
-    weigh_by_map(found, moved[OFF, first:stop], factors, weighed[first:stop])
+    before, after = log_weight[first:stop], weighed[first:stop]
+    for i in range(found.size):
+        after[i] = before[i]
+    weigh_by_map(found, moved[OFF, first:stop], factors, after)
 
 
 @njit(error_model="numpy", cache=True)
