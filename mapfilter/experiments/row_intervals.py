@@ -24,8 +24,8 @@ class RowInterval:
     part, method : str
         As in the row.
     over : {"units", "runs", "reports", ""}
-        What is drawn again. Runs of a single unit say nothing of other units; "" where there is
-        nothing to draw from, and all intervals are NaN.
+        What is drawn again. Runs of one or two units say nothing of other units; "" where there is
+        too little to draw from, and all intervals are NaN.
     count : int
         How many there are. Intervals over fewer than ten are too narrow.
     median_low_m, median_high_m, mean_low_m, mean_high_m : float
@@ -96,7 +96,7 @@ def _groups(runs: Sequence[ScoredRun]) -> tuple[Over, list[Floats], list[Bools]]
         covered = np.concatenate([one.covered for one in runs])
         return "reports", list(errors[:, None]), list(covered[:, None])
     units = list(dict.fromkeys(one.unit for one in runs))
-    if len(units) == 1:
+    if len(units) < LEAST_POOLED:
         own = [one for one in runs if one.error_m.size]
         return "runs", [one.error_m for one in own], [one.covered for one in own]
     grouped = [[one for one in runs if one.unit == unit and one.error_m.size] for unit in units]

@@ -101,7 +101,7 @@ def test_neighbouring_points_have_a_share_and_no_interval():
 
 def test_intervals_are_over_what_is_independent():
     units = [_found(str(i), (i, i + 2.0)) for i in range(12)]
-    runs = [_found("one", (1.0, 3.0)), _found("one", (2.0,)), _found("one", (9.0,))]
+    runs = [_found("one", (1.0, 3.0)), _found("one", (2.0,)), _found("two", (9.0,))]
     reports = [_found("test", np.arange(50.0), count=50)]
     found = {
         "units": (units, 12),
