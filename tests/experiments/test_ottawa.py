@@ -300,7 +300,8 @@ def test_a_real_walk_is_found(shared_data, tmp_path):
     first, *others = sorted(folder.iterdir())
     task = Task("carling", first, tuple(others), tmp_path / "out", QUICK, runs=1)
     find_left_out(task)
-    bayes, smoothed = read_left_out(task.result).found
+    bayes, smoothed, *oracles = read_left_out(task.result).found
+    assert [one.method for one in oracles] == METHODS[2:4]
     assert (bayes.method, smoothed.method) == ("bayes", "smoothed")
     assert bayes.success
     assert np.median(bayes.error_m) < 60
