@@ -243,8 +243,9 @@ def evaluate(
                 result = run_recorded(
                     name, data, folder, parts=cases or (), runs=runs, progress=progress, **common
                 )
-        # Units may be hundreds: they are in the JSON and in table.json.
-        shown = {key: value for key, value in vars(result).items() if key != "units"}
+        # Units may be hundreds: they are in the JSON and in table.json, as intervals are.
+        hidden = ("units", "intervals")
+        shown = {key: value for key, value in vars(result).items() if key not in hidden}
         print_result(result if as_json else shown, as_json)
         if name == ALL and (result.missing or result.failed):
             raise typer.Exit(PARTIAL)

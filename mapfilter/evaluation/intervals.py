@@ -9,6 +9,7 @@ shares, Garwood's (1936) for events that never happened.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -20,6 +21,8 @@ from mapfilter.evaluation.success import wilson_interval_of_routes
 
 LEAST_JOURNEYS = 10
 """With fewer, the interval of a share is Wilson's over journeys."""
+LEAST_POOLED = 3
+"""With fewer, drawing journeys again says nothing of a median or a mean."""
 
 _DRAWS, _SEED = 2000, 20231
 _ENDS = (2.5, 97.5)
@@ -122,6 +125,56 @@ def statistic_interval(values: ArrayLike, statistic: Statistic = "mean") -> tupl
     found: Floats = drawn.mean(axis=1) if statistic == "mean" else np.median(drawn, axis=1)
     low, high = np.percentile(found, _ENDS)
     return float(low), float(high)
+
+
+def pooled_interval(
+    groups: Sequence[ArrayLike], statistic: Statistic = "median"
+) -> tuple[float, float]:
+    """Return the 95 % bootstrap interval of a mean or median of all values of some journeys.
+
+    Journeys are drawn again with all of their values. Of three to ten journeys the interval is too
+    narrow, as few others were seen.
+
+    Parameters
+    ----------
+    groups : sequence of array_like
+        Values of each journey; journeys without any are left out. Infinite ones are allowed for
+        the median.
+
+    Returns
+    -------
+    low, high : float
+        NaN below three journeys with values.
+
+    Examples
+    --------
+    >>> low, high = pooled_interval([[1.0, 2.0], [2.0, 3.0], [4.0, 9.0], [5.0, 5.0]])
+    >>> low < 3.5 < high
+    True
+    """
+    filled = [np.asarray(one, dtype=np.float64) for one in groups if np.size(one)]
+    if len(filled) < LEAST_POOLED:
+        return float("nan"), float("nan")
+    sizes = np.array([one.size for one in filled])
+    values = np.concatenate(filled)
+    order = np.argsort(values, kind="stable")
+    ascending, of = values[order], np.repeat(np.arange(sizes.size), sizes)[order]
+    sums = np.array([one.sum() for one in filled])
+    found = np.empty(_DRAWS)
+    for number, drawn in enumerate(_drawn(sizes.size)):
+        times = np.bincount(drawn, minlength=sizes.size)
+        if statistic == "mean":
+            found[number] = times @ sums / (times @ sizes)
+        else:
+            reached = np.cumsum(times[of])
+            middle = np.array([(reached[-1] - 1) // 2, reached[-1] // 2])
+            found[number] = ascending[np.searchsorted(reached, middle, side="right")].mean()
+    low, high = _ENDS
+    # Between a finite and an infinite value there is no interpolation.
+    return (
+        float(np.percentile(found, low, method="lower")),
+        float(np.percentile(found, high, method="higher")),
+    )
 
 
 def _drawn(count: int) -> Ints:

@@ -35,6 +35,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
 from mapfilter.experiments.benchmarks.ottawa_table import (
     LeftOut,
     SessionRow,
+    part_intervals,
     part_rows,
     read_left_out,
     session_rows,
@@ -42,6 +43,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     write_left_out,
 )
 from mapfilter.experiments.recorded.benchmark import Journey
+from mapfilter.experiments.row_intervals import RowInterval
 from mapfilter.report.canvas import BLUE, GREEN, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
@@ -61,11 +63,15 @@ _COLOURS = {"bayes": BLUE, "smoothed": GREEN, "centroid": GREY}
 
 @dataclass(frozen=True)
 class OttawaResult:
-    """Results of all sessions: seed and draws of the noise, tables, worst runs, wall time."""
+    """Results of all sessions: seed and draws of the noise, tables, worst runs, wall time.
+
+    ``intervals`` are those of the rows' errors, over sessions.
+    """
 
     seed: int
     runs: int
     rows: tuple[Row, ...]
+    intervals: tuple[RowInterval, ...]
     sessions: tuple[SessionRow, ...]
     worst: tuple[WorstUnit, ...]
     seconds: float
@@ -170,6 +176,7 @@ def run_ottawa(
         with kept_when_stopped("sessions"):
             deque(results, maxlen=0)
     rows: list[Row] = []
+    intervals: list[RowInterval] = []
     sessions: list[SessionRow] = []
     worst: list[WorstUnit] = []
     for part in parts:
@@ -178,13 +185,16 @@ def run_ottawa(
         found = [one for left_out in every for one in left_out.found]
         centroid_m = {left_out.session: left_out.centroid_m for left_out in every}
         rows += part_rows(part, found, centroid_m)
+        intervals += part_intervals(part, found)
         sessions += session_rows(found, centroid_m)
         title = f"Ottawa, {part}: real phones, each session on the map of the others"
         picture = out / part / PICTURE
         save(plot_cumulative(_curves(every), title=title, most_m=_MOST_M, share=0.95), picture)
         worst += _worst_of(own, every)
     seconds = time.perf_counter() - began_s
-    result = OttawaResult(seed, runs, tuple(rows), tuple(sessions), tuple(worst), seconds, out)
+    result = OttawaResult(
+        seed, runs, tuple(rows), tuple(intervals), tuple(sessions), tuple(worst), seconds, out
+    )
     write_json(out / TABLE, to_jsonable(result))
     return result
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from mapfilter._io import atomic_dir, ensure_writable_folder, sha256_file, write_json
@@ -31,10 +32,12 @@ from mapfilter.experiments.recorded.kept import (
 )
 from mapfilter.experiments.recorded.rows import (
     UnitRow,
+    table_intervals,
     table_rows,
     unit_rows,
 )
-from mapfilter.workflows.evaluate_ottawa import run_ottawa
+from mapfilter.experiments.row_intervals import RowInterval
+from mapfilter.workflows.evaluate_ottawa import OttawaResult, run_ottawa
 from mapfilter.workflows.recorded_pictures import WorstUnit, draw_worst
 from mapfilter.workflows.terminal import to_jsonable
 
@@ -57,12 +60,14 @@ _MOST_TOGETHER = 5
 class RecordedResult:
     """Results of one benchmark: seed of what is drawn, tables, pictures, wall time.
 
-    ``worst`` names the worst run of each part and method, the reason and its picture.
+    ``intervals`` are those of the rows' errors; ``worst`` names the worst run of each part and
+    method, the reason and its picture.
     """
 
     name: str
     seed: int
     rows: tuple[Row, ...]
+    intervals: tuple[RowInterval, ...]
     units: tuple[UnitRow, ...]
     pictures: tuple[Path, ...]
     worst: tuple[WorstUnit, ...]
@@ -76,6 +81,8 @@ class AllResult:
 
     Parameters
     ----------
+    intervals : tuple of RowInterval
+        Of the rows' errors.
     missing : tuple of str
         What was not run, because its data set is not there or lacks files.
     failed : tuple of str
@@ -84,6 +91,7 @@ class AllResult:
 
     seed: int
     rows: tuple[Row, ...]
+    intervals: tuple[RowInterval, ...]
     missing: tuple[str, ...]
     failed: tuple[str, ...]
     seconds: Mapping[str, float]
@@ -168,6 +176,7 @@ def run_recorded(
         name,
         seed,
         tuple(rows),
+        tuple(table_intervals(found)),
         tuple(unit_rows(found)),
         tuple(one.picture for one in worst),
         tuple(worst),
@@ -198,6 +207,7 @@ def run_all(
         None of the data sets is there, or none can be judged; the table says so, too.
     """
     rows: list[Row] = []
+    intervals: list[RowInterval] = []
     missing: list[str] = []
     failed: list[str] = []
     seconds: dict[str, float] = {}
@@ -209,15 +219,19 @@ def run_all(
         except InputError as error:
             missing.append(f"{name}: {error}")
             continue
+        run: Callable[..., RecordedResult | OttawaResult]
+        run = run_ottawa if name == OTTAWA else partial(run_recorded, name)
         try:
-            found, seconds[name] = _rows_of(
-                name, data, out / name, seed=seed, workers=workers, resume=resume, progress=part
-            )
+            found = run(data, out / name, seed=seed, workers=workers, resume=resume, progress=part)
         except InputError as error:
             failed.append(f"{name}: {error}")
             continue
-        rows += [replace(row, part=f"{name}/{row.part}") for row in found]
-    result = AllResult(seed, tuple(rows), tuple(missing), tuple(failed), seconds, out)
+        seconds[name] = found.seconds
+        rows += [replace(row, part=f"{name}/{row.part}") for row in found.rows]
+        intervals += [replace(one, part=f"{name}/{one.part}") for one in found.intervals]
+    result = AllResult(
+        seed, tuple(rows), tuple(intervals), tuple(missing), tuple(failed), seconds, out
+    )
     write_json(out / TABLE, to_jsonable(result))
     if not rows:
         raise fail(InputError, str(data), *_nothing_judged(names, missing, failed))
@@ -245,25 +259,6 @@ def _check_there(name: str, data: Path) -> None:
         check_there(data / OTTAWA_FOLDER, tuple(f"{part}/*.csv" for part in OTTAWA_PARTS))
     else:
         check_there(data / _folder(name), BENCHMARKS[name].needs)
-
-
-def _rows_of(
-    name: str,
-    data: Path,
-    out: Path,
-    *,
-    seed: int,
-    workers: int,
-    resume: bool,
-    progress: Progress | None,
-) -> tuple[Sequence[Row], float]:
-    if name != OTTAWA:
-        found = run_recorded(
-            name, data, out, seed=seed, workers=workers, resume=resume, progress=progress
-        )
-        return found.rows, found.seconds
-    ottawa = run_ottawa(data, out, seed=seed, workers=workers, resume=resume, progress=progress)
-    return ottawa.rows, ottawa.seconds
 
 
 def _prepare(benchmark: Benchmark, folder: Path, work: Path) -> None:

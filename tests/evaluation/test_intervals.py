@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from mapfilter.evaluation.intervals import (
+    pooled_interval,
     rate_interval,
     ratio_interval,
     share_interval,
@@ -102,3 +103,24 @@ def test_one_value_has_no_interval():
     assert all(map(isnan, statistic_interval([4.0])))
     assert all(map(isnan, ratio_interval([1.0], [2.0])))
     assert rate_interval([], []) == (0.0, float("inf"))
+
+
+@pytest.mark.parametrize(("name", "function"), [("mean", np.mean), ("median", np.median)])
+def test_pooled_values_are_drawn_by_whole_journeys(name, function):
+    rng = np.random.default_rng(12)
+    groups = [rng.normal(middle, 1.0, rng.integers(1, 40)) for middle in rng.normal(20.0, 5.0, 30)]
+    draws = [
+        function(np.concatenate([groups[i] for i in rng.integers(0, 30, 30)])) for _ in range(4000)
+    ]
+    found = pooled_interval(groups, name)
+    assert found == pytest.approx(np.percentile(draws, (2.5, 97.5)), abs=0.5)
+    # Values of a journey are no independent ones: as many single values are known much better.
+    single = pooled_interval(np.concatenate(groups)[:, None], name)
+    assert found[1] - found[0] > 2 * (single[1] - single[0])
+
+
+def test_pooled_values_of_few_journeys_and_infinite_ones():
+    assert all(isnan(end) for end in pooled_interval([[1.0, 2.0], [3.0], []]))
+    assert pooled_interval([[5.0], [5.0], [5.0, 5.0]]) == (5.0, 5.0)
+    low, high = pooled_interval([[1.0], [2.0], [np.inf], [np.inf]])
+    assert (low, high) == (1.0, np.inf)

@@ -14,6 +14,7 @@ from mapfilter.experiments.recorded.oracles import (
     with_fix_errors,
     with_range_errors,
     with_start,
+    with_true_motion,
 )
 from mapfilter.geodesy import project, unproject
 from mapfilter.gnss.sky import ecef_from_lonlat
@@ -41,6 +42,22 @@ def test_a_known_start_is_the_first_thirty_metres():
     assert found["time_s"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     assert found["east_m"].tolist() == truth.east_m[:7].tolist()
     assert set(found["var_east_m2"]) == {1.0}
+
+
+def test_true_motion_are_the_chords_of_the_true_way():
+    time_s = np.arange(6.0)
+    motion = pd.DataFrame({"time_s": time_s, "step_m": 9.0, "heading_rad": 1.0, "turn_rad": 0.5})
+    motion = motion.assign(sampling_sd_m=4.0)
+    # North, at rest, east; not known after 4 s.
+    truth = Truth(
+        np.arange(5.0), np.array([0.0, 0, 0, 3, 6]) + 5e5, np.array([0.0, 2, 2, 2, 2]) + 5e6
+    )
+    found = with_true_motion(make_log(CRS, motion=motion), truth).motion
+    assert found["step_m"].tolist() == pytest.approx([0, 2, 0, 3, 3, 9])
+    quarter = np.pi / 2
+    assert found["heading_rad"].tolist() == pytest.approx([quarter, quarter, quarter, 0, 0, 1])
+    assert found["turn_rad"].isna().tolist() == [True] * 5 + [False]
+    assert found["sampling_sd_m"].tolist() == [0.0] * 5 + [4.0]
 
 
 def test_errors_of_motion_over_a_hundred_metres():

@@ -37,6 +37,7 @@ CRS = "EPSG:32618"
 WEST, SOUTH = 445_000.0, 5_030_000.0
 ANTENNAS = {1: (-60.0, 40.0), 2: (300.0, 460.0), 3: (520.0, -40.0)}
 STEP_M, SPEED_MPS = 20.0, 4.0
+METHODS = ["bayes", "smoothed", "oracle-start", "oracle-motion", "centroid"]
 CHOSEN = OttawaOptions()
 QUICK = replace(
     CHOSEN,
@@ -92,20 +93,24 @@ def found(made, tmp_path_factory):
 
 def test_made_sessions_are_found_on_the_map_of_the_others(found):
     rows = {row.method: row for row in found.rows}
-    assert list(rows) == ["bayes", "smoothed", "centroid"]
+    assert list(rows) == METHODS
     bayes, centroid = rows["bayes"], rows["centroid"]
     assert bayes.unit_count == 3
     assert bayes.success == 1.0
     assert bayes.success_low == pytest.approx(3 / (3 + 1.96**2), abs=1e-3)
     assert bayes.median_m < 20 < 60 < centroid.median_m
     assert rows["smoothed"].n > bayes.n
+    # Who knows the start claims sooner, so that more fixes are scored.
+    assert rows["oracle-start"].n > bayes.n
+    assert rows["oracle-start"].success == rows["oracle-motion"].success == 1.0
     assert bayes.baseline_m == centroid.median_m
     assert [one.on_map for one in found.sessions] == [1.0, 1.0, 1.0]
 
 
 def test_the_table_is_written(found):
     table = json.loads((found.out / "table.json").read_text())
-    assert [row["method"] for row in table["rows"]] == ["bayes", "smoothed", "centroid"]
+    assert [row["method"] for row in table["rows"]] == METHODS
+    assert [one["method"] for one in table["intervals"]] == METHODS[:-1]
     assert table["sessions"][0]["successes"] == 1
 
 
@@ -295,7 +300,8 @@ def test_a_real_walk_is_found(shared_data, tmp_path):
     first, *others = sorted(folder.iterdir())
     task = Task("carling", first, tuple(others), tmp_path / "out", QUICK, runs=1)
     find_left_out(task)
-    bayes, smoothed = read_left_out(task.result).found
+    bayes, smoothed, *oracles = read_left_out(task.result).found
+    assert [one.method for one in oracles] == METHODS[2:4]
     assert (bayes.method, smoothed.method) == ("bayes", "smoothed")
     assert bayes.success
     assert np.median(bayes.error_m) < 60

@@ -12,10 +12,14 @@ from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded import kitti, mountain_view
 from mapfilter.experiments.recorded.least_squares import least_squares_positions
 from mapfilter.experiments.recorded.outages import (
+    HEADING,
+    PLACE,
+    PLACE_HEADING,
     Outages,
     coasted_errors_m,
     errors_at,
     errors_between,
+    errors_from_true_begin,
     log_without,
     without,
 )
@@ -133,6 +137,42 @@ def test_a_place_that_is_none_is_infinitely_far_off():
     errors_m, held = errors_at(estimate, truth, [1.0, 3.0, 9.0])
     assert errors_m.tolist() == [np.inf, 5.0, 5.0]
     assert held.tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("turned_rad", "scale", "expected"),
+    [
+        # 30 m off at the beginning, the direction right, and the length.
+        (0.0, 1.0, {PLACE: 0.0, HEADING: 30.0, PLACE_HEADING: 0.0}),
+        # A chord of 2 sin(0.1) of 100 m; with the true direction the first 30 m stay.
+        (0.2, 1.0, {PLACE: 200 * np.sin(0.1), HEADING: 30.0, PLACE_HEADING: 0.0}),
+        (0.0, 1.1, {PLACE: 10.0, HEADING: np.hypot(30, 10), PLACE_HEADING: 10.0}),
+    ],
+    ids=["place", "direction", "length"],
+)
+def test_an_error_after_an_outage_is_made_of_place_direction_and_length(
+    turned_rad, scale, expected
+):
+    """100 m eastwards from 0 s to 100 s, by an estimate that begins 30 m too far north."""
+    truth = Truth(np.arange(101.0), 5e5 + np.arange(101.0), np.full(101, 5e6))
+    way_m = scale * np.arange(101.0)
+    fixes = [
+        _fix(t, 5e5 + gone * np.cos(turned_rad), 5e6 + 30 + gone * np.sin(turned_rad), 9.0)
+        for t, gone in enumerate(way_m)
+    ]
+    estimate = TrackEstimate.of_fixes(CRS, "bayes", fixes)
+    found = errors_from_true_begin(estimate, truth, [(0.0, 100.0)])
+    assert {name: float(each[0]) for name, each in found.items()} == pytest.approx(
+        expected, abs=1e-6
+    )
+
+
+def test_without_a_position_no_beginning_is_right():
+    truth = Truth(np.arange(101.0), 5e5 + np.arange(101.0), np.full(101, 5e6))
+    fixes = [_fix(20.0, np.nan, np.nan, np.nan), _fix(90.0, 5e5, 5e6, 9.0)]
+    estimate = TrackEstimate.of_fixes(CRS, "bayes", fixes)
+    found = errors_from_true_begin(estimate, truth, [(10.0, 95.0), (30.0, 95.0)])
+    assert all(np.isinf(each).all() for each in found.values())
 
 
 def test_least_squares_finds_a_place_and_leaves_out_three_satellites():

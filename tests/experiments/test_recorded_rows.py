@@ -12,6 +12,7 @@ from mapfilter.experiments.recorded.benchmark import check_there
 from mapfilter.experiments.recorded.rows import (
     Found,
     read_found,
+    table_intervals,
     table_rows,
     unit_rows,
     worst_of,
@@ -96,6 +97,39 @@ def test_neighbouring_points_have_a_share_and_no_interval():
     assert row.success == 3 / 4
     assert isnan(row.success_low)
     assert isnan(row.success_high)
+
+
+def test_intervals_are_over_what_is_independent():
+    units = [_found(str(i), (i, i + 2.0)) for i in range(12)]
+    runs = [_found("one", (1.0, 3.0)), _found("one", (2.0,)), _found("two", (9.0,))]
+    reports = [_found("test", np.arange(50.0), count=50)]
+    found = {
+        "units": (units, 12),
+        "runs": (runs, 3),
+        "reports": (reports, 50),
+    }
+    for over, (own, count) in found.items():
+        (row,), (interval,) = table_rows(own), table_intervals(own)
+        assert (interval.over, interval.count) == (over, count)
+        assert interval.median_low_m <= row.median_m <= interval.median_high_m
+        assert interval.mean_low_m < row.mean_m < interval.mean_high_m
+        assert interval.coverage_low < row.coverage_95 < interval.coverage_high
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        [_found("a", (1.0, 2.0)), _found("b", (3.0,))],
+        [_found("a", ()), _found("b", ()), _found("c", ())],
+        [_found("a", (float(i),), dependent=True) for i in range(20)],
+    ],
+    ids=["two units", "no errors", "neighbouring points"],
+)
+def test_without_three_of_them_there_is_no_interval(own):
+    (interval,) = table_intervals(own)
+    assert interval.over == ""
+    values = (interval.median_low_m, interval.mean_high_m, interval.coverage_low)
+    assert all(isnan(value) for value in values)
 
 
 @given(

@@ -13,13 +13,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mapfilter._types import Bools, Floats
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
 from mapfilter.experiments.benchmarks.ottawa_sessions import (
     ReckoningErrors,
     Session,
     centroids,
     session_log,
 )
+from mapfilter.experiments.recorded.oracles import MOTION, START, with_start, with_true_motion
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -37,6 +38,9 @@ GOOD_M = 20.0
 MAP_M = 50.0
 """Fixes of this accuracy make maps."""
 METHODS = ("bayes", "smoothed")
+ORACLES = (START, MOTION)
+"""The filter of ``bayes`` with the true first 30 m as fixes, or with the true way between good
+fixes as motion; the first draw of the noise only."""
 _ON_MAP_M = 50.0
 
 
@@ -90,11 +94,11 @@ def find_session(
     draw: int,
     step_factor: float = 1.0,
 ) -> list[FoundSession]:
-    """Find a session from an unknown start, with one draw of the noise, by both methods."""
+    """Find a session from an unknown start, with one draw of the noise, by all methods."""
     found = []
-    for method in METHODS:
+    for method in (*METHODS, *(ORACLES if draw == 0 else ())):
         log, estimate = locate_session(
-            session, positioner, options, seed, draw, step_factor, smooth=method == "smoothed"
+            session, positioner, options, seed, draw, step_factor, method=method
         )
         found.append(_scored(part, session, method, log, estimate, positioner))
     return found
@@ -108,15 +112,24 @@ def locate_session(
     draw: int,
     step_factor: float = 1.0,
     *,
-    smooth: bool = False,
+    method: str = METHODS[0],
 ) -> tuple[TrackLog, TrackEstimate]:
-    """Return the log of a session with one draw of the noise, and its estimate."""
+    """Return the log of a session with one draw of the noise, and its estimate by a method."""
     rng = named_rng(seed, "noise", session.name, str(draw))
     crs = positioner.area.lattice.crs
     log = session_log(session, crs, options.errors, rng, step_factor=step_factor)
+    given = _for_oracle(method, log, session)
     # The same stream of numbers: the filter below the smoother is the filter itself.
     own = named_rng(seed, "filter", session.name, str(draw))
-    return log, locate(log, replace(positioner, smooth=smooth), own).estimate
+    return log, locate(given, replace(positioner, smooth=method == METHODS[1]), own).estimate
+
+
+def _for_oracle(method: str, log: TrackLog, session: Session) -> TrackLog:
+    """Return the log that a method is given: an oracle's holds parts of the truth."""
+    truth = Truth.of_table(log.truth[session.accuracy_m <= GOOD_M])
+    if method not in ORACLES or truth is None:
+        return log
+    return with_start(log, truth) if method == START else with_true_motion(log, truth)
 
 
 def centroid_errors_m(session: Session, others: Sequence[Session], crs: str) -> Floats:

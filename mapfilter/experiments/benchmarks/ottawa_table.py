@@ -22,7 +22,8 @@ from mapfilter.experiments.accuracy_row import (
     row_of,
     success_of,
 )
-from mapfilter.experiments.benchmarks.ottawa import METHODS, FoundSession
+from mapfilter.experiments.benchmarks.ottawa import METHODS, ORACLES, FoundSession
+from mapfilter.experiments.row_intervals import RowInterval, ScoredRun, interval_of
 
 _MAPPED_SHARE = 0.5
 
@@ -65,9 +66,10 @@ def part_rows(part: str, found: Sequence[FoundSession], centroid_m: dict[str, Fl
     """Return a row for each method on a part, then that of the centroids.
 
     Methods are ``bayes``, from CONVERGED on; ``smoothed``, whole tracks; both also as ``-mapped``,
-    of the sessions of which at least half lies within 50 m of where others were; ``centroid``, the
-    mean place of the serving cell's rows. A run succeeds that converges at most 50 m off. The
-    baseline is the median error of the centroids of the same sessions.
+    of the sessions of which at least half lies within 50 m of where others were; the oracles, from
+    CONVERGED on; ``centroid``, the mean place of the serving cell's rows. A run succeeds that
+    converges at most 50 m off. The baseline is the median error of the centroids of the same
+    sessions.
 
     Parameters
     ----------
@@ -82,11 +84,26 @@ def part_rows(part: str, found: Sequence[FoundSession], centroid_m: dict[str, Fl
         if mapped and len(mapped) < len(centroid_m):
             some = [one for one in own if one.session in mapped]
             rows.append(_row(part, f"{method}-mapped", some, centroid_m))
+    for oracle in ORACLES:
+        own = [one for one in found if one.method == oracle]
+        rows += [_row(part, oracle, own, centroid_m)] if own else []
     every = joined(centroid_m.values())
     no_radii = np.empty(0)
     usual_m = median_of(every)
     rows.append(row_of(part, "centroid", len(centroid_m), every, Success(), no_radii, usual_m))
     return rows
+
+
+def part_intervals(part: str, found: Sequence[FoundSession]) -> list[RowInterval]:
+    """Return the intervals of each method's errors on a part, over its sessions."""
+    return [
+        interval_of(
+            part,
+            method,
+            [ScoredRun(o.session, o.error_m, o.covered) for o in found if o.method == method],
+        )
+        for method in (*METHODS, *ORACLES)
+    ]
 
 
 def session_rows(found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -> list[SessionRow]:

@@ -4,12 +4,12 @@ The whole chain: the access points of the other walks are the radio map, each sc
 itself (``wifi``), and the positions with their radii go as fixes into the Bayes map filter over
 the walkable part of the plan (``bayes``), and into a Kalman filter without a map (``ekf`` and
 ``ekf-smoothed``), with steps and headings made of the raw sensors. How much of the fixes' errors
-lasts, and for how long, is found where walks of the radio map are left out in turn. Two oracles
+lasts, and for how long, is found where walks of the radio map are left out in turn. Three oracles
 show what these positions allow, smoothed: one is given the true first waypoint, one the true size
-of each fix's error. Walks are judged at their surveyed waypoints, from the first scan on, claimed
-or not: most walks end before the map filter claims one. The later half of the walks is judged, in
-two parts, each by all other walks: parameters of steps and headings were chosen on walks of the
-first half.
+of each fix's error, one the true way between waypoints in place of steps. Walks are judged at their
+surveyed waypoints, from the first scan on, claimed or not: most walks end before the map filter
+claims one. The later half of the walks is judged, in two parts, each by all other walks: parameters
+of steps and headings were chosen on walks of the first half.
 """
 
 from __future__ import annotations
@@ -35,7 +35,14 @@ from mapfilter.experiments.benchmarks.single_reports import BASELINE, METHODS
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import open_ground, roads_alone
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
-from mapfilter.experiments.recorded.oracles import NOISE, START, with_fix_errors, with_true_fixes
+from mapfilter.experiments.recorded.oracles import (
+    MOTION,
+    NOISE,
+    START,
+    with_fix_errors,
+    with_true_fixes,
+    with_true_motion,
+)
 from mapfilter.experiments.recorded.outages import errors_at
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
@@ -164,6 +171,8 @@ def _located(
         found[START] = _without_map(started, replace(kalman, smooth=True), rng())
         known = with_fix_errors(log, truth)
         found[NOISE] = _without_map(known, replace(plain, smooth=True), rng())
+        moved = with_true_motion(log, truth)
+        found[MOTION] = _without_map(moved, replace(kalman, smooth=True), rng())
     return found
 
 

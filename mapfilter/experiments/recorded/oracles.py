@@ -15,9 +15,10 @@ from mapfilter._types import Bools, Floats
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.sky import ecef_from_lonlat
+from mapfilter.tracks.deadreckoning import steps_between
 from mapfilter.tracks.log import TrackLog
 
-START, NOISE = "oracle-start", "oracle-noise"
+START, NOISE, MOTION = "oracle-start", "oracle-noise", "oracle-motion"
 """Names of the methods."""
 FIX_SD_M = 1.0
 START_M = 30.0
@@ -57,6 +58,26 @@ def with_true_fixes(log: TrackLog, truth: Truth, which: Bools) -> TrackLog:
 def with_start(log: TrackLog, truth: Truth, length_m: float = START_M) -> TrackLog:
     """Return a log with the true positions over the first metres of the way as fixes."""
     return with_true_fixes(log, truth, truth.distance_at(truth.time_s) <= length_m)
+
+
+def with_true_motion(log: TrackLog, truth: Truth) -> TrackLog:
+    """Return a log whose steps and headings are those of the true way, as chords row by row.
+
+    Rows outside the record of the truth stay as measured. What the log states of errors stays.
+    """
+    motion = log.motion
+    east, north = truth.at(motion["time_s"].to_numpy())
+    step_m, heading = steps_between(east, north)
+    step_m, heading = np.append(0.0, step_m), np.append(heading[:1], heading)
+    known = np.isfinite(step_m) & np.isfinite(heading)
+    columns = {
+        "step_m": np.where(known, step_m, motion["step_m"]),
+        "heading_rad": np.where(known, heading, motion["heading_rad"]),
+        "turn_rad": np.where(known, np.nan, motion["turn_rad"]),
+    }
+    if "sampling_sd_m" in motion:
+        columns["sampling_sd_m"] = np.where(known, 0.0, motion["sampling_sd_m"])
+    return replace(log, motion=motion.assign(**columns))
 
 
 def motion_errors(motion: pd.DataFrame, perfect: pd.DataFrame) -> tuple[float, float]:

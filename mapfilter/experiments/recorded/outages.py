@@ -14,6 +14,8 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.tracks.deadreckoning import dead_reckon
 from mapfilter.tracks.log import TrackLog
 
+PLACE, HEADING, PLACE_HEADING = "oracle-place", "oracle-heading", "oracle-place-heading"
+"""Names of the methods by what is true at the beginning of an outage."""
 _DIRECTION_M = 30.0
 
 
@@ -84,6 +86,40 @@ def errors_between(
     errors_m = position_errors_m(estimate, truth)[asked]
     there = np.isfinite(errors_m)
     return np.where(there, errors_m, np.inf), there & (errors_m <= estimate.radii_m[asked, 2])
+
+
+def errors_from_true_begin(
+    estimate: TrackEstimate, truth: Truth, spans: Sequence[tuple[float, float]]
+) -> dict[str, Floats]:
+    """Return the errors at the ends of spans, had the estimate begun each of them at the truth.
+
+    Its displacement over a span begins at the true position, is turned by the error of its
+    direction over the first 30 m, or both. What is left are errors of lengths and turns. Infinite
+    where there is no position.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (number of spans,)
+        By :data:`PLACE`, :data:`HEADING` and :data:`PLACE_HEADING`.
+    """
+    found: dict[str, list[float]] = {PLACE: [], HEADING: [], PLACE_HEADING: []}
+    for begin_s, end_s in spans:
+        length_m = truth.distance_at(truth.time_s) - truth.distance_at(begin_s)
+        far = np.searchsorted(length_m, _DIRECTION_M)
+        first_s = float(truth.time_s[min(int(far), len(length_m) - 1)])
+        at_s = np.array([begin_s, min(first_s, end_s), end_s])
+        at = np.searchsorted(estimate.time_s, at_s + 1e-6) - 1
+        # Complex numbers are turned by a factor.
+        own = np.where(at >= 0, estimate.east_m[at] + 1j * estimate.north_m[at], np.nan)
+        east_m, north_m = truth.at(at_s)
+        true = east_m + 1j * north_m
+        off = own[0] - true[0]
+        moved, should = own[2] - own[0], true[2] - true[0]
+        turned = np.exp(1j * (np.angle(true[1] - true[0]) - np.angle(own[1] - own[0])))
+        found[PLACE].append(abs(moved - should))
+        found[HEADING].append(abs(off + turned * moved - should))
+        found[PLACE_HEADING].append(abs(turned * moved - should))
+    return {name: np.nan_to_num(np.array(each), nan=np.inf) for name, each in found.items()}
 
 
 def coasted_errors_m(

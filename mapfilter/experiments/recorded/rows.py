@@ -22,6 +22,7 @@ from mapfilter.experiments.accuracy_row import (
     row_of,
     success_of,
 )
+from mapfilter.experiments.row_intervals import RowInterval, ScoredRun, interval_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +128,23 @@ def table_rows(
         published = known.get((part, method), known.get((part, ""), known.get(("", ""), nan)))
         rows.append(_row(part, method, own, published, baseline))
     return rows
+
+
+def table_intervals(found: Sequence[Found]) -> list[RowInterval]:
+    """Return the intervals of each part and method, in the order of :func:`table_rows`."""
+    keys = dict.fromkeys((one.part, one.method) for one in found)
+    return [
+        interval_of(
+            part,
+            method,
+            [
+                ScoredRun(o.unit, o.error_m, o.covered, o.count > 1, o.dependent)
+                for o in found
+                if (o.part, o.method) == (part, method)
+            ],
+        )
+        for part, method in keys
+    ]
 
 
 def unit_rows(found: Sequence[Found]) -> list[UnitRow]:

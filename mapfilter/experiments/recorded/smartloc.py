@@ -4,7 +4,9 @@ The other drives of the data set are in other streets, so the map is open ground
 receiver's least-squares positions of the first minute. All satellites are used for the first
 minute; afterwards none, one, two or three of the highest ones, or all. ``outages`` takes all of
 them away for 60 s, again and again. Where a figure is asked for, two oracles locate the same drive:
-one knows the true positions before (in place of satellites), one the true size of each error.
+one knows the true positions before (in place of satellites), one the true size of each error. With
+outages three more take the filter's own way through each, from the true place at its beginning, in
+the true direction there, or both.
 """
 
 from __future__ import annotations
@@ -35,10 +37,13 @@ from mapfilter.experiments.recorded.outages import (
     coasted_errors_m,
     errors_at,
     errors_between,
+    errors_from_true_begin,
     log_without,
 )
+from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import unproject
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.corridors import Positions
 from mapfilter.tracks.combine import CombineOptions
@@ -103,7 +108,8 @@ def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
             baseline_m = _least_squares_errors_m(log, truth)
         else:
             baseline_m = _reckoned_errors_m(log, truth)
-    found, journeys = [], {}
+    found: list[Found] = []
+    journeys: dict[str, Journey] = {}
     for method, one in {"bayes": given, **by_oracles(task.part, given, truth, spans)}.items():
         words = (task.part, str(task.run), *(() if method == "bayes" else (method,)))
         located = locate_log(one, over, named_rng(task.seed, "smartloc", *words))
@@ -128,7 +134,20 @@ def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
             )
         )
         journeys[method] = Journey(located.estimate, truth, over.path)
+        if task.part == OUTAGES and method == "bayes":
+            found += _from_true_begin(task, located.estimate, truth, spans)
     return Judged(tuple(found), journeys)
+
+
+def _from_true_begin(
+    task: Task, estimate: TrackEstimate, truth: Truth, spans: Sequence[tuple[float, float]]
+) -> list[Found]:
+    """Return the errors at the ends of outages with parts of their beginnings true."""
+    none, no_radii = (None, None, None), np.empty(0, dtype=np.bool_)
+    return [
+        Found(task.part, method, task.unit, *none, errors_m, no_radii)
+        for method, errors_m in errors_from_true_begin(estimate, truth, spans).items()
+    ]
 
 
 def by_oracles(
