@@ -161,11 +161,13 @@ def made_ways(lattice: Lattice, seed: int) -> Ways:
     return Ways.open(CRS, 1 + np.arange(len(ends)), names, shapely.linestrings(ends))
 
 
-def made_plan(lattice: Lattice, seed: int, namesakes: int) -> CellPlan:
+def made_plan(
+    lattice: Lattice, seed: int, namesakes: int, cells_per_km2: float = CELLS_PER_KM2
+) -> CellPlan:
     """Return sites of three sectors about the points of a hexagonal grid."""
     rng = np.random.default_rng(seed)
     west, south, east, north = lattice.bounds_m
-    spacing_m = sqrt(2 / sqrt(3) * 3e6 / CELLS_PER_KM2)
+    spacing_m = sqrt(2 / sqrt(3) * 3e6 / cells_per_km2)
     cells, rows = [], ceil((north - south) / (spacing_m * sqrt(3) / 2))
     per_row = ceil((east - west) / spacing_m)
     number = 0

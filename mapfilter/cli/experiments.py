@@ -133,6 +133,10 @@ def bench(
     memory: Annotated[
         bool, typer.Option("--memory", help="The most memory that the stage's tasks take.")
     ] = False,
+    threads: Annotated[
+        int,
+        typer.Option("--threads", min=1, max=64, help="Filter: a step divided among threads."),
+    ] = 1,
     device: Annotated[
         str,
         typer.Option(
@@ -144,7 +148,7 @@ def bench(
     """Measure how fast a stage is on this machine, or what memory it takes."""
     from mapfilter.workflows.bench import run_bench
 
-    found = run_bench(stage, runs=runs, peers=peers, memory=memory, device=device)
+    found = run_bench(stage, runs=runs, peers=peers, memory=memory, threads=threads, device=device)
     print_result(found, as_json)
 
 

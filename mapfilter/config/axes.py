@@ -24,6 +24,7 @@ _NOT_USED = {
     "journeys.seed": "sweep.seed",
     "database.floor_dbm": "sweep.databases, each built with its own floor",
     "database.tile_px": "",
+    "filter.bayes.threads": "--workers, as runs are divided among processes",
     **dict.fromkeys(
         (
             *(f"filter.bayes.{name}" for name in ("timing_step_m", "timing_sd_m")),

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.database.checked import Part
 from mapfilter.database.parquet import Window, WindowReader, opened, part_ranges, read_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase, way_columns
 from mapfilter.errors import StoreError, fail
@@ -28,12 +29,12 @@ _FIRST_MARGIN_PX = 32
 
 
 class CellLevels(NamedTuple):
-    """All levels of one cell.
+    """Levels of one cell.
 
     ``point`` (N,) are numbers of points in ascending order, ``level_dbm`` (N,) their levels.
     """
 
-    point: Ints
+    point: Ints32
     level_dbm: Floats32
 
 
@@ -48,10 +49,11 @@ def received_cells(database: RadioRouteDatabase) -> tuple[str, ...]:
 class PartExtents(NamedTuple):
     """Where the points of M parts lie, and their strongest level.
 
-    ``band`` (M,) is the cell of each part; ``box`` (M, 4) the first and last row, and the first and
-    last column; ``most_dbm`` (M,) the largest level.
+    ``part`` (M) are those with rows, cell by cell, and ``band`` (M,) the cells; ``box`` (M, 4) the
+    first and last row, and the first and last column; ``most_dbm`` (M,) the largest level.
     """
 
+    part: tuple[Part, ...]
     band: Ints
     box: Ints
     most_dbm: Floats
@@ -65,38 +67,38 @@ def part_extents(database: RadioRouteDatabase, cell_ids: tuple[str, ...]) -> Par
     StoreError
         A part is damaged, or the database was replaced since it was opened.
     """
-    bands, boxes, most_dbm = [], [], []
+    parts, bands, boxes, most_dbm = [], [], [], []
     for band, cell_id in enumerate(cell_ids):
         for part in database.level_parts[cell_id]:
             if part.rows:
                 with opened(part) as file:
                     found = part_ranges(file.metadata, ("row", "col", "level_dbm"))
+                parts.append(part)
                 bands.append(band)
                 boxes.append((*found[0], *found[1]))
                 most_dbm.append(found[2][1])
-    return PartExtents(np.array(bands), np.array(boxes, dtype=np.int64), np.array(most_dbm))
+    box = np.array(boxes, dtype=np.int64)
+    return PartExtents(tuple(parts), np.array(bands), box, np.array(most_dbm))
 
 
-def read_cell(database: RadioRouteDatabase, cell_id: str) -> CellLevels:
-    """Read all levels of a cell.
+def read_levels(part: Part, lattice: Lattice) -> CellLevels:
+    """Read the levels of a part, all of one cell.
 
     Raises
     ------
     StoreError
-        A part is damaged, or the database was replaced since it was opened.
+        The part is damaged, or the database was replaced since it was opened.
     """
-    points, levels, lattice = [], [], database.lattice
-    for part in database.level_parts[cell_id]:
-        table = read_columns(part, ("point", "level_dbm"))
-        point = table["point"].to_numpy()
-        if point.size and not 0 <= point.min() <= point.max() < lattice.rows * lattice.cols:
-            expected = "points on the database's lattice"
-            raise fail(StoreError, str(part), expected, "others", "parts mixed up")
-        points.append(point)
-        levels.append(table["level_dbm"].to_numpy())
-    point, level_dbm = np.concatenate(points), np.concatenate(levels)
+    table = read_columns(part, ("point", "level_dbm"))
+    point = table["point"].to_numpy()
+    if point.size and not 0 <= point.min() <= point.max() < lattice.rows * lattice.cols:
+        expected = "points on the database's lattice"
+        raise fail(StoreError, str(part), expected, "others", "parts mixed up")
+    # A lattice has fewer pixels than 32 bits count.
+    point = point.astype(np.int32)
     order = np.argsort(point)
-    return CellLevels(point[order], level_dbm[order].astype(np.float32))
+    level_dbm = table["level_dbm"].to_numpy().astype(np.float32)
+    return CellLevels(point[order], level_dbm[order])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from mapfilter._kernels import draw_key
+from mapfilter._threads import ONE, Threads
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
@@ -218,10 +219,14 @@ class ParticleBelief:
 
 @dataclass(frozen=True, slots=True)
 class ParticleFilter(Generic[PriorT, ReadingT]):
-    """A regularised particle filter for a model."""
+    """A regularised particle filter for a model.
+
+    Copies are divided among ``threads``; a model has its own.
+    """
 
     model: ParticleModel[PriorT, ReadingT]
     options: ParticleOptions = field(default_factory=ParticleOptions)
+    threads: Threads = ONE
 
     def init(self, prior: PriorT, rng: np.random.Generator) -> ParticleBelief:
         """Draw the first particles."""
@@ -298,16 +303,20 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             systematic(weight, rng.random(), chosen)
             sd = np.array(options.searching_jitter if searching else options.jitter, np.float32)
             copies = np.empty((state.shape[0], wanted), dtype=np.float32)
-            copy_with_jitter(state, chosen, sd, draw_key(rng), copies)
+            key = draw_key(rng)
             # Copies keep the part of their weight that they were not chosen by. Rounding may choose
             # the last one though its weight is none.
             log_of, chosen_by = np.empty(wanted), np.empty(wanted, dtype=np.float32)
-            taken(log_weight, weight, chosen, log_of, chosen_by)
+            before, kept = kept, np.empty((kept.shape[0], wanted), dtype=np.float32)
+            self.threads.over(
+                wanted,
+                (copy_with_jitter, state, chosen, sd, key, copies),
+                (taken, log_weight, weight, chosen, log_of, chosen_by),
+                (copied, before, chosen, kept),
+            )
+            state = copies
             np.maximum(chosen_by, _LEAST_WEIGHT, out=chosen_by)
             log_weight = np.subtract(log_of, np.log(chosen_by, out=chosen_by), out=log_of)
-            state, before = copies, kept
-            kept = np.empty((before.shape[0], wanted), dtype=np.float32)
-            copied(before, chosen, kept)
             normalise(log_weight, np.empty(wanted, dtype=np.float32))
         now = ParticleBelief(
             state,

@@ -101,25 +101,35 @@ def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
         chosen[j] = max(chosen[j], chosen[j - 1])
 
 
-@njit(error_model="numpy", cache=True)
+@njit(error_model="numpy", cache=True, nogil=True)
 def taken(
-    log_weight: Floats, weight: Floats32, chosen: Ints32, log_of: Floats, weight_of: Floats32
+    first: int,
+    stop: int,
+    log_weight: Floats,
+    weight: Floats32,
+    chosen: Ints32,
+    log_of: Floats,
+    weight_of: Floats32,
 ) -> None:
-    """Fill ``log_of`` and ``weight_of`` (M,) with the weights of the chosen particles."""
-    for j in range(chosen.size):
-        i = np.uint32(chosen[j])
+    """Fill ``log_of`` and ``weight_of`` (M,) with the weights of the chosen particles.
+
+    As below, ``first`` and ``stop`` are the part of the M copies that is filled.
+    """
+    at, log_of, weight_of = chosen[first:stop], log_of[first:stop], weight_of[first:stop]
+    for j in range(at.size):
+        i = np.uint32(at[j])
         log_of[j] = log_weight[i]
         weight_of[j] = weight[i]
 
 
-@njit(error_model="numpy", cache=True)
-def copied(kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
+@njit(error_model="numpy", cache=True, nogil=True)
+def copied(begin: int, stop: int, kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
     """Copy the chosen columns of ``kept`` (W, N) to ``copies`` (W, M)."""
     rows = kept.shape[0]
     fours = rows // 4 * 4
     # A block of indices stays in the cache; each is loaded once for four rows.
-    for first in range(0, chosen.size, _BLOCK):
-        at = chosen[first : first + _BLOCK]
+    for first in range(begin, stop, _BLOCK):
+        at = chosen[first : min(first + _BLOCK, stop)]
         for r in range(0, fours, 4):
             a, b, c, d = kept[r], kept[r + 1], kept[r + 2], kept[r + 3]
             to_a, to_b = copies[r, first:], copies[r + 1, first:]
@@ -136,28 +146,34 @@ def copied(kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
                 to[j] = row[np.uint32(at[j])]
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def copy_with_jitter(
-    state: Floats32, chosen: Ints32, jitter: Floats32, key: np.uint64, copies: Floats32
+    first: int,
+    stop: int,
+    state: Floats32,
+    chosen: Ints32,
+    jitter: Floats32,
+    key: np.uint64,
+    copies: Floats32,
 ) -> None:
     """Copy the chosen particles of ``state`` (R, N) and move each copy by normal noise.
 
     ``jitter`` has the standard deviation for each row; rows of 0, and rows beyond, are copied as
     they are. The noise is drawn from ``key``.
     """
-    rows = state.shape[0]
+    rows, at = state.shape[0], chosen[first:stop]
     for r in range(0, rows, 2):
         # Normal numbers come in pairs: one for each of two rows.
         one, other = state[r], state[min(r + 1, rows - 1)]
-        to_one, to_other = copies[r], copies[min(r + 1, rows - 1)]
+        to_one, to_other = copies[r, first:stop], copies[min(r + 1, rows - 1), first:stop]
         sd = jitter[r] if r < jitter.size else np.float32(0.0)
         other_sd = jitter[r + 1] if r + 1 < min(rows, jitter.size) else np.float32(0.0)
-        for j in range(chosen.size):
-            to_one[j] = one[np.uint32(chosen[j])]
-            to_other[j] = other[np.uint32(chosen[j])]
-        first = np.uint64(r) << np.uint64(40)
+        for j in range(at.size):
+            to_one[j] = one[np.uint32(at[j])]
+            to_other[j] = other[np.uint32(at[j])]
+        drawn = (np.uint64(r) << np.uint64(40)) + np.uint64(first)
         if sd > 0 or other_sd > 0:
-            for j in range(chosen.size):
-                a, b = normals(hashed(key, first + np.uint64(j)))
+            for j in range(at.size):
+                a, b = normals(hashed(key, drawn + np.uint64(j)))
                 to_one[j] += sd * a
                 to_other[j] += other_sd * b

@@ -109,20 +109,36 @@ def bound_table() -> Floats32:
     return np.asarray(log_ndtr(sds), dtype=np.float32)
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def pixels(state: Floats32, raster: RasterFrame) -> Ints32:
     """Return the flat pixel of each hypothesis; beyond the raster that of its edge."""
-    return pixels_up_to(state, raster, raster.rows - 1, raster.cols - 1)
+    pixel = np.empty(state.shape[1], dtype=np.int32)
+    fill_pixels(0, pixel.size, state, raster, raster.rows - 1, raster.cols - 1, pixel)
+    return pixel
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def pixels_up_to(state: Floats32, raster: RasterFrame, last_row: int, last_col: int) -> Ints32:
     """Return the flat pixel of each hypothesis; rows and columns beyond the last ones are these."""
-    east, north = state[0], state[1]
+    pixel = np.empty(state.shape[1], dtype=np.int32)
+    fill_pixels(0, pixel.size, state, raster, last_row, last_col, pixel)
+    return pixel
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
+def fill_pixels(
+    first: int,
+    stop: int,
+    state: Floats32,
+    raster: RasterFrame,
+    last_row: int,
+    last_col: int,
+    pixel: Ints32,
+) -> None:
+    """Fill the flat pixels of hypotheses ``first`` to ``stop``, as :func:`pixels_up_to`."""
+    east, north, found = state[0, first:stop], state[1, first:stop], pixel[first:stop]
     w, n, k, zero = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m), _F(0.0)
     lower, right, width = np.int32(last_row), np.int32(last_col), np.int32(raster.cols)
-    pixel = np.empty(state.shape[1], dtype=np.int32)
-    for i in range(pixel.size):
+    for i in range(found.size):
         x = (east[i] - w) * k
         y = (n - north[i]) * k
         x = x if x > zero else zero
@@ -130,8 +146,7 @@ def pixels_up_to(state: Floats32, raster: RasterFrame, last_row: int, last_col: 
         col, row = np.int32(x), np.int32(y)
         col = col if col < right else right
         row = row if row < lower else lower
-        pixel[i] = np.int32(np.int32(row * width) + col)
-    return pixel
+        found[i] = np.int32(np.int32(row * width) + col)
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -169,8 +184,10 @@ def weigh_by_bound(
         log_weight[i] += w * log32(total * share)
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def weigh_by_serving(
+    first: int,
+    stop: int,
     pixel: Ints32,
     level_dbm: Floats32,
     bands: int,
@@ -183,20 +200,22 @@ def weigh_by_serving(
 ) -> None:
     """Add the log-likelihood of the serving cell, times a weight, to weights, in place.
 
-    ``cell`` is its band, ``table`` that of :func:`serving_table`. ``odds`` (N,) are the log odds of
-    its fault, updated in place, and ``other`` is the log-likelihood with a fault.
+    It is that of hypotheses ``first`` to ``stop``. ``cell`` is its band, ``table`` that of
+    :func:`serving_table`. ``odds`` (N,) are the log odds of its fault, updated in place, and
+    ``other`` is the log-likelihood with a fault.
     """
+    pixel, odds, log_weight = pixel[first:stop], odds[first:stop], log_weight[first:stop]
     middle = _F(REACH_DB * STEPS_PER_DB)
     zero, last = _F(0.0), _F(2 * REACH_DB * STEPS_PER_DB)
     per_db, w, half, wrong = _F(STEPS_PER_DB), _F(weight), _F(0.5), _F(weight * other)
-    own, first, second = np.uint32(cell), np.uint32(bands - 2), np.uint32(bands - 1)
+    own, strongest, second = np.uint32(cell), np.uint32(bands - 2), np.uint32(bands - 1)
     width = np.uint32(bands)
     right = np.empty(pixel.size, dtype=np.float32)
     # Loops that look up are apart from the one that computes, which is vectorised.
     for i in range(pixel.size):
         at = np.uint32(np.uint32(pixel[i]) * width)
         level = level_dbm[at + own]
-        best = level_dbm[at + first]
+        best = level_dbm[at + strongest]
         beside = level_dbm[at + second] if level >= best else best
         place = (level - beside) * per_db + middle + half
         place = place if place > zero else zero

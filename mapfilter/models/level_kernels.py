@@ -3,6 +3,7 @@
 Hypotheses go through in blocks that stay in the cache; within a block each loop runs over its
 hypotheses, so that the arithmetic is vectorised. What hypotheses keep has shape (W, N): a row for
 each slot's slow error, each fast one, that of the device, then the log odds of each slot's fault.
+Those that change hypotheses take the first of them, and the end, before other arguments.
 """
 
 from __future__ import annotations
@@ -51,31 +52,33 @@ class Prediction(NamedTuple):
     share: float
 
 
-def decayed(kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float) -> Floats32:
-    """Return what hypotheses keep, (W, N), after a distance."""
-    # NumPy asks for large pages, numba for many small ones.
-    now = np.empty_like(kept)
-    _decay(kept, decay, fault_keep, fault_log_odds, now)
-    return now
-
-
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def _decay(
-    kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float, now: Floats32
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
+def age(
+    first: int,
+    stop: int,
+    kept: Floats32,
+    decay: Floats32,
+    fault_keep: float,
+    fault_log_odds: float,
+    now: Floats32,
 ) -> None:
+    """Fill what hypotheses keep, (W, N), after a distance."""
     means = decay.size
     keep, usual = _F(fault_keep), _F(fault_log_odds)
     for d in range(means):
-        factor = decay[d]
-        for i in range(kept.shape[1]):
-            now[d, i] = factor * kept[d, i]
+        factor, row, to = decay[d], kept[d, first:stop], now[d, first:stop]
+        for i in range(row.size):
+            to[i] = factor * row[i]
     for d in range(means, kept.shape[0]):
-        for i in range(kept.shape[1]):
-            now[d, i] = usual + (kept[d, i] - usual) * keep
+        row, to = kept[d, first:stop], now[d, first:stop]
+        for i in range(row.size):
+            to[i] = usual + (row[i] - usual) * keep
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def weigh_by_levels(
+    begin: int,
+    stop: int,
     kept: Floats32,
     pixel: Ints32,
     predicted: Prediction,
@@ -88,8 +91,8 @@ def weigh_by_levels(
     w = _F(weight)
     steps, more = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
     total, upon = np.empty(_BLOCK, np.float32), _gain_of_sums(terms)
-    for first in range(0, pixel.size, _BLOCK):
-        count = min(_BLOCK, pixel.size - first)
+    for first in range(begin, stop, _BLOCK):
+        count, into = min(_BLOCK, stop - first), log_weight[first:]
         total[:] = _ZERO
         for k in range(terms.cell.size):
             s, cell, innovation = terms.slot[k], terms.cell[k], steps[k]
@@ -110,11 +113,13 @@ def weigh_by_levels(
                 innovation[j] = fine * innovation[j]
         _corrected(kept, first, count, terms.gain, steps)
         for j in range(count):
-            log_weight[first + j] += w * total[j]
+            into[j] += w * total[j]
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def weigh_by_absence(
+    begin: int,
+    stop: int,
     kept: Floats32,
     pixel: Ints32,
     predicted: Prediction,
@@ -134,8 +139,8 @@ def weigh_by_absence(
     steps, per_sd = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
     right, total = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
     place, upon = np.empty(_BLOCK, np.int32), _gain_of_sums(terms)
-    for first in range(0, pixel.size, _BLOCK):
-        count = min(_BLOCK, pixel.size - first)
+    for first in range(begin, stop, _BLOCK):
+        count, into = min(_BLOCK, stop - first), log_weight[first:]
         total[:] = _ZERO
         for k in range(terms.cell.size):
             s, cell, below = terms.slot[k], terms.cell[k], steps[k]
@@ -163,7 +168,7 @@ def weigh_by_absence(
                 below[j] = -fine * hazard * own * per_sd[j]
         _corrected(kept, first, count, terms.gain, steps)
         for j in range(count):
-            log_weight[first + j] += w * total[j]
+            into[j] += w * total[j]
 
 
 @njit(error_model="numpy", cache=True)

@@ -28,6 +28,7 @@ import numpy as np
 from numba import njit
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
+from mapfilter._threads import ONE, Call
 from mapfilter._types import Floats, Floats32
 from mapfilter.geodesy import wrap_rad
 from mapfilter.options import NotNegative, Options, Positive, Share
@@ -180,10 +181,23 @@ def move(
     :func:`mapfilter._kernels.draw_key`; ``sampling_sd_m`` is the step's own error, to each side,
     which a step of length 0 does not have.
     """
+    call, moved = moving(state, step_m, heading_rad, errors, key, sampling_sd_m)
+    ONE.over(state.shape[1], call)
+    return moved
+
+
+def moving(
+    state: Floats32,
+    step_m: float,
+    heading_rad: float,
+    errors: MotionErrors,
+    key: np.uint64,
+    sampling_sd_m: float = 0.0,
+) -> tuple[Call, Floats32]:
+    """Return the call that does what :func:`move` does, and the array that it fills."""
     long_m, length, noise = noise_of_step(step_m, errors, sampling_sd_m)
     moved = np.empty_like(state)
-    _move(state, long_m, length, heading_rad, noise, key, moved)
-    return moved
+    return (_move, state, long_m, length, heading_rad, noise, key, moved), moved
 
 
 def noise_of_step(
@@ -227,8 +241,10 @@ class StepNoise(NamedTuple):
     jump_rad: float
 
 
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def _move(
+    first: int,
+    stop: int,
     state: Floats32,
     step_m: float,
     length_m: float,
@@ -243,17 +259,19 @@ def _move(
     turn_keep, turn_sd = _F(noise.turn_keep), _F(noise.turn_rad)
     stretch_keep, stretch_sd = _F(noise.stretch_keep), _F(noise.stretch)
     jump, jump_sd = _F(noise.jump), _F(noise.jump_rad)
-    count = state.shape[1]
-    east, north, bias, scale = state[0], state[1], state[2], state[3]
-    turn, stretch, rate = state[5], state[6], state[7]
-    to_east, to_north, to_bias, to_scale = moved[0], moved[1], moved[2], moved[3]
-    to_turn, to_stretch = moved[5], moved[6]
-    moved[4] = state[4]
-    for i in range(count):
-        a, b = normals(hashed(key, np.uint64(4 * i)))
-        c, d = normals(hashed(key, np.uint64(4 * i + 1)))
-        e, f = normals(hashed(key, np.uint64(4 * i + 2)))
-        u, _ = uniforms(hashed(key, np.uint64(4 * i + 3)))
+    east, north = state[0, first:stop], state[1, first:stop]
+    bias, scale = state[2, first:stop], state[3, first:stop]
+    turn, stretch, rate = state[5, first:stop], state[6, first:stop], state[7, first:stop]
+    to_east, to_north = moved[0, first:stop], moved[1, first:stop]
+    to_bias, to_scale = moved[2, first:stop], moved[3, first:stop]
+    to_turn, to_stretch = moved[5, first:stop], moved[6, first:stop]
+    moved[4, first:stop] = state[4, first:stop]
+    drawn = np.uint64(4 * first)
+    for i in range(east.size):
+        a, b = normals(hashed(key, drawn + np.uint64(4 * i)))
+        c, d = normals(hashed(key, drawn + np.uint64(4 * i + 1)))
+        e, f = normals(hashed(key, drawn + np.uint64(4 * i + 2)))
+        u, _ = uniforms(hashed(key, drawn + np.uint64(4 * i + 3)))
         lasting = wrap32(bias[i] + rate[i] * length + bias_sd * c)
         steady = scale[i] + scale_sd * d
         beside = turn_keep * turn[i] + turn_sd * e
@@ -268,7 +286,8 @@ def _move(
         to_stretch[i] = longer
         to_east[i] = east[i] + (along * cosine - across * sine)
         to_north[i] = north[i] + (along * sine + across * cosine)
-    moved[7:] = state[7:]
+    for r in range(7, state.shape[0]):
+        moved[r, first:stop] = state[r, first:stop]
 
 
 def remounted(
@@ -306,20 +325,19 @@ def moved_back(state: Floats32, east_m: float, north_m: float) -> Floats32:
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def interpolate(
-    state: Floats32, raster: Floats32, west_m: float, north_m: float, per_m: float
+    east: Floats32, north: Floats32, raster: Floats32, west_m: float, north_m: float, per_m: float
 ) -> Floats32:
-    """Return a raster's values at hypotheses, bilinear between the pixels' centres.
+    """Return a raster's values at places (N,), in metres, bilinear between the pixels' centres.
 
     ``west_m`` and ``north_m`` are the centre of the first pixel, ``per_m`` the pixels per metre.
     Beyond the raster's edge values are those of the edge.
     """
     rows, cols = raster.shape
-    flat, count = raster.ravel(), state.shape[1]
+    flat, count = raster.ravel(), east.size
     zero, one = _F(0.0), _F(1.0)
     west, top, k = _F(west_m), _F(north_m), _F(per_m)
     last_col, last_row = np.int32(cols - 2), np.int32(rows - 2)
     below, width = np.uint32(cols), np.int32(cols)
-    east, north = state[0], state[1]
     first = np.empty(count, dtype=np.int32)
     along, down = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
     found = np.empty(count, dtype=np.float32)

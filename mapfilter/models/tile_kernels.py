@@ -146,7 +146,7 @@ def pixels_from_south(
 
 @njit(error_model="numpy", cache=True)
 def level_ranges(
-    point: Ints, level_dbm: Floats32, cols: int, side: int, tile_cols: int, tiles: int
+    point: Ints32, level_dbm: Floats32, cols: int, side: int, tile_cols: int, tiles: int
 ) -> tuple[Floats32, Floats32]:
     """Return the least and the largest level (dBm) of a cell in each tile, both (``tiles``,).
 
@@ -168,7 +168,7 @@ def level_ranges(
 
 @njit(error_model="numpy", cache=True)
 def levels_at_points(
-    point: Ints, cell_point: Ints, cell_dbm: Floats32, quiet_dbm: float
+    point: Ints, cell_point: Ints32, cell_dbm: Floats32, quiet_dbm: float
 ) -> tuple[Floats32, bool]:
     """Return a cell's level at points (P,), and whether it has one at any of them.
 

@@ -33,11 +33,10 @@ class WayMap(NamedTuple):
 
 
 @njit(error_model="numpy", cache=True)
-def places_beyond(state: Floats32, width_m: float, height_m: float) -> Bools:
-    """Return whether each hypothesis, by its first two rows, lies beyond an area, (N,)."""
-    east, north, zero = state[0], state[1], _F(0.0)
-    wide, high = _F(width_m), _F(height_m)
-    found = np.empty(state.shape[1], dtype=np.bool_)
+def places_beyond(east: Floats32, north: Floats32, width_m: float, height_m: float) -> Bools:
+    """Return whether each place (N,), in metres, lies beyond an area, (N,)."""
+    wide, high, zero = _F(width_m), _F(height_m), _F(0.0)
+    found = np.empty(east.size, dtype=np.bool_)
     for i in range(found.size):
         aside = (east[i] < zero) | (east[i] > wide)
         found[i] = aside | (north[i] < zero) | (north[i] > high)
@@ -54,24 +53,32 @@ def all_inside(east_m: Floats32, north_m: Floats32, width_m: float, height_m: fl
     return inside
 
 
-@njit(error_model="numpy", cache=True)
-def weighed_by_ways(
-    moved: Floats32, ways: WayMap, factors: MapFactors, beyond: float, log_weight: Floats
-) -> Floats:
-    """Return log weights (N,) after a step, and update the probability of being off in ``moved``.
+@njit(error_model="numpy", cache=True, nogil=True)
+def weigh_by_ways(
+    first: int,
+    stop: int,
+    moved: Floats32,
+    ways: WayMap,
+    factors: MapFactors,
+    beyond: float,
+    log_weight: Floats,
+    weighed: Floats,
+) -> None:
+    """Fill log weights (N,) after a step, and update the probability of being off in ``moved``.
 
-    ``beyond`` is the map's log-likelihood beyond the area; NaN for that of the area's edge.
+    That is done for hypotheses ``first`` to ``stop``. ``beyond`` is the map's log-likelihood beyond
+    the area; NaN for that of the area's edge.
     """
+    east, north = moved[0, first:stop], moved[1, first:stop]
     rows, pixel_m = ways.log_likelihood.shape[0], ways.pixel_m
     first_m, north_m = pixel_m / 2, (rows - 0.5) * pixel_m
-    found = interpolate(moved, ways.log_likelihood, first_m, north_m, 1 / pixel_m)
+    found = interpolate(east, north, ways.log_likelihood, first_m, north_m, 1 / pixel_m)
     if not np.isnan(beyond):
-        outside, instead = places_beyond(moved, ways.width_m, ways.height_m), _F(beyond)
+        outside, instead = places_beyond(east, north, ways.width_m, ways.height_m), _F(beyond)
         for i in range(found.size):
             found[i] = instead if outside[i] else found[i]
-    weighed = log_weight.copy()
-    weigh_by_map(found, moved[OFF], factors, weighed)
-    return weighed
+    weighed[first:stop] = log_weight[first:stop]
+    weigh_by_map(found, moved[OFF, first:stop], factors, weighed[first:stop])
 
 
 @njit(error_model="numpy", cache=True)
@@ -83,12 +90,12 @@ def weighed_at_places(
     beyond: float,
     log_weight: Floats,
 ) -> Floats:
-    """Return log weights as :func:`weighed_by_ways` does, where the map's were looked up, (N,).
+    """Return log weights as :func:`weigh_by_ways` fills them, where the map's were looked up, (N,).
 
     Those of hypotheses beyond the area are replaced in place.
     """
     if not np.isnan(beyond):
-        outside, instead = places_beyond(moved, size_m[0], size_m[1]), _F(beyond)
+        outside, instead = places_beyond(moved[0], moved[1], size_m[0], size_m[1]), _F(beyond)
         for i in range(log_likelihood.size):
             log_likelihood[i] = instead if outside[i] else log_likelihood[i]
     weighed = log_weight.copy()

@@ -21,6 +21,7 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.broadcast import UNPLACED
+from mapfilter.tracks.clock_steps import with_clocks_gone_on
 from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import check_clocks, check_start, check_steps, early_ends
@@ -233,7 +234,8 @@ def make_log(
         faults.found.extend(error.faults)
     present = {table: rows for table in TABLES if (rows := arguments[table]) is not None}
     given, start_utc_s = _seconds(present, float(start_utc_s), called, faults)
-    tables, every_note = dict[str, pd.DataFrame](), tuple(notes)
+    given, of_clocks = with_clocks_gone_on(given, called)
+    tables, every_note = dict[str, pd.DataFrame](), (*notes, *of_clocks)
     for table in TABLES:
         name, number = called.get(table, table), numbers.get(table)
         tables[table], more = tidy_table(table, given.get(table), name, faults, number)

@@ -19,7 +19,6 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.identities import LIMITS
-from mapfilter.tracks.clock_steps import told_clock_steps
 from mapfilter.tracks.schema import (
     MISSING_SIGNS,
     NEIGHBOUR,
@@ -342,8 +341,7 @@ def _sorted_unique(
     time_s = table["time_s"].to_numpy()
     backwards = int(np.sum(np.diff(time_s) < 0))
     if backwards:
-        step = told_clock_steps(time_s)
-        notes += (f"{where}: {step or f'out of order in {backwards} places, sorted by time'}",)
+        notes += (f"{where}: out of order in {backwards} places, sorted by time",)
         table = table.sort_values("time_s", kind="stable")
     return table.reset_index(drop=True), notes
 

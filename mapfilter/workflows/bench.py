@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from mapfilter.workflows.bench_memory import MemoryBench
     from mapfilter.workflows.bench_peers import PeersBench
     from mapfilter.workflows.bench_sweep import SweepBench
+    from mapfilter.workflows.bench_threads import ThreadsBench
 
 CRS = "EPSG:32629"
 STAGES = ("build", "filter", "fusion", "sweep")
@@ -102,35 +103,47 @@ def run_bench(
     runs: int = 5,
     peers: bool = False,
     memory: bool = False,
+    threads: int = 1,
     device: str = "cpu",
-) -> BuildBench | FilterBench | FusionBench | SweepBench | PeersBench | MemoryBench | DeviceBench:
+) -> (
+    BuildBench
+    | FilterBench
+    | FusionBench
+    | SweepBench
+    | PeersBench
+    | MemoryBench
+    | ThreadsBench
+    | DeviceBench
+):
     """Measure a stage on generated inputs; a filter and a sweep on the embedded map.
 
     ``peers`` is whether a step of the filter is compared with other packages instead, ``memory``
-    whether the memory of the stage's tasks is measured instead. With the ``device`` ``gpu`` a step
-    of the filter on a graphics processor is compared with the processor's instead.
+    whether the memory of the stage's tasks is measured instead. With ``threads`` above 1 a step of
+    the filter is divided among as many instead, with the ``device`` ``gpu`` it is taken on a
+    graphics processor beside the processor.
     """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
-    if peers and memory:
-        raise fail(ConfigError, "bench", "--peers or --memory", "both")
-    if device != "cpu":
-        if stage != "filter" or peers or memory:
-            got = "--peers" if peers else "--memory" if memory else stage
-            raise fail(
-                ConfigError, "bench --device", "the stage filter, without other options", got
-            )
-        opened = open_device(device, "bench --device")
-        from mapfilter.workflows.bench_device import bench_device
-
-        return bench_device(opened, runs=runs)
+    if peers + memory + (threads > 1) + (device != "cpu") > 1:
+        expected = "one of --peers, --memory, --threads and --device"
+        raise fail(ConfigError, "bench", expected, "several")
     if memory:
         from mapfilter.workflows.bench_memory import bench_memory
 
         return bench_memory(stage)
+    if (peers or threads > 1 or device != "cpu") and stage != "filter":
+        given = "--peers" if peers else "--threads" if threads > 1 else "--device"
+        raise fail(ConfigError, f"bench {given}", "the stage filter", stage)
+    if device != "cpu":
+        opened = open_device(device, "bench --device")
+        from mapfilter.workflows.bench_device import bench_device
+
+        return bench_device(opened, runs=runs)
+    if threads > 1:
+        from mapfilter.workflows.bench_threads import bench_threads
+
+        return bench_threads(threads, runs=runs)
     if peers:
-        if stage != "filter":
-            raise fail(ConfigError, "bench --peers", "the stage filter", stage)
         from mapfilter.workflows.bench_peers import bench_peers
 
         return bench_peers(runs=runs)

@@ -224,10 +224,12 @@ def whole_step(
     normalise(log_weight, weight)
     chosen = np.empty(count, dtype=np.int32)
     systematic(weight, rng.random(), chosen)
-    copies = np.empty_like(state)
-    copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
-    kept = np.empty_like(cloud.kept)
-    copied(cloud.kept, chosen, kept)
+    copies, kept = np.empty_like(state), np.empty_like(cloud.kept)
+    model.threads.over(
+        count,
+        (copy_with_jitter, state, chosen, jitter, draw_key(rng), copies),
+        (copied, cloud.kept, chosen, kept),
+    )
     return copies, kept
 
 

@@ -27,7 +27,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import STATES
-from mapfilter.models.way_map import weighed_by_ways
+from mapfilter.models.way_map import all_inside
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
@@ -69,8 +69,8 @@ def compile_evidence() -> None:
 def compile_motion() -> None:
     """Compile steps, and the weighing by the map."""
     model, cloud, log_weight = _made()
-    model.area.clear_of_edge(cloud.state)
     model.move(cloud.state, log_weight, MotionStep(1.0, 0.0), draw_key(np.random.default_rng(0)))
+    model.area.clear_of_edge(cloud.state)
 
 
 def compile_summaries() -> None:
@@ -89,15 +89,17 @@ def compile_resampling() -> None:
     model.area.matched_way(cloud.state[0], cloud.state[1], weight)
     tail = sample_tail(cloud.state[0], cloud.state[1], weight, np.zeros(STATES), 0.0)
     protected_m(tail, np.zeros(3))
-    systematic(weight, 0.5, chosen)
+    chosen[:] = np.arange(_PARTICLES)
     jitter, copies = np.ones(STATES, dtype=np.float32), np.empty_like(cloud.state)
-    copied(cloud.state, chosen, copies)
-    copy_with_jitter(cloud.state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
+    key = draw_key(np.random.default_rng(0))
+    copied(0, _PARTICLES, cloud.state, chosen, copies)
+    copy_with_jitter(0, _PARTICLES, cloud.state, chosen, jitter, key, copies)
+    systematic(weight, 0.5, chosen)
 
 
 # The longest first; what each compiles last shows that it has ended.
 _TASKS = (compile_motion, compile_evidence, compile_summaries, compile_resampling)
-_LAST: tuple[Any, ...] = (weighed_by_ways, weigh_by_bound, flattened, copy_with_jitter)
+_LAST: tuple[Any, ...] = (all_inside, weigh_by_bound, flattened, systematic)
 
 
 def _is_kept(kernel: Any) -> bool:

@@ -8,7 +8,7 @@ import pytest
 from small_world import CRS, IDS, LATTICE, make_database, make_plan, make_world
 
 from mapfilter.database import cell_levels
-from mapfilter.database.cell_levels import PointReader, part_extents, read_cell, received_cells
+from mapfilter.database.cell_levels import PointReader, part_extents, read_levels, received_cells
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels
@@ -92,40 +92,38 @@ def test_extents_of_cells_that_are_received_nowhere(database):
     database = replace(database)
     database.__dict__["level_parts"] = dict.fromkeys(IDS, ())
     found = part_extents(database, IDS)
-    assert [len(one) for one in found] == [0, 0, 0]
+    assert [len(one) for one in found] == [0, 0, 0, 0]
 
 
-def test_the_levels_of_a_cell_are_in_the_order_of_its_points(database):
+def test_the_levels_of_a_part_are_in_the_order_of_its_points(database):
     for cell in IDS:
         row, col, level_dbm = database.cell_points(cell, np.inf)
-        found = read_cell(database, cell)
+        (part,) = database.level_parts[cell]
+        found = read_levels(part, LATTICE)
         np.testing.assert_array_equal(found.point, row.astype(np.int64) * LATTICE.cols + col)
         np.testing.assert_array_equal(found.level_dbm, level_dbm)
         assert np.all(np.diff(found.point) > 0)
-        assert (found.point.dtype, found.level_dbm.dtype) == (np.int64, np.float32)
+        assert (found.point.dtype, found.level_dbm.dtype) == (np.int32, np.float32)
 
 
-def test_a_cell_of_several_parts_has_all_of_them(database):
-    """The same part three times, as a large cell is cut into some."""
-    (part,) = database.level_parts[IDS[0]]
+def test_extents_name_the_parts_of_each_cell_in_order(database):
+    parts = {cell: database.level_parts[cell] for cell in IDS}
     several = replace(database)
-    several.__dict__["level_parts"] = {IDS[0]: (part, part, part)}
-    once, found = read_cell(database, IDS[0]), read_cell(several, IDS[0])
-    np.testing.assert_array_equal(found.point, np.repeat(once.point, 3))
-    np.testing.assert_array_equal(found.level_dbm, np.repeat(once.level_dbm, 3))
-    assert part_extents(several, IDS[:1]).band.tolist() == [0, 0, 0]
+    several.__dict__["level_parts"] = {**parts, IDS[0]: parts[IDS[0]] * 3}
+    found = part_extents(several, IDS)
+    assert found.band.tolist() == [0, 0, 0, 1, 2]
+    assert found.part == (*parts[IDS[0]] * 3, *parts[IDS[1]], *parts[IDS[2]])
 
 
 def test_points_beyond_the_lattice_are_refused(database):
-    last = int(read_cell(database, IDS[0]).point[-1])
-    just = replace(database, lattice=Lattice(CRS, 0.0, 5.0, 5.0, 1, last + 1))
-    assert read_cell(just, IDS[0]).point[-1] == last
-    beyond = replace(database, lattice=Lattice(CRS, 0.0, 5.0, 5.0, 1, last))
+    (part,) = database.level_parts[IDS[0]]
+    last = int(read_levels(part, LATTICE).point[-1])
+    assert read_levels(part, Lattice(CRS, 0.0, 5.0, 5.0, 1, last + 1)).point[-1] == last
     with pytest.raises(
         StoreError, match="points on the database's lattice, found others"
     ) as caught:
-        read_cell(beyond, IDS[0])
-    assert str(database.level_parts[IDS[0]][0]) in caught.value.faults[0].where
+        read_levels(part, Lattice(CRS, 0.0, 5.0, 5.0, 1, last))
+    assert str(part) in caught.value.faults[0].where
 
 
 @pytest.mark.parametrize(
@@ -139,9 +137,9 @@ def test_which_points_lie_on_the_lattice(database, monkeypatch, points, good):
     monkeypatch.setattr(cell_levels, "read_columns", lambda _, columns: table.select(columns))
     if not good:
         with pytest.raises(StoreError, match="points on the database's lattice, found others"):
-            read_cell(database, IDS[0])
+            read_levels(database.level_parts[IDS[0]][0], LATTICE)
         return
-    found = read_cell(database, IDS[0])
+    found = read_levels(database.level_parts[IDS[0]][0], LATTICE)
     order = np.argsort(points)
     np.testing.assert_array_equal(found.point, np.array(points, dtype=int)[order])
     np.testing.assert_array_equal(found.level_dbm, levels_dbm[order])
@@ -211,7 +209,7 @@ def test_second_levels_are_those_of_the_second_cell(sparse):
     found = PointReader(sparse).nearest((0, 0, WIDE.rows, WIDE.cols))
     levels = np.full((3, found.point.size), np.nan)
     for k, cell in enumerate(IDS):
-        own = read_cell(sparse, cell)
+        own = read_levels(sparse.level_parts[cell][0], WIDE)
         levels[k, np.searchsorted(found.point, own.point)] = own.level_dbm
     ordered = np.sort(np.where(np.isnan(levels), -np.inf, levels), axis=0)
     np.testing.assert_array_equal(found.best_dbm, ordered[2].astype(np.float32))

@@ -174,13 +174,13 @@ def test_more_jitter_than_rows_counts_not():
     picked = np.zeros(20_000, dtype=np.int32)
     copies = np.empty((3, picked.size), "f4")
     jitter = np.array([2.0, 0.5, 1.0, 300.0, 300.0], "f4")
-    copy_with_jitter(state, picked, jitter, np.uint64(5), copies)
+    copy_with_jitter(0, picked.size, state, picked, jitter, np.uint64(5), copies)
     np.testing.assert_allclose(copies.std(axis=1), [2.0, 0.5, 1.0], rtol=0.04)
     # One of a pair without noise stays as it is, the other one is moved.
     for quiet in (0, 1):
         sd = np.array([1.0, 1.0, 0.0], "f4")
         sd[quiet] = 0.0
-        copy_with_jitter(state, picked, sd, np.uint64(5), copies)
+        copy_with_jitter(0, picked.size, state, picked, sd, np.uint64(5), copies)
         np.testing.assert_array_equal(copies[[quiet, 2]], state[[quiet, 2]][:, picked])
         assert copies[1 - quiet].std() == pytest.approx(1.0, rel=0.04)
 
@@ -188,7 +188,7 @@ def test_more_jitter_than_rows_counts_not():
 def test_rows_of_a_copy_are_moved_by_numbers_of_their_own():
     state, picked = np.zeros((6, 1), "f4"), np.zeros(5000, dtype=np.int32)
     copies = np.empty((6, 5000), "f4")
-    copy_with_jitter(state, picked, np.ones(6, "f4"), np.uint64(8), copies)
+    copy_with_jitter(0, picked.size, state, picked, np.ones(6, "f4"), np.uint64(8), copies)
     beside = np.vstack([copies[:, :-1], copies[:, 1:]])
     assert np.abs(np.corrcoef(beside) - np.eye(12)).max() < 5 / 5000**0.5
 

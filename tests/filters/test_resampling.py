@@ -72,7 +72,7 @@ def test_copies_of_what_is_kept_are_the_chosen_columns(rows, count):
     kept = rng.standard_normal((rows, 900)).astype(np.float32)
     chosen = np.sort(rng.integers(900, size=count)).astype(np.int32)
     copies = np.full((rows, count), np.nan, dtype=np.float32)
-    copied(kept, chosen, copies)
+    copied(0, chosen.size, kept, chosen, copies)
     np.testing.assert_array_equal(copies, kept[:, chosen])
 
 
@@ -92,7 +92,9 @@ def test_copies_part_by_the_jitter():
     chosen = np.zeros(50_000, dtype=np.int32)
     copies = np.empty((5, chosen.size), dtype=np.float32)
     jitter = np.array([2.0, 0.5, 0.0, 1.0, 3.0], dtype=np.float32)
-    copy_with_jitter(state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
+    copy_with_jitter(
+        0, chosen.size, state, chosen, jitter, draw_key(np.random.default_rng(0)), copies
+    )
     np.testing.assert_allclose(copies.mean(axis=1), [1.0, 10.0, 7.0, 1.0, 5.0], atol=0.06)
     np.testing.assert_allclose(copies.std(axis=1), [2.0, 0.5, 0.0, 1.0, 3.0], rtol=0.02)
     noise = np.corrcoef(copies[[0, 1, 3, 4]]) - np.eye(4)
@@ -105,7 +107,9 @@ def test_rows_beyond_the_jitter_are_copied_as_they_are():
     copies = np.empty((8, chosen.size), dtype=np.float32)
     # What lies behind it in memory is no jitter.
     jitter = np.full(8, 100.0, dtype=np.float32)[:5]
-    copy_with_jitter(state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
+    copy_with_jitter(
+        0, chosen.size, state, chosen, jitter, draw_key(np.random.default_rng(0)), copies
+    )
     np.testing.assert_array_equal(copies[5:], state[5:, chosen])
     assert not np.any(copies[:5] == state[:5, chosen])
 

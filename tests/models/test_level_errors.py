@@ -13,7 +13,7 @@ from scipy.stats import norm, truncnorm
 from mapfilter.errors import ConfigError
 from mapfilter.models.fingerprint import bound_table
 from mapfilter.models.level_errors import LevelErrors, LevelReport, roughness
-from mapfilter.models.level_kernels import Prediction, decayed, weigh_by_absence, weigh_by_levels
+from mapfilter.models.level_kernels import Prediction, age, weigh_by_absence, weigh_by_levels
 from mapfilter.models.level_memory import SLOTS, LevelMemory
 
 SITE = np.array([0, 0, 1, 1, 1, 2])
@@ -48,11 +48,11 @@ def weighed(memory, kept, pixel, table, given, rough_db=None):
     rough = np.zeros(table.size, np.uint8) if rough_db is None else rough_db.ravel()
     pixel, flat, bands = pixel.astype(np.int32), table.ravel(), table.shape[1]
     predicted = Prediction(flat, rough, bands, errors.roughness)
-    weigh_by_levels(kept, pixel, predicted, terms, errors.weight, log_weight)
+    weigh_by_levels(0, pixel.size, kept, pixel, predicted, terms, errors.weight, log_weight)
     if given.absent.size:
         absent = memory.absence(given)
         table, weight = bound_table(), errors.weight
-        weigh_by_absence(kept, pixel, predicted, absent, table, weight, log_weight)
+        weigh_by_absence(0, pixel.size, kept, pixel, predicted, absent, table, weight, log_weight)
     return memory, kept, log_weight
 
 
@@ -60,7 +60,9 @@ def moved(memory, kept, length_m):
     errors = memory.errors
     memory, decay = memory.after(length_m)
     keep = exp(-length_m / errors.fault_m)
-    return memory, decayed(kept, decay, keep, errors.fault_log_odds)
+    now = np.empty_like(kept)
+    age(0, kept.shape[1], kept, decay, keep, errors.fault_log_odds, now)
+    return memory, now
 
 
 class Walk:

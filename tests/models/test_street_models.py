@@ -285,7 +285,7 @@ def test_a_raster_is_read_between_the_middles_of_its_pixels():
     raster, side_m = rng.normal(0, 5, (5, 7)).astype(np.float32), 8.0
     state = np.zeros((STATES, 300), dtype=np.float32)
     state[EAST], state[NORTH] = rng.uniform(-10, 66, 300), rng.uniform(-10, 50, 300)
-    found = interpolate(state, raster, side_m / 2, 4.5 * side_m, 1 / side_m)
+    found = interpolate(*state[:2], raster, side_m / 2, 4.5 * side_m, 1 / side_m)
     expected = [oracle.bilinear(raster, float(x), float(y), side_m) for x, y in state[:2].T]
     np.testing.assert_allclose(found, expected, atol=2e-5)
 

@@ -28,7 +28,7 @@ from mapfilter.models import cuda_motion
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import MapWeights, MotionErrors, move
-from mapfilter.models.way_map import WayMap, weighed_by_ways
+from mapfilter.models.way_map import WayMap, weigh_by_ways
 from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start
@@ -87,7 +87,9 @@ def test_map(beyond):
     cuda_motion.weigh_by_ways(found, log_map, 10.0, area.size_m, factors, beyond, weighed)
     expected = state.copy()
     ways = WayMap(log_map, 10.0, *area.size_m)
-    expected_weight = weighed_by_ways(expected, ways, factors, beyond, log_weight)
+    expected_weight = np.empty(COUNT)
+    given = expected, ways, factors, beyond, log_weight, expected_weight
+    weigh_by_ways(0, COUNT, *given)
     np.testing.assert_allclose(found, expected, rtol=2e-6, atol=1e-6)
     np.testing.assert_allclose(weighed, expected_weight, rtol=0, atol=5e-6)
     assert np.ptp(weighed - log_weight) > 0.1
@@ -136,7 +138,7 @@ def test_choice_and_copies(wanted):
     np.testing.assert_array_equal(chosen, expected)
     copies, noisy = np.empty((8, wanted), np.float32), np.empty((8, wanted), np.float32)
     cuda_copies.copy_with_jitter(state, chosen, JITTER, np.uint64(5), noisy)
-    copy_with_jitter(state, chosen, JITTER, np.uint64(5), copies)
+    copy_with_jitter(0, wanted, state, chosen, JITTER, np.uint64(5), copies)
     np.testing.assert_allclose(noisy, copies, rtol=2e-6, atol=1e-5)
 
 
@@ -169,8 +171,8 @@ def test_a_whole_step_gives_the_estimate_of_the_processor():
     chosen = np.empty(COUNT, np.int32)
     systematic(weight, rng.random(), chosen)
     same, same_kept = np.empty_like(state), np.empty_like(here.kept)
-    copy_with_jitter(here.state, chosen, JITTER, draw_key(rng), same)
-    copied(here.kept, chosen, same_kept)
+    copy_with_jitter(0, COUNT, here.state, chosen, JITTER, draw_key(rng), same)
+    copied(0, COUNT, here.kept, chosen, same_kept)
     np.testing.assert_allclose(copies, same, rtol=1e-5, atol=1e-4)
     np.testing.assert_allclose(kept, same_kept, rtol=1e-4, atol=5e-4)
 

@@ -56,6 +56,31 @@ def test_a_heading_that_stands_still_is_found_within_twenty_metres_and_given_up_
     assert step.spread_m == pytest.approx(0.7, rel=0.01)
 
 
+def test_a_heading_that_was_the_same_from_the_beginning_stands_still_after_three_hundred_metres():
+    """Not sooner, as a street may be straight; and it counts again from where it changes."""
+    after = walk(50, seed=1)
+    frozen = [MotionStep(0.7, 0.123456789)] * 600
+    found = followed([*frozen, *after])
+    stuck = [k for k, why in enumerate(reasons(found)) if why is Reason.HEADING_STUCK]
+    assert 0.7 * stuck[0] == pytest.approx(300.0, abs=1.0)
+    assert stuck == list(range(stuck[0], 600))
+    assert not isfinite(found[stuck[0]][0][0].heading_rad)
+    long_rows = [MotionStep(30.0, 0.123456789)] * 99
+    assert set(reasons(followed(long_rows, again_s=1.0))) == {Reason.USED}
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, np.radians(37.0), 0.524])
+def test_a_coarse_heading_may_be_the_same_all_along_a_street(heading_rad):
+    steps = [MotionStep(0.7, heading_rad)] * 900
+    assert Reason.HEADING_STUCK not in reasons(followed(steps))
+
+
+def test_a_street_that_is_straight_for_long_after_others_is_left_alone():
+    """A made log without noise: once its headings have changed, they may repeat as before."""
+    legs = [MotionStep(0.7, 0.1234567 * k) for k in range(1, 5) for _ in range(300)]
+    assert Reason.HEADING_STUCK not in reasons(followed([*legs, *[legs[-1]] * 600]))
+
+
 def test_the_spread_of_a_way_without_direction_adds_up_to_that_of_a_way_that_forgets_it():
     before = walk(200)
     found = followed([*before, *[before[-1]] * 1000])

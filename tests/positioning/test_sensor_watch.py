@@ -231,6 +231,20 @@ def test_a_report_that_repeats_itself_on_the_way_is_stale(levels, least_m, most_
     assert found[stale[0] - 1][0].radio == rows
 
 
+def test_a_report_is_stale_after_as_many_metres_whatever_the_unit_of_steps():
+    """Lengths in feet are read in metres; read as metres they would be stale within 7 m."""
+    foot_m, rows = 0.3048, report([-90, -91, -92])
+    lengths_m, stale_at = {1.0: 1.4, foot_m: 1.4 / foot_m}, {}
+    for unit_m, step_m in lengths_m.items():
+        watch, reasons = SensorWatch(), []
+        for second in range(40):
+            epoch = Epoch(float(second), (MotionStep(step_m, 0.0),), rows)
+            watch, _, (_, why) = watched(watch, epoch, unit_m)
+            reasons.append(why)
+        stale_at[unit_m] = reasons.index(Reason.STALE_RADIO)
+    assert stale_at[foot_m] == stale_at[1.0] > 10
+
+
 def test_one_level_that_repeats_every_seven_seconds_of_a_walk_is_stale_within_a_minute():
     step = MotionStep(9.8, 0.0)
     _, found = told([Epoch(7.0 * k, (step,), report([-90])) for k in range(20)])

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from made_town import CRS, FLOOR_DBM, NAMES, PIXEL_M, SIDE_M, SOUTH_M, WEST_M, Town, walk_log
 
+from mapfilter.database import parts
 from mapfilter.database.cell_levels import PointReader, part_extents
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.store import open_database
@@ -134,7 +135,7 @@ def test_every_value_is_that_of_the_whole_area(database, whole, side):
     assert np.array_equal(points_everywhere(tiled), whole.points)
     state, ways = places(whole), BayesFilter().over_area(whole).model._ways
     middle = PIXEL_M / 2, (whole.lattice.rows - 0.5) * PIXEL_M
-    expected = interpolate(state, ways.log_likelihood, *middle, 1 / PIXEL_M)
+    expected = interpolate(*state[:2], ways.log_likelihood, *middle, 1 / PIXEL_M)
     assert np.array_equal(tiled.log_map_at(state, 3.0), expected)
     weight = np.random.default_rng(2).random(50, dtype=np.float32)
     for first in range(0, 5000, 50):
@@ -579,6 +580,39 @@ def test_extents_of_parts_hold_their_points(database):
         assert extents.most_dbm[own] == level_dbm.max()
 
 
+def _parts_read(tiled):
+    return {key[1] for key in tiled.tiles.held._entries if key[0] == "part"}
+
+
+def test_of_cells_in_several_parts_those_near_a_tile_are_read(town, tmp_path, monkeypatch):
+    """As large databases are: all values are those of the whole, and a tile reads few parts."""
+    monkeypatch.setattr(parts, "ROWS_IN_MEMORY", 1)
+    database = open_database(write_database(tmp_path / "database", town))
+    counts = [len(some) for some in database.level_parts.values()]
+    assert min(counts) > 1
+    assert max(counts) > 3
+    whole = AreaMap.of_field(database.field(), database.plan, database.floor_dbm)
+    tiled = TiledArea.of_database(database, side=30)
+    bands = np.arange(len(whole.cell_ids), dtype=np.int32)
+    corner = np.array([0, 1, tiled.lattice.cols], dtype=np.int32)
+    flat = whole.level_dbm.reshape(whole.on_way.size, -1)
+    assert np.array_equal(tiled.looked_up(corner, bands)[0], flat[corner][:, :-2])
+    assert 0 < len(_parts_read(tiled)) < 0.5 * sum(counts)
+    assert np.array_equal(every_level(tiled)[0], flat)
+    ranges = [tiled.tiles.range_of(band) for band in bands.tolist()]
+    most = [np.nanmax(one.most_dbm) for one in ranges]
+    least = [np.nanmin(one.least_dbm) for one in ranges]
+    heard = [database.cell_points(cell, np.inf)[2] for cell in whole.cell_ids]
+    assert most == [some.max() for some in heard]
+    assert least == [some.min() for some in heard]
+
+
+def test_an_area_of_more_pixels_than_32_bits_count_is_refused(database):
+    lattice = replace(database.lattice, rows=50_000, cols=50_000)
+    with pytest.raises(StoreError, match="less than 2147483648 pixels"):
+        TiledArea.of_database(replace(database, lattice=lattice))
+
+
 def test_cells_are_read_only_where_they_may_be_strong(database, whole):
     """At some places above a level, and none is missed; a limit that none reaches reads none."""
     tiled = TiledArea.of_database(database, side=20)
@@ -589,7 +623,7 @@ def test_cells_are_read_only_where_they_may_be_strong(database, whole):
     for limit_dbm in limits_dbm:
         share = tiled.shares_above(pixel, bands, limit_dbm)
         assert np.array_equal(share, (flat[pixel] > limit_dbm).mean(axis=0))
-        assert limit_dbm < 0 or not [key for key in tiled.tiles.held._entries if key[0] == "cell"]
+        assert limit_dbm < 0 or not _parts_read(tiled)
     some = bands[[0, 3, 5]]
     share = tiled.shares_above(pixel, some, -80.0)
     assert np.array_equal(share, (flat[pixel][:, some] > -80.0).mean(axis=0))

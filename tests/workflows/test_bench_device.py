@@ -23,11 +23,15 @@ def test_a_missing_device_is_named():
 
 
 @pytest.mark.parametrize(
-    ("stage", "others", "found"),
-    [("build", {}, "build"), ("filter", {"peers": True}, "--peers")],
+    ("stage", "others", "message"),
+    [
+        ("build", {}, r"^bench --device: .*found build$"),
+        ("filter", {"peers": True}, r"^bench: .* --device, found several$"),
+        ("filter", {"threads": 2}, r"^bench: .* --device, found several$"),
+    ],
 )
-def test_a_device_is_for_a_step_of_the_filter(stage, others, found):
-    with pytest.raises(ConfigError, match=rf"^bench --device: .*found {found}$"):
+def test_a_device_is_for_a_step_of_the_filter(stage, others, message):
+    with pytest.raises(ConfigError, match=message):
         run_bench(stage, device="gpu", **others)
 
 

@@ -2,7 +2,10 @@
 
 import pytest
 
+from mapfilter.errors import ConfigError
 from mapfilter.workflows import bench_filter
+from mapfilter.workflows.bench import run_bench
+from mapfilter.workflows.bench_threads import bench_threads
 
 SMALL = (
     "area.bbox=24.9420,60.1660,24.9495,60.1697", "area.resolution_m=10", "journeys.length_m=400",
@@ -20,3 +23,24 @@ def test_a_small_bench():
     assert found.track_s > 0
     assert found.with_alternative in (0, 1)
     assert 50e6 < found.loaded_memory_bytes < found.peak_memory_bytes < 2e9
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_step_in_one_thread_and_in_two():
+    found = bench_threads(2, runs=1, particles=(500, 3000), least=2048, settings=SMALL)
+    assert (found.threads, found.runs, found.processors > 0) == (2, 1, True)
+    assert found.load_average >= 0
+    assert [(one.particles, one.is_divided) for one in found.steps] == [(500, False), (3000, True)]
+    for step in found.steps:
+        assert step.speedup == pytest.approx(step.one_ns / step.divided_ns)
+        ratios = step.best_speedup, step.filter_speedup, step.best_filter_speedup
+        assert min(step.one_ns, *ratios) > 0
+
+
+@pytest.mark.parametrize(
+    ("stage", "asked", "expected"),
+    [("build", {}, "the stage filter"), ("filter", {"peers": True}, "one of --peers")],
+)
+def test_threads_are_a_question_of_their_own(stage, asked, expected):
+    with pytest.raises(ConfigError, match=expected):
+        run_bench(stage, threads=2, **asked)

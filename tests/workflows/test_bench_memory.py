@@ -43,5 +43,5 @@ def test_a_sweep_and_steps_run_on_what_was_made_for_them(tmp_path):
 
 
 def test_peers_and_memory_are_two_questions():
-    with pytest.raises(ConfigError, match="--peers or --memory"):
+    with pytest.raises(ConfigError, match="one of --peers, --memory"):
         run_bench("filter", peers=True, memory=True)

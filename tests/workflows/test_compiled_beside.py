@@ -63,8 +63,8 @@ def test_nothing_is_started_where_all_is_kept(monkeypatch):
 def test_a_kernel_is_kept_by_its_line():
     class Elsewhere:
         py_func = test_nothing_is_started_where_all_is_kept
-        stats = kernels.weighed_by_ways.stats
+        stats = kernels.all_inside.stats
 
     kernels.compile_motion()
-    assert kernels._is_kept(kernels.weighed_by_ways)
+    assert kernels._is_kept(kernels.all_inside)
     assert not kernels._is_kept(Elsewhere)

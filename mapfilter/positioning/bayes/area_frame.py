@@ -119,7 +119,7 @@ class AreaFrame(ABC):
 
     def beyond(self, state: Floats32) -> Bools:
         """Return whether each hypothesis, by its first two rows, lies beyond the area, (N,)."""
-        found: Bools = places_beyond(state, *self.size_m)
+        found: Bools = places_beyond(state[0], state[1], *self.size_m)
         return found
 
     def holds_all(self, east_m: Floats32, north_m: Floats32) -> bool:

@@ -1,8 +1,9 @@
 """Tiles of a large area, read from its database when they are looked up, and given up again.
 
 A tile has the nearest point of each pixel, and the levels of a cell at these points: only of cells
-that are looked up, and nothing of cells that are not received there. What was looked up longest ago
-is given up when all of it takes more than a number of bytes.
+that are looked up, and nothing of cells that are not received there. Of a cell those parts are read
+that reach the tile. What was looked up longest ago is given up when all of it takes more than a
+number of bytes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from mapfilter.database.cell_levels import (
     PartExtents,
     PointReader,
     part_extents,
-    read_cell,
+    read_levels,
 )
 from mapfilter.database.parquet import read_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -76,12 +77,14 @@ class Tile:
 class _Reaching(NamedTuple):
     """The cells that may have a level in a tile, ascending, (C,), and a bound of these levels.
 
-    The bound is by the footers of the parts until it is ``exact``: by the cell's range.
+    The bound is by the footers of the parts until it is ``exact``. ``part`` (C) are the parts of
+    each cell, by their places among the extents.
     """
 
     band: Ints
     bound_dbm: Floats
     exact: Bools
+    part: tuple[Ints, ...]
 
 
 class AreaTiles:
@@ -179,11 +182,18 @@ class AreaTiles:
         if at == reaching.size or reaching[at] != band:
             return None
 
+        parts = self._reaching(number).part[at]
+
         def make() -> Floats32 | None:
-            level_dbm, there = levels_at_points(
-                points.point, *self.cell(band), float(self.quiet_dbm)
-            )
-            return level_dbm if there else None
+            every_dbm, received = None, False
+            for part in parts.tolist():
+                level_dbm, there = levels_at_points(
+                    points.point, *self._levels_of_part(part), float(self.quiet_dbm)
+                )
+                # A point is in one part of a cell, and quiet in the others.
+                every_dbm = level_dbm if every_dbm is None else np.maximum(every_dbm, level_dbm)
+                received |= there
+            return every_dbm if received else None
 
         return self.held.get(("levels", number, band), make, _array_bytes)
 
@@ -208,7 +218,8 @@ class AreaTiles:
         """
         reaching = self._reaching(number)
         for k in np.flatnonzero((reaching.bound_dbm > limit_dbm) & ~reaching.exact).tolist():
-            reaching.bound_dbm[k] = self._bound(number, int(reaching.band[k]))
+            level_dbm = self.levels(number, int(reaching.band[k]))
+            reaching.bound_dbm[k] = -np.inf if level_dbm is None else level_dbm.max()
             reaching.exact[k] = True
         strong = reaching.band[reaching.bound_dbm > limit_dbm]
         place = np.minimum(np.searchsorted(bands, strong), max(bands.size - 1, 0))
@@ -222,46 +233,44 @@ class AreaTiles:
             top, bottom, left, right = self.tile(number).box
             low, high, west, east = self.extents.box.T
             meets = (low <= bottom) & (high >= top) & (west <= right) & (east >= left)
-            band, of = np.unique(self.extents.band[meets], return_inverse=True)
-            bound_dbm = np.full(band.size, -np.inf)
-            np.maximum.at(bound_dbm, of, self.extents.most_dbm[meets])
-            return _Reaching(band, bound_dbm, np.zeros(band.size, dtype=np.bool_))
+            part = np.flatnonzero(meets)
+            band, first = np.unique(self.extents.band[part], return_index=True)
+            parts = tuple(np.split(part, first[1:])) if part.size else ()
+            bound_dbm = np.array([self.extents.most_dbm[some].max() for some in parts])
+            return _Reaching(band, bound_dbm, np.zeros(band.size, dtype=np.bool_), parts)
 
-        return self.held.get(("reaching", number), make, _arrays_bytes)
-
-    def _bound(self, number: int, band: int) -> float:
-        """Return an upper bound of a cell's levels at a tile's nearest points."""
-        top, bottom, left, right = self.tile(number).box
-        row, col, _, most_dbm = self.range_of(band)
-        rows, cols = (
-            slice(max(first // self.side - at, 0), max(last // self.side - at + 1, 0))
-            for first, last, at in ((top, bottom, row), (left, right, col))
-        )
-        return float(np.fmax.reduce(most_dbm[rows, cols], axis=None, initial=-np.inf))
+        return self.held.get(("reaching", number), make, _reaching_bytes)
 
     def range_of(self, band: int) -> LevelRange:
         """Return the range of a cell's levels by tiles; kept for good once it was read."""
         found = self._ranges.get(band)
         if found is None:
-            self.cell(band)
-            found = self._ranges[band]
+            every = [self._levels_of_part(k) for k in self._parts_of(band)]
+            found = self._range(every)
+            self._ranges[band] = found
         return found
 
-    def cell(self, band: int) -> CellLevels:
-        """Return all levels of a cell."""
+    def _parts_of(self, band: int) -> list[int]:
+        first, end = np.searchsorted(self.extents.band, [band, band + 1]).tolist()
+        return list(range(first, end))
+
+    def _levels_of_part(self, part: int) -> CellLevels:
+        """Return the levels of a part, by its place among the extents."""
 
         def make() -> CellLevels:
-            cell = read_cell(self.database, self.cell_ids[band])
-            if band not in self._ranges:
-                self._ranges[band] = self._range(cell)
-            return cell
+            return read_levels(self.extents.part[part], self.database.lattice)
 
-        return self.held.get(("cell", band), make, _cell_bytes)
+        return self.held.get(("part", part), make, _cell_bytes)
 
-    def _range(self, cell: CellLevels) -> LevelRange:
+    def _range(self, parts: list[CellLevels]) -> LevelRange:
         cols, tiles = self.database.lattice.cols, self.rows * self.cols
-        least, most = level_ranges(*cell, cols, self.side, self.cols, tiles)
-        least, most = least.reshape(self.rows, self.cols), most.reshape(self.rows, self.cols)
+        found = [level_ranges(*part, cols, self.side, self.cols, tiles) for part in parts]
+        least, most = (
+            reduce(some).reshape(self.rows, self.cols)
+            for reduce, some in zip(
+                (np.fmin.reduce, np.fmax.reduce), zip(*found, strict=True), strict=True
+            )
+        )
         row, col = np.nonzero(np.isfinite(most))
         part = np.s_[row.min() : row.max() + 1, col.min() : col.max() + 1]
         return LevelRange(int(row.min()), int(col.min()), least[part].copy(), most[part].copy())
@@ -286,8 +295,8 @@ def _cell_bytes(cell: CellLevels) -> int:
     return cell.point.nbytes + cell.level_dbm.nbytes
 
 
-def _arrays_bytes(arrays: _Reaching) -> int:
-    return sum(one.nbytes for one in arrays)
+def _reaching_bytes(reaching: _Reaching) -> int:
+    return sum(one.nbytes for one in (*reaching[:3], *reaching.part))
 
 
 def _array_bytes(array: Floats32 | Bytes | None) -> int:

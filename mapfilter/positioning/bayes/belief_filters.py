@@ -140,7 +140,7 @@ class BeliefFilters:
         options = replace(
             self.options, max_particles=2 * few, min_particles=few, min_search_particles=few
         )
-        return ParticleFilter(self.model, options)
+        return ParticleFilter(self.model, options, self.model.threads)
 
     @cached_property
     def _positioned_by_compass(self) -> dict[bool, MapFilter]:
@@ -152,8 +152,8 @@ class BeliefFilters:
         searching = _MORE_SEARCHING * known.min_search_particles
         unknown = replace(known, max_particles=most, min_search_particles=searching)
         return {
-            True: ParticleFilter(self.model, known),
-            False: ParticleFilter(self.model, unknown),
+            True: ParticleFilter(self.model, known, self.model.threads),
+            False: ParticleFilter(self.model, unknown, self.model.threads),
         }
 
     def is_contested(self, state: BayesState) -> bool:

@@ -13,7 +13,8 @@ from math import exp, isfinite, log, nan, sqrt
 
 import numpy as np
 
-from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints32
+from mapfilter._threads import ONE, Call, Threads
+from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import Cloud
@@ -22,7 +23,7 @@ from mapfilter.models import fingerprint
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import (
     Prediction,
-    decayed,
+    age,
     gained,
     rough_squares,
     shares_above,
@@ -36,8 +37,9 @@ from mapfilter.models.street_motion import (
     MapWeights,
     MotionErrors,
     move,
+    moving,
 )
-from mapfilter.models.way_map import WayMap, weighed_at_places, weighed_by_ways
+from mapfilter.models.way_map import WayMap, weigh_by_ways, weighed_at_places
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import SERVING_UNDER_NULL, RadioReading
@@ -58,7 +60,8 @@ class BayesModel:
     """Ways and radio maps of an area, and the errors of measurements.
 
     ``remember`` is whether hypotheses keep the errors of levels from one report to the next; else
-    each report counts by the share of its errors that is new.
+    each report counts by the share of its errors that is new. Hypotheses are divided among
+    ``threads``.
     """
 
     area: AreaFrame
@@ -66,6 +69,7 @@ class BayesModel:
     weights: MapWeights = field(default_factory=MapWeights)
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
     remember: bool = True
+    threads: Threads = ONE
 
     @property
     def timed_by_sites(self) -> bool:
@@ -132,9 +136,10 @@ class BayesModel:
         self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
     ) -> tuple[Floats32, Floats]:
         """Move by one step and weigh by the map, by the metre."""
-        length_m = abs(motion.step_m)
+        length_m, count = abs(motion.step_m), log_weight.size
+        calls: list[Call] = []
         if isfinite(motion.heading_rad):
-            moved = move(
+            call, moved = moving(
                 state,
                 motion.step_m,
                 motion.heading_rad,
@@ -142,6 +147,7 @@ class BayesModel:
                 key,
                 motion.sampling_sd_m,
             )
+            calls.append(call)
         else:
             # To all sides.
             moved = move(state, 0.0, 0.0, self.motion, key)
@@ -154,12 +160,15 @@ class BayesModel:
         factors = self.weights.over(length_m)
         weighed: Floats
         if isinstance(self.area, TiledArea):
+            self.threads.over(count, *calls)
             on_map = self.area.log_map_at(moved, self.weights.sd_m)
             weighed = weighed_at_places(
                 moved, on_map, self.area.size_m, factors, beyond, log_weight
             )
         else:
-            weighed = weighed_by_ways(moved, self._ways, factors, beyond, log_weight)
+            weighed = np.empty_like(log_weight)
+            calls.append((weigh_by_ways, moved, self._ways, factors, beyond, log_weight, weighed))
+            self.threads.over(count, *calls)
         return moved, weighed
 
     def weigh(
@@ -172,21 +181,21 @@ class BayesModel:
         """
         kept_back: Floats | None = None
         counted: Floats | None = None
+        withholds = reading.tracked and self.remember
         # A serving cell that the map lacks weighs all hypotheses in the area alike.
         used = reading.serving_weight > 0
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
-            pixel, beyond = self._pixels(cloud.state), self.area.beyond(cloud.state)
-            some_beyond = bool(beyond.any())
-            used = True
-            cloud, before = self._aged(cloud, reading), log_weight.copy()
+            beyond, used = np.flatnonzero(self.area.beyond(cloud.state)), True
+            before = log_weight[beyond]
+            cloud, pixel = self._aged(cloud, reading)
             other = 0.0
             if reading.serving >= 0 and reading.serving_weight > 0:
                 self._weigh_serving(cloud, pixel, log_weight, reading)
             if reading.levels is not None:
-                start = log_weight.copy()
+                start = log_weight.copy() if withholds else log_weight
                 cloud = self._weigh_levels(cloud, pixel, log_weight, reading)
                 other = cloud.shared.other_log_likelihood
-                if reading.tracked and self.remember:
+                if withholds:
                     withheld_share = 1 - self.evidence.levels.tracking_share
                     kept_back = gained(start, log_weight, withheld_share)
             for bound in reading.bounds:
@@ -202,9 +211,9 @@ class BayesModel:
             if kept_back is not None:
                 counted = log_weight - kept_back
                 share = self.evidence.levels.tracking_share
-                if some_beyond:
+                if beyond.size:
                     _weigh_beyond(beyond, before, counted, reading, share * other)
-            if some_beyond:
+            if beyond.size:
                 _weigh_beyond(beyond, before, log_weight, reading, other)
         for term in reading.terms:
             log_likelihood = term.log_likelihood(cloud.state)
@@ -248,22 +257,25 @@ class BayesModel:
     def _bands(self) -> int:
         return len(self.area.cell_ids) + 2
 
-    def _pixels(self, state: Floats32) -> Ints32:
-        return np.asarray(fingerprint.pixels(state, self.area.frame))
-
-    def _aged(self, cloud: Cloud, reading: RadioReading) -> Cloud:
-        """Return hypotheses with what they keep of the cells' errors, as a reading finds it."""
+    def _aged(self, cloud: Cloud, reading: RadioReading) -> tuple[Cloud, Ints32]:
+        """Return hypotheses with what they keep as a reading finds it, and their pixels."""
         errors, memory, length_m = self.evidence.levels, cloud.shared, reading.length_m
+        frame, count = self.area.frame, cloud.state.shape[1]
+        pixel, last = np.empty(count, dtype=np.int32), (frame.rows - 1, frame.cols - 1)
+        calls: list[Call] = [(fingerprint.fill_pixels, cloud.state, frame, *last, pixel)]
         if memory is None or not self.remember:
             memory = LevelMemory.empty(errors, self.area.site_of)
-            kept = memory.start(cloud.state.shape[1])
+            kept = memory.start(count)
         else:
             memory, decay = memory.after(length_m)
             keep = exp(-length_m / errors.fault_m)
-            kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds)
+            # NumPy asks for large pages, numba for many small ones.
+            kept = np.empty_like(cloud.kept)
+            calls.append((age, cloud.kept, decay, keep, errors.fault_log_odds, kept))
+        self.threads.over(count, *calls)
         served = [reading.serving] if reading.serving >= 0 else []
         memory, kept = memory.with_cells(np.array(served, dtype=np.int32), kept, in_place=True)
-        return Cloud(cloud.state, kept, memory)
+        return Cloud(cloud.state, kept, memory), pixel
 
     def _weigh_serving(
         self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
@@ -275,9 +287,8 @@ class BayesModel:
         cells = np.array([reading.serving, self._bands - 2, self._bands - 1], dtype=np.int32)
         predicted, pixel, cells = self._looked_up(pixel, cells, rough=False)
         flat, bands, cell = predicted.level_dbm, predicted.bands, int(cells[0])
-        fingerprint.weigh_by_serving(
-            pixel, flat, bands, cell, table, weight, odds, other, log_weight
-        )
+        given = pixel, flat, bands, cell, table, weight, odds, other, log_weight
+        self.threads.over(pixel.size, (fingerprint.weigh_by_serving, *given))
 
     @property
     def serving_is_measured(self) -> bool:
@@ -314,11 +325,13 @@ class BayesModel:
         rough_db2 = mean_rough_db2(predicted, own, cells)
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
-        weigh_by_levels(kept, own, predicted, terms._replace(cell=cells), weight, log_weight)
+        by_levels = predicted, terms._replace(cell=cells), weight, log_weight
+        calls: list[Call] = [(weigh_by_levels, kept, own, *by_levels)]
         if absent.cell.size:
             predicted, own, cells = self._looked_up(pixel, absent.cell)
-            table, expected = self._bound_table, absent._replace(cell=cells)
-            weigh_by_absence(kept, own, predicted, expected, table, weight, log_weight)
+            terms_of = absent._replace(cell=cells), self._bound_table
+            calls.append((weigh_by_absence, kept, own, predicted, *terms_of, weight, log_weight))
+        self.threads.over(log_weight.size, *calls)
         other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
         memory = replace(memory, other_log_likelihood=other)
         return Cloud(cloud.state, kept, memory)
@@ -363,12 +376,15 @@ def _every(pixel: Ints32) -> int:
 
 
 def _weigh_beyond(
-    beyond: Bools,
+    beyond: Ints,
     before: Floats,
     log_weight: Floats,
     reading: RadioReading,
     other_log_likelihood: float,
 ) -> None:
-    """Mix what a report says beyond the area: predictions at the edge may hold, or not."""
-    unknown = before[beyond] + reading.radio_under_null(other_log_likelihood)
+    """Mix what a report says beyond the area: predictions at the edge may hold, or not.
+
+    ``beyond`` (M,) are the hypotheses there, ``before`` (M,) their log weights before the report.
+    """
+    unknown = before + reading.radio_under_null(other_log_likelihood)
     log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)

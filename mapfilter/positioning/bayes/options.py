@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from annotated_types import Ge, Gt, Le
 
 from mapfilter._device import DeviceName, open_device
+from mapfilter._threads import Threads
 from mapfilter.database.cell_levels import received_cells
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
@@ -147,6 +148,9 @@ class BayesFilter(Options):
         Distance of a step of timing advance: 553.5 m in GSM, 78.1 m in LTE.
     timing_sd_m : float
         Assumed deviation of a timing advance besides its rounding.
+    threads : int
+        Threads that a step of 32 768 particles or more is divided among, 1 to 64; with fewer
+        particles, in worker processes and on a grid it is not. Results do not depend on it.
     """
 
     vehicle: bool | None = None
@@ -176,6 +180,7 @@ class BayesFilter(Options):
     antenna_height_sd_m: NotNegative = 200.0
     timing_step_m: Positive = 553.5
     timing_sd_m: Positive = 200.0
+    threads: Annotated[int, Ge(1), Le(64)] = 1
 
     def check(self, faults: Faults) -> None:
         """Add a least number of particles above the largest."""
@@ -266,7 +271,8 @@ class BayesFilter(Options):
             clear_from_mass=min(rules.clear_from_mass, self.switch_mass),
         )
         positioned, carriageways = None, None
-        model = BayesModel(area, motion, weights, evidence)
+        threads = Threads(self.threads)
+        model = BayesModel(area, motion, weights, evidence, threads=threads)
         if not area.cell_ids:
             positioned = particles, rules
             rules = replace(

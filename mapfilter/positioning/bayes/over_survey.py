@@ -93,6 +93,7 @@ def over_survey(
         bound.model.weights,
         replace(evidence, serving=weights, levels=levels),
         bound.model.remember,
+        bound.model.threads,
         serving_model=_statistics(measured, area, database, serving_map),
         level_sd_db=_known(sd_db, options.unmeasured_db),
     )

@@ -6,7 +6,7 @@ deliveries of one row: every other one is dropped, or all steps would count twic
 times are those of a sensor that is read more often than it measures, and stay. Headings in whole
 degrees, and those of made logs, do repeat, and go on doing so along a straight road: where headings
 are as coarse as that, repetitions say nothing. Elsewhere each speaks by how rare it was before (a
-CUSUM; Page, 1954).
+CUSUM; Page, 1954). A heading that has never been another one is no compass's after some distance.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ _PRIOR_ROWS, _PRIOR_REPEATS = 50.0, 49.0
 _MOST_NATS, _STILL_NATS = 1.0, 12.0
 """Gain of one repetition at most, and the sum from which on a heading stands still."""
 _FINE_ROWS = 30
+_NEVER_ROWS, _NEVER_M = 100, 300.0
+"""Rows and metres after which a heading that was the same from the beginning stands still; made
+logs without noise have such headings along an edge of a street that is straight for so long."""
 _COARSE_PER_DEG, _COARSE_PER_RAD = 100.0, 1000.0
 _PAIRS, _SOONER = 8, 0.8
 """Pairs of equal rows, and the interval within a pair relative to that between two of them."""
@@ -44,6 +47,8 @@ class MotionRepeats:
         Rows so far, and those of them with the heading of the row before; without the present run.
     run : int
         Rows of the present run of equal headings.
+    run_m : float
+        Distance moved in it.
     nats : float
         How much the run speaks for a heading that stands still.
     still_m : float
@@ -68,11 +73,15 @@ class MotionRepeats:
     within_s: float = nan
     between_s: float = nan
     fine: int = 0
+    run_m: float = 0.0
 
     @property
     def stands_still(self) -> bool:
         """Whether the heading no longer follows the way."""
-        return self.nats >= _STILL_NATS and self.fine >= _FINE_ROWS
+        if self.nats >= _STILL_NATS and self.fine >= _FINE_ROWS:
+            return True
+        never_changed = self.rows <= _PRIOR_ROWS + 1 and self.fine > 0
+        return never_changed and self.run >= _NEVER_ROWS and self.run_m >= _NEVER_M
 
     @property
     def come_twice(self) -> bool:
@@ -139,6 +148,7 @@ def _followed(repeats: MotionRepeats, time_s: float, step: MotionStep) -> Motion
             was_equal=is_equal,
             pairs=pairs,
             run=run,
+            run_m=repeats.run_m + abs(step.step_m),
             nats=nats,
             time_s=time_s,
             within_s=within_s,

@@ -72,7 +72,7 @@ class SensorWatch:
     report : tuple of ReportRow
         The last report.
     moved_m : float
-        Distance since then.
+        Distance since then, as measured.
     repeated_nats : float
         How much repeated reports speak for a radio that stands still.
     repeats : MotionRepeats
@@ -140,7 +140,7 @@ def watched(
     why = repeated if why is Reason.USED else why
     report, moved_m, nats = watch.report, way.moved_m, watch.repeated_nats
     if epoch.radio:
-        nats = _repeated(watch, moved_m, epoch.radio)
+        nats = _repeated(watch, step_unit_m * moved_m, epoch.radio)
         report, moved_m = epoch.radio, 0.0
     fastest_mps = max(watch.fastest_mps, _row_mps(watch, epoch.time_s, steps))
     watch = SensorWatch(*way[:-1], report, moved_m, nats, repeats, fastest_mps)

@@ -11,6 +11,7 @@ import numpy as np
 from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
 from mapfilter.database.cell_levels import received_cells
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.level_kernels import Prediction
@@ -26,6 +27,7 @@ from mapfilter.positioning.bayes.area_tiles import HELD_BYTES, TILE_PX, AreaTile
 
 SEARCH_TILES = 48
 """Most tiles in which the first hypotheses are drawn."""
+_MOST_PIXELS = 1 << 31
 _LEVELS_AT_ONCE = 256
 """Pixels that levels are looked up at together: as each may be of another cell, they are looked up
 at all pixels."""
@@ -76,7 +78,16 @@ class TiledArea(AreaFrame):
             Of all tiles and levels that are held at a time.
         search_tiles : int
             Most tiles in which the first hypotheses are drawn.
+
+        Raises
+        ------
+        StoreError
+            The area has more pixels than 32 bits count.
         """
+        if database.lattice.rows * database.lattice.cols >= _MOST_PIXELS:
+            expected, got = f"an area of less than {_MOST_PIXELS} pixels", repr(database.lattice)
+            hint = "cut it to the region of the log, or merge fewer regions"
+            raise fail(StoreError, str(database.path), expected, got, hint)
         plan, cells = database.plan, received_cells(database)
         return cls(
             database.lattice,

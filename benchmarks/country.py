@@ -1,0 +1,159 @@
+"""Builds of made areas of growing size: python benchmarks/country.py make|build FOLDER --km2 N ...
+
+``make`` writes, for each size, a raster for each cell as planning tools export them, cut at 2 km
+from its site; one cell per square kilometre, pixels of 5 m. ``build`` builds a database
+of each with the made streets of ``benchmarks/metropolis.py``: by one process, by two, and by two
+workers of Dask, in turns. It prints seconds by the clock and of the processors, points and levels.
+The slope is that of the logarithms of seconds and of levels.
+"""
+
+import argparse
+import json
+import resource
+import time
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from metropolis import CRS, FLOOR_DBM, NORTH_M, PIXEL_M, WEST_M, Radio, made_plan, made_ways
+
+from mapfilter._parallel import executor_of
+from mapfilter.database.build import build
+from mapfilter.database.sources import LayerRoutes
+from mapfilter.database.store import open_database
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.roads.index import HALF_WIDTH_M, RouteSource
+from mapfilter.workflows.build import tiles_a_task
+
+REACH_PX = 400
+CELLS_PER_KM2 = 1.0
+WAYS = {"one process": (1, None), "two processes": (2, None), "Dask, two workers": (1, "local:2")}
+"""Workers and cluster of each way to build."""
+
+
+def lattice_of(km2: float) -> Lattice:
+    """Return a square of so many square kilometres."""
+    side_px = 2 * round(np.sqrt(km2) * 1000 / PIXEL_M / 2)
+    return Lattice(CRS, WEST_M, NORTH_M, PIXEL_M, side_px, side_px)
+
+
+def plan_of(lattice: Lattice) -> CellPlan:
+    """Return the cells of an area."""
+    return made_plan(lattice, 2, 1, CELLS_PER_KM2)
+
+
+def made(folder: Path, km2: float) -> None:
+    """Write rasters and plan of an area."""
+    lattice = lattice_of(km2)
+    plan = plan_of(lattice)
+    radio = Radio.of(plan, lattice)
+    rasters = folder / "rasters"
+    rasters.mkdir(parents=True)
+    for number, cell in enumerate(plan.cells):
+        window = window_of(cell, lattice)
+        row, col = np.divmod(np.arange(window.rows * window.cols), window.cols)
+        level = radio.levels(np.array([number]), *window.east_north(row, col))
+        shape = level.reshape(window.rows, window.cols)
+        write_rasters(rasters / f"{cell.id}.tif", window, [(cell.id, shape)], [cell.id])
+
+
+def window_of(cell: Cell, lattice: Lattice) -> Lattice:
+    """Return the part of an area within the reach of a cell."""
+    row, col = (int(one) for one in lattice.row_col(cell.east_m, cell.north_m))
+    top, left = max(row - REACH_PX, 0), max(col - REACH_PX, 0)
+    bottom, right = min(row + REACH_PX, lattice.rows), min(col + REACH_PX, lattice.cols)
+    return lattice.window(top, left, bottom - top, right - left)
+
+
+def processor_s() -> float:
+    """Return the processor time of this process and of those that it started and that ended."""
+    who = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN
+    return sum(used.ru_utime + used.ru_stime for used in map(resource.getrusage, who))
+
+
+def built(folder: Path, km2: float, way: str) -> dict[str, float]:
+    """Build the database of an area; return its size, and seconds by clock and processors."""
+    workers, cluster = WAYS[way]
+    lattice = lattice_of(km2)
+    plan, ways = plan_of(lattice), made_ways(lattice, 1)
+    rasters = open_rasters(folder / "rasters")
+    layers = RouteSource.of(ways, None, None, HALF_WIDTH_M, crs=lattice.crs)
+    out = folder / "database"
+    began_s, used_s = time.perf_counter(), processor_s()
+    with executor_of(workers, cluster) as (executor, at_once):
+        ready_s = time.perf_counter()
+        database = build(
+            rasters,
+            plan,
+            LayerRoutes(layers, rasters.lattice),
+            out,
+            floor_dbm=FLOOR_DBM,
+            executor=executor,
+            in_flight=4 * at_once,
+            tiles_a_task=1 if cluster is None else tiles_a_task(rasters, 256),
+            writers=at_once,
+        )
+        done_s = time.perf_counter()
+    parts = database.manifest["parts"]
+    return {
+        "start_s": ready_s - began_s,
+        "build_s": done_s - ready_s,
+        "processor_s": processor_s() - used_s,
+        "points": int(database.manifest["counts"]["points"]),
+        "levels": sum(part["rows"] for part in parts if part.get("cell") is not None),
+        "bytes": sum(part["bytes"] for part in parts),
+        "peak_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
+    }
+
+
+def compare(folder: Path, km2: float, runs: int, ways: list[str]) -> dict[str, object]:
+    """Build an area in several ways that take turns; return medians, and all bytes being equal."""
+    found: dict[str, list[dict[str, float]]] = {way: [] for way in ways}
+    digests = set()
+    for run in range(runs):
+        for way in ways:
+            one = built(folder, km2, way)
+            found[way].append(one)
+            digests.add(open_database(folder / "database").generation)
+            print(json.dumps({"km2": km2, "way": way, "run": run, **one}), flush=True)
+    if len(digests) > 1:
+        raise SystemExit(f"{folder}: {len(digests)} different databases")
+    return {way: {key: median(one[key] for one in some) for key in some[0]}
+            for way, some in found.items()}  # fmt: skip
+
+
+def main() -> None:
+    """Make areas, or build them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=["make", "build"])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--km2", type=float, nargs="+", default=[125.0, 500.0, 2000.0])
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--way", action="append", choices=list(WAYS), help="may be repeated")
+    given = parser.parse_args()
+    table: dict[float, dict[str, object]] = {}
+    for km2 in given.km2:
+        area = given.folder / f"{km2:g}"
+        if given.what == "make":
+            made(area, km2)
+        else:
+            table[km2] = compare(area, km2, given.runs, given.way or list(WAYS))
+    if table:
+        print(json.dumps({"medians": table, "slopes": slopes(table)}))
+
+
+def slopes(table: dict[float, dict[str, object]]) -> dict[str, float]:
+    """Return, for each way, the power of the levels by which seconds grow from area to area."""
+    found = {}
+    for way in next(iter(table.values())):
+        rows = [row[way] for row in table.values()]
+        seconds, levels = (np.log([row[key] for row in rows]) for key in ("build_s", "levels"))  # type: ignore[index]
+        found[way] = float(np.polyfit(levels, seconds, 1)[0]) if len(rows) > 1 else float("nan")
+    return found
+
+
+if __name__ == "__main__":
+    main()
