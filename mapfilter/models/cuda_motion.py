@@ -46,7 +46,7 @@ def weigh_by_ways(
 ) -> None:
     """Weigh by the map, and update the probability of being off it, in place.
 
-    As :func:`mapfilter.models.way_map.weighed_by_ways`, for an area of ``size_m``, east and north.
+    As :func:`mapfilter.models.way_map.weigh_by_ways`, for an area of ``size_m``, east and north.
     """
     given = moved, log_map, pixel_m, size_m, factors, beyond, log_weight
     _cuda.start(_weigh_by_ways, moved.shape[1], *given)

@@ -198,7 +198,8 @@ class DeviceStep:
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
         given = kept, pixel, self._prediction
-        cuda_reports.weigh_by_levels(*given, self._terms(terms), weight, log_weight)
+        if terms.cell.size:
+            cuda_reports.weigh_by_levels(*given, self._terms(terms), weight, log_weight)
         if absent.cell.size:
             expected = self._terms(absent), self._bound_table
             cuda_reports.weigh_by_absence(*given, *expected, weight, log_weight)
