@@ -41,6 +41,7 @@ from mapfilter.positioning.gnss.receiver import (
     range_sigma_m,
     sky_over,
     weighed,
+    with_satellites,
 )
 
 _RESET_GATE = 0.5
@@ -266,7 +267,8 @@ class GnssGate:
         if fresh:
             rows = np.zeros((LINEAR, belief.log_weight.size))
         receiver, rows = moved(options, receiver, rows, epoch.time_s, travelled_m)
-        sigma = range_sigma_m(options, sky, travelled_m - receiver.used_at_m, particle_spacing_m)
+        receiver, rows = with_satellites(options, receiver, rows, sky)
+        sigma = range_sigma_m(options, sky, particle_spacing_m)
         used, why = None, Reason.ON_PROBATION
         if epoch.time_s >= state.probation_until_s:
             used = self._agreeing(sky, sigma, receiver, belief, rows, fresh=fresh)
@@ -301,8 +303,7 @@ class GnssGate:
         """
         gate, place, log_weight = self._gate(belief), belief.state[:2], belief.log_weight
         searching = belief.status is Status.SEARCHING
-        # Echoes that last reduce the weight of readings, but do not explain larger innovations.
-        once = sigma if searching else range_sigma_m(self.options, sky, np.inf, 0.0)
+        once = sigma if searching else range_sigma_m(self.options, sky, 0.0)
 
         def weigh(chosen: Bools, clock: Receiver, free: int, gate: float) -> Weighed | None:
             some = sky.only(chosen)

@@ -54,7 +54,11 @@ class GnssOptions(Options):
 
     zenith_m: Positive = 2.0
     echo_m: NotNegative = 4.0
-    echo_memory_m: Positive = 15.0
+    echo_memory_m: Positive = 100.0
+    echo_memory_s: Positive = 120.0
+    reflection_m: NotNegative = 4.0
+    reflection_times: NotNegative = 2.0
+    lateness: NotNegative = 0.8
     fix_memory_m: Positive = 20.0
     spacing_m: NotNegative = 10.0
     pause_s: NotNegative = 10.0

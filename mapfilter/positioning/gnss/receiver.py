@@ -9,7 +9,7 @@ clock is known better than they are apart.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite
 
 import numpy as np
@@ -24,6 +24,12 @@ from mapfilter.models.ranging import pseudoranges
 from mapfilter.models.state import StateLayout
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.epochs import Epoch, Pseudorange
+from mapfilter.positioning.gnss.biases import (
+    MOST,
+    Biases,
+    kept_share,
+    reflection_deviations_m,
+)
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.kalman.models import compiled
 
@@ -87,6 +93,17 @@ class Receiver:
     mean: Floats
     covariance: Floats
     used_at_m: float = -np.inf
+    biases: Biases = field(default_factory=Biases)
+
+    def loading(self, sky: Sky) -> Floats:
+        """Return what its states add to the pseudoranges of satellites, (m, 3 + K)."""
+        found = np.zeros((len(sky.names), self.mean.size))
+        found[:, 0] = 1.0
+        # Up, and away from the satellite.
+        found[:, 2] = -np.sin(sky.elevation_rad)
+        if self.biases.names:
+            found[np.arange(len(sky.names)), LINEAR + self.biases.index_of(sky.names)] = 1.0
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,15 +134,46 @@ def begun(options: GnssOptions, time_s: float, travelled_m: float) -> Receiver:
     return Receiver(time_s, travelled_m, np.zeros(LINEAR), np.diag(deviations**2))
 
 
+def with_satellites(
+    options: GnssOptions, receiver: Receiver, rows: Floats, sky: Sky
+) -> tuple[Receiver, Floats]:
+    """Return a receiver, and rows (3 + K, N), with a lasting error of each satellite of an epoch.
+
+    Satellites that are not received are left out once their errors are unknown again.
+    """
+    old = receiver.biases
+    known = old.known(options, np.diag(receiver.covariance)[LINEAR:])
+    known &= len(old.names) + len(sky.names) <= MOST
+    stay = np.array([name in sky.names for name in old.names], dtype=np.bool_) | known
+    held = [name for name, one in zip(old.names, stay.tolist(), strict=True) if one]
+    names = (*held, *(name for name in sky.names if name not in held))
+    reflection_m = np.zeros(len(names))
+    reflection_m[: len(held)] = old.reflection_m[stay]
+    biases = Biases(names, reflection_m)
+    now_m = reflection_deviations_m(options, sky.elevation_rad, sky.sigma_m)
+    reflection_m[biases.index_of(sky.names)] = now_m
+    index = np.append(np.arange(LINEAR), LINEAR + np.flatnonzero(stay))
+    kept, size = index.size, LINEAR + len(names)
+    mean = np.append(np.zeros(LINEAR), biases.means_m(options))
+    covariance = np.diag(np.append(np.zeros(LINEAR), biases.variances_m2(options)))
+    carrying = np.zeros((size, rows.shape[1]))
+    mean[:kept], carrying[:kept] = receiver.mean[index], rows[index]
+    covariance[:kept, :kept] = receiver.covariance[np.ix_(index, index)]
+    return replace(receiver, mean=mean, covariance=covariance, biases=biases), carrying
+
+
 def moved(
     options: GnssOptions, receiver: Receiver, rows: Floats, time_s: float, travelled_m: float
 ) -> tuple[Receiver, Floats]:
     """Propagate clock and height since the last comparison; rows have shape (3, N)."""
     elapsed_s = max(time_s - receiver.time_s, 0.0)
     gone_m = max(travelled_m - receiver.travelled_m, 0.0)
-    run = np.eye(LINEAR)
+    keep, size = kept_share(options, gone_m, elapsed_s), receiver.mean.size
+    run = np.diag(np.append(np.ones(LINEAR), np.full(size - LINEAR, keep)))
     run[0, 1] = elapsed_s
-    noise = np.zeros((LINEAR, LINEAR))
+    noise = np.zeros((size, size))
+    biases = receiver.biases
+    noise[LINEAR:, LINEAR:] = np.diag((1 - keep**2) * biases.variances_m2(options))
     # In proportion to time: noise must not depend on how often readings are compared.
     bias, rate = np.diag(clock_noise(1.0)).tolist()
     noise[0, 0] = bias * elapsed_s + rate * elapsed_s**3 / 3
@@ -134,12 +182,15 @@ def moved(
     noise[2, 2] = options.slope**2 * gone_m
     rows = rows.copy()
     rows[0] += elapsed_s * rows[1]
+    rows[LINEAR:] *= keep
     covariance = run @ receiver.covariance @ run.T + noise
+    mean = run @ receiver.mean
+    mean[LINEAR:] += (1 - keep) * biases.means_m(options)
     after = replace(
         receiver,
         time_s=time_s,
         travelled_m=travelled_m,
-        mean=run @ receiver.mean,
+        mean=mean,
         covariance=0.5 * (covariance + covariance.T),
     )
     return after, rows
@@ -156,7 +207,7 @@ def clock_reset(options: GnssOptions, receiver: Receiver) -> Receiver:
 def centred(receiver: Receiver, rows: Floats, state: Floats32) -> tuple[Receiver, Floats32]:
     """Return the receiver with the mean of the rows added, and hypotheses with the rest."""
     middle = rows.mean(axis=1)
-    carrying = np.empty((STATES + LINEAR, state.shape[1]), dtype=np.float32)
+    carrying = np.empty((STATES + len(rows), state.shape[1]), dtype=np.float32)
     carrying[:STATES] = state[:STATES]
     carrying[STATES:] = rows - middle[:, None]
     return replace(receiver, mean=receiver.mean + middle), carrying
@@ -166,7 +217,7 @@ def carried(state: Floats32) -> Floats:
     """Return clock and height of the hypotheses, shape (3, N); 0 before the first pseudorange."""
     if state.shape[0] < STATES + LINEAR:
         return np.zeros((LINEAR, state.shape[1]))
-    return state[STATES : STATES + LINEAR].astype(np.float64)
+    return state[STATES:].astype(np.float64)
 
 
 def near_clock(sky: Sky, receiver: Receiver) -> Receiver:
@@ -202,20 +253,23 @@ def weighed(
         Number of readings that an unknown clock explains by itself.
     """
     origin = np.array(sky.origin_m)[:, None]
-    state = np.empty((LAYOUT.size, place.shape[1]))
+    size = 2 + len(rows)
+    state = np.empty((size, place.shape[1]))
     state[:2] = sky.true_from_grid @ (place.astype(np.float64) - origin)
     state[2:] = rows
-    covariance = np.zeros((LAYOUT.size, LAYOUT.size))
+    covariance = np.zeros((size, size))
     covariance[2:, 2:] = receiver.covariance
     total = float(np.logaddexp.reduce(log_weight))
     # Weights of 0 become tiny ones, so that differences stay finite.
     weight = np.maximum(log_weight - total, -700.0)
     before = MixedBelief(state, weight, covariance, np.array([0, 1]))
-    model = pseudoranges(LAYOUT, sky.satellites_m, sigma_m)
-    # Up, and away from the satellite.
-    loading = np.zeros((len(sky.names), LAYOUT.size))
-    loading[:, 4] = -np.sin(sky.elevation_rad)
-    known_m = receiver.mean[0] + loading[:, 4] * receiver.mean[2]
+    model = pseudoranges(replace(LAYOUT, size=size), sky.satellites_m, sigma_m)
+    slope = receiver.loading(sky)
+    slope[:, 1] = 0.0
+    known_m = slope @ receiver.mean
+    loading = np.zeros((len(sky.names), size))
+    # The model has the clock.
+    loading[:, 4:] = slope[:, 2:]
     rng = np.random.default_rng(0)  # Nothing is drawn.
     after, info = rao_blackwell.update(
         before, compiled(model), sky.range_m - known_m, rng, _NO_RESAMPLING, loading
@@ -245,9 +299,7 @@ def agreement(
     away = sky.satellites_m[:, :2, None] - flat
     up = sky.satellites_m[:, 2, None]
     expected = np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2 + up**2)
-    slope = np.zeros((len(sky.names), LINEAR))
-    slope[:, 0] = 1.0
-    slope[:, 2] = -np.sin(sky.elevation_rad)
+    slope = receiver.loading(sky)
     off = sky.range_m[:, None] - expected - slope @ (rows + receiver.mean[:, None])
     mean = off @ weight
     apart = off - mean[:, None]
@@ -300,16 +352,12 @@ def sky_over(
     return (sky.only(up) if up.any() else None), tuple(unused)
 
 
-def range_sigma_m(
-    options: GnssOptions, sky: Sky, gone_m: float, particle_spacing_m: float
-) -> Floats:
-    """Return standard deviations of pseudoranges, ``gone_m`` after the last ones that were used.
+def range_sigma_m(options: GnssOptions, sky: Sky, particle_spacing_m: float) -> Floats:
+    """Return standard deviations of the white noise of pseudoranges.
 
-    White noise is independent each time. Echoes last for some metres, over which readings count as
-    one. The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
+    The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
     """
     by_elevation = options.zenith_m / np.sin(sky.elevation_rad)
     white = np.where(np.isfinite(sky.sigma_m), sky.sigma_m, by_elevation)
-    lasts = max(options.echo_memory_m / max(gone_m, MIN_MOVED_M), 1.0)
     beside = particle_spacing_m * np.cos(sky.elevation_rad)
-    return np.asarray(np.sqrt(white**2 + options.echo_m**2 * lasts + beside**2))
+    return np.asarray(np.hypot(white, beside))
