@@ -1,8 +1,8 @@
-"""Pseudoranges, and the receiver's clock and height that each hypothesis carries.
+"""Pseudoranges, and the clock, height and lasting errors that each hypothesis carries.
 
 A pseudorange is the distance to a satellite, plus the clock's error, plus the effect of the
-antenna's height. Given a hypothesis's path, clock and height are linear and Gaussian: each
-hypothesis carries their mean in three further rows of its state, and all share one covariance
+antenna's height, plus the satellite's lasting error. Given a hypothesis's path, these are linear
+and Gaussian: each hypothesis carries their mean in further rows, and all share one covariance
 (:mod:`mapfilter.filters.rao_blackwell`). So a single satellite weighs hypotheses, as soon as the
 clock is known better than they are apart.
 """
@@ -10,20 +10,16 @@ clock is known better than they are apart.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import isfinite
 
 import numpy as np
 
-from mapfilter._types import Bools, Floats, Floats32
+from mapfilter._types import Floats, Floats32
 from mapfilter.filters import rao_blackwell
-from mapfilter.filters.contract import Reason
 from mapfilter.filters.rao_blackwell import MixedBelief, SirOptions
-from mapfilter.gnss.sky import GridFrame, directions
 from mapfilter.models.motion import clock_noise
 from mapfilter.models.ranging import pseudoranges
 from mapfilter.models.state import StateLayout
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.epochs import Epoch, Pseudorange
 from mapfilter.positioning.gnss.biases import (
     MOST,
     Biases,
@@ -31,61 +27,34 @@ from mapfilter.positioning.gnss.biases import (
     reflection_deviations_m,
 )
 from mapfilter.positioning.gnss.options import GnssOptions
+from mapfilter.positioning.gnss.sky import Sky
 from mapfilter.positioning.kalman.models import compiled
 
 LAYOUT = StateLayout(5, 0, 1, clock=2)
-"""East and north from the frame's origin, the clock's error and rate, and the height."""
+"""East and north from the frame's origin, the clock's error and rate, and the height; lasting
+errors of satellites (:mod:`mapfilter.positioning.gnss.biases`) stand behind these."""
 LINEAR = 3
 MIN_MOVED_M = 0.1
 _NO_RESAMPLING = SirOptions(resample_below=0.0)
 
-Unused = tuple[str, str, Reason]
-"""Kind and name of a reading left out, and why."""
-
-
-@dataclass(frozen=True, eq=False)
-class Sky:
-    """Satellites (m, 3) received at one epoch, in true east, north and up about a place.
-
-    ``sigma_m`` are standard deviations of the pseudoranges' noise, NaN if not reported;
-    ``origin_m`` is the place in the frame of the hypotheses, and ``true_from_grid`` (2, 2) the
-    rotation by the grid convergence.
-    """
-
-    names: tuple[str, ...]
-    satellites_m: Floats
-    elevation_rad: Floats
-    range_m: Floats
-    sigma_m: Floats
-    origin_m: tuple[float, float]
-    true_from_grid: Floats
-
-    def only(self, chosen: Bools) -> Sky:
-        """Return the chosen satellites."""
-        return replace(
-            self,
-            names=tuple(np.array(self.names)[chosen].tolist()),
-            satellites_m=self.satellites_m[chosen],
-            elevation_rad=self.elevation_rad[chosen],
-            range_m=self.range_m[chosen],
-            sigma_m=self.sigma_m[chosen],
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class Receiver:
-    """Clock and height of a belief; hypotheses carry their differences from it.
+    """Clock, height and lasting errors of a belief; hypotheses carry their differences from it.
 
     Parameters
     ----------
     time_s, travelled_m : float
         Time and distance travelled at the last comparison.
-    mean : (3,) array
-        Clock error (m) and rate (m/s), and height over the frame's origin (m).
-    covariance : (3, 3) array
+    mean : (3 + K,) array
+        Clock error (m) and rate (m/s), height over the frame's origin (m), and the lasting error
+        of each satellite in ``biases`` (m).
+    covariance : (3 + K, 3 + K) array
         Shared by all hypotheses.
     used_at_m : float
         Distance travelled when satellites were last used.
+    biases : Biases
+        Satellites whose lasting errors are held.
     """
 
     time_s: float
@@ -116,10 +85,10 @@ class Weighed:
         Log-likelihood of each hypothesis, such that the belief's total is 0.
     score : float
         Log-likelihood of the belief less the usual one.
-    rows : (3, N) array
-        Clock and height of the hypotheses afterwards.
-    covariance : (3, 3) array
-        Of the clock error, its rate and the height afterwards, shared by all hypotheses.
+    rows : (3 + K, N) array
+        Clock, height and lasting errors of the hypotheses afterwards.
+    covariance : (3 + K, 3 + K) array
+        Of these afterwards, shared by all hypotheses.
     """
 
     gain: Floats
@@ -165,7 +134,7 @@ def with_satellites(
 def moved(
     options: GnssOptions, receiver: Receiver, rows: Floats, time_s: float, travelled_m: float
 ) -> tuple[Receiver, Floats]:
-    """Propagate clock and height since the last comparison; rows have shape (3, N)."""
+    """Propagate a receiver since the last comparison; rows have shape (3 + K, N)."""
     elapsed_s = max(time_s - receiver.time_s, 0.0)
     gone_m = max(travelled_m - receiver.travelled_m, 0.0)
     keep, size = kept_share(options, gone_m, elapsed_s), receiver.mean.size
@@ -213,10 +182,13 @@ def centred(receiver: Receiver, rows: Floats, state: Floats32) -> tuple[Receiver
     return replace(receiver, mean=receiver.mean + middle), carrying
 
 
-def carried(state: Floats32) -> Floats:
-    """Return clock and height of the hypotheses, shape (3, N); 0 before the first pseudorange."""
-    if state.shape[0] < STATES + LINEAR:
-        return np.zeros((LINEAR, state.shape[1]))
+def carried(state: Floats32, size: int = LINEAR) -> Floats:
+    """Return what hypotheses carry of a receiver's states, shape (size, N).
+
+    This is 0 before the first pseudorange, and where they began beside another receiver.
+    """
+    if state.shape[0] != STATES + size:
+        return np.zeros((size, state.shape[1]))
     return state[STATES:].astype(np.float64)
 
 
@@ -237,7 +209,7 @@ def weighed(
     rows: Floats,
     free: int = 0,
 ) -> Weighed:
-    """Weigh hypotheses by pseudoranges, with clock and height integrated out.
+    """Weigh hypotheses by pseudoranges, with clock, height and lasting errors integrated out.
 
     Parameters
     ----------
@@ -247,8 +219,8 @@ def weighed(
         At the time of the pseudoranges.
     place : (2, N) array
         East and north of the hypotheses in their frame.
-    rows : (3, N) array
-        Clock and height of the hypotheses.
+    rows : (3 + K, N) array
+        Clock, height and lasting errors of the hypotheses.
     free : int
         Number of readings that an unknown clock explains by itself.
     """
@@ -268,7 +240,7 @@ def weighed(
     slope[:, 1] = 0.0
     known_m = slope @ receiver.mean
     loading = np.zeros((len(sky.names), size))
-    # The model has the clock.
+    # The model itself adds the clock's error.
     loading[:, 4:] = slope[:, 2:]
     rng = np.random.default_rng(0)  # Nothing is drawn.
     after, info = rao_blackwell.update(
@@ -306,58 +278,3 @@ def agreement(
     spread = (apart * weight) @ apart.T + slope @ receiver.covariance @ slope.T
     square = float(mean @ np.linalg.solve(spread + np.diag(sigma_m**2), mean))
     return 0.5 * (max(len(sky.names) - free, 0) - square)
-
-
-def sky_over(
-    options: GnssOptions,
-    crs: str,
-    origin_m: tuple[float, float],
-    epoch: Epoch,
-    middle_m: tuple[float, float],
-) -> tuple[Sky | None, tuple[Unused, ...]]:
-    """Return the satellites of an epoch over a place, and the readings left out.
-
-    ``origin_m`` is that of the frame of the hypotheses, in the map's CRS; ``middle_m`` the place,
-    in that frame.
-    """
-    unused = list[Unused]()
-    chosen: dict[str, Pseudorange] = {}
-    for row in epoch.ranges:
-        if not isfinite(row.range_m):
-            continue
-        if row.satellite in chosen:
-            unused.append(("pseudorange", row.satellite, Reason.SECOND_READING))
-        elif not all(isfinite(value) for value in row.place_m):
-            unused.append(("pseudorange", row.satellite, Reason.UNKNOWN_SATELLITE))
-        else:
-            chosen[row.satellite] = row
-    if not chosen:
-        return None, tuple(unused)
-    east, north = middle_m[0] + origin_m[0], middle_m[1] + origin_m[1]
-    frame = GridFrame(crs, east, north, options.height_m)
-    local = frame.local.to_local(np.array([row.place_m for row in chosen.values()]))
-    seen = directions(local)
-    sky = Sky(
-        tuple(chosen),
-        local,
-        seen.elevation_rad,
-        np.array([row.range_m for row in chosen.values()]),
-        np.array([row.sigma_m for row in chosen.values()]),
-        middle_m,
-        frame.true_from_grid,
-    )
-    up = seen.above(options.mask_deg)
-    for name in np.array(sky.names)[~up].tolist():
-        unused.append(("pseudorange", name, Reason.BELOW_HORIZON))
-    return (sky.only(up) if up.any() else None), tuple(unused)
-
-
-def range_sigma_m(options: GnssOptions, sky: Sky, particle_spacing_m: float) -> Floats:
-    """Return standard deviations of the white noise of pseudoranges.
-
-    The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
-    """
-    by_elevation = options.zenith_m / np.sin(sky.elevation_rad)
-    white = np.where(np.isfinite(sky.sigma_m), sky.sigma_m, by_elevation)
-    beside = particle_spacing_m * np.cos(sky.elevation_rad)
-    return np.asarray(np.hypot(white, beside))

@@ -24,14 +24,12 @@ from mapfilter.positioning.gnss.gate import FixTerm, GnssGate, GnssState
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
-    Sky,
     begun,
     near_clock,
-    range_sigma_m,
-    sky_over,
     weighed,
     with_satellites,
 )
+from mapfilter.positioning.gnss.sky import Sky, range_sigma_m, sky_over
 from mapfilter.tracks.schema import Kind
 
 _FIRST_SPACING_M = 10.0
