@@ -37,6 +37,7 @@ from mapfilter.positioning.bayes.state import BayesState, Reported
 from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.epochs import GnssFix, ReportRow
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
+from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.integrity import SampleTail
@@ -52,6 +53,7 @@ _CLASSES: dict[str, type] = {
         AlternativeHypothesis,
         BayesState,
         BeliefSummary,
+        Biases,
         Bins,
         DeadReckoning,
         Fix,

@@ -176,8 +176,11 @@ def _is_whole(belief: object) -> bool:
         return False
     shared, count = belief.shared, belief.log_weight.size
     width = shared.width if isinstance(shared, LevelMemory) else belief.kept.shape[0]
+    rows, columns = belief.state.shape if belief.state.ndim == 2 else (0, 0)
+    # Behind these rows stand those of a satellite receiver.
     return (
-        belief.state.shape == (STATES, count)
+        rows >= STATES
+        and columns == count
         and belief.log_weight.shape == (count,)
         and belief.kept.shape == (width, count)
     )

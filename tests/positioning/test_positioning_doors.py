@@ -36,7 +36,8 @@ from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 def test_the_usual_options():
     assert asdict(GnssOptions()) == {
-        "zenith_m": 2.0, "echo_m": 4.0, "echo_memory_m": 15.0, "fix_memory_m": 20.0,
+        "zenith_m": 2.0, "echo_m": 4.0, "echo_memory_m": 100.0, "echo_memory_s": 120.0,
+        "reflection_m": 4.0, "reflection_times": 2.0, "lateness": 1.0, "fix_memory_m": 20.0,
         "spacing_m": 10.0, "pause_s": 10.0, "mask_deg": 5.0, "height_m": 100.0,
         "height_sd_m": 200.0, "slope": 0.3, "clock_sd_m": 3e5, "drift_sd_mps": 100.0,
         "outliers": 0.05, "gate": 8.0, "search_gate": 16.0, "probation_s": 5.0, "trust": 3.0,
@@ -175,7 +176,9 @@ def test_limits_are_those_of_the_parts(given, fault):
         BayesFilter(**given)
 
 
-POSITIVE = ("zenith_m", "echo_memory_m", "fix_memory_m", "clock_sd_m", "trust_grows_s")
+POSITIVE = (
+    "zenith_m", "echo_memory_m", "echo_memory_s", "fix_memory_m", "clock_sd_m", "trust_grows_s",
+)  # fmt: skip
 NUMBERS = tuple(asdict(GnssOptions()))
 
 

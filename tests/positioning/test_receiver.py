@@ -10,7 +10,6 @@ from mapfilter.errors import ConfigError
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.receiver import (
-    Sky,
     begun,
     carried,
     centred,
@@ -19,6 +18,7 @@ from mapfilter.positioning.gnss.receiver import (
     near_clock,
     weighed,
 )
+from mapfilter.positioning.gnss.sky import Sky
 
 OPTIONS = GnssOptions(height_sd_m=0.0)
 PLACES = np.array([[0.0, 40.0, -200.0, 350.0], [0.0, 90.0, 30.0, -80.0]], dtype=np.float32)

@@ -15,7 +15,6 @@ from mapfilter.positioning.epochs import Epoch, Pseudorange
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     Receiver,
-    Sky,
     agreement,
     begun,
     carried,
@@ -23,10 +22,9 @@ from mapfilter.positioning.gnss.receiver import (
     clock_reset,
     moved,
     near_clock,
-    range_sigma_m,
-    sky_over,
     weighed,
 )
+from mapfilter.positioning.gnss.sky import Sky, range_sigma_m, sky_over
 
 CRS = "EPSG:32632"
 OPTIONS = GnssOptions(slope=0.4, height_m=80.0)
@@ -181,6 +179,8 @@ def test_hypotheses_without_a_receiver_carry_nothing():
     state = np.arange(11 * 4, dtype=np.float32).reshape(11, 4)
     np.testing.assert_array_equal(carried(state), state[8:])
     np.testing.assert_array_equal(carried(state[:10]), np.zeros((3, 4)))
+    # Nor do those that began beside a receiver of other satellites.
+    np.testing.assert_array_equal(carried(state, 5), np.zeros((5, 4)))
 
 
 def test_some_of_the_satellites():
@@ -193,18 +193,15 @@ def test_some_of_the_satellites():
     assert found.origin_m == ORIGIN_M
 
 
-def test_errors_of_pseudoranges():
-    """White noise by elevation or as reported, echoes for as long as they last, and the spacing."""
-    options = GnssOptions(zenith_m=3.0, echo_m=5.0, echo_memory_m=20.0)
+def test_white_noise_of_pseudoranges():
+    """By elevation or as reported, and the spacing; what lasts is no white noise."""
+    options = GnssOptions(zenith_m=3.0, echo_m=5.0)
     elevation = np.radians([90.0, 30.0, 10.0])
     sky = replace(sky_of(3), elevation_rad=elevation, sigma_m=np.array([np.nan, np.nan, 7.0]))
     white = np.array([3.0, 6.0, 7.0])
-    for gone_m, lasts in ((5.0, 4.0), (20.0, 1.0), (90.0, 1.0), (0.0, 200.0)):
-        found = range_sigma_m(options, sky, gone_m, 0.0)
-        np.testing.assert_allclose(found, np.sqrt(white**2 + 25.0 * lasts))
-    spaced = range_sigma_m(options, sky, 20.0, 8.0)
+    np.testing.assert_allclose(range_sigma_m(options, sky, 0.0), white)
     beside = 8.0 * np.cos(elevation)
-    np.testing.assert_allclose(spaced, np.sqrt(white**2 + 25.0 + beside**2))
+    np.testing.assert_allclose(range_sigma_m(options, sky, 8.0), np.hypot(white, beside))
 
 
 LON_DEG, LAT_DEG, HEIGHT_M = 9.3, 48.5, 250.0

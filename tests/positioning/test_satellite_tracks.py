@@ -10,6 +10,7 @@ from cross_world import CRS, EAST, LATTICE, NORTH, SOUTH, make_database, walk_lo
 from sky_world import HEIGHTS, START_UTC_S, no_rows, off_m, sky_log, sky_table
 
 from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.bayes.held import Hold
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, epochs
 from mapfilter.positioning.filter import estimate_of, locate
@@ -53,6 +54,18 @@ def test_satellites_and_streets_find_a_walk_without_radio(positioner):
     estimate = found(positioner, log)
     assert estimate.converged_at is not None
     assert off_m(log, estimate)[estimate.converged_at :].mean() < 6
+
+
+def test_a_phone_that_was_turned_may_receive_satellites(area):
+    """Beliefs with another reading of headings have other hypotheses, and another number."""
+    positioner = BayesFilter(**{**FEW, "min_particles": 600}, **HEIGHTS).over_area(area)
+    rng, state, compared = np.random.default_rng(0), positioner.begin(), 0
+    for epoch in epochs(sky_log(most=4)):
+        if not compared and state.belief and state.belief.status is Status.TRACKING:
+            state = replace(state, hold=Hold(sign=-1.0))
+        state, _ = positioner.step(state, epoch, rng)
+        compared += bool(state.held)
+    assert compared > 1
 
 
 def test_a_log_without_readings_of_satellites_gives_the_same_bytes(positioner):

@@ -4,16 +4,23 @@ import asyncio
 import json
 import time
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from asking import SERVING, Streamed, ask, documents, service
 
 from mapfilter.errors import ConfigError
+from mapfilter.gnss.almanacs import nominal_gps
+from mapfilter.gnss.orbits import gps_time
+from mapfilter.models.street_motion import STATES
+from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate as replay
 from mapfilter.serving import sessions as sessions_module
 from mapfilter.serving.documents import RequestError
 from mapfilter.serving.store import LOCK, SessionStore
+from mapfilter.simulation.satellites import ReceptionModel, receive
+from mapfilter.tracks.log import make_log
 
 COUNT = 60
 
@@ -207,6 +214,29 @@ def test_sessions_of_another_database_are_refused(positioner, cross, tmp_path):
         pytest.raises(ConfigError, match="sessions of this database"),
     ):
         store.read_all()
+
+
+def test_a_session_with_satellites_is_restored(positioner, tmp_path):
+    """Its hypotheses carry further rows: clock, height and lasting errors."""
+    rng, state, start_utc_s = np.random.default_rng(0), positioner.begin(), 1_700_000_000.0
+    log, crs = documents()[1], positioner.area.lattice.crs
+    almanac = nominal_gps(gps_time(start_utc_s)[0])
+    ranges = receive(log.truth, crs, None, almanac, start_utc_s, ReceptionModel(most=4), rng)
+    log = replace(log, pseudoranges=make_log(crs, pseudoranges=ranges).pseudoranges)
+    for epoch in epochs(log)[:60]:
+        state, _ = positioner.step(state, epoch, rng)
+    assert state.belief.state.shape[0] > STATES
+    value = {
+        "name": "a phone", "seed": 0, "began_utc_s": 0.0, "state": state, "epochs": 60,
+        "rng": rng.bit_generator.state, "time_s": 1.0, "last": "",
+    }  # fmt: skip
+    session = "0" * 22
+    with closing(SessionStore.in_folder(tmp_path, "made")) as store:
+        store.write(session, value)
+        again = store.read(session)["state"]
+    np.testing.assert_array_equal(again.belief.state, state.belief.state)
+    receiver = again.sources["gnss"].receiver
+    assert receiver.biases.names == state.sources["gnss"].receiver.biases.names != ()
 
 
 def test_a_folder_belongs_to_one_service_at_a_time(positioner, cross, tmp_path):

@@ -109,6 +109,14 @@ class RadioReading:
     serving_under_null: float = SERVING_UNDER_NULL
     belief: MapBelief | None = None
 
+    def for_other_hypotheses(self) -> RadioReading:
+        """Return the reading without terms that hold for the hypotheses of one belief only."""
+        own = [isinstance(one, FixedTerm) and one.value.size > 1 for one in self.terms]
+        if not any(own):
+            return self
+        kept = tuple(one for one, drop in zip(self.terms, own, strict=True) if not drop)
+        return replace(self, terms=kept)
+
     def at_edge(self, area: AreaFrame) -> bool:
         """Return whether the belief lies at the edge of an area."""
         belief = self.belief

@@ -205,6 +205,8 @@ class Weighing:
         beliefs = self.beliefs
         rules, holds = beliefs.rules_of(state), beliefs.holds
         found, rng = [], own_rng(time_s, _WEIGHED)
+        # Pseudoranges are compared with the main belief alone, whose total likelihood they leave.
+        evidence = evidence.for_other_hypotheses()
         for one in state.held:
             reading = _tracked(evidence, one.belief, measured=measured)
             belief, info = beliefs.held_otherwise.update(one.belief, reading, rng)

@@ -28,8 +28,6 @@ from mapfilter.positioning.gnss.receiver import (
     LINEAR,
     MIN_MOVED_M,
     Receiver,
-    Sky,
-    Unused,
     Weighed,
     agreement,
     begun,
@@ -38,10 +36,10 @@ from mapfilter.positioning.gnss.receiver import (
     clock_reset,
     moved,
     near_clock,
-    range_sigma_m,
-    sky_over,
     weighed,
+    with_satellites,
 )
+from mapfilter.positioning.gnss.sky import Sky, Unused, range_sigma_m, sky_over
 
 _RESET_GATE = 0.5
 _F = np.float32
@@ -261,12 +259,15 @@ class GnssGate:
         found = found._replace(unused=(*found.unused, *unused))
         if sky is None:
             return found
-        rows, fresh = carried(belief.state), state.receiver is None
-        receiver = state.receiver or near_clock(sky, begun(options, epoch.time_s, travelled_m))
-        if fresh:
+        receiver, fresh = state.receiver, state.receiver is None
+        if receiver is None:
+            receiver = near_clock(sky, begun(options, epoch.time_s, travelled_m))
             rows = np.zeros((LINEAR, belief.log_weight.size))
+        else:
+            rows = carried(belief.state, receiver.mean.size)
         receiver, rows = moved(options, receiver, rows, epoch.time_s, travelled_m)
-        sigma = range_sigma_m(options, sky, travelled_m - receiver.used_at_m, particle_spacing_m)
+        receiver, rows = with_satellites(options, receiver, rows, sky)
+        sigma = range_sigma_m(options, sky, particle_spacing_m)
         used, why = None, Reason.ON_PROBATION
         if epoch.time_s >= state.probation_until_s:
             used = self._agreeing(sky, sigma, receiver, belief, rows, fresh=fresh)
@@ -301,8 +302,7 @@ class GnssGate:
         """
         gate, place, log_weight = self._gate(belief), belief.state[:2], belief.log_weight
         searching = belief.status is Status.SEARCHING
-        # Echoes that last reduce the weight of readings, but do not explain larger innovations.
-        once = sigma if searching else range_sigma_m(self.options, sky, np.inf, 0.0)
+        once = sigma if searching else range_sigma_m(self.options, sky, 0.0)
 
         def weigh(chosen: Bools, clock: Receiver, free: int, gate: float) -> Weighed | None:
             some = sky.only(chosen)

@@ -21,11 +21,18 @@ class GnssOptions(Options):
         Standard deviation of a pseudorange overhead where the log has none; grows as one over the
         sine of the elevation.
     echo_m : float
-        Standard deviation of lasting errors (multipath in streets).
-    echo_memory_m : float
-        Distance for which they last; pseudoranges in a row count as one over it.
+        Standard deviation of each satellite's lasting error in the open.
+    echo_memory_m, echo_memory_s : float
+        Distance and time over which lasting errors are correlated by 1/e.
+    reflection_m : float
+        Standard deviation of lasting errors by reflections at an elevation of 45 degrees, where the
+        log has no deviations; in proportion to the cotangent of the elevation.
+    reflection_times : float
+        The same where it has: times the deviation, times its ratio to the least one of the epoch.
+    lateness : float
+        Mean of the errors by reflections over their deviation: reflections are late.
     fix_memory_m : float
-        The same for fixes.
+        Distance for which errors of fixes last; fixes in a row count as one over it.
     spacing_m, pause_s : float
         Satellites are used with each radio report that is used; without one after this distance,
         or after this time at a standstill.
@@ -54,7 +61,11 @@ class GnssOptions(Options):
 
     zenith_m: Positive = 2.0
     echo_m: NotNegative = 4.0
-    echo_memory_m: Positive = 15.0
+    echo_memory_m: Positive = 100.0
+    echo_memory_s: Positive = 120.0
+    reflection_m: NotNegative = 4.0
+    reflection_times: NotNegative = 2.0
+    lateness: NotNegative = 1.0
     fix_memory_m: Positive = 20.0
     spacing_m: NotNegative = 10.0
     pause_s: NotNegative = 10.0

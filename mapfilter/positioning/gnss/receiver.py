@@ -1,85 +1,60 @@
-"""Pseudoranges, and the receiver's clock and height that each hypothesis carries.
+"""Pseudoranges, and the clock, height and lasting errors that each hypothesis carries.
 
 A pseudorange is the distance to a satellite, plus the clock's error, plus the effect of the
-antenna's height. Given a hypothesis's path, clock and height are linear and Gaussian: each
-hypothesis carries their mean in three further rows of its state, and all share one covariance
+antenna's height, plus the satellite's lasting error. Given a hypothesis's path, these are linear
+and Gaussian: each hypothesis carries their mean in further rows, and all share one covariance
 (:mod:`mapfilter.filters.rao_blackwell`). So a single satellite weighs hypotheses, as soon as the
 clock is known better than they are apart.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import isfinite
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mapfilter._types import Bools, Floats, Floats32
+from mapfilter._types import Floats, Floats32
 from mapfilter.filters import rao_blackwell
-from mapfilter.filters.contract import Reason
 from mapfilter.filters.rao_blackwell import MixedBelief, SirOptions
-from mapfilter.gnss.sky import GridFrame, directions
 from mapfilter.models.motion import clock_noise
 from mapfilter.models.ranging import pseudoranges
 from mapfilter.models.state import StateLayout
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.epochs import Epoch, Pseudorange
+from mapfilter.positioning.gnss.biases import (
+    MOST,
+    Biases,
+    kept_share,
+    reflection_deviations_m,
+)
 from mapfilter.positioning.gnss.options import GnssOptions
+from mapfilter.positioning.gnss.sky import Sky
 from mapfilter.positioning.kalman.models import compiled
 
 LAYOUT = StateLayout(5, 0, 1, clock=2)
-"""East and north from the frame's origin, the clock's error and rate, and the height."""
+"""East and north from the frame's origin, the clock's error and rate, and the height; lasting
+errors of satellites (:mod:`mapfilter.positioning.gnss.biases`) stand behind these."""
 LINEAR = 3
 MIN_MOVED_M = 0.1
 _NO_RESAMPLING = SirOptions(resample_below=0.0)
 
-Unused = tuple[str, str, Reason]
-"""Kind and name of a reading left out, and why."""
-
-
-@dataclass(frozen=True, eq=False)
-class Sky:
-    """Satellites (m, 3) received at one epoch, in true east, north and up about a place.
-
-    ``sigma_m`` are standard deviations of the pseudoranges' noise, NaN if not reported;
-    ``origin_m`` is the place in the frame of the hypotheses, and ``true_from_grid`` (2, 2) the
-    rotation by the grid convergence.
-    """
-
-    names: tuple[str, ...]
-    satellites_m: Floats
-    elevation_rad: Floats
-    range_m: Floats
-    sigma_m: Floats
-    origin_m: tuple[float, float]
-    true_from_grid: Floats
-
-    def only(self, chosen: Bools) -> Sky:
-        """Return the chosen satellites."""
-        return replace(
-            self,
-            names=tuple(np.array(self.names)[chosen].tolist()),
-            satellites_m=self.satellites_m[chosen],
-            elevation_rad=self.elevation_rad[chosen],
-            range_m=self.range_m[chosen],
-            sigma_m=self.sigma_m[chosen],
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class Receiver:
-    """Clock and height of a belief; hypotheses carry their differences from it.
+    """Clock, height and lasting errors of a belief; hypotheses carry their differences from it.
 
     Parameters
     ----------
     time_s, travelled_m : float
         Time and distance travelled at the last comparison.
-    mean : (3,) array
-        Clock error (m) and rate (m/s), and height over the frame's origin (m).
-    covariance : (3, 3) array
+    mean : (3 + K,) array
+        Clock error (m) and rate (m/s), height over the frame's origin (m), and the lasting error
+        of each satellite in ``biases`` (m).
+    covariance : (3 + K, 3 + K) array
         Shared by all hypotheses.
     used_at_m : float
         Distance travelled when satellites were last used.
+    biases : Biases
+        Satellites whose lasting errors are held.
     """
 
     time_s: float
@@ -87,6 +62,17 @@ class Receiver:
     mean: Floats
     covariance: Floats
     used_at_m: float = -np.inf
+    biases: Biases = field(default_factory=Biases)
+
+    def loading(self, sky: Sky) -> Floats:
+        """Return what its states add to the pseudoranges of satellites, (m, 3 + K)."""
+        found = np.zeros((len(sky.names), self.mean.size))
+        found[:, 0] = 1.0
+        # Up, and away from the satellite.
+        found[:, 2] = -np.sin(sky.elevation_rad)
+        if self.biases.names:
+            found[np.arange(len(sky.names)), LINEAR + self.biases.index_of(sky.names)] = 1.0
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +85,10 @@ class Weighed:
         Log-likelihood of each hypothesis, such that the belief's total is 0.
     score : float
         Log-likelihood of the belief less the usual one.
-    rows : (3, N) array
-        Clock and height of the hypotheses afterwards.
-    covariance : (3, 3) array
-        Of the clock error, its rate and the height afterwards, shared by all hypotheses.
+    rows : (3 + K, N) array
+        Clock, height and lasting errors of the hypotheses afterwards.
+    covariance : (3 + K, 3 + K) array
+        Of these afterwards, shared by all hypotheses.
     """
 
     gain: Floats
@@ -117,15 +103,46 @@ def begun(options: GnssOptions, time_s: float, travelled_m: float) -> Receiver:
     return Receiver(time_s, travelled_m, np.zeros(LINEAR), np.diag(deviations**2))
 
 
+def with_satellites(
+    options: GnssOptions, receiver: Receiver, rows: Floats, sky: Sky
+) -> tuple[Receiver, Floats]:
+    """Return a receiver, and rows (3 + K, N), with a lasting error of each satellite of an epoch.
+
+    Satellites that are not received are left out once their errors are unknown again.
+    """
+    old = receiver.biases
+    known = old.known(options, np.diag(receiver.covariance)[LINEAR:])
+    known &= len(old.names) + len(sky.names) <= MOST
+    stay = np.array([name in sky.names for name in old.names], dtype=np.bool_) | known
+    held = [name for name, one in zip(old.names, stay.tolist(), strict=True) if one]
+    names = (*held, *(name for name in sky.names if name not in held))
+    reflection_m = np.zeros(len(names))
+    reflection_m[: len(held)] = old.reflection_m[stay]
+    biases = Biases(names, reflection_m)
+    now_m = reflection_deviations_m(options, sky.elevation_rad, sky.sigma_m)
+    reflection_m[biases.index_of(sky.names)] = now_m
+    index = np.append(np.arange(LINEAR), LINEAR + np.flatnonzero(stay))
+    kept, size = index.size, LINEAR + len(names)
+    mean = np.append(np.zeros(LINEAR), biases.means_m(options))
+    covariance = np.diag(np.append(np.zeros(LINEAR), biases.variances_m2(options)))
+    carrying = np.zeros((size, rows.shape[1]))
+    mean[:kept], carrying[:kept] = receiver.mean[index], rows[index]
+    covariance[:kept, :kept] = receiver.covariance[np.ix_(index, index)]
+    return replace(receiver, mean=mean, covariance=covariance, biases=biases), carrying
+
+
 def moved(
     options: GnssOptions, receiver: Receiver, rows: Floats, time_s: float, travelled_m: float
 ) -> tuple[Receiver, Floats]:
-    """Propagate clock and height since the last comparison; rows have shape (3, N)."""
+    """Propagate a receiver since the last comparison; rows have shape (3 + K, N)."""
     elapsed_s = max(time_s - receiver.time_s, 0.0)
     gone_m = max(travelled_m - receiver.travelled_m, 0.0)
-    run = np.eye(LINEAR)
+    keep, size = kept_share(options, gone_m, elapsed_s), receiver.mean.size
+    run = np.diag(np.append(np.ones(LINEAR), np.full(size - LINEAR, keep)))
     run[0, 1] = elapsed_s
-    noise = np.zeros((LINEAR, LINEAR))
+    noise = np.zeros((size, size))
+    biases = receiver.biases
+    noise[LINEAR:, LINEAR:] = np.diag((1 - keep**2) * biases.variances_m2(options))
     # In proportion to time: noise must not depend on how often readings are compared.
     bias, rate = np.diag(clock_noise(1.0)).tolist()
     noise[0, 0] = bias * elapsed_s + rate * elapsed_s**3 / 3
@@ -134,12 +151,15 @@ def moved(
     noise[2, 2] = options.slope**2 * gone_m
     rows = rows.copy()
     rows[0] += elapsed_s * rows[1]
+    rows[LINEAR:] *= keep
     covariance = run @ receiver.covariance @ run.T + noise
+    mean = run @ receiver.mean
+    mean[LINEAR:] += (1 - keep) * biases.means_m(options)
     after = replace(
         receiver,
         time_s=time_s,
         travelled_m=travelled_m,
-        mean=run @ receiver.mean,
+        mean=mean,
         covariance=0.5 * (covariance + covariance.T),
     )
     return after, rows
@@ -156,17 +176,20 @@ def clock_reset(options: GnssOptions, receiver: Receiver) -> Receiver:
 def centred(receiver: Receiver, rows: Floats, state: Floats32) -> tuple[Receiver, Floats32]:
     """Return the receiver with the mean of the rows added, and hypotheses with the rest."""
     middle = rows.mean(axis=1)
-    carrying = np.empty((STATES + LINEAR, state.shape[1]), dtype=np.float32)
+    carrying = np.empty((STATES + len(rows), state.shape[1]), dtype=np.float32)
     carrying[:STATES] = state[:STATES]
     carrying[STATES:] = rows - middle[:, None]
     return replace(receiver, mean=receiver.mean + middle), carrying
 
 
-def carried(state: Floats32) -> Floats:
-    """Return clock and height of the hypotheses, shape (3, N); 0 before the first pseudorange."""
-    if state.shape[0] < STATES + LINEAR:
-        return np.zeros((LINEAR, state.shape[1]))
-    return state[STATES : STATES + LINEAR].astype(np.float64)
+def carried(state: Floats32, size: int = LINEAR) -> Floats:
+    """Return what hypotheses carry of a receiver's states, shape (size, N).
+
+    This is 0 before the first pseudorange, and where they began beside another receiver.
+    """
+    if state.shape[0] != STATES + size:
+        return np.zeros((size, state.shape[1]))
+    return state[STATES:].astype(np.float64)
 
 
 def near_clock(sky: Sky, receiver: Receiver) -> Receiver:
@@ -186,7 +209,7 @@ def weighed(
     rows: Floats,
     free: int = 0,
 ) -> Weighed:
-    """Weigh hypotheses by pseudoranges, with clock and height integrated out.
+    """Weigh hypotheses by pseudoranges, with clock, height and lasting errors integrated out.
 
     Parameters
     ----------
@@ -196,26 +219,29 @@ def weighed(
         At the time of the pseudoranges.
     place : (2, N) array
         East and north of the hypotheses in their frame.
-    rows : (3, N) array
-        Clock and height of the hypotheses.
+    rows : (3 + K, N) array
+        Clock, height and lasting errors of the hypotheses.
     free : int
         Number of readings that an unknown clock explains by itself.
     """
     origin = np.array(sky.origin_m)[:, None]
-    state = np.empty((LAYOUT.size, place.shape[1]))
+    size = 2 + len(rows)
+    state = np.empty((size, place.shape[1]))
     state[:2] = sky.true_from_grid @ (place.astype(np.float64) - origin)
     state[2:] = rows
-    covariance = np.zeros((LAYOUT.size, LAYOUT.size))
+    covariance = np.zeros((size, size))
     covariance[2:, 2:] = receiver.covariance
     total = float(np.logaddexp.reduce(log_weight))
     # Weights of 0 become tiny ones, so that differences stay finite.
     weight = np.maximum(log_weight - total, -700.0)
     before = MixedBelief(state, weight, covariance, np.array([0, 1]))
-    model = pseudoranges(LAYOUT, sky.satellites_m, sigma_m)
-    # Up, and away from the satellite.
-    loading = np.zeros((len(sky.names), LAYOUT.size))
-    loading[:, 4] = -np.sin(sky.elevation_rad)
-    known_m = receiver.mean[0] + loading[:, 4] * receiver.mean[2]
+    model = pseudoranges(replace(LAYOUT, size=size), sky.satellites_m, sigma_m)
+    slope = receiver.loading(sky)
+    slope[:, 1] = 0.0
+    known_m = slope @ receiver.mean
+    loading = np.zeros((len(sky.names), size))
+    # The model itself adds the clock's error.
+    loading[:, 4:] = slope[:, 2:]
     rng = np.random.default_rng(0)  # Nothing is drawn.
     after, info = rao_blackwell.update(
         before, compiled(model), sky.range_m - known_m, rng, _NO_RESAMPLING, loading
@@ -245,71 +271,10 @@ def agreement(
     away = sky.satellites_m[:, :2, None] - flat
     up = sky.satellites_m[:, 2, None]
     expected = np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2 + up**2)
-    slope = np.zeros((len(sky.names), LINEAR))
-    slope[:, 0] = 1.0
-    slope[:, 2] = -np.sin(sky.elevation_rad)
+    slope = receiver.loading(sky)
     off = sky.range_m[:, None] - expected - slope @ (rows + receiver.mean[:, None])
     mean = off @ weight
     apart = off - mean[:, None]
     spread = (apart * weight) @ apart.T + slope @ receiver.covariance @ slope.T
     square = float(mean @ np.linalg.solve(spread + np.diag(sigma_m**2), mean))
     return 0.5 * (max(len(sky.names) - free, 0) - square)
-
-
-def sky_over(
-    options: GnssOptions,
-    crs: str,
-    origin_m: tuple[float, float],
-    epoch: Epoch,
-    middle_m: tuple[float, float],
-) -> tuple[Sky | None, tuple[Unused, ...]]:
-    """Return the satellites of an epoch over a place, and the readings left out.
-
-    ``origin_m`` is that of the frame of the hypotheses, in the map's CRS; ``middle_m`` the place,
-    in that frame.
-    """
-    unused = list[Unused]()
-    chosen: dict[str, Pseudorange] = {}
-    for row in epoch.ranges:
-        if not isfinite(row.range_m):
-            continue
-        if row.satellite in chosen:
-            unused.append(("pseudorange", row.satellite, Reason.SECOND_READING))
-        elif not all(isfinite(value) for value in row.place_m):
-            unused.append(("pseudorange", row.satellite, Reason.UNKNOWN_SATELLITE))
-        else:
-            chosen[row.satellite] = row
-    if not chosen:
-        return None, tuple(unused)
-    east, north = middle_m[0] + origin_m[0], middle_m[1] + origin_m[1]
-    frame = GridFrame(crs, east, north, options.height_m)
-    local = frame.local.to_local(np.array([row.place_m for row in chosen.values()]))
-    seen = directions(local)
-    sky = Sky(
-        tuple(chosen),
-        local,
-        seen.elevation_rad,
-        np.array([row.range_m for row in chosen.values()]),
-        np.array([row.sigma_m for row in chosen.values()]),
-        middle_m,
-        frame.true_from_grid,
-    )
-    up = seen.above(options.mask_deg)
-    for name in np.array(sky.names)[~up].tolist():
-        unused.append(("pseudorange", name, Reason.BELOW_HORIZON))
-    return (sky.only(up) if up.any() else None), tuple(unused)
-
-
-def range_sigma_m(
-    options: GnssOptions, sky: Sky, gone_m: float, particle_spacing_m: float
-) -> Floats:
-    """Return standard deviations of pseudoranges, ``gone_m`` after the last ones that were used.
-
-    White noise is independent each time. Echoes last for some metres, over which readings count as
-    one. The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
-    """
-    by_elevation = options.zenith_m / np.sin(sky.elevation_rad)
-    white = np.where(np.isfinite(sky.sigma_m), sky.sigma_m, by_elevation)
-    lasts = max(options.echo_memory_m / max(gone_m, MIN_MOVED_M), 1.0)
-    beside = particle_spacing_m * np.cos(sky.elevation_rad)
-    return np.asarray(np.sqrt(white**2 + options.echo_m**2 * lasts + beside**2))

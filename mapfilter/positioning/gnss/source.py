@@ -24,13 +24,12 @@ from mapfilter.positioning.gnss.gate import FixTerm, GnssGate, GnssState
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
-    Sky,
     begun,
     near_clock,
-    range_sigma_m,
-    sky_over,
     weighed,
+    with_satellites,
 )
+from mapfilter.positioning.gnss.sky import Sky, range_sigma_m, sky_over
 from mapfilter.tracks.schema import Kind
 
 _FIRST_SPACING_M = 10.0
@@ -50,9 +49,9 @@ class FirstRanges:
         """Return the log-likelihood of each place, such that the mean likelihood is 1."""
         count = state.shape[1]
         receiver = near_clock(self.sky, begun(self.options, 0.0, 0.0))
-        found = weighed(
-            self.sky, self.sigma_m, receiver, state[:2], np.zeros(count), np.zeros((LINEAR, count))
-        )
+        rows = np.zeros((LINEAR, count))
+        receiver, rows = with_satellites(self.options, receiver, rows, self.sky)
+        found = weighed(self.sky, self.sigma_m, receiver, state[:2], np.zeros(count), rows)
         blind = np.log(_BLIND_START)
         return np.asarray(np.logaddexp(np.log1p(-_BLIND_START) + found.gain, blind))
 
@@ -111,7 +110,7 @@ class GnssSource(EvidenceSource):
         sky, _ = sky_over(options, self.gate.crs, self.gate.origin_m, epoch, middle_m)
         if sky is None:
             return EvidenceUpdate(state)
-        sigma_m = range_sigma_m(options, sky, np.inf, _FIRST_SPACING_M)
+        sigma_m = range_sigma_m(options, sky, _FIRST_SPACING_M)
         return EvidenceUpdate(state, (FirstRanges(sky, sigma_m, options),))
 
     def start(
