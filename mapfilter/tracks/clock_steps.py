@@ -3,8 +3,9 @@
 Sorted by time, the rows of two minutes would lie between each other: a walk at twice its speed, and
 levels of two streets in turns. Rows after the step are taken to go on from the row before it, until
 the clock is set forward again by as much; or, where that fits the begin and the end of the other
-tables better, rows before it are taken earlier. Rows that are out of order do not overlap so, and
-are sorted.
+tables better, rows before it are taken earlier. Where the other tables have no room for either, as
+when all have one clock and too few rows to show it, rows are sorted. So are rows that are out of
+order, which do not overlap so, and a second series that begins where the first one does.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ _STEPS = 3
 _ROWS, _DENSE = 3, 0.7
 """At most so many steps are those of a clock; so many times come again between the same two, and
 both sides have so large a share of those that the usual interval allows."""
-_INTERVALS = 2.0
-"""A clock set forward by as much as it was set back is set again; up to so many intervals."""
+_INTERVALS, _SERIES_INTERVALS = 2.0, 3.0
+"""A clock set forward by as much as it was set back is set again, up to so many intervals; what
+begins as near to the begin of the table is another series."""
 
 
 _SINGLE = ("motion", "gnss", "truth")
@@ -49,8 +51,8 @@ def clock_steps(time_s: Floats) -> tuple[ClockStep, ...]:
 
     Examples
     --------
-    >>> clock_steps(np.array([0.0, 1.0, 2.0, 3.0, 0.5, 1.5, 2.5, 3.5]))
-    (ClockStep(row=4, at_s=3.0, back_s=2.5, late_s=3.5, again=8),)
+    >>> clock_steps(np.concatenate([np.arange(8.0), np.arange(4.0, 9.0)]))
+    (ClockStep(row=8, at_s=7.0, back_s=3.0, late_s=4.0, again=13),)
     >>> clock_steps(np.array([0.0, 2.0, 1.0, 3.0]))
     ()
     """
@@ -68,7 +70,9 @@ def clock_steps(time_s: Floats) -> tuple[ClockStep, ...]:
 def _step(time_s: Floats, at: int, end: int, usual_s: float) -> ClockStep | None:
     """Return a step after a row if rows on both sides lie densely between the same times."""
     before, after = np.unique(time_s[: at + 1]), np.unique(time_s[at + 1 :])
-    first, last = max(before[0], after[0]), min(before[-1], after[-1])
+    if after[0] - before[0] <= _SERIES_INTERVALS * usual_s:
+        return None
+    first, last = after[0], min(before[-1], after[-1])
     least = max(_ROWS, _DENSE * ((last - first) / usual_s + 1))
     if min(np.sum((rows >= first) & (rows <= last)) for rows in (before, after)) < least:
         return None
@@ -99,17 +103,19 @@ def gone_on(time_s: Floats, reach_s: tuple[float, float] | None = None) -> tuple
 
     Examples
     --------
-    >>> times, note = gone_on(np.array([0.0, 1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 4.0]))
-    >>> times.tolist()
-    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+    >>> times, note = gone_on(np.concatenate([np.arange(8.0), np.arange(4.0, 9.0)]))
+    >>> times.tolist() == np.arange(13.0).tolist()
+    True
     >>> note
-    'time goes back by 2 s after 3 s, as when a clock is set back; later rows are taken 3 s later'
+    'time goes back by 3 s after 7 s, as when a clock is set back; later rows are taken 4 s later'
     """
     steps = clock_steps(time_s)
     if not steps:
         return time_s, ""
     told = ", ".join(f"by {step.back_s:g} s after {step.at_s:g} s" for step in steps)
     options = _options(time_s, steps)
+    if reach_s is not None:
+        options.append((time_s, "sorted by time, as the other tables end with it"))
     # Of equal ones the first: a clock that is set again was wrong in between.
     best = min(options, key=lambda option: round(_beyond_s(option[0], reach_s), 1))
     return best[0], f"time goes back {told}, as when a clock is set back; {best[1]}"

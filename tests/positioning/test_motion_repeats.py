@@ -69,6 +69,15 @@ def test_a_heading_that_was_the_same_from_the_beginning_stands_still_after_three
     assert set(reasons(followed(long_rows, again_s=1.0))) == {Reason.USED}
 
 
+def test_three_hundred_metres_are_metres_whatever_the_unit_of_steps():
+    repeats, stuck_at_m = MotionRepeats(), []
+    for row in range(700):
+        step = MotionStep(0.7 / 0.3048, 0.123456789)
+        repeats, _, why = without_repeats(repeats, float(row), (step,), 0.3048)
+        stuck_at_m += [0.7 * row] if why is Reason.HEADING_STUCK else []
+    assert stuck_at_m[0] == pytest.approx(300.0, abs=1.0)
+
+
 @pytest.mark.parametrize("heading_rad", [0.0, np.radians(37.0), 0.524])
 def test_a_coarse_heading_may_be_the_same_all_along_a_street(heading_rad):
     steps = [MotionStep(0.7, heading_rad)] * 900

@@ -98,6 +98,26 @@ def test_one_clock_of_all_tables_goes_on_in_all_of_them():
     assert len(notes_of(log)) == 2
 
 
+def test_where_sparse_reports_have_the_same_clock_rows_are_sorted_as_they_are():
+    """Reports of each half minute cannot show the step; motion that went on would leave them."""
+    clock_s = set_back(true_s(), 100.0)
+    sparse = radio(set_back(true_s(every_s=25.0), 100.0))
+    log = make_log(CRS, motion=motion(clock_s), radio=sparse)
+    np.testing.assert_allclose(np.unique(log.motion["time_s"]), np.unique(clock_s))
+    assert notes_of(log)[0].endswith("sorted by time, as the other tables end with it")
+
+
+def test_fixes_of_one_provider_after_those_of_another_are_no_clock():
+    """Also where there is no other table."""
+    east_m = np.tile(1.4 * true_s(), 2)
+    time_s = np.concatenate([true_s(), true_s() + 1.0])
+    fixes = pd.DataFrame({"time_s": time_s, "east_m": east_m, "north_m": 0.0})
+    for more in ({}, {"motion": motion(true_s())}):
+        log = make_log(CRS, gnss=fixes, **more)
+        assert notes_of(log) == []
+        np.testing.assert_allclose(np.unique(log.gnss["time_s"]), np.unique(time_s))
+
+
 @pytest.mark.parametrize("table", ["radio", "pseudoranges"])
 def test_series_that_are_written_one_after_the_other_are_no_clock(table):
     """All rows of the serving cell and then those of a neighbour; one satellite after another."""

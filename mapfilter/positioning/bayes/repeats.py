@@ -90,7 +90,10 @@ class MotionRepeats:
 
 
 def without_repeats(
-    repeats: MotionRepeats, time_s: float, steps: tuple[MotionStep, ...]
+    repeats: MotionRepeats,
+    time_s: float,
+    steps: tuple[MotionStep, ...],
+    step_unit_m: float = 1.0,
 ) -> tuple[MotionRepeats, tuple[MotionStep, ...], Reason]:
     """Return the rows of an epoch as far as they are news.
 
@@ -102,6 +105,8 @@ def without_repeats(
         Of the epoch.
     steps : tuple of MotionStep
         Its rows.
+    step_unit_m : float
+        Unit that their lengths are read in.
 
     Returns
     -------
@@ -116,7 +121,7 @@ def without_repeats(
         if not isfinite(step.step_m) or step.step_m == 0:
             kept.append(step)
             continue
-        repeats = _followed(repeats, time_s, step)
+        repeats = _followed(repeats, time_s, step, step_unit_m)
         if repeats.come_twice and repeats.was_equal:
             why = Reason.DELIVERED_TWICE
             continue
@@ -130,7 +135,9 @@ def without_repeats(
     return (repeats, steps, why) if why is Reason.USED else (repeats, tuple(kept), why)
 
 
-def _followed(repeats: MotionRepeats, time_s: float, step: MotionStep) -> MotionRepeats:
+def _followed(
+    repeats: MotionRepeats, time_s: float, step: MotionStep, step_unit_m: float
+) -> MotionRepeats:
     """Return what is known after one more row."""
     row = step.step_m, step.heading_rad, step.turn_rad
     is_equal = all(map(_equal, row, repeats.last))
@@ -148,7 +155,7 @@ def _followed(repeats: MotionRepeats, time_s: float, step: MotionStep) -> Motion
             was_equal=is_equal,
             pairs=pairs,
             run=run,
-            run_m=repeats.run_m + abs(step.step_m),
+            run_m=repeats.run_m + step_unit_m * abs(step.step_m),
             nats=nats,
             time_s=time_s,
             within_s=within_s,

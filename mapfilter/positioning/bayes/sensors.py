@@ -132,7 +132,9 @@ def watched(
         Of motion and of the report: ``USED``, or ``NO_STEP``, ``MOTION_MISSING``,
         ``MOTION_STUCK``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``, and ``STALE_RADIO``.
     """
-    repeats, motion, repeated = without_repeats(watch.repeats, epoch.time_s, epoch.motion)
+    repeats, motion, repeated = without_repeats(
+        watch.repeats, epoch.time_s, epoch.motion, step_unit_m
+    )
     if motion is not epoch.motion:
         epoch = replace(epoch, motion=motion)
     steps = epoch.motion
