@@ -200,7 +200,7 @@ class GridBelief:
 
     def __getstate__(self) -> dict[str, object]:
         kept = {name: self.__dict__[name] for name in self.__dataclass_fields__}
-        # Another process may have no device; a filter brings the mass to its own.
+        # Masses are written as NumPy's; the model opens its device where it is read.
         return kept | {"on": on_host(self.on), "off": on_host(self.off)}
 
     def placed(self, device: Device) -> GridBelief:
