@@ -69,6 +69,12 @@ def test_a_heading_that_was_the_same_from_the_beginning_stands_still_after_three
     assert set(reasons(followed(long_rows, again_s=1.0))) == {Reason.USED}
 
 
+@pytest.mark.parametrize("first_rad", [0.0, 0.2345678, nan])
+def test_a_first_heading_of_a_sensor_that_starts_changes_nothing(first_rad):
+    frozen = [MotionStep(0.7, first_rad), *[MotionStep(0.7, 0.123456789)] * 600]
+    assert reasons(followed(frozen)).count(Reason.HEADING_STUCK) == pytest.approx(600 - 428, abs=3)
+
+
 def test_three_hundred_metres_are_metres_whatever_the_unit_of_steps():
     repeats, stuck_at_m = MotionRepeats(), []
     for row in range(700):

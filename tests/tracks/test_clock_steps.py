@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.clock_steps import clock_steps, gone_on
+from mapfilter.tracks.clock_steps import clock_steps, with_clocks_gone_on
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32635"
@@ -29,6 +29,12 @@ def set_back(time_s, first_s, last_s=np.inf, by_s=BACK_S):
 
 def notes_of(log):
     return [note for note in log.notes if "as when a clock is set back" in note]
+
+
+def gone_on(time_s):
+    """Return the times of a table alone as they go on, and the note."""
+    tables, notes = with_clocks_gone_on({"motion": pd.DataFrame({"time_s": time_s})}, {})
+    return tables["motion"]["time_s"].to_numpy(), "".join(notes)
 
 
 def true_s(seconds=240.0, every_s=1.0):
@@ -98,22 +104,63 @@ def test_one_clock_of_all_tables_goes_on_in_all_of_them():
     assert len(notes_of(log)) == 2
 
 
-def test_where_sparse_reports_have_the_same_clock_rows_are_sorted_as_they_are():
-    """Reports of each half minute cannot show the step; motion that went on would leave them."""
-    clock_s = set_back(true_s(), 100.0)
-    sparse = radio(set_back(true_s(every_s=25.0), 100.0))
-    log = make_log(CRS, motion=motion(clock_s), radio=sparse)
-    np.testing.assert_allclose(np.unique(log.motion["time_s"]), np.unique(clock_s))
-    assert notes_of(log)[0].endswith("sorted by time, as the other tables end with it")
+def fixes(time_s):
+    return pd.DataFrame({"time_s": time_s, "east_m": 1.4 * true_s(every_s=60.0), "north_m": 0.0})
+
+
+@pytest.mark.parametrize("every_s", [25.0, 60.0])
+def test_sparse_tables_of_the_same_clock_follow(every_s):
+    """They have too few rows to show the step, but end with the stepped clock."""
+    rows = fixes if every_s == 60.0 else radio
+    table = "gnss" if every_s == 60.0 else "radio"
+    sparse_s = true_s(every_s=every_s)
+    log = make_log(
+        CRS,
+        motion=motion(set_back(true_s(), 100.0)),
+        **{table: rows(set_back(sparse_s, 100.0))},
+    )
+    np.testing.assert_allclose(log.motion["time_s"], true_s())
+    # Rows within the time that comes twice may be of either side.
+    found_s = np.unique(getattr(log, table)["time_s"])
+    sure = (sparse_s < 70.0) | (sparse_s > 130.0)
+    np.testing.assert_allclose(np.intersect1d(found_s, sparse_s[sure]), sparse_s[sure])
+    assert any("rows are taken later with those of motion" in note for note in log.notes)
+
+
+def test_a_dense_table_with_a_clock_of_its_own_does_not_follow():
+    """Reports each 5 s would show the step; they only end earlier."""
+    own_s = true_s(seconds=210.0, every_s=5.0)
+    log = make_log(CRS, motion=motion(set_back(true_s(), 100.0)), radio=radio(own_s))
+    np.testing.assert_allclose(np.unique(log.radio["time_s"]), own_s)
+
+
+def test_one_clock_of_motion_radio_fixes_and_satellites():
+    second = set_back(true_s(), 100.0)
+    satellites = pd.DataFrame({
+        "time_s": np.repeat(second, 2), "satellite": ["G01", "G02"] * second.size,
+        "pseudorange_m": 2.2e7,
+    })  # fmt: skip
+    log = make_log(
+        CRS,
+        motion=motion(second),
+        radio=radio(set_back(true_s(every_s=4.0), 100.0)),
+        gnss=fixes(set_back(true_s(every_s=60.0), 100.0)),
+        pseudoranges=satellites,
+    )
+    np.testing.assert_allclose(log.motion["time_s"], true_s())
+    np.testing.assert_allclose(log.radio["time_s"], np.repeat(true_s(every_s=4.0), 2))
+    np.testing.assert_allclose(log.pseudoranges["time_s"], np.repeat(true_s(), 2))
+    np.testing.assert_allclose(log.gnss["time_s"], [0.0, 60.0, 120.0, 180.0], atol=30.0)
+    assert log.gnss["time_s"].iloc[-1] == pytest.approx(181.0, abs=2.0)
 
 
 def test_fixes_of_one_provider_after_those_of_another_are_no_clock():
     """Also where there is no other table."""
     east_m = np.tile(1.4 * true_s(), 2)
     time_s = np.concatenate([true_s(), true_s() + 1.0])
-    fixes = pd.DataFrame({"time_s": time_s, "east_m": east_m, "north_m": 0.0})
+    both = pd.DataFrame({"time_s": time_s, "east_m": east_m, "north_m": 0.0})
     for more in ({}, {"motion": motion(true_s())}):
-        log = make_log(CRS, gnss=fixes, **more)
+        log = make_log(CRS, gnss=both, **more)
         assert notes_of(log) == []
         np.testing.assert_allclose(np.unique(log.gnss["time_s"]), np.unique(time_s))
 

@@ -20,9 +20,10 @@ _PRIOR_ROWS, _PRIOR_REPEATS = 50.0, 49.0
 _MOST_NATS, _STILL_NATS = 1.0, 12.0
 """Gain of one repetition at most, and the sum from which on a heading stands still."""
 _FINE_ROWS = 30
-_NEVER_ROWS, _NEVER_M = 100, 300.0
-"""Rows and metres after which a heading that was the same from the beginning stands still; made
-logs without noise have such headings along an edge of a street that is straight for so long."""
+_NEVER_ROWS, _NEVER_M, _ODD_ROWS = 100, 300.0, 3
+"""Rows and metres after which a heading that was the same from the beginning, but for some first
+rows, stands still; made logs without noise have such headings along an edge of a street that is
+straight for so long."""
 _COARSE_PER_DEG, _COARSE_PER_RAD = 100.0, 1000.0
 _PAIRS, _SOONER = 8, 0.8
 """Pairs of equal rows, and the interval within a pair relative to that between two of them."""
@@ -80,7 +81,7 @@ class MotionRepeats:
         """Whether the heading no longer follows the way."""
         if self.nats >= _STILL_NATS and self.fine >= _FINE_ROWS:
             return True
-        never_changed = self.rows <= _PRIOR_ROWS + 1 and self.fine > 0
+        never_changed = self.rows <= _PRIOR_ROWS + _ODD_ROWS and self.fine > 0
         return never_changed and self.run >= _NEVER_ROWS and self.run_m >= _NEVER_M
 
     @property
