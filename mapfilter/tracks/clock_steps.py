@@ -261,8 +261,12 @@ def _told(steps: tuple[ClockStep, ...], reading: Reading) -> str:
 
 def _times_of(rows: pd.DataFrame) -> Floats:
     """Return the times of a table's rows; none where one is not a finite number."""
-    if "time_s" in rows and pd.api.types.is_numeric_dtype(rows["time_s"].dtype):
-        time_s: Floats = rows["time_s"].to_numpy(dtype=np.float64, na_value=np.nan)
-        if np.isfinite(time_s).all():
-            return time_s
-    return np.empty(0)
+    if "time_s" not in rows:
+        return np.empty(0)
+    try:
+        # Of a CSV file they are texts still.
+        seconds = pd.to_numeric(rows["time_s"], errors="coerce")
+    except TypeError:
+        return np.empty(0)
+    time_s: Floats = seconds.to_numpy(dtype=np.float64, na_value=np.nan)
+    return time_s if np.isfinite(time_s).all() else np.empty(0)

@@ -85,9 +85,10 @@ def test_three_hundred_metres_are_metres_whatever_the_unit_of_steps():
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, np.radians(37.0), 0.524])
-def test_a_coarse_heading_may_be_the_same_all_along_a_street(heading_rad):
-    steps = [MotionStep(0.7, heading_rad)] * 900
-    assert Reason.HEADING_STUCK not in reasons(followed(steps))
+def test_a_coarse_heading_may_be_the_same_all_along_a_street_but_not_for_ever(heading_rad):
+    steps = [MotionStep(0.7, heading_rad)] * 2500
+    stuck = [k for k, why in enumerate(reasons(followed(steps))) if why is Reason.HEADING_STUCK]
+    assert 0.7 * stuck[0] == pytest.approx(1500.0, abs=1.0)
 
 
 def test_a_street_that_is_straight_for_long_after_others_is_left_alone():

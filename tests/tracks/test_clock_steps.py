@@ -6,6 +6,7 @@ import pytest
 
 from mapfilter.tracks.clock_steps import clock_steps, with_clocks_gone_on
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.store import read_log
 
 CRS = "EPSG:32635"
 BACK_S = 30.0
@@ -58,6 +59,17 @@ def test_a_clock_that_is_set_again_was_wrong_in_between():
     found_s, said = gone_on(stepped)
     np.testing.assert_allclose(found_s, time_s)
     assert said.endswith("rows until it is set again are taken 30 s later")
+
+
+def test_a_log_of_csv_files_goes_on_too(tmp_path):
+    """Their values are texts until they are checked."""
+    motion(set_back(true_s(), 100.0)).to_csv(tmp_path / "motion.csv", index=False)
+    radio(set_back(true_s(every_s=4.0), 100.0)).to_csv(tmp_path / "radio.csv", index=False)
+    (tmp_path / "log.json").write_text(f'{{"crs": "{CRS}"}}')
+    log = read_log(tmp_path)
+    np.testing.assert_allclose(log.motion["time_s"], true_s())
+    np.testing.assert_allclose(log.radio["time_s"], np.repeat(true_s(every_s=4.0), 2))
+    assert len(notes_of(log)) == 2
 
 
 @pytest.mark.parametrize("table", ["motion", "radio"])

@@ -20,10 +20,10 @@ _PRIOR_ROWS, _PRIOR_REPEATS = 50.0, 49.0
 _MOST_NATS, _STILL_NATS = 1.0, 12.0
 """Gain of one repetition at most, and the sum from which on a heading stands still."""
 _FINE_ROWS = 30
-_NEVER_ROWS, _NEVER_M, _ODD_ROWS = 100, 300.0, 3
+_NEVER_ROWS, _NEVER_M, _NEVER_COARSE_M, _ODD_ROWS = 100, 300.0, 1500.0, 3
 """Rows and metres after which a heading that was the same from the beginning, but for some first
 rows, stands still; made logs without noise have such headings along an edge of a street that is
-straight for so long."""
+straight for so long, coarse ones along a road."""
 _COARSE_PER_DEG, _COARSE_PER_RAD = 100.0, 1000.0
 _PAIRS, _SOONER = 8, 0.8
 """Pairs of equal rows, and the interval within a pair relative to that between two of them."""
@@ -81,8 +81,9 @@ class MotionRepeats:
         """Whether the heading no longer follows the way."""
         if self.nats >= _STILL_NATS and self.fine >= _FINE_ROWS:
             return True
-        never_changed = self.rows <= _PRIOR_ROWS + _ODD_ROWS and self.fine > 0
-        return never_changed and self.run >= _NEVER_ROWS and self.run_m >= _NEVER_M
+        never_changed = self.rows <= _PRIOR_ROWS + _ODD_ROWS
+        least_m = _NEVER_M if self.fine > 0 else _NEVER_COARSE_M
+        return never_changed and self.run >= _NEVER_ROWS and self.run_m >= least_m
 
     @property
     def come_twice(self) -> bool:
