@@ -18,6 +18,9 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.gnss.gate import GnssState
+from mapfilter.positioning.gnss.receiver import LINEAR
+from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.serving.state_file import read_session, write_session
 
 SUFFIX = ".session"
@@ -159,12 +162,15 @@ def _check(value: Mapping[str, Any], where: str) -> None:
         if not isinstance(value.get(name), kind):
             raise fail(StoreError, where, f"{name}, as it was saved", "something else", "edited")
     state = value["state"]
-    beliefs = [state.belief]
+    beliefs, sources = [state.belief, *(one.belief for one in state.held)], [state.sources]
     if state.alternative is not None:
         beliefs.append(state.alternative.belief)
-    for belief in beliefs:
-        if belief is not None and not _is_whole(belief):
-            raise fail(StoreError, where, "arrays of one length", "others", "edited")
+        sources.append(state.alternative.sources)
+    if state.twin is not None:
+        beliefs.append(state.twin.belief)
+    is_whole = all(belief is None or _is_whole(belief) for belief in beliefs)
+    if not (is_whole and all(_receives_whole(one) for one in sources)):
+        raise fail(StoreError, where, "arrays of one length", "others", "edited")
     try:
         np.random.default_rng().bit_generator.state = value["rng"]
     except (ValueError, TypeError, KeyError) as error:
@@ -183,4 +189,19 @@ def _is_whole(belief: object) -> bool:
         and columns == count
         and belief.log_weight.shape == (count,)
         and belief.kept.shape == (width, count)
+    )
+
+
+def _receives_whole(sources: Mapping[str, Any]) -> bool:
+    """Return whether the receiver among the states of sources, if any, has all of its states."""
+    gnss = sources.get(GnssSource.name)
+    receiver = gnss.receiver if isinstance(gnss, GnssState) else None
+    if receiver is None:
+        return True
+    satellites = len(receiver.biases.names)
+    size = LINEAR + satellites
+    return (
+        receiver.mean.shape == (size,)
+        and receiver.covariance.shape == (size, size)
+        and receiver.biases.reflection_m.shape == (satellites,)
     )

@@ -13,6 +13,7 @@ from mapfilter.positioning.gnss.receiver import (
     LINEAR,
     agreement,
     begun,
+    begun_anew,
     carried,
     centred,
     moved,
@@ -160,13 +161,46 @@ def test_never_more_satellites_than_can_be_held():
     known[LINEAR:, LINEAR:] = 0.5 * known[LINEAR:, LINEAR:]
     receiver = replace(receiver, covariance=known)
     many = tuple(f"E{k:02d}" for k in range(MOST))
-    unit = np.tile(UNIT[:1], (MOST, 1))
-    crowd = replace(
-        sky, names=many, satellites_m=2.2e7 * unit, elevation_rad=np.arcsin(unit[:, 2]),
-        range_m=np.full(MOST, 2.2e7), sigma_m=np.full(MOST, nan),
-    )  # fmt: skip
-    after, _ = with_satellites(OPTIONS, receiver, rows, crowd)
+    after, _ = with_satellites(OPTIONS, receiver, rows, crowd_of(many))
     assert after.biases.names == many
+
+
+def crowd_of(names):
+    unit = np.tile(UNIT[:1], (len(names), 1))
+    return replace(
+        sky_of(), names=tuple(names), satellites_m=2.2e7 * unit,
+        elevation_rad=np.arcsin(unit[:, 2]), range_m=np.full(len(names), 2.2e7),
+        sigma_m=np.full(len(names), nan),
+    )  # fmt: skip
+
+
+def test_a_satellite_missing_for_an_epoch_is_remembered_in_a_crowd():
+    """Satellites that are received again count once: as many as can be held are, and no more."""
+    names = [f"E{k:02d}" for k in range(MOST)]
+    for count, new, remembered in ((MOST, 0, True), (40, 24, True), (40, 25, False)):
+        receiver, rows = receiver_of(crowd_of(names[:count]))
+        known = receiver.covariance.copy()
+        known[LINEAR:, LINEAR:] = 0.5 * known[LINEAR:, LINEAR:]
+        receiver = replace(receiver, covariance=known)
+        others = [f"G{k:02d}" for k in range(new)]
+        after, _ = with_satellites(OPTIONS, receiver, rows, crowd_of(names[1:count] + others))
+        assert (names[0] in after.biases.names) is remembered
+        assert len(after.biases.names) == count + new - (not remembered)
+
+
+def test_a_receiver_beside_another_belief_knows_its_clock_only_roughly():
+    receiver, rows = receiver_of(sky_of())
+    mean = np.array([5e4, 3.0, 8.0, 1.0, 2.0, 3.0])
+    receiver = replace(receiver, time_s=7.0, travelled_m=90.0, used_at_m=80.0, mean=mean)
+    found, new = begun_anew(OPTIONS, receiver), begun(OPTIONS, 7.0, 90.0)
+    np.testing.assert_array_equal(found.mean, [5e4, 3.0, 0.0])
+    np.testing.assert_array_equal(found.covariance, new.covariance)
+    assert (found.time_s, found.travelled_m, found.used_at_m) == (7.0, 90.0, 80.0)
+    assert found.biases.names == ()
+    assert mean[2] == 8.0
+    # Hypotheses that carry errors beside the receiver before have none of them beside this one.
+    _, carrying = centred(receiver, rows + 4.0 * np.arange(4), np.zeros((STATES, 4), "f4"))
+    np.testing.assert_array_equal(carried(carrying, found.mean.size), 0.0)
 
 
 def test_hypotheses_carry_lasting_errors():

@@ -10,10 +10,12 @@ from cross_world import CRS, EAST, LATTICE, NORTH, SOUTH, make_database, walk_lo
 from sky_world import HEIGHTS, START_UTC_S, no_rows, off_m, sky_log, sky_table
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.alternative import NullHypothesis
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, epochs
 from mapfilter.positioning.filter import estimate_of, locate
+from mapfilter.positioning.gnss.receiver import carried
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log
 
@@ -66,6 +68,59 @@ def test_a_phone_that_was_turned_may_receive_satellites(area):
         state, _ = positioner.step(state, epoch, rng)
         compared += bool(state.held)
     assert compared > 1
+
+
+def test_pseudoranges_alone_say_nothing_of_a_phone_that_was_turned(area):
+    """A belief with another reading of headings outlasts epochs without anything else."""
+    positioner = BayesFilter(**{**FEW, "min_particles": 600}, **HEIGHTS).over_area(area)
+    rng, state, begun, lasted = np.random.default_rng(0), positioner.begin(), None, 0
+    for epoch in epochs(sky_log(radio=False, most=4)):
+        if begun is None and state.belief and state.belief.status is Status.TRACKING:
+            state = replace(state, hold=Hold(offset_rad=1.0))
+        before = state.sources["gnss"]
+        state, _ = positioner.step(state, epoch, rng)
+        if begun is None and state.hold != Hold():
+            (begun,) = state.held
+        elif begun is not None:
+            assert [one.start_m for one in state.held] == [begun.start_m]
+            assert state.held[0].belief.log_evidence == begun.belief.log_evidence
+            lasted += state.sources["gnss"].compared_at_s > before.compared_at_s
+        if lasted == 3:
+            return
+    pytest.fail("too few epochs with satellites")
+
+
+def test_a_phone_that_was_turned_begins_with_a_receiver_of_its_own(area):
+    """Errors of as many satellites, but of others, are carried since the phone was turned."""
+    positioner = BayesFilter(**{**FEW, "min_particles": 600}, **HEIGHTS).over_area(area)
+    log, rng, state = sky_log(most=4), np.random.default_rng(0), positioner.begin()
+    for epoch in epochs(log):
+        state, _ = positioner.step(state, epoch, rng)
+        if state.belief and state.belief.status is Status.TRACKING and epoch.radio:
+            break
+    gnss = state.sources["gnss"]
+    assert np.ptp(carried(state.belief.state, gnss.receiver.mean.size)) > 0
+    others = replace(gnss.receiver.biases, names=tuple("WXYZ"[: len(gnss.receiver.biases.names)]))
+    gnss = replace(gnss, receiver=replace(gnss.receiver, biases=others))
+    own = replace(state.belief, log_evidence=state.belief.log_evidence + 100.0)
+    held = HeldOtherwise(own, Hold(), 3.0, 0.0, NullHypothesis(-40.0))
+    sources = {**state.sources, "gnss": gnss}
+    after = replace(state, hold=Hold(offset_rad=1.0), held=(held,), sources=sources)
+    rest = [one for one in epochs(log) if one.time_s > epoch.time_s]
+    while after.takeovers == state.takeovers:
+        after, _ = positioner.step(after, replace(rest.pop(0), ranges=()), rng)
+    assert after.hold == Hold()
+    receiver = after.sources["gnss"].receiver
+    assert after.sources["gnss"].compared_at_s == gnss.compared_at_s
+    np.testing.assert_array_equal(carried(after.belief.state, receiver.mean.size), 0.0)
+    assert receiver.biases.names == ()
+    # The next satellites are compared with it.
+    unused = []
+    while after.sources["gnss"].receiver.used_at_m == gnss.receiver.used_at_m:
+        after, output = positioner.step(after, rest.pop(0), rng)
+        unused += output.unused
+    assert not [one for one in unused if one.kind == "pseudorange"]
+    assert "W" not in after.sources["gnss"].receiver.biases.names
 
 
 def test_a_log_without_readings_of_satellites_gives_the_same_bytes(positioner):

@@ -105,6 +105,10 @@ def test_smaller_beliefs_have_hypotheses_by_weight_and_equal_weights():
         # 9 in 10 of 1000 by weight are among the first 100: five standard errors.
         share = np.mean(from_ < 100)
         assert abs(share - 900 / 990) < 5 * (0.0827 / 300) ** 0.5
+    # Rows of a satellite receiver stay with the main belief.
+    more = replace(main, state=np.vstack([main.state, main.state[:5]]))
+    for one, other in zip(forks(Hold(), 0.0, 1.6, main=more), forks(Hold(), 0.0, 1.6), strict=True):
+        np.testing.assert_array_equal(one.belief.state, other.belief.state)
     few = belief(40)
     assert forks(Hold(), 0.0, 1.6, main=few)[0].belief.state.shape == (STATES, 40)
     np.testing.assert_array_equal(main.state, belief().state)

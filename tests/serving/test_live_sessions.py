@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 from asking import SERVING, Streamed, ask, documents, service
 
-from mapfilter.errors import ConfigError
+from mapfilter.errors import ConfigError, StoreError
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time
 from mapfilter.models.street_motion import STATES
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate as replay
 from mapfilter.serving import sessions as sessions_module
@@ -235,8 +238,32 @@ def test_a_session_with_satellites_is_restored(positioner, tmp_path):
         store.write(session, value)
         again = store.read(session)["state"]
     np.testing.assert_array_equal(again.belief.state, state.belief.state)
-    receiver = again.sources["gnss"].receiver
+    gnss, belief = again.sources["gnss"], again.belief
+    receiver = gnss.receiver
     assert receiver.biases.names == state.sources["gnss"].receiver.biases.names != ()
+    short = replace(belief, kept=belief.kept[:, :1])
+    other = replace(receiver.biases, names=(*receiver.biases.names, "G99"))
+    edited = [
+        replace(state, held=(HeldOtherwise(short, Hold(), 0.0, 0.0),)),
+        replace(state, twin=MirroredTwin(short, 0.0)),
+    ]
+    for changed in (
+        replace(receiver, mean=receiver.mean[:3]),
+        replace(receiver, covariance=receiver.covariance[:3]),
+        replace(receiver, biases=other),
+    ):
+        sources = {**state.sources, "gnss": replace(gnss, receiver=changed)}
+        edited.append(replace(state, sources=sources))
+        beside = AlternativeHypothesis(belief, 0.0, 0.0, sources=sources)
+        edited.append(replace(state, alternative=beside))
+    with closing(SessionStore.in_folder(tmp_path, "made")) as store:
+        for one in edited:
+            store.write(session, {**value, "state": one})
+            with pytest.raises(StoreError, match="arrays of one length"):
+                store.read(session)
+        held = (HeldOtherwise(belief, Hold(), 0.0, 0.0),)
+        store.write(session, {**value, "state": replace(state, held=held)})
+        assert len(store.read(session)["state"].held) == 1
 
 
 def test_a_folder_belongs_to_one_service_at_a_time(positioner, cross, tmp_path):

@@ -220,6 +220,14 @@ class EvidenceSource(ABC):
         """Adapt a belief just started; also return the state that depends on it, None if none."""
         return belief, None
 
+    def beside_other(self, state: Any) -> Any:
+        """Return the state when the belief is replaced by one that the source has not adapted.
+
+        Such is a belief in which the phone was turned. Only sources differ whose state depends on
+        a belief.
+        """
+        return state
+
     @abstractmethod
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:
         """Return evidence for the belief and its alternative, both moved already."""

@@ -21,7 +21,7 @@ from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import wrap_one_rad, wrap_rad
-from mapfilter.models.street_motion import BIAS
+from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 
@@ -216,7 +216,8 @@ def _smaller(
     share = np.exp(belief.log_weight - belief.log_weight.max())
     count = min(rules.particles, share.size)
     chosen = rng.choice(share.size, count, p=share / share.sum())
-    state = belief.state[:, chosen].copy()
+    # A satellite receiver stays with the main belief, and so do the rows of its errors.
+    state = belief.state[:STATES, chosen].copy()
     state[BIAS] = wrap_rad(state[BIAS] + 2**0.5 * white_rad * rng.standard_normal(count))
     log_weight = np.full(count, -log(count))
     return replace(belief, state=state, log_weight=log_weight, kept=belief.kept[:, chosen])

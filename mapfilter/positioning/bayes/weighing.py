@@ -210,6 +210,10 @@ class Weighing:
         for one in state.held:
             reading = _tracked(evidence, one.belief, measured=measured)
             belief, info = beliefs.held_otherwise.update(one.belief, reading, rng)
+            if info.reason is Reason.NO_READING:
+                # Nothing but pseudoranges: they say nothing of it.
+                found.append(one)
+                continue
             if info.reason is not Reason.USED:
                 continue
             null = _challenged(rules, one.null, reading, one.belief, belief)
@@ -218,10 +222,12 @@ class Weighing:
         best = winner(holds, held, main, rules.converge_log_odds)
         if best is None:
             return replace(state, held=held)
+        own = {one.name: one.beside_other(state.sources[one.name]) for one in self.sources}
         return replace(
             state,
             belief=best.belief,
             status=Status.TRACKING,
+            sources={**state.sources, **own},
             null=best.null,
             alternative=None,
             takeovers=state.takeovers + 1,

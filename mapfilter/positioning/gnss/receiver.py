@@ -103,6 +103,16 @@ def begun(options: GnssOptions, time_s: float, travelled_m: float) -> Receiver:
     return Receiver(time_s, travelled_m, np.zeros(LINEAR), np.diag(deviations**2))
 
 
+def begun_anew(options: GnssOptions, receiver: Receiver) -> Receiver:
+    """Return a receiver beside another belief: the same clock, but all its errors are unknown.
+
+    They were estimated given the hypotheses of the belief before, which carried their part of them.
+    """
+    again = begun(options, receiver.time_s, receiver.travelled_m)
+    again.mean[:2] = receiver.mean[:2]
+    return replace(again, used_at_m=receiver.used_at_m)
+
+
 def with_satellites(
     options: GnssOptions, receiver: Receiver, rows: Floats, sky: Sky
 ) -> tuple[Receiver, Floats]:
@@ -112,8 +122,10 @@ def with_satellites(
     """
     old = receiver.biases
     known = old.known(options, np.diag(receiver.covariance)[LINEAR:])
-    known &= len(old.names) + len(sky.names) <= MOST
-    stay = np.array([name in sky.names for name in old.names], dtype=np.bool_) | known
+    received = np.array([name in sky.names for name in old.names], dtype=np.bool_)
+    stay = received | known
+    if int(stay.sum()) + len(sky.names) - int(received.sum()) > MOST:
+        stay = received
     held = [name for name, one in zip(old.names, stay.tolist(), strict=True) if one]
     names = (*held, *(name for name in sky.names if name not in held))
     reflection_m = np.zeros(len(names))

@@ -25,6 +25,7 @@ from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
     begun,
+    begun_anew,
     near_clock,
     weighed,
     with_satellites,
@@ -121,6 +122,13 @@ class GnssSource(EvidenceSource):
             return belief, GnssState()
         found = self.gate.compare(belief, GnssState(), epoch, travelled_m, _FIRST_SPACING_M)
         return found.belief, found.state
+
+    def beside_other(self, state: GnssState) -> GnssState:
+        """Return the state with a receiver that begins anew."""
+        receiver = state.receiver
+        if receiver is None:
+            return state
+        return replace(state, receiver=begun_anew(self.options, receiver))
 
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:
         """Compare the epoch's fix and pseudoranges with the belief and the alternative."""
