@@ -153,7 +153,7 @@ def test_the_caller_makes_what_no_helper_has_begun():
     def call(first, _):
         made.append((first, threading.get_ident()))
         if first in failing:
-            raise ValueError
+            raise ValueError("a part")
 
     with ThreadPoolExecutor(1) as others:
         held = others.submit(Threads(count, 0).over, count * 1024, (hold,))
@@ -163,7 +163,7 @@ def test_the_caller_makes_what_no_helper_has_begun():
         assert made == [(first, threading.get_ident()) for first, _ in two.parts(SIZE)]
         made.clear()
         failing = {0}
-        with pytest.raises(ValueError):
+        with pytest.raises(ValueError, match="a part"):
             two.over(SIZE, (call,))
         let.set()
         held.result()
@@ -176,7 +176,7 @@ def test_the_caller_makes_what_no_helper_has_begun():
 def test_no_array_is_kept_after_an_error(failing):
     begun = threading.Barrier(2)
 
-    def call(first, _, array):
+    def call(first, _, array):  # noqa: ARG001
         begun.wait(60)
         if first == failing:
             raise MemoryError
