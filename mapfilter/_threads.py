@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections import deque
-from dataclasses import dataclass
+from _thread import start_new_thread
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cache
-from threading import Lock, Thread
+from queue import SimpleQueue
+from threading import Lock, current_thread, get_ident
 from typing import Any
 
 LEAST_PARTICLES = 32_768
@@ -31,8 +33,8 @@ class Threads:
     """A number of threads among which kernels are divided.
 
     Results are the same for every number. Worker processes divide nothing: there are as many of
-    them as processors already. Threads are started when they are first needed in a process, and
-    end with it.
+    them as processors already. Threads are started when they are first needed in a process, are
+    shared by its callers, and end with it.
 
     Parameters
     ----------
@@ -67,72 +69,104 @@ class Threads:
     def over(self, size: int, *calls: Call) -> None:
         """Make calls one after another for each part of so many particles, and await them.
 
-        An error in a part is raised once no other part is under way: that of the calling thread, or
-        else of the first part that has one.
+        An error or an interrupt is raised once no part is under way, and parts that have not begun
+        are left out: an interrupt, or else the error of the calling thread, or else that of the
+        first part that has one.
         """
         if not self.divide(size):
             _make(0, size, calls)
             return
         (first, stop), *others = self.parts(size)
-        helpers: list[_Helper] = []
+        parts = [_Part(begin, end, calls) for begin, end in others]
+        failure: BaseException | None = None
         try:
-            for begin, end in others:
-                helpers.append(_idle_helper())
-                helpers[-1].begin(begin, end, calls)
+            _hand_over(parts)
             _make(first, stop, calls)
+            _make_what_has_not_begun(parts)
+        except BaseException as error:
+            failure = error
+        # What a signal raises comes after calls, at the beginning of functions and where loops jump
+        # back. All of these are inside a `try` here. The inner loop jumps back inside the outer
+        # one, so that a second interrupt, while the first is remembered, is remembered, too.
+        is_awaited = False
+        while not is_awaited:
+            try:
+                while not is_awaited:
+                    try:
+                        _await(parts)
+                        is_awaited = True
+                    except BaseException as error:
+                        failure = error
+            except BaseException as error:
+                failure = error
+        errors: list[BaseException | None] = []
+        try:
+            errors = [failure, *(part.taken_error() for part in parts)]
+            failure = next((error for error in errors if error is not None), None)
+            if failure is not None:
+                raise failure
         finally:
-            errors = [helper.end() for helper in helpers]
-            _idle(os.getpid()).extend(helpers)
-        for error in errors:
-            if error is not None:
-                raise error
+            # Its traceback has this frame: arrays would be kept by the circle.
+            del failure, errors
 
 
 ONE = Threads()
 """The calling thread alone."""
 
+_CALLER, _HELPER = "caller", "helper"
 
-class _Helper:
-    """A thread that makes calls for one part after another.
 
-    Two bare locks begin a part 25 to 45 µs sooner than futures of an executor.
+class _Part:
+    """Calls for a part of the particles, which are made once: by a helper or by the caller.
+
+    An interrupt may be raised in the caller after each of its steps. So it can repeat all of them,
+    and never waits for a part that no helper has begun.
     """
 
-    def __init__(self) -> None:
-        self._due, self._done, self._is_done = Lock(), Lock(), True
-        self._part: tuple[int, int, tuple[Call, ...]] = 0, 0, ()
-        self._error: BaseException | None = None
-        self._due.acquire()
-        Thread(target=self._work, name="mapfilter-part", daemon=True).start()
+    def __init__(self, first: int, stop: int, calls: tuple[Call, ...]) -> None:
+        self.first, self.stop, self.calls = first, stop, calls
+        self.error: BaseException | None = None
+        self._taken_by: dict[str, str] = {}
+        self._is_done, self._done = False, Lock()
+        self._done.acquire()
 
-    def begin(self, first: int, stop: int, calls: tuple[Call, ...]) -> None:
-        """Begin a part; the one before has ended."""
-        self._part, self._error, self._is_done = (first, stop, calls), None, False
-        self._done.acquire(blocking=False)
-        self._due.release()
+    def take(self, who: str) -> bool:
+        """Return whether the part is the caller's or a helper's: of the first of them to ask."""
+        # A single call that is not divided, with the same answer each time.
+        return self._taken_by.setdefault("", who) == who
 
-    def end(self) -> BaseException | None:
-        """Wait for the end of the part, and return its error, or an interrupt meanwhile."""
-        interrupt: BaseException | None = None
+    def work(self) -> None:
+        """Make the calls in a helper's thread, where no signal raises anything."""
+        if not self.take(_HELPER):
+            return
+        try:
+            _make(self.first, self.stop, self.calls)
+        except BaseException as error:
+            self.error = error
+        # Arrays are the caller's alone again.
+        self.calls = ()
+        self._is_done = True
+        self._done.release()
+
+    def taken_error(self) -> BaseException | None:
+        """Take the error out, whose traceback has the arrays and this part."""
+        error, self.error = self.error, None
+        return error
+
+    def wait(self) -> None:
+        """Wait until no helper is at work, or ever will be."""
+        if self.take(_CALLER):
+            return
         while not self._is_done:
-            try:
-                self._done.acquire()
-            except KeyboardInterrupt as error:
-                # The part goes on with the caller's arrays.
-                interrupt = error
-        return interrupt or self._error
+            self._done.acquire()
 
-    def _work(self) -> None:
-        while True:
-            self._due.acquire()
-            try:
-                _make(*self._part)
-            except BaseException as error:
-                self._error = error
-            # Arrays are the caller's alone again.
-            self._part, self._is_done = (0, 0, ()), True
-            if self._done.locked():
-                self._done.release()
+
+@dataclass(frozen=True, slots=True)
+class _Pool:
+    """Parts that are due, and the threads of a process that help, by number."""
+
+    due: SimpleQueue[_Part] = field(default_factory=SimpleQueue)
+    helpers: dict[int, int] = field(default_factory=dict)
 
 
 def _make(first: int, stop: int, calls: tuple[Call, ...]) -> None:
@@ -140,14 +174,36 @@ def _make(first: int, stop: int, calls: tuple[Call, ...]) -> None:
         kernel(first, stop, *arguments)
 
 
-def _idle_helper() -> _Helper:
-    try:
-        return _idle(os.getpid()).pop()
-    except IndexError:
-        return _Helper()
+def _hand_over(parts: Sequence[_Part]) -> None:
+    pool = _pool(os.getpid())
+    for number, part in enumerate(parts):
+        if number not in pool.helpers:
+            # One call: an interrupt amid those of `Thread.start` becomes another error.
+            helper = start_new_thread(_help, (pool, number))
+            pool.helpers.setdefault(number, helper)
+        pool.due.put(part)
+
+
+def _make_what_has_not_begun(parts: Sequence[_Part]) -> None:
+    for part in parts:
+        if part.take(_CALLER):
+            _make(part.first, part.stop, part.calls)
+
+
+def _await(parts: Sequence[_Part]) -> None:
+    for part in parts:
+        part.wait()
+
+
+def _help(pool: _Pool, number: int) -> None:
+    current_thread().name = "mapfilter-part"
+    # Two callers may have started one at the same time.
+    while pool.helpers.setdefault(number, get_ident()) == get_ident():
+        # Without a name for the part, whose error would be kept until the next one comes.
+        pool.due.get().work()
 
 
 @cache
-def _idle(process: int) -> deque[_Helper]:  # noqa: ARG001
-    """Return the helpers that wait; a forked process has none of its parent's."""
-    return deque()
+def _pool(process: int) -> _Pool:  # noqa: ARG001
+    """Return the helpers of a process; a forked process has none of its parent's."""
+    return _Pool()

@@ -1,11 +1,14 @@
 """Parts of particles: each is done once, errors are raised once, and no thread goes on."""
 
+import contextlib
+import gc
 import os
 import pickle
 import signal
 import subprocess
 import sys
 import threading
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from time import sleep
@@ -73,9 +76,10 @@ def test_few_particles_are_not_divided():
 
 @pytest.mark.parametrize("failing", [{0}, {2048}, {0, 2048, 4096}])
 def test_an_error_is_raised_once_and_after_all_parts(failing):
-    done = []
+    done, begun = [], threading.Barrier(3)
 
     def call(first, _):
+        begun.wait(60)
         if first in failing:
             raise ValueError(f"part {first}")
         sleep(0.02)
@@ -94,13 +98,13 @@ def test_an_error_is_raised_once_and_after_all_parts(failing):
 
 
 def test_there_are_no_more_threads_than_asked():
-    four, before = Threads(4, least=0), len(names())
+    four, before, begun = Threads(4, least=0), len(names()), threading.Barrier(4)
     for _ in range(200):
-        four.over(SIZE, (lambda *_: None,))
+        four.over(SIZE, (lambda *_: begun.wait(60),))
     assert len(names()) == max(before, 3)
 
 
-def test_callers_side_by_side_do_not_share_a_thread():
+def test_callers_side_by_side_do_not_share_a_part():
     def count(one):
         for _ in range(100):
             found = np.zeros(SIZE)
@@ -116,9 +120,10 @@ def test_callers_side_by_side_do_not_share_a_thread():
 
 
 def test_an_interrupt_is_raised_after_all_parts():
-    done = []
+    done, begun = [], threading.Barrier(2)
 
     def call(first, _):
+        begun.wait(60)
         if first == 0:
             # While the calling thread waits for the other part.
             signal.setitimer(signal.ITIMER_REAL, 0.05)
@@ -135,6 +140,57 @@ def test_an_interrupt_is_raised_after_all_parts():
         signal.signal(signal.SIGALRM, before)
     assert done == [two.parts(SIZE)[1][0]]
     two.over(SIZE, (lambda *_: None,))
+
+
+def test_the_caller_makes_what_no_helper_has_begun():
+    count = len(names()) + 2
+    begun, let, two, made = threading.Barrier(count + 1), threading.Event(), Threads(2, 0), []
+
+    def hold(*_):
+        begun.wait(60)
+        let.wait(60)
+
+    def call(first, _):
+        made.append((first, threading.get_ident()))
+        if first in failing:
+            raise ValueError("a part")
+
+    with ThreadPoolExecutor(1) as others:
+        held = others.submit(Threads(count, 0).over, count * 1024, (hold,))
+        begun.wait(60)
+        failing = set()
+        two.over(SIZE, (call,))
+        assert made == [(first, threading.get_ident()) for first, _ in two.parts(SIZE)]
+        made.clear()
+        failing = {0}
+        with pytest.raises(ValueError, match="a part"):
+            two.over(SIZE, (call,))
+        let.set()
+        held.result()
+    # Nor after an error, which leaves it out.
+    two.over(SIZE, (lambda *_: None,))
+    assert [first for first, _ in made] == [0]
+
+
+@pytest.mark.parametrize("failing", [0, 3072])
+def test_no_array_is_kept_after_an_error(failing):
+    begun = threading.Barrier(2)
+
+    def call(first, _, array):  # noqa: ARG001
+        begun.wait(60)
+        if first == failing:
+            raise MemoryError
+
+    array = np.zeros(SIZE)
+    kept = weakref.ref(array)
+    gc.disable()
+    try:
+        with contextlib.suppress(MemoryError):
+            Threads(2, least=0).over(SIZE, (call, array))
+        del array
+        assert kept() is None
+    finally:
+        gc.enable()
 
 
 def test_threads_can_be_pickled():
@@ -155,8 +211,10 @@ from mapfilter._threads import Threads
 
 found = []
 def call(first, stop):
+    begun.wait(60)
     found.append((first, threading.get_ident()))
 
+begun = threading.Barrier(2)
 two = Threads(2, least=0)
 assert threading.active_count() == 1
 two.over(5000, (call,))

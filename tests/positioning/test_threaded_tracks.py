@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from made_town import Town, walk_log
 
-from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter._threads import ONE
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate
 
@@ -56,3 +57,10 @@ def test_a_filter_with_threads_can_be_sent_elsewhere(walk):
 
 def located(filter_, log):
     return locate(log, filter_, np.random.default_rng(2)).estimate.to_dataframe()
+
+
+@pytest.mark.parametrize("compass", [True, False])
+def test_a_grid_is_not_divided(compass):
+    filter_ = GridFilter(threads=4).over_area(AREA)
+    assert filter_.model.threads.count == 4
+    assert filter_.beliefs.by_compass[compass].model.model.threads == ONE

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter._device import PROCESSOR, Device, arrays_of
+from mapfilter._threads import ONE
 from mapfilter.filters.contract import BeliefFilter, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
@@ -125,7 +126,8 @@ class BeliefFilters:
         return self._particle_filters(self.options)
 
     def _street_grid(self, *, compass: bool) -> StreetGrid:
-        return StreetGrid(replace(self.model, remember=False), compass, device=self.device)
+        model = replace(self.model, remember=False, threads=ONE)
+        return StreetGrid(model, compass, device=self.device)
 
     @cached_property
     def _by_carriageways(self) -> MapFilter:
