@@ -3,33 +3,50 @@
 ``make`` writes, for each size, a raster for each cell as planning tools export them, cut at 2 km
 from its site; one cell per square kilometre, pixels of 5 m. ``build`` builds a database
 of each with the made streets of ``benchmarks/metropolis.py``: by one process, by two, and by two
-workers of Dask, in turns. It prints seconds by the clock and of the processors, points and levels.
-The slope is that of the logarithms of seconds and of levels.
+workers of Dask, in turns. For each build it prints, as JSON:
+
+``start_s``
+    Seconds by the clock until all workers have started and imported what they need.
+``build_s``
+    Seconds by the clock of the build by these workers.
+``processor_s``
+    Seconds of the processors, start and workers included.
+``points``, ``levels``, ``bytes``
+    Of the database.
+
+At the end it prints medians, and the slopes of the logarithm of ``build_s`` over that of the levels
+from size to size. The databases of all ways have to be equal to the byte. The most memory of a
+build is measured by ``mapfilter bench build --memory``.
 """
 
 import argparse
 import json
+import os
 import resource
 import time
+from concurrent.futures import Executor
 from pathlib import Path
 from statistics import median
 
 import numpy as np
 from metropolis import CRS, FLOOR_DBM, NORTH_M, PIXEL_M, WEST_M, Radio, made_plan, made_ways
 
+from mapfilter._code import code_digest
 from mapfilter._parallel import executor_of
 from mapfilter.database.build import build
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import open_database
+from mapfilter.database.tiles import read_tiles
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.index import HALF_WIDTH_M, RouteSource
-from mapfilter.workflows.build import tiles_a_task
+from mapfilter.workflows.build import PIXELS_A_TASK
 
 REACH_PX = 400
 CELLS_PER_KM2 = 1.0
+MOST_ROUNDS = 40
 WAYS = {"one process": (1, None), "two processes": (2, None), "Dask, two workers": (1, "local:2")}
 """Workers and cluster of each way to build."""
 
@@ -74,6 +91,27 @@ def processor_s() -> float:
     return sum(used.ru_utime + used.ru_stime for used in map(resource.getrusage, who))
 
 
+def process_of(task: int, wait_s: float = 0.3) -> int:  # noqa: ARG001
+    """Return the process that this runs in, once it has imported what a build needs."""
+    code_digest()
+    read_tiles([])
+    time.sleep(wait_s)
+    return os.getpid()
+
+
+def start_workers(executor: Executor, count: int) -> None:
+    """Start all workers of an executor: each has done a task."""
+    # A worker that is ready first would do the tasks of the others if it did not wait. Tasks have
+    # numbers as Dask computes equal ones once.
+    found: set[int] = set()
+    for first in range(0, MOST_ROUNDS * count, count):
+        tasks = [executor.submit(process_of, first + number) for number in range(count)]
+        found |= {task.result() for task in tasks}
+        if len(found) == count:
+            return
+    raise SystemExit(f"{len(found)} of {count} workers started")
+
+
 def built(folder: Path, km2: float, way: str) -> dict[str, float]:
     """Build the database of an area; return its size, and seconds by clock and processors."""
     workers, cluster = WAYS[way]
@@ -84,6 +122,7 @@ def built(folder: Path, km2: float, way: str) -> dict[str, float]:
     out = folder / "database"
     began_s, used_s = time.perf_counter(), processor_s()
     with executor_of(workers, cluster) as (executor, at_once):
+        start_workers(executor, at_once)
         ready_s = time.perf_counter()
         database = build(
             rasters,
@@ -93,7 +132,7 @@ def built(folder: Path, km2: float, way: str) -> dict[str, float]:
             floor_dbm=FLOOR_DBM,
             executor=executor,
             in_flight=4 * at_once,
-            tiles_a_task=1 if cluster is None else tiles_a_task(rasters, 256),
+            pixels_a_task=0 if cluster is None else PIXELS_A_TASK,
             writers=at_once,
         )
         done_s = time.perf_counter()
@@ -105,7 +144,6 @@ def built(folder: Path, km2: float, way: str) -> dict[str, float]:
         "points": int(database.manifest["counts"]["points"]),
         "levels": sum(part["rows"] for part in parts if part.get("cell") is not None),
         "bytes": sum(part["bytes"] for part in parts),
-        "peak_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
     }
 
 

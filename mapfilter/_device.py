@@ -8,7 +8,6 @@ unless :meth:`Device.placed` or :func:`on_host` is called.
 from __future__ import annotations
 
 import sys
-import warnings
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -99,7 +98,8 @@ def open_device(name: str, where: str = "device") -> Device:
     Raises
     ------
     ConfigError
-        There is no such name, no graphics processor, or what it needs is not installed.
+        There is no such name, no graphics processor, or what it needs is not installed or cannot
+        be imported.
     """
     if name == "cpu":
         return PROCESSOR
@@ -107,13 +107,24 @@ def open_device(name: str, where: str = "device") -> Device:
         raise fail(ConfigError, where, "cpu or gpu", repr(name))
     try:
         return Device("gpu", _opened())
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         hint = "the extra gpu is not installed: pip install 'mapfilter[gpu]'"
-        found = f"no module {error.name}" if error.name else str(error)
-        raise fail(ConfigError, where, _EXPECTED, found, hint) from None
+        raise fail(ConfigError, where, _EXPECTED, f"no module {error.name}", hint) from None
+    except ImportError as error:
+        hint = "installed, but not with the libraries of CUDA that it needs, or of another version"
+        raise fail(ConfigError, where, _EXPECTED, _reason(error), hint) from None
     except RuntimeError as error:
         hint = "no driver of NVIDIA, or no such device in this machine or container; cpu needs none"
         raise fail(ConfigError, where, _EXPECTED, str(error), hint) from None
+
+
+def _reason(error: ImportError) -> str:
+    """Return in one line why an import failed; CuPy wraps the cause in a page of advice."""
+    cause: BaseException = error
+    while cause.__cause__ is not None:
+        cause = cause.__cause__
+    lines = [line.strip(" =") for line in str(cause).splitlines()]
+    return next(filter(None, lines), type(cause).__name__)
 
 
 @cache
@@ -126,6 +137,4 @@ def _opened() -> Any:
     cupy.cuda.runtime.getDeviceCount()
     if not cuda.is_available():
         raise RuntimeError("none that numba.cuda can use")
-    # A narrow belief does not fill a device; numba would warn at each kernel.
-    warnings.filterwarnings("ignore", message="Grid size")
     return cupy

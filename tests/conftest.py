@@ -19,6 +19,9 @@ settings.load_profile("mapfilter")
 
 # Commands, with imports from several rooms: python -m tests.fuzz, python -m tests.faults.
 collect_ignore = ["faults.py", "serve_load.py", "fuzz_command.py", "fuzz_readers.py"]
+if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1":
+    # Run by a test in a process of its own.
+    collect_ignore.append("positioning/simulated_device.py")
 
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
 

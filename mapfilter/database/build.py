@@ -25,7 +25,14 @@ from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
 from mapfilter.database.store import open_database
-from mapfilter.database.tiles import TileRows, TileTask, read_tiles, roads_tile, tile_windows
+from mapfilter.database.tiles import (
+    TileRows,
+    TileTask,
+    grouped,
+    read_tiles,
+    roads_tile,
+    tile_windows,
+)
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
@@ -68,7 +75,7 @@ def build(
     measured: tuple[Readings, RxLevRasters] | None = None,
     executor: Executor | None = None,
     in_flight: int = 8,
-    tiles_a_task: int = 1,
+    pixels_a_task: int = 0,
     writers: int = 1,
     resume: bool = False,
     progress: Progress | None = None,
@@ -108,8 +115,9 @@ def build(
         Where tiles are read; the result does not depend on it.
     in_flight : int
         Tasks submitted at a time; four per worker keep all of them busy.
-    tiles_a_task : int
-        Tiles per task: many where submitting one takes long.
+    pixels_a_task : int
+        Most pixels that a task reads, of all cells that reach its tiles: many where submitting a
+        task takes long. A task has a tile at least, and by default no more.
     writers : int
         Cells whose parts are written at a time.
     resume : bool
@@ -141,7 +149,7 @@ def build(
 
         finished = stack.enter_context(FinishedParts(out, key, keep=resume, name="tile"))
         folder = stack.enter_context(atomic_dir(out))
-        made = job.made(executor or SerialExecutor(), finished, in_flight, tiles_a_task)
+        made = job.made(executor or SerialExecutor(), finished, in_flight, pixels_a_task)
         crs, ids = rasters.lattice.crs, job.plan.ids
         written = write_parts(folder, crs, ids, made, len(job.windows), writers, progress)
         if written.received == 0:
@@ -258,13 +266,12 @@ class BuildJob:
         return self.rasters.lattice.window(*inside)
 
     def made(
-        self, executor: Executor, finished: FinishedParts, in_flight: int, tiles_a_task: int
+        self, executor: Executor, finished: FinishedParts, in_flight: int, pixels_a_task: int
     ) -> Iterator[TileRows]:
         """Yield the tiles in order, finished ones from disk."""
         every = range(len(self.windows))
         missing = [n for n in every if not finished.keep or finished.load(n) is None]
-        groups = [missing[n : n + tiles_a_task] for n in range(0, len(missing), tiles_a_task)]
-        tasks = ([self.task(number) for number in group] for group in groups)
+        tasks = grouped(map(self.task, tuple(missing)), pixels_a_task)
         results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)
         made = (rows for group in results for rows in group)
         for number in every:

@@ -26,6 +26,8 @@ _POINT_COLUMNS = (
     "margin_db",
 )
 _FIRST_MARGIN_PX = 32
+_MAX_PIXELS = 1 << 31
+"""Pixels of a lattice whose numbers fit in signed 32 bits."""
 
 
 class CellLevels(NamedTuple):
@@ -87,14 +89,17 @@ def read_levels(part: Part, lattice: Lattice) -> CellLevels:
     Raises
     ------
     StoreError
-        The part is damaged, or the database was replaced since it was opened.
+        The part is damaged, the database was replaced since it was opened, or its lattice has more
+        pixels than 32 bits count.
     """
+    if lattice.rows * lattice.cols > _MAX_PIXELS:
+        expected, got = f"at most {_MAX_PIXELS} pixels", f"{lattice.rows} x {lattice.cols}"
+        raise fail(StoreError, f"{part}, lattice", expected, got, "cut the area into several")
     table = read_columns(part, ("point", "level_dbm"))
     point = table["point"].to_numpy()
     if point.size and not 0 <= point.min() <= point.max() < lattice.rows * lattice.cols:
         expected = "points on the database's lattice"
         raise fail(StoreError, str(part), expected, "others", "parts mixed up")
-    # A lattice has fewer pixels than 32 bits count.
     point = point.astype(np.int32)
     order = np.argsort(point)
     level_dbm = table["level_dbm"].to_numpy().astype(np.float32)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,8 @@ from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 _CELLS_AT_A_TIME = 128
+_MAX_TILES = 64
+"""Tiles of a group, however few cells reach them."""
 _AT_POINTS = ("best", "best_level_dbm", "margin_db")
 _AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
 
@@ -36,6 +38,11 @@ class TileTask:
     window: Window
     part: RoutePart
     floor_dbm: float
+
+    @property
+    def pixels(self) -> int:
+        """Pixels that are read, of all cells together; those of one where none reaches the tile."""
+        return self.window[2] * self.window[3] * max(len(self.numbers), 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,6 +98,27 @@ class TileRows:
         columns = {name: points[name].to_numpy() for name in _AT_POINTS}
         columns |= {name: rows[name].to_numpy() for name in _AT_LEVELS}
         return cls(points.drop_columns(list(_AT_POINTS)), TileLevels(**columns))
+
+
+def grouped(tasks: Iterable[TileTask], max_pixels: int) -> Iterator[list[TileTask]]:
+    """Yield the tasks in groups, in order, each made when it is due.
+
+    Parameters
+    ----------
+    tasks : iterable of TileTask
+    max_pixels : int
+        Pixels that a group reads; one tile is a group however many it reads.
+    """
+    group: list[TileTask] = []
+    pixels = 0
+    for task in tasks:
+        if group and (pixels + task.pixels > max_pixels or len(group) == _MAX_TILES):
+            yield group
+            group, pixels = [], 0
+        group.append(task)
+        pixels += task.pixels
+    if group:
+        yield group
 
 
 def read_tiles(tasks: Sequence[TileTask]) -> list[bytes]:

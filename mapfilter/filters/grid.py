@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import cos, inf, isfinite, nan, sin
-from typing import Any, Generic, Protocol
+from typing import Any, Generic, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +90,9 @@ class GridModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
         ``spread_m2`` is a further variance along each axis.
         """
 
+    def placed(self, device: Device) -> Self:
+        """Return the model with its arrays on a device: itself if they lie there already."""
+
 
 @dataclass(frozen=True, eq=False)
 class GridBelief:
@@ -130,7 +133,7 @@ class GridBelief:
             return self
         model = self.model
         step = model.transport(*self.waiting)
-        # A belief that comes from another process lies where it was read.
+        # Masses of a restored belief may lie elsewhere than a model that it was given since.
         arrays = arrays_of(step.on)
         before_on, before_off = arrays.asarray(self.on), arrays.asarray(self.off)
         on, off = arrays.empty_like(before_on), arrays.empty_like(before_off)
@@ -199,14 +202,17 @@ class GridBelief:
         return summarise_arrays(state, weight, self.bins)
 
     def __getstate__(self) -> dict[str, object]:
+        # It is read where there may be no device; the filter's next update places it again.
         kept = {name: self.__dict__[name] for name in self.__dataclass_fields__}
-        # Masses are written as NumPy's; the model opens its device where it is read.
-        return kept | {"on": on_host(self.on), "off": on_host(self.off)}
+        here = {"on": on_host(self.on), "off": on_host(self.off)}
+        return kept | here | {"model": self.model.placed(PROCESSOR)}
 
     def placed(self, device: Device) -> GridBelief:
         """Return the belief with its mass on a device: itself if it lies there already."""
-        on, off = device.placed(self.on), device.placed(self.off)
-        return self if on is self.on and off is self.off else replace(self, on=on, off=off)
+        on, off, model = device.placed(self.on), device.placed(self.off), self.model.placed(device)
+        if on is self.on and off is self.off and model is self.model:
+            return self
+        return replace(self, on=on, off=off, model=model)
 
 
 @dataclass(frozen=True, slots=True)

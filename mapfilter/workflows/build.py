@@ -29,7 +29,7 @@ from mapfilter.workflows.world import (
 )
 
 PIXELS_A_TASK = 10_000_000
-MOST_TILES_A_TASK = 64
+"""Pixels of a task for a worker on a cluster, to whom sending one costs time."""
 _TASKS_A_WORKER = 4
 
 
@@ -90,7 +90,7 @@ def run_build(
             measured=_measured(config),
             executor=executor,
             in_flight=_TASKS_A_WORKER * at_once,
-            tiles_a_task=tiles_a_task(rasters, section.tile_px) if cluster is not None else 1,
+            pixels_a_task=PIXELS_A_TASK if cluster is not None else 0,
             writers=at_once,
             resume=resume,
             progress=progress,
@@ -107,25 +107,6 @@ def run_build(
         notes=(*rasters.notes, *plan.notes, *floor, *cover, *world.streets.notes),
         pictures=_draw(config, rasters, database, world),
     )
-
-
-def tiles_a_task(rasters: RxLevRasters, tile_px: int) -> int:
-    """Return how many tiles make a task for a worker on a cluster, to whom sending one costs time.
-
-    Parameters
-    ----------
-    rasters : RxLevRasters
-        A tile reads the pixels of those that reach it.
-    tile_px : int
-        Side of a tile.
-    """
-    area_m2 = rasters.lattice.rows * rasters.lattice.cols * rasters.lattice.resolution_m**2
-    covered_m2 = sum(
-        len(file.cell_ids) * file.lattice.rows * file.lattice.cols * file.lattice.resolution_m**2
-        for file in rasters.files
-    )
-    pixels = tile_px**2 * max(covered_m2 / area_m2, 1.0)
-    return int(min(max(PIXELS_A_TASK // pixels, 1), MOST_TILES_A_TASK))
 
 
 def _build_roads(config: Config, progress: Progress | None) -> BuildResult:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from killed_worker import KillsOneWorker
-from small_world import CRS, FLOOR_DBM, LATTICE, make_plan, make_routes, make_world
+from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
 
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
 from mapfilter.database.build import build
@@ -23,6 +23,7 @@ from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Buildings, Squares, Ways
 
 OPTIONS = {"floor_dbm": FLOOR_DBM, "tile_px": 8}
+TILE_PIXELS = 8 * 8 * len(IDS)
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +136,7 @@ def test_a_dask_worker_killed_in_mid_build_loses_nothing(world, whole, tmp_path)
         assert workers == 2
         deadly = KillsOneWorker(executor, tmp_path / "died")
         out = tmp_path / "db"
-        database = again(world, out, executor=deadly, tiles_a_task=2, in_flight=4)
+        database = again(world, out, executor=deadly, pixels_a_task=2 * TILE_PIXELS, in_flight=4)
         deadly.deaths[0].result()
     assert (tmp_path / "died").exists()
     assert contents(database.path) == whole
@@ -150,8 +151,21 @@ def test_a_cluster_that_is_not_there(address, monkeypatch):
 
 
 def test_many_tiles_a_task_give_the_same_bytes(world, whole, tmp_path):
+    one, several, many = Counting(), Counting(), {"pixels_a_task": 3 * TILE_PIXELS}
+    again(world, tmp_path / "one", executor=one)
+    again(world, tmp_path / "several", executor=several, **many)
+    assert several.tasks <= one.tasks / 2
+    assert contents(tmp_path / "several") == whole
     with local_executor(2) as executor:
-        built = again(world, tmp_path / "db", executor=executor, tiles_a_task=3, writers=2)
+        built = again(world, tmp_path / "db", executor=executor, writers=2, **many)
+    assert contents(built.path) == whole
+
+
+def test_a_build_that_goes_on_makes_tasks_of_what_is_missing(world, whole, tmp_path):
+    interrupted(world, tmp_path / "db", 4)
+    rest = Counting()
+    built = again(world, tmp_path / "db", executor=rest, pixels_a_task=10**9, resume=True)
+    assert rest.tasks == 1
     assert contents(built.path) == whole
 
 

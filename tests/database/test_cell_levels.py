@@ -126,6 +126,18 @@ def test_points_beyond_the_lattice_are_refused(database):
     assert str(part) in caught.value.faults[0].where
 
 
+def test_a_lattice_with_more_pixels_than_32_bits_count_is_refused(database):
+    (part,) = database.level_parts[IDS[0]]
+    point = read_levels(part, LATTICE).point
+    most = read_levels(part, Lattice(CRS, 0.0, 5.0, 5.0, 1 << 15, 1 << 16))
+    np.testing.assert_array_equal(most.point, point)
+    with pytest.raises(
+        StoreError, match="at most 2147483648 pixels, found 32769 x 65536"
+    ) as caught:
+        read_levels(part, Lattice(CRS, 0.0, 5.0, 5.0, (1 << 15) + 1, 1 << 16))
+    assert str(part) in caught.value.faults[0].where
+
+
 @pytest.mark.parametrize(
     ("points", "good"),
     [((0,), True), ((1999,), True), ((2000,), False), ((-1,), False), ((-1, 7), False),

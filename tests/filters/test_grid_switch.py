@@ -69,6 +69,9 @@ class Places:
     def can_converge(self, summary, reading):  # noqa: ARG002
         return self.believable
 
+    def placed(self, device):  # noqa: ARG002
+        return self
+
 
 ONE = [0.0, 0.0, 1.0, 0.0, 0.0]
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from small_area import make_area
 
+from mapfilter._threads import ONE, Threads
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief, ParticleOptions
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, STATES, MapWeights, MotionErrors
@@ -33,6 +34,7 @@ class Model:
 
     motion: MotionErrors = MODEL.motion
     remember: bool = False
+    threads: Threads = ONE
 
     @property
     def area(self):

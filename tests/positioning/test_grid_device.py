@@ -9,6 +9,7 @@ import strict_arrays
 from cross_world import CRS, EAST, NORTH, make_database, walk_log
 from small_area import make_area
 
+from mapfilter import _device
 from mapfilter._device import PROCESSOR, Device, on_host
 from mapfilter.errors import ConfigError
 from mapfilter.filters.grid import GridBelief
@@ -84,16 +85,50 @@ def test_mass_stays_on_the_device_from_step_to_step(grid):
     belief = track.belief
     assert isinstance(belief.on, strict_arrays.Array)
     assert isinstance(belief.off, strict_arrays.Array)
-    # What is stored of it can be read where there is no device.
-    stored = belief.__getstate__()
-    assert isinstance(stored["on"], np.ndarray)
-    np.testing.assert_array_equal(stored["on"], strict_arrays.asnumpy(belief.on))
-    again = replace(belief, on=stored["on"], off=stored["off"])
-    assert isinstance(again.moved.on, strict_arrays.Array | np.ndarray)
-    np.testing.assert_allclose(again.summary.mean, belief.summary.mean, atol=1e-3)
+
+
+def no_device():
+    raise RuntimeError("cudaErrorNoDevice")
+
+
+def test_a_stored_belief_can_be_read_where_there_is_no_device(grid, monkeypatch):
+    positioner, rng = replace(grid, device=DEVICE), np.random.default_rng(0)
+    track = positioner.begin()
+    *before, last = epochs(walk_log(((EAST, 5.0),)))
+    for epoch in before:
+        track, _ = positioner.step(track, epoch, rng)
+    stored = pickle.dumps(track.belief)
+    monkeypatch.setattr(_device, "_opened", no_device)
+    again = pickle.loads(stored)
+    assert isinstance(again.on, np.ndarray)
+    np.testing.assert_array_equal(again.on, strict_arrays.asnumpy(track.belief.on))
+    assert isinstance(again.moved.on, np.ndarray)
+    np.testing.assert_allclose(again.summary.mean, track.belief.summary.mean, atol=1e-3)
+    # The filter goes on from it as from the other, on its device or on the processor.
     brought = again.placed(DEVICE)
     assert isinstance(brought.on, strict_arrays.Array)
     assert brought.placed(DEVICE) is brought
+    expected = positioner.step(track, last, rng)[0].belief
+    for other, arrays in ((positioner, strict_arrays.Array), (grid, np.ndarray)):
+        found = other.step(replace(track, belief=again), last, rng)[0].belief
+        assert isinstance(found.on, arrays)
+        np.testing.assert_allclose(found.summary.mean, expected.summary.mean, atol=1e-3)
+
+
+def test_likelihoods_that_were_computed_are_not_stored(grid, monkeypatch):
+    positioner, rng = replace(grid, device=DEVICE), np.random.default_rng(0)
+    track = positioner.begin()
+    for epoch in epochs(walk_log(((EAST, 5.0),))):
+        track, _ = positioner.step(track, epoch, rng)
+    model = track.belief.model
+    monkeypatch.setattr(_device, "_opened", lambda: strict_arrays)
+    step = model._on_device
+    assert step._log_map.shape == model._log_map.shape
+    for kept in (model, step):
+        assert "_log_map" in vars(kept)
+        again = pickle.loads(pickle.dumps(kept))
+        assert set(vars(again)) == set(kept.__dataclass_fields__)
+        assert again.device == DEVICE
 
 
 def test_positions_for_scores_bring_back_no_more_than_summaries(grid, monkeypatch):

@@ -63,6 +63,7 @@ OF_BAYES = {
     "fault_probability": (0.07, "model.evidence.levels.fault_probability"),
     "level_weight": (0.6, "model.evidence.levels.weight"),
     "report_spacing_m": (9.0, "model.evidence.spacing_m"),
+    "threads": (2, "model.threads.count"),
     "max_particles": (15000, "options.max_particles"),
     "min_search_particles": (9000, "options.min_search_particles"),
     "min_particles": (800, "options.min_particles"),

@@ -64,6 +64,10 @@ class DeviceStep:
     def _bound_table(self) -> Any:
         return self.device.placed(fingerprint.bound_table())
 
+    def __getstate__(self) -> dict[str, object]:
+        # Arrays are brought to the device again where they are needed.
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
+
     def placed(self, cloud: Cloud) -> Cloud:
         """Return hypotheses on the device."""
         placed = self.device.placed

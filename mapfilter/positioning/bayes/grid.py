@@ -6,7 +6,7 @@ other sources are computed by the processor, for the pixels that hold mass.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, exp, isfinite, pi
 from typing import TYPE_CHECKING, Any
@@ -152,6 +152,14 @@ class StreetGrid:
         """Add the log-likelihood of a reading, in place."""
         weigher = self.model if self.device.is_host else self._on_device
         return weigher.weigh(cloud, log_weight, reading)
+
+    def placed(self, device: Device) -> StreetGrid:
+        """Return the grid with its arrays on a device: itself if they lie there already."""
+        return self if device == self.device else replace(self, device=device)
+
+    def __getstate__(self) -> dict[str, object]:
+        # The likelihood of the map is computed again where it is needed.
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
 
     def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
         """Return whether the leading hypothesis is on the map, and nothing else is as probable."""
