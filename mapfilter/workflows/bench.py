@@ -21,19 +21,7 @@ from mapfilter.database.build import BuildJob, build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail
-from mapfilter.experiments.papers.fritsche_klein_2009.paper import bound_curves
-from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
-    COMBINATIONS,
-    Layout,
-    Scene,
-    Trials,
-    draw,
-    scene,
-)
-from mapfilter.filters.gaussian import EKF, RBUKF, Method
-from mapfilter.filters.trials import run_trials
 from mapfilter.geodesy import Lattice
-from mapfilter.positioning.kalman.models import compiled
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
@@ -42,6 +30,7 @@ from mapfilter.roads.lattice import RouteLattice
 if TYPE_CHECKING:
     from mapfilter.workflows.bench_device import DeviceBench
     from mapfilter.workflows.bench_filter import FilterBench
+    from mapfilter.workflows.bench_fusion import FusionBench
     from mapfilter.workflows.bench_memory import MemoryBench
     from mapfilter.workflows.bench_peers import PeersBench
     from mapfilter.workflows.bench_sweep import SweepBench
@@ -51,7 +40,6 @@ CRS = "EPSG:32629"
 STAGES = ("build", "filter", "fusion", "sweep")
 _FLOOR_DBM = -104.0
 _BLOCK_PX = 256
-_TRIALS = 500
 
 
 @dataclass(frozen=True)
@@ -154,6 +142,8 @@ def run_bench(
 
         return bench_filter(runs=runs)
     if stage == "fusion":
+        from mapfilter.workflows.bench_fusion import bench_fusion
+
         return bench_fusion(runs=runs)
     if stage == "sweep":
         from mapfilter.workflows.bench_sweep import bench_sweep
@@ -283,58 +273,6 @@ def _peak_memory_bytes(rasters: Path, points: int) -> int:
     return int(done.stdout)
 
 
-@dataclass(frozen=True)
-class FusionBench:
-    """Kalman-type filters on the hybrid problem of 6 states and 10 measurements, one process.
-
-    Figures are medians over the runs, which take turns; compilation is not counted.
-
-    Parameters
-    ----------
-    trials, steps, runs : int
-        The task.
-    ekf_per_s, rbukf_per_s : float
-        Steps of trials per second.
-    table_3_s : float
-        Table III of Fritsche & Klein 2009: three combinations, two filters, drawing and bounds.
-    """
-
-    trials: int
-    steps: int
-    runs: int
-    ekf_per_s: float
-    rbukf_per_s: float
-    table_3_s: float
-
-
-def bench_fusion(*, runs: int = 5) -> FusionBench:
-    """Measure the filters of one run."""
-    given = scene("hybrid2", Layout())
-    steps = Layout().steps
-    drawn = draw(given, _TRIALS, steps, np.random.default_rng(0))
-
-    def run(method: Method) -> Callable[[], object]:
-        return lambda: estimates(given, drawn, method, drawn.first_means, given.first_covariance)
-
-    took_s = median_seconds({"ekf": run(EKF), "rbukf": run(RBUKF), "table": _table_3}, runs)
-    ekf_per_s, rbukf_per_s = (_TRIALS * steps / took_s[name] for name in ("ekf", "rbukf"))
-    return FusionBench(_TRIALS, steps, runs, ekf_per_s, rbukf_per_s, took_s["table"])
-
-
-def estimates(given: Scene, drawn: Trials, method: Method, means: Floats, first: Floats) -> Floats:
-    """Run a filter over trials and return its means."""
-    run = run_trials(
-        compiled(given.measurement),
-        given.assumed.transition,
-        given.assumed.noise,
-        method,
-        means,
-        first,
-        drawn.readings[: len(means)],
-    )
-    return run.means
-
-
 def median_seconds(
     tasks: Mapping[str, Callable[[], object]],
     runs: int,
@@ -350,13 +288,3 @@ def median_seconds(
             if turn > 0:
                 took_s[name].append(clock() - began_s)
     return {name: median(times) for name, times in took_s.items()}
-
-
-def _table_3() -> None:
-    rng = np.random.default_rng(1)
-    for name in COMBINATIONS:
-        given = scene(name, Layout())
-        drawn = draw(given, _TRIALS, Layout().steps, rng)
-        bound_curves(given, drawn.states)
-        for method in (RBUKF, EKF):
-            estimates(given, drawn, method, drawn.first_means, given.first_covariance)

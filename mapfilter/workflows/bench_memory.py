@@ -21,8 +21,9 @@ from mapfilter.experiments.sweep.run import sweep
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.filter import locate
 from mapfilter.tracks.store import read_log
-from mapfilter.workflows.bench import bench_fusion, build_made, made_rasters
+from mapfilter.workflows.bench import build_made, made_rasters
 from mapfilter.workflows.bench_filter import JITTER, make_world, step_inputs, whole_step
+from mapfilter.workflows.bench_fusion import bench_fusion
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.reproduce import paper_config

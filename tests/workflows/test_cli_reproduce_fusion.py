@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from mapfilter.cli import app
 from mapfilter.experiments.papers.fritsche_klein_2009 import paper
-from mapfilter.workflows import bench
+from mapfilter.workflows import bench_fusion
 
 QUANTITIES = {"location_m", "velocity_mps", "bias_m", "drift_mps"}
 
@@ -95,7 +95,7 @@ def test_more_trials_than_memory_holds_are_refused(paper, tmp_path):
 
 
 def test_bench_of_fusion(monkeypatch):
-    monkeypatch.setattr(bench, "_TRIALS", 20)
+    monkeypatch.setattr(bench_fusion, "_TRIALS", 20)
     found = told(["bench", "fusion", "--runs", "1"])
     assert found["trials"] == 20
     assert found["ekf_per_s"] > 0
