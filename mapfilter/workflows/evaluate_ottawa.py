@@ -185,7 +185,7 @@ def run_ottawa(
         found = [one for left_out in every for one in left_out.found]
         centroid_m = {left_out.session: left_out.centroid_m for left_out in every}
         rows += part_rows(part, found, centroid_m)
-        intervals += part_intervals(part, found)
+        intervals += part_intervals(part, found, centroid_m)
         sessions += session_rows(found, centroid_m)
         title = f"Ottawa, {part}: real phones, each session on the map of the others"
         picture = out / part / PICTURE

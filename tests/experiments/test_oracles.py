@@ -1,11 +1,14 @@
 """What oracles are given: true starts, and the true size of errors."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from mapfilter.evaluation.accuracy import Truth
-from mapfilter.experiments.recorded import smartloc
+from mapfilter.experiments.recorded import locating, smartloc
+from mapfilter.experiments.recorded.locating import OpenMap, with_white_ranges
 from mapfilter.experiments.recorded.oracles import (
     NOISE,
     START,
@@ -18,6 +21,12 @@ from mapfilter.experiments.recorded.oracles import (
 )
 from mapfilter.geodesy import project, unproject
 from mapfilter.gnss.sky import ecef_from_lonlat
+from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.gnss.biases import Biases, reflection_deviations_m
+from mapfilter.positioning.gnss.options import GnssOptions
+from mapfilter.positioning.gnss.sky import Sky, range_sigma_m
+from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32633"
@@ -116,6 +125,38 @@ def test_errors_of_pseudoranges_without_clock_and_height():
     sigma_m = with_range_errors(log, truth).pseudoranges["sigma_m"].to_numpy()
     assert sigma_m[late] == pytest.approx(60.0, abs=1.0)
     assert (sigma_m[~late] < 1.5).all()
+
+
+def test_errors_of_known_size_are_white_and_of_that_size():
+    usual = GnssOptions(zenith_m=3.0, height_m=50.0)
+    white = with_white_ranges(usual)
+    assert (white.zenith_m, white.height_m, white.gate) == (3.0, 50.0, usual.gate)
+    elevation_rad, names = np.radians([20.0, 50.0, 80.0]), ("G01", "G02", "G03")
+    for stated_m in ([60.0, 1.0, np.nan], [np.nan] * 3):
+        sigma_m = np.array(stated_m)
+        lasting = Biases(names, reflection_deviations_m(white, elevation_rad, sigma_m))
+        assert lasting.means_m(white).tolist() == [0.0, 0.0, 0.0]
+        assert lasting.variances_m2(white).tolist() == [0.0, 0.0, 0.0]
+        assert (reflection_deviations_m(usual, elevation_rad, sigma_m) > 0).all()
+    sigma_m = np.array([60.0, 1.0, 7.0])
+    sky = Sky(names, np.zeros((3, 3)), elevation_rad, np.zeros(3), sigma_m, (0.0, 0.0), np.eye(2))
+    assert range_sigma_m(white, sky, 0.0).tolist() == [60.0, 1.0, 7.0]
+
+
+def test_smartloc_locates_the_oracle_of_noise_alone_with_white_errors(monkeypatch, tmp_path):
+    truth = _truth()
+    log = make_log(CRS, pseudoranges=_ranges(truth, 60.0), truth=_table(truth))
+    usual = GnssOptions(zenith_m=3.0, height_m=50.0)
+    database = SimpleNamespace(lattice=SimpleNamespace(crs=CRS), plan=None, cell_ids=())
+    own = BayesPositioner(None, satellites=usual)
+    over = OpenMap(database, tmp_path, {(fitted_to_log(BayesFilter(), log)[0], False): own})
+    found = {}
+    for method in ("bayes", START, NOISE):
+        monkeypatch.setattr(
+            locating, "locate", lambda _, by, __, name=method: found.update({name: by.satellites})
+        )
+        smartloc.located_by(method, log, over, np.random.default_rng(0))
+    assert found == {"bayes": usual, START: usual, NOISE: with_white_ranges(usual)}
 
 
 def test_oracles_of_smartloc_are_those_of_the_parts_with_a_target():

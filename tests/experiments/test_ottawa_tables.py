@@ -23,6 +23,7 @@ from mapfilter.experiments.benchmarks.ottawa import (
 from mapfilter.experiments.benchmarks.ottawa_sessions import LONGEST_GAP_S, ReckoningErrors
 from mapfilter.experiments.benchmarks.ottawa_table import (
     LeftOut,
+    part_intervals,
     part_rows,
     read_left_out,
     session_rows,
@@ -86,6 +87,7 @@ def test_sessions_of_which_half_lies_on_the_map_have_a_row_of_their_own():
     found = [run("a", method, on_map=0.5) for method in METHODS]
     found += [run("b", method, on_map=0.49, errors=[400.0]) for method in METHODS]
     rows = {row.method: row for row in part_rows("carling", found, CENTROID_M)}
+    assert [one.method for one in part_intervals("carling", found, CENTROID_M)] == list(rows)
     assert list(rows) == ["bayes", "bayes-mapped", "smoothed", "smoothed-mapped", "centroid"]
     mapped = rows["bayes-mapped"]
     assert (mapped.unit_count, mapped.n, mapped.mean_m, mapped.baseline_m) == (1, 2, 20.0, 200.0)
@@ -94,6 +96,20 @@ def test_sessions_of_which_half_lies_on_the_map_have_a_row_of_their_own():
     assert len(part_rows("carling", none, CENTROID_M)) == 3
     every = [replace(one, on_map=1.0) for one in found]
     assert len(part_rows("carling", every, CENTROID_M)) == 3
+
+
+def test_intervals_of_the_sessions_on_the_map_leave_out_the_others():
+    found = [run(name, method, on_map=0.9) for name in "abc" for method in METHODS]
+    alone = {one.method: one for one in part_intervals("carling", found, {})}
+    found += [run("d", method, on_map=0.1, errors=[400.0] * 9) for method in METHODS]
+    centroid_m = {name: np.array([100.0, 300.0]) for name in "abcd"}
+    every = {one.method: one for one in part_intervals("carling", found, centroid_m)}
+    assert replace(every["smoothed-mapped"], method="smoothed") == alone["smoothed"]
+    assert every["smoothed"].mean_high_m > 100 > every["smoothed-mapped"].mean_high_m
+    assert (every["smoothed"].count, every["smoothed-mapped"].count) == (4, 3)
+    centroid = every["centroid"]
+    assert (centroid.over, centroid.count, centroid.mean_low_m) == ("units", 4, 200.0)
+    assert isnan(centroid.coverage_low)
 
 
 def test_a_part_without_any_fix():

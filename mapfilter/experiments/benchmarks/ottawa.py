@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mapfilter._types import Bools, Floats
+from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
 from mapfilter.experiments.benchmarks.ottawa_sessions import (
     ReckoningErrors,
@@ -42,6 +43,8 @@ ORACLES = (START, MOTION)
 """The filter of ``bayes`` with the true first 30 m as fixes, or with the true way between good
 fixes as motion; the first draw of the noise only."""
 _ON_MAP_M = 50.0
+_LEAST_FIXES = 2
+"""Positions of a true way."""
 
 
 @dataclass(frozen=True)
@@ -94,9 +97,13 @@ def find_session(
     draw: int,
     step_factor: float = 1.0,
 ) -> list[FoundSession]:
-    """Find a session from an unknown start, with one draw of the noise, by all methods."""
+    """Find a session from an unknown start, with one draw of the noise, by all methods.
+
+    Oracles need two good fixes; a session with fewer has none.
+    """
     found = []
-    for method in (*METHODS, *(ORACLES if draw == 0 else ())):
+    oracles = ORACLES if draw == 0 and has_truth(session) else ()
+    for method in (*METHODS, *oracles):
         log, estimate = locate_session(
             session, positioner, options, seed, draw, step_factor, method=method
         )
@@ -114,7 +121,13 @@ def locate_session(
     *,
     method: str = METHODS[0],
 ) -> tuple[TrackLog, TrackEstimate]:
-    """Return the log of a session with one draw of the noise, and its estimate by a method."""
+    """Return the log of a session with one draw of the noise, and its estimate by a method.
+
+    Raises
+    ------
+    InputError
+        The method is an oracle, and the session has fewer than two good fixes.
+    """
     rng = named_rng(seed, "noise", session.name, str(draw))
     crs = positioner.area.lattice.crs
     log = session_log(session, crs, options.errors, rng, step_factor=step_factor)
@@ -126,10 +139,18 @@ def locate_session(
 
 def _for_oracle(method: str, log: TrackLog, session: Session) -> TrackLog:
     """Return the log that a method is given: an oracle's holds parts of the truth."""
-    truth = Truth.of_table(log.truth[session.accuracy_m <= GOOD_M])
-    if method not in ORACLES or truth is None:
+    if method not in ORACLES:
         return log
+    truth = Truth.of_table(log.truth[session.accuracy_m <= GOOD_M])
+    if truth is None:
+        expected = f"two fixes of {GOOD_M:g} m or better for {method}"
+        raise fail(InputError, session.name, expected, int(np.sum(session.accuracy_m <= GOOD_M)))
     return with_start(log, truth) if method == START else with_true_motion(log, truth)
+
+
+def has_truth(session: Session) -> bool:
+    """Return whether a session has the two good fixes that an oracle needs."""
+    return int(np.sum(session.accuracy_m <= GOOD_M)) >= _LEAST_FIXES
 
 
 def centroid_errors_m(session: Session, others: Sequence[Session], crs: str) -> Floats:

@@ -26,6 +26,7 @@ from mapfilter.experiments.benchmarks.ottawa import METHODS, ORACLES, FoundSessi
 from mapfilter.experiments.row_intervals import RowInterval, ScoredRun, interval_of
 
 _MAPPED_SHARE = 0.5
+_CENTROID = "centroid"
 
 
 @dataclass(frozen=True)
@@ -76,34 +77,41 @@ def part_rows(part: str, found: Sequence[FoundSession], centroid_m: dict[str, Fl
     centroid_m : dict of str to ndarray
         Errors of the centroids, by session.
     """
-    mapped = {one.session for one in found if one.on_map >= _MAPPED_SHARE}
-    rows = []
-    for method in METHODS:
-        own = [one for one in found if one.method == method]
-        rows.append(_row(part, method, own, centroid_m))
-        if mapped and len(mapped) < len(centroid_m):
-            some = [one for one in own if one.session in mapped]
-            rows.append(_row(part, f"{method}-mapped", some, centroid_m))
-    for oracle in ORACLES:
-        own = [one for one in found if one.method == oracle]
-        rows += [_row(part, oracle, own, centroid_m)] if own else []
+    rows = [_row(part, method, own, centroid_m) for method, own in _by_method(found)]
     every = joined(centroid_m.values())
     no_radii = np.empty(0)
     usual_m = median_of(every)
-    rows.append(row_of(part, "centroid", len(centroid_m), every, Success(), no_radii, usual_m))
+    rows.append(row_of(part, _CENTROID, len(centroid_m), every, Success(), no_radii, usual_m))
     return rows
 
 
-def part_intervals(part: str, found: Sequence[FoundSession]) -> list[RowInterval]:
-    """Return the intervals of each method's errors on a part, over its sessions."""
-    return [
-        interval_of(
-            part,
-            method,
-            [ScoredRun(o.session, o.error_m, o.covered) for o in found if o.method == method],
-        )
-        for method in (*METHODS, *ORACLES)
+def part_intervals(
+    part: str, found: Sequence[FoundSession], centroid_m: dict[str, Floats]
+) -> list[RowInterval]:
+    """Return the intervals of each row of :func:`part_rows`, in its order, over sessions."""
+    intervals = [
+        interval_of(part, method, [ScoredRun(o.session, o.error_m, o.covered) for o in own])
+        for method, own in _by_method(found)
     ]
+    no_radii = np.empty(0, dtype=np.bool_)
+    centroids = [ScoredRun(name, each, no_radii) for name, each in centroid_m.items()]
+    return [*intervals, interval_of(part, _CENTROID, centroids)]
+
+
+def _by_method(found: Sequence[FoundSession]) -> list[tuple[str, list[FoundSession]]]:
+    """Return the runs of each row but that of the centroids."""
+    sessions = {one.session for one in found}
+    mapped = {one.session for one in found if one.on_map >= _MAPPED_SHARE}
+    selected = []
+    for method in METHODS:
+        own = [one for one in found if one.method == method]
+        selected.append((method, own))
+        if mapped and mapped != sessions:
+            selected.append((f"{method}-mapped", [one for one in own if one.session in mapped]))
+    for oracle in ORACLES:
+        own = [one for one in found if one.method == oracle]
+        selected += [(oracle, own)] if own else []
+    return selected
 
 
 def session_rows(found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -> list[SessionRow]:

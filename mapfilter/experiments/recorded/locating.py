@@ -13,6 +13,7 @@ from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import PositionedTrack
 from mapfilter.positioning.filter import locate
+from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.log_options import by_streets_alone, fitted_to_log
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -51,6 +52,7 @@ def locate_log(
     options: BayesFilter | None = None,
     *,
     smooth: bool = False,
+    white_ranges: bool = False,
 ) -> PositionedTrack:
     """Locate a log over a database from an unknown start.
 
@@ -60,9 +62,18 @@ def locate_log(
         The defaults when left out; what the log states takes the place of defaults.
     smooth : bool
         Whether positions are smoothed by the whole log.
+    white_ranges : bool
+        Whether errors of pseudoranges are white, of the sizes that the log states.
     """
     database = over.database
     named = name_by_plan(in_frame(log, database.lattice.crs), database.plan)
     fitted, _ = fitted_to_log(options or BayesFilter(), named)
     positioner = over.filter_of(fitted, alone=by_streets_alone(fitted, named, database))
+    if white_ranges:
+        positioner = replace(positioner, satellites=with_white_ranges(positioner.satellites))
     return locate(named, replace(positioner, smooth=smooth), rng)
+
+
+def with_white_ranges(options: GnssOptions) -> GnssOptions:
+    """Return options by which no satellite has a lasting error, reflected or not."""
+    return replace(options, echo_m=0.0, reflection_m=0.0, reflection_times=0.0)

@@ -43,7 +43,7 @@ from mapfilter.experiments.recorded.outages import (
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import unproject
-from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.corridors import Positions
 from mapfilter.tracks.combine import CombineOptions
@@ -112,7 +112,7 @@ def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
     journeys: dict[str, Journey] = {}
     for method, one in {"bayes": given, **by_oracles(task.part, given, truth, spans)}.items():
         words = (task.part, str(task.run), *(() if method == "bayes" else (method,)))
-        located = locate_log(one, over, named_rng(task.seed, "smartloc", *words))
+        located = located_by(method, one, over, named_rng(task.seed, "smartloc", *words))
         scored = score_journey(
             task.part, method, task.unit, located.estimate, truth, seconds=located.filter_s
         )
@@ -137,6 +137,13 @@ def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
         if task.part == OUTAGES and method == "bayes":
             found += _from_true_begin(task, located.estimate, truth, spans)
     return Judged(tuple(found), journeys)
+
+
+def located_by(
+    method: str, log: TrackLog, over: OpenMap, rng: np.random.Generator
+) -> PositionedTrack:
+    """Locate a log as its method is: with white errors where their true sizes are stated."""
+    return locate_log(log, over, rng, white_ranges=method == NOISE)
 
 
 def _from_true_begin(
