@@ -148,7 +148,8 @@ def _steps_by_table(
     every = {table: clock_steps(time_s) for table, time_s in times.items()}
     found = {table: every[table] for table in _SINGLE if every.get(table)}
     if every.get("radio") and "role" in tables["radio"]:
-        serving = (tables["radio"]["role"] == "serving").to_numpy(dtype=np.bool_)
+        # Roles that are missing are refused later.
+        serving = (tables["radio"]["role"] == "serving").to_numpy(dtype=np.bool_, na_value=False)
         served = clock_steps(times["radio"][serving])
         if [step.back_s for step in served] == [step.back_s for step in every["radio"]]:
             found["radio"] = every["radio"]

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter.errors import InputError
 from mapfilter.tracks.clock_steps import clock_steps, with_clocks_gone_on
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import read_log
@@ -114,6 +115,14 @@ def test_one_clock_of_all_tables_goes_on_in_all_of_them():
     np.testing.assert_allclose(log.motion["time_s"], true_s())
     np.testing.assert_allclose(log.radio["time_s"], np.repeat(true_s(every_s=4.0), 2))
     assert len(notes_of(log)) == 2
+
+
+def test_a_missing_role_beside_a_step_is_told_as_any_other():
+    rows = radio(set_back(true_s(every_s=4.0), 100.0))
+    rows["role"] = rows["role"].astype("string")
+    rows.loc[5, "role"] = pd.NA
+    with pytest.raises(InputError, match="role"):
+        make_log(CRS, motion=motion(true_s()), radio=rows)
 
 
 def fixes(time_s):
