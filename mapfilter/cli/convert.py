@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from mapfilter.cli.options import JsonOption, given_path, numbers
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.workflows.terminal import print_result, print_text
 
 if TYPE_CHECKING:
@@ -72,6 +73,10 @@ def convert(
         float | None,
         typer.Option("--declination", metavar="DEG", help="Magnetic declination, east positive."),
     ] = None,
+    step_length: Annotated[
+        float | None,
+        typer.Option("--step-length", metavar="M", help="Length of a step that is only counted."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Convert recordings of other programs to a track log."""
@@ -94,7 +99,7 @@ def convert(
             truth=true,
             offsets_s=_offsets(parse_pairs(offset or (), "--offset"), [*given, *true]),
             course_motion=course_motion,
-            walk=None if no_steps else _walk(pose, declination),
+            walk=None if no_steps else _walk(pose, declination, step_length),
         ),
     )
     result = run_convert(given, out, options)
@@ -104,14 +109,21 @@ def convert(
         print_text("\n".join(report_lines(result)))
 
 
-def _walk(pose: Literal["auto", "device", "any"], declination_deg: float | None) -> WalkOptions:
+def _walk(
+    pose: Literal["auto", "device", "any"],
+    declination_deg: float | None,
+    step_m: float | None,
+) -> WalkOptions:
     from mapfilter.tracks.pdr.options import WalkOptions
 
-    try:
-        return WalkOptions(pose=pose, declination_deg=declination_deg)
-    except ConfigError as error:
-        expected = "degrees in -180..180"
-        raise fail(ConfigError, "--declination", expected, declination_deg) from error
+    faults = Faults()
+    if declination_deg is not None and not abs(declination_deg) <= 180:
+        faults.add("--declination", "degrees in -180..180", declination_deg)
+    if step_m is not None and not 0 < step_m < 3:
+        faults.add("--step-length", "metres above 0 and below 3", step_m, "centimetres")
+    faults.raise_if_any(ConfigError)
+    options = WalkOptions(pose=pose, declination_deg=declination_deg)
+    return options if step_m is None else replace(options, step_m=step_m)
 
 
 def _offsets(pairs: dict[str, str], files: list[Path]) -> dict[Path, float]:

@@ -20,6 +20,7 @@ from mapfilter.tracks.moved import (
     motion_from_course,
     motion_from_poses,
 )
+from mapfilter.tracks.pdr.counted import reckon_counted
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
@@ -108,11 +109,13 @@ def journey_motion(
         return _course([*recordings, *true], sensors, frame, notes)
     if walk is not None:
         walked, words = reckon_walk(sensors, walk, frame.convergence_rad)
-        if walked is None:
-            notes += words
-            return Moved()
-        notes += walked.notes
-        return Moved(walked.motion, walked.imu, walked.reckoning)
+        if walked is not None:
+            notes += walked.notes
+            return Moved(walked.motion, walked.imu, walked.reckoning)
+        counted, noise, told = reckon_counted(sensors, walk, frame.convergence_rad)
+        notes += words if counted is None else ()
+        notes += told
+        return Moved(counted, noise)
     return Moved()
 
 

@@ -28,6 +28,7 @@ SENSOR_COLUMNS: dict[str, tuple[str, ...]] = {
     "orientation": ("time_s", "qx", "qy", "qz", "qw"),
     "barometer": ("time_s", "pressure_hpa"),
     "steps": ("time_s", "count"),
+    "compass": ("time_s", "azimuth_deg"),
     "odometry": ("time_s", "speed_mps", "yaw_rate_radps", "speed_sd_mps", "yaw_rate_sd_radps"),
     "velocity": ("time_s", "speed_mps", "heading_rad"),
     "reckoning": ("time_s", "heading_sd_rad", "disturbed", "climb", "height_m"),
@@ -35,9 +36,10 @@ SENSOR_COLUMNS: dict[str, tuple[str, ...]] = {
 """Sensors of a log and the columns of each.
 
 ``accelerometer`` includes gravity, ``linear_acceleration`` does not; ``orientation`` is the
-rotation from the device to east, north and up; ``steps`` counts since some start; ``velocity`` is
-that of a GNSS receiver, with headings counter-clockwise from grid east; ``reckoning`` belongs to
-motion made of these sensors, see :class:`mapfilter.tracks.pdr.walk.Reckoned`.
+rotation from the device to east, north and up; ``steps`` counts since some start, or in each row;
+``compass`` is clockwise from magnetic north; ``velocity`` is that of a GNSS receiver, with headings
+counter-clockwise from grid east; ``reckoning`` belongs to motion made of these sensors, see
+:class:`mapfilter.tracks.pdr.walk.Reckoned`.
 """
 
 

@@ -96,6 +96,24 @@ def test_a_wrong_declination_or_pose_is_refused(recording, tmp_path):
         assert not (tmp_path / "log").exists()
 
 
+def test_counted_steps_of_a_csv_have_the_length_that_is_given(tmp_path):
+    rows = [f"2026-05-01T10:00:{k:02d}Z,{2 * k},80,60.17,24.94" for k in range(40)]
+    path = tmp_path / "phone.csv"
+    path.write_text("\n".join(["time,steps,compass_deg,latitude,longitude", *rows]) + "\n")
+    given = ("--declination", "10", "--step-length", "0.8")
+    done = mapfilter("convert", path, *given, "--out", tmp_path / "log")
+    assert done.code == 0
+    assert "motion: 78 counted steps of 0.8 m, headings of the compass" in done.out
+    log = mf.read_log(tmp_path / "log")
+    assert log.motion["step_m"].sum() == pytest.approx(78 * 0.8)
+    np.testing.assert_allclose(headings_deg(log), 0 - 1.8, atol=0.2)
+    assert read_sensors(tmp_path / "log")["compass"]["azimuth_deg"].unique().tolist() == [80.0]
+    refused = mapfilter("convert", path, "--step-length", "80", "--out", tmp_path / "other")
+    assert refused.code == 2
+    assert "metres above 0 and below 3, found 80" in refused.err
+    assert not (tmp_path / "other").exists()
+
+
 def test_a_configuration_and_python_take_the_same_options(recording, tmp_path):
     text = f"""
     [track]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Le
+from annotated_types import Ge, Gt, Le, Lt
 
 from mapfilter.options import Options, Positive
 
@@ -33,9 +33,12 @@ class WalkOptions(Options):
         Size of the magnetic field of the place; 0 for the median of the recording.
     step_factor : float
         Length of a step by the fourth root of its vertical acceleration's range in m/s².
+    step_m : float
+        Length of a step where a phone only counts them.
     """
 
     pose: Pose = "auto"
     declination_deg: Annotated[float, Ge(-180), Le(180)] | None = None
     field_ut: Annotated[float, Ge(0), Le(100)] = 0.0
     step_factor: Positive = STEP_FACTOR
+    step_m: Annotated[float, Gt(0), Lt(3)] = 0.7

@@ -27,7 +27,8 @@ from mapfilter.tracks.pdr.walk_noise import walk_noise, walk_notes
 
 _AROUND_S = 0.75
 _QUIET_RADPS, _FASTEST_BIAS_RADPS = 0.02, 0.05
-_DECLINATION_SD_RAD = np.radians(8.0)
+DECLINATION_SD_RAD = np.radians(8.0)
+"""Error of headings by a compass whose magnetic declination is not known."""
 _DRIVING_MPS, _SPEED_LASTS_S = 4.0, 3.0
 
 
@@ -112,7 +113,7 @@ def reckon_walk(
     reckoning = rows[["time_s", "heading_sd_rad", "disturbed", "climb", "height_m"]]
     motion = rows[["time_s", "step_m", "heading_rad", "turn_rad"]]
     has_gyroscope = stretches[0].rate_radps is not None
-    north_sd_rad = _DECLINATION_SD_RAD if options.declination_deg is None else 0.0
+    north_sd_rad = DECLINATION_SD_RAD if options.declination_deg is None else 0.0
     imu = walk_noise(
         rows,
         main.offset,

@@ -9,8 +9,8 @@ from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S, YawOffset
 from mapfilter.tracks.pdr.height import Climb
 
-_STEP_SHARE = 0.1
-_SCALE = 0.1
+STEP_SHARE = 0.1
+SCALE = 0.1
 _SCALE_WANDER, _SCALE_WANDER_S = 0.06, 15.0
 _COMPASS_BIAS_RAD = np.radians(5.0)
 _NO_GYROSCOPE_CORRELATION_S = 6.0
@@ -43,11 +43,11 @@ def walk_noise(
         white = float(np.degrees(offset.spread_rad))
     return ImuNoise(
         period_s=period_s,
-        sigma_trans_m=_STEP_SHARE * float(stepped["step_m"].mean()),
+        sigma_trans_m=STEP_SHARE * float(stepped["step_m"].mean()),
         sigma_orient_deg=min(white, 180.0),
         bias_sd_deg=min(float(np.degrees(lasting)), 180.0) if compass else 0.0,
         drift_deg_per_sqrt_s=walk if compass and gyroscope else 0.0,
-        scale=_SCALE,
+        scale=SCALE,
         heading_correlation_s=0.0 if gyroscope else _NO_GYROSCOPE_CORRELATION_S,
         step_scale_wander=_SCALE_WANDER,
         step_scale_correlation_s=_SCALE_WANDER_S,

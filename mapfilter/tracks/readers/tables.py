@@ -171,6 +171,7 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         ),
     ),
     "steps": (_TIME, Field("count", 0, 1e9, "steps >= 0", required=True)),
+    "compass": (_TIME, Field("azimuth_deg", -180, 360, "degrees in -180..360", required=True)),
     "ephemerides": (
         _TIME,
         _text("satellite", required=True),
@@ -203,6 +204,6 @@ RECORDED: dict[str, tuple[Field, ...]] = {
 
 SENSORS = (
     *("accelerometer", "linear_acceleration", "gravity", "gyroscope", "magnetometer"),
-    *("orientation", "barometer", "steps", "odometry", "velocity"),
+    *("orientation", "barometer", "steps", "compass", "odometry", "velocity"),
 )
 """Tables of raw sensors, which a log keeps in its folder ``sensors``."""

@@ -1,0 +1,146 @@
+"""Motion of counted steps and a compass: lengths, headings, gaps, and a plain CSV as a log."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mapfilter.errors import ConfigError
+from mapfilter.tracks.combine import CombineOptions, combine
+from mapfilter.tracks.pdr.counted import reckon_counted
+from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.readers.formats import read_recording
+
+EAST = WalkOptions(declination_deg=0.0, step_m=0.8)
+
+
+def sensors(count, azimuth_deg, time_s=None, compass_s=None):
+    time_s = np.arange(len(count), dtype=float) if time_s is None else np.asarray(time_s, float)
+    compass_s = time_s if compass_s is None else np.asarray(compass_s, float)
+    azimuth = np.broadcast_to(np.asarray(azimuth_deg, float), compass_s.shape)
+    return {
+        "steps": pd.DataFrame({"time_s": time_s, "count": np.asarray(count, float)}),
+        "compass": pd.DataFrame({"time_s": compass_s, "azimuth_deg": azimuth}),
+    }
+
+
+def lengths(count, **kinds):
+    motion, _, _ = reckon_counted(sensors(count, 90.0, **kinds), EAST)
+    return motion["step_m"].to_numpy() / EAST.step_m
+
+
+def test_a_counter_gives_the_steps_since_the_row_before():
+    np.testing.assert_allclose(lengths([100, 102, 102, 105]), [0, 2, 0, 3])
+
+
+def test_rows_that_count_their_own_steps_are_taken_as_they_are():
+    own = [2, 1, 2, 0, 2, 1, 2, 1, 2, 2]
+    np.testing.assert_allclose(lengths(own), own)
+
+
+def test_steps_are_unknown_where_a_counter_began_anew():
+    count = [*range(5000, 5300, 2), *range(0, 300, 2)]
+    steps = lengths(count)
+    assert np.isnan(steps[150])
+    assert np.isnan(steps).sum() == 1
+    assert np.nansum(steps) == pytest.approx(149 * 2 + 149 * 2)
+
+
+@given(st.lists(st.integers(0, 5), min_size=2, max_size=40), st.integers(0, 10**6))
+def test_a_counters_start_does_not_matter(steps, start):
+    count = start + np.cumsum([0, *steps])
+    if not sum(steps):
+        return
+    np.testing.assert_allclose(lengths(count), [0, *steps])
+
+
+@pytest.mark.parametrize(
+    ("azimuth", "declination", "convergence", "heading"),
+    [
+        (90, 0, 0, 0),
+        (0, 0, 0, 90),
+        (0, 10, 0, 80),
+        (0, 0, 3, 93),
+        (350, 10, 0, 90),
+        (180, 0, 0, -90),
+    ],
+)
+def test_headings_are_counter_clockwise_from_grid_east(azimuth, declination, convergence, heading):
+    options = WalkOptions(declination_deg=declination)
+    motion, imu, notes = reckon_counted(
+        sensors([0, 2, 4], azimuth), options, np.radians(convergence)
+    )
+    np.testing.assert_allclose(np.degrees(motion["heading_rad"]), heading, atol=1e-9)
+    assert imu.bias_sd_deg == pytest.approx(15.0)
+    assert not any("declination" in note for note in notes)
+
+
+def test_an_unknown_declination_is_told_and_widens_the_lasting_error():
+    _, imu, notes = reckon_counted(sensors([0, 2, 4], 90.0), WalkOptions())
+    assert imu.bias_sd_deg == pytest.approx(17.0)
+    assert any("no magnetic declination" in note for note in notes)
+
+
+def test_headings_of_an_interval_are_their_mean_across_north():
+    kinds = sensors([0, 2, 4], [350, 350, 10, 350, 10], [0, 1, 2], [0, 0.5, 1, 1.5, 2])
+    motion, _, _ = reckon_counted(kinds, EAST)
+    np.testing.assert_allclose(np.degrees(motion["heading_rad"]), [100, 90, 90], atol=1e-9)
+
+
+def test_a_heading_is_unknown_two_seconds_from_any():
+    kinds = sensors([0, 2, 4, 6, 8], 90.0, [0, 1, 2, 3, 4], [0.0])
+    motion, _, _ = reckon_counted(kinds, EAST)
+    assert np.isfinite(motion["heading_rad"]).tolist() == [True, True, True, False, False]
+
+
+def test_the_white_error_of_headings_is_that_of_their_scatter():
+    rng = np.random.default_rng(3)
+    azimuth = 90 + rng.normal(0, 8, 2000)
+    _, imu, _ = reckon_counted(sensors(np.arange(0, 4000, 2), azimuth), EAST)
+    assert imu.sigma_orient_deg == pytest.approx(8.0, rel=0.08)
+    assert imu.sigma_trans_m == pytest.approx(np.hypot(0.16, 0.4))
+
+
+def test_a_counter_that_stands_still_is_told():
+    motion, imu, notes = reckon_counted(sensors([7, 7, 7], 90.0), EAST)
+    assert motion is None
+    assert imu is None
+    assert notes == ("the step counter counts no step in 3 rows",)
+
+
+@pytest.mark.parametrize(("lacking", "told"), [("steps", ()), ("compass", "no compass")])
+def test_without_a_counter_or_a_compass_there_is_no_motion(lacking, told):
+    kinds = sensors([0, 2], 90.0)
+    del kinds[lacking]
+    motion, imu, notes = reckon_counted(kinds)
+    assert motion is None
+    assert imu is None
+    assert notes == told or (len(notes) == 1 and told in notes[0])
+
+
+def test_a_table_of_a_phone_with_steps_and_compass_has_motion(tmp_path):
+    rows = [f"2026-05-01T10:00:{k:02d}Z,{3 * k},90,48.0,11.0" for k in range(30)]
+    path = tmp_path / "phone.csv"
+    path.write_text("\n".join(["time,steps,compass_deg,latitude,longitude", *rows]) + "\n")
+    options = CombineOptions(truth=(path,), measured=(path,), walk=EAST)
+    log = combine([read_recording(path)], options).log
+    assert log.motion["step_m"].sum() == pytest.approx(29 * 3 * 0.8)
+    assert np.abs(np.degrees(log.motion["heading_rad"])).max() < 3.0
+    assert log.imu is not None
+    assert log.notes
+
+
+def test_lengths_of_steps_move_beside_a_compass_as_before(tmp_path):
+    path = tmp_path / "phone.csv"
+    rows = [f"{k},0.7,{3 * k},90,48.0,11.0" for k in range(5)]
+    path.write_text("\n".join(["time_s,step_m,steps,compass_deg,latitude,longitude", *rows]) + "\n")
+    recording = read_recording(path)
+    assert "compass" not in recording.tables
+    assert "motion" in recording.tables
+
+
+@pytest.mark.parametrize("step_m", [0.0, -0.7, 3.0, 70.0])
+def test_a_length_that_no_step_has_is_refused(step_m):
+    with pytest.raises(ConfigError, match="step_m"):
+        WalkOptions(step_m=step_m)
