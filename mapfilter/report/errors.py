@@ -93,7 +93,8 @@ def plot_error_over_distance(
     if np.isfinite(levels_m).any():
         dotted = Look(color=PURPLE, linewidth=1.1, linestyle=(0, (1, 1.5)))
         axes.plot(distance_m, levels_m, label="protection level", **dotted)
-    axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
+    if known_m.size:
+        axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
     if score.switched:
         at_m, error_m = score.switch_distance_m, score.error_at_switch_m
         star = Look(markersize=15, markeredgecolor="white", zorder=6, clip_on=False)
@@ -106,7 +107,7 @@ def plot_error_over_distance(
         ):
             if np.isfinite(after_m):
                 look = Look(color=colour, linestyle=dashes, linewidth=1.4, zorder=5)
-                name = f"{figure} after it: {after_m:.1f} m"
+                name = f"{figure} after the switch: {after_m:.1f} m"
                 axes.plot([at_m, length_m], [after_m, after_m], label=name, **look)
     else:
         text = axes.text(0.5, 0.55, "never switched to tracking", transform=axes.transAxes)

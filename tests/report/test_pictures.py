@@ -225,6 +225,15 @@ def test_error_plot_shows_lost_and_radius(area, tmp_path):
     assert pixels_near(tmp_path / "e.png", "#f7d9c9") > 1000
 
 
+def test_an_error_that_is_nowhere_known_is_not_in_the_legend(area):
+    good = estimate(area, 100.0)
+    nowhere = np.full(len(good), np.nan)
+    unknown = replace(good, east_m=nowhere, north_m=nowhere)
+    for one, drawn in ((good, True), (unknown, False)):
+        _, names = plot_error_over_distance(one, area.truth).get_legend_handles_labels()
+        assert ("error" in names) is drawn
+
+
 def test_points_without_streets(area, tmp_path):
     bare = BaseMap(area.base.bounds_m, points_m=np.array([[WEST_M + 100.0, NORTH_M - 100.0]] * 3))
     save(plot_candidates([snapshot(area, 3)], area.truth, bare), tmp_path / "c.png")
