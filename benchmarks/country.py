@@ -42,7 +42,6 @@ from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.index import HALF_WIDTH_M, RouteSource
-from mapfilter.workflows.build import PIXELS_A_TASK
 
 REACH_PX = 400
 CELLS_PER_KM2 = 1.0
@@ -132,7 +131,6 @@ def built(folder: Path, km2: float, way: str) -> dict[str, float]:
             floor_dbm=FLOOR_DBM,
             executor=executor,
             in_flight=4 * at_once,
-            pixels_a_task=0 if cluster is None else PIXELS_A_TASK,
             writers=at_once,
         )
         done_s = time.perf_counter()
