@@ -121,7 +121,8 @@ def build(
         Most pixels that a task reads, of all cells that reach its tiles; with 0 it has one tile.
         Tiles of a task read a file that reaches several of them once. The last tasks are smaller.
     writers : int
-        Cells whose parts are written at a time.
+        Threads that write parts of the database while tiles are made elsewhere; with 1 this one
+        writes them in turn with the tiles.
     resume : bool
         Take over the tiles that an interrupted build of the same inputs has finished.
     progress : callable, optional
@@ -273,7 +274,7 @@ class BuildJob:
         """Yield the tiles in order, finished ones from disk."""
         every = range(len(self.windows))
         missing = [n for n in every if not finished.keep or finished.load(n) is None]
-        shares = 1 if isinstance(executor, SerialExecutor) else in_flight
+        shares = 1 if isinstance(executor, SerialExecutor) else max(in_flight // 2, 1)
         todo = tuple(missing)
         tasks = grouped(map(self.task, todo), pixels_a_task, len(todo), shares)
         results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)
