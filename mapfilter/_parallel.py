@@ -128,7 +128,8 @@ class _ClusterExecutor(Executor):
 
     def __init__(self, client: Any, place: Any) -> None:
         self._client, self._place = client, place
-        self._inner = client.get_executor()
+        # Else Dask compares tasks by all that is in them, which takes as long as a tenth of a build.
+        self._inner = client.get_executor(pure=False)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Hand in a task; MapfilterError where the connection is lost."""

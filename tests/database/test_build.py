@@ -261,6 +261,7 @@ def test_the_old_database_survives_a_build_that_dies(world, tmp_path):
             out,
             tile_px=8,
             executor=DiesAtThirdTile(),
+            pixels_a_task=0,
             in_flight=1,
         )
     assert contents(out) == before

@@ -42,7 +42,9 @@ def contents(folder: Path):
 
 
 def again(world, out, **more):
-    return build(world.rasters, world.plan, world.routes, out, **OPTIONS, **more)
+    # A tile a task, so that counting tasks counts tiles.
+    given = {**OPTIONS, "pixels_a_task": 0, **more}
+    return build(world.rasters, world.plan, world.routes, out, **given)
 
 
 class Counting(SerialExecutor):
@@ -122,7 +124,7 @@ def test_who_stops_does_not_wait_for_the_checksum_of_the_rasters(world, tmp_path
         raise InputError(())
 
     monkeypatch.setattr(RxLevRasters, "sha256", slow)
-    monkeypatch.setattr(RxLevRasters, "read", damaged)
+    monkeypatch.setattr("mapfilter.rasters.sampling.read_on", damaged)
     with pytest.raises(InputError):
         again(world, tmp_path / "db")
     assert done == []
