@@ -128,7 +128,7 @@ class _ClusterExecutor(Executor):
 
     def __init__(self, client: Any, place: Any) -> None:
         self._client, self._place = client, place
-        # Else Dask compares tasks by all that is in them, which takes as long as a tenth of a build.
+        # Else Dask compares tasks by all that is in them: a tenth of the time of a build.
         self._inner = client.get_executor(pure=False)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
