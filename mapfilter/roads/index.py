@@ -265,8 +265,10 @@ class RouteSource:
 def _unpacked_source(
     crs: str, ways: WayIndex, packed: list[NDArray[np.object_] | None], bridges: WayIndex | None
 ) -> RouteSource:
-    trees = [None if areas is None else STRtree(shapely.from_wkb(areas)) for areas in packed]
-    return RouteSource(crs, ways, *trees, bridges)
+    squares, buildings, water = (
+        None if areas is None else STRtree(shapely.from_wkb(areas)) for areas in packed
+    )
+    return RouteSource(crs, ways, squares, buildings, water, bridges)
 
 
 def described(
