@@ -1,9 +1,9 @@
 """Builds of made areas of growing size: python benchmarks/country.py make|build FOLDER --km2 N ...
 
 ``make`` writes, for each size, a raster for each cell as planning tools export them, cut at 2 km
-from its site; one cell per square kilometre, pixels of 5 m. ``build`` builds a database
-of each with the made streets of ``benchmarks/metropolis.py``: by one process, by two, and by two
-workers of Dask, in turns. For each build it prints, as JSON:
+from its site; one cell per square kilometre, pixels of 5 m; it goes on where it was stopped.
+``build`` builds a database of each with the made streets of ``benchmarks/metropolis.py``: by one
+process, by two, and by two workers of Dask, in turns. For each build it prints, as JSON:
 
 ``start_s``
     Seconds by the clock until all workers have started and imported what they need.
@@ -11,6 +11,8 @@ workers of Dask, in turns. For each build it prints, as JSON:
     Seconds by the clock of the build by these workers.
 ``processor_s``
     Seconds of the processors, start and workers included.
+``memory_bytes``
+    Most memory that this process has taken in any build so far.
 ``points``, ``levels``, ``bytes``
     Of the database.
 
@@ -23,6 +25,7 @@ import argparse
 import json
 import os
 import resource
+import shutil
 import time
 from concurrent.futures import Executor
 from pathlib import Path
@@ -32,8 +35,9 @@ import numpy as np
 from metropolis import CRS, FLOOR_DBM, NORTH_M, PIXEL_M, WEST_M, Radio, made_plan, made_ways
 
 from mapfilter._code import code_digest
-from mapfilter._parallel import executor_of
+from mapfilter._parallel import executor_of, local_executor
 from mapfilter.database.build import build
+from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import read_tiles
@@ -42,11 +46,11 @@ from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.index import HALF_WIDTH_M, RouteSource
-from mapfilter.workflows.build import PIXELS_A_TASK
 
 REACH_PX = 400
 CELLS_PER_KM2 = 1.0
 MOST_ROUNDS = 40
+MAKERS = 2
 WAYS = {"one process": (1, None), "two processes": (2, None), "Dask, two workers": (1, "local:2")}
 """Workers and cluster of each way to build."""
 
@@ -63,18 +67,29 @@ def plan_of(lattice: Lattice) -> CellPlan:
 
 
 def made(folder: Path, km2: float) -> None:
-    """Write rasters and plan of an area."""
+    """Write the rasters of an area by two processes; those that are there already are kept."""
+    (folder / "rasters").mkdir(parents=True, exist_ok=True)
+    with local_executor(MAKERS) as executor:
+        shares = [executor.submit(made_share, folder, km2, first) for first in range(MAKERS)]
+        for share in shares:
+            share.result()
+
+
+def made_share(folder: Path, km2: float, first: int) -> None:
+    """Write the rasters of each second cell of an area."""
     lattice = lattice_of(km2)
     plan = plan_of(lattice)
     radio = Radio.of(plan, lattice)
-    rasters = folder / "rasters"
-    rasters.mkdir(parents=True)
-    for number, cell in enumerate(plan.cells):
+    for number in range(first, len(plan), MAKERS):
+        cell = plan.cells[number]
+        file = folder / "rasters" / f"{cell.id}.tif"
+        if file.exists():
+            continue
         window = window_of(cell, lattice)
         row, col = np.divmod(np.arange(window.rows * window.cols), window.cols)
         level = radio.levels(np.array([number]), *window.east_north(row, col))
         shape = level.reshape(window.rows, window.cols)
-        write_rasters(rasters / f"{cell.id}.tif", window, [(cell.id, shape)], [cell.id])
+        write_rasters(file, window, [(cell.id, shape)], [cell.id])
 
 
 def window_of(cell: Cell, lattice: Lattice) -> Lattice:
@@ -120,6 +135,8 @@ def built(folder: Path, km2: float, way: str) -> dict[str, float]:
     rasters = open_rasters(folder / "rasters")
     layers = RouteSource.of(ways, None, None, HALF_WIDTH_M, crs=lattice.crs)
     out = folder / "database"
+    # An older one is compared with its checksums before it is replaced.
+    shutil.rmtree(out, ignore_errors=True)
     began_s, used_s = time.perf_counter(), processor_s()
     with executor_of(workers, cluster) as (executor, at_once):
         start_workers(executor, at_once)
@@ -132,7 +149,6 @@ def built(folder: Path, km2: float, way: str) -> dict[str, float]:
             floor_dbm=FLOOR_DBM,
             executor=executor,
             in_flight=4 * at_once,
-            pixels_a_task=0 if cluster is None else PIXELS_A_TASK,
             writers=at_once,
         )
         done_s = time.perf_counter()
@@ -141,6 +157,7 @@ def built(folder: Path, km2: float, way: str) -> dict[str, float]:
         "start_s": ready_s - began_s,
         "build_s": done_s - ready_s,
         "processor_s": processor_s() - used_s,
+        "memory_bytes": peak_memory_bytes(),
         "points": int(database.manifest["counts"]["points"]),
         "levels": sum(part["rows"] for part in parts if part.get("cell") is not None),
         "bytes": sum(part["bytes"] for part in parts),

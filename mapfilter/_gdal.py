@@ -6,6 +6,7 @@ metadata, and GDAL opens the overviews and the mask beside it whatever they are.
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -68,9 +69,10 @@ def _check_sidecars(path: Path) -> None:
     _check_is_tiff(path)
     for suffix in _READ_BESIDE:
         for base in {stem, name}:
-            for sidecar in (Path(f"{base}{suffix}"), Path(f"{base}{suffix.upper()}")):
-                if sidecar.exists():
-                    check_file(sidecar)
+            for sidecar in (f"{base}{suffix}", f"{base}{suffix.upper()}"):
+                # Most are not there, and paths take longer to make than to look for.
+                if os.path.exists(sidecar):  # noqa: PTH110
+                    check_file(Path(sidecar))
     settings = Path(f"{name}.aux.xml")
     if settings.exists():
         size = check_file(settings)

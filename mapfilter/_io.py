@@ -14,6 +14,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib.metadata import version
 from io import BufferedReader
@@ -27,6 +28,7 @@ from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fa
 
 _LARGEST_JSON_BYTES = 256 << 20
 _SEAL = "sha256"
+_SYNCED_AT_ONCE = 16
 _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 VERSION = version("mapfilter")
@@ -83,8 +85,10 @@ def atomic_dir(path: Path) -> Iterator[Path]:
             new.mkdir()
             note_old(partial, target)
             yield new
-            for inner in sorted(new.rglob("*")):
-                _sync(inner)
+            # Most of the time of each is waiting for the disk, which takes many at once.
+            with ThreadPoolExecutor(_SYNCED_AT_ONCE) as pool:
+                for _ in pool.map(_sync, sorted(new.rglob("*"))):
+                    pass
             _sync(new)
         with _into_place(path, target):
             if target.exists():

@@ -42,6 +42,8 @@ from mapfilter.roads.lattice import RouteLattice
 
 MARGIN_DB = 6.0
 TILE_PX = 256
+PIXELS_A_TASK = 16_000_000
+"""Pixels of a task: some eight tiles of 30 cells, which share most of their files."""
 
 
 def work_key(
@@ -75,7 +77,7 @@ def build(
     measured: tuple[Readings, RxLevRasters] | None = None,
     executor: Executor | None = None,
     in_flight: int = 8,
-    pixels_a_task: int = 0,
+    pixels_a_task: int = PIXELS_A_TASK,
     writers: int = 1,
     resume: bool = False,
     progress: Progress | None = None,
@@ -116,10 +118,11 @@ def build(
     in_flight : int
         Tasks submitted at a time; four per worker keep all of them busy.
     pixels_a_task : int
-        Most pixels that a task reads, of all cells that reach its tiles: many where submitting a
-        task takes long. A task has a tile at least, and by default no more.
+        Most pixels that a task reads, of all cells that reach its tiles; with 0 it has one tile.
+        Tiles of a task read a file that reaches several of them once. The last tasks are smaller.
     writers : int
-        Cells whose parts are written at a time.
+        Threads that write parts of the database while tiles are made elsewhere; with 1 this one
+        writes them in turn with the tiles.
     resume : bool
         Take over the tiles that an interrupted build of the same inputs has finished.
     progress : callable, optional
@@ -271,7 +274,9 @@ class BuildJob:
         """Yield the tiles in order, finished ones from disk."""
         every = range(len(self.windows))
         missing = [n for n in every if not finished.keep or finished.load(n) is None]
-        tasks = grouped(map(self.task, tuple(missing)), pixels_a_task)
+        shares = 1 if isinstance(executor, SerialExecutor) else max(in_flight // 2, 1)
+        todo = tuple(missing)
+        tasks = grouped(map(self.task, todo), pixels_a_task, len(todo), shares)
         results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)
         made = (rows for group in results for rows in group)
         for number in every:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
@@ -88,12 +88,16 @@ def levels_table(cell_id: str, rows: Sequence[LevelsRows]) -> pa.Table:
 class PartWriter:
     """Collects rows, and writes them into a folder whenever enough of them are in memory.
 
-    ``writers`` parts are written at a time; they do not depend on it. ``points`` counts those added
-    and ``received`` those of them with a level; ``parts`` are the manifest's entries at the end.
+    With several ``writers`` as many threads write these parts while rows of the next ones are
+    collected, and no longer than that: twice as many rows are in memory. The parts do not depend on
+    it. ``points`` counts those added and ``received`` those of them with a level; ``parts`` are the
+    manifest's entries at the end.
     """
 
     def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int = 1) -> None:
-        self._folder, self._crs, self._cell_ids, self._writers = folder, crs, cell_ids, writers
+        self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
+        self._pool = ThreadPoolExecutor(writers) if writers > 1 else None
+        self._writing: list[Future[None]] = []
         self._folders = levels_folders(cell_ids)
         self._points: list[pa.Table] = []
         self._levels: dict[int, list[LevelsRows]] = {}
@@ -108,6 +112,9 @@ class PartWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self._pool is not None:
+            # Nobody writes into the folder when it is left, which may be removed.
+            self._pool.shutdown(cancel_futures=True)
         if self._points_file is not None:
             self._points_file.close()
 
@@ -128,6 +135,7 @@ class PartWriter:
     def finish(self) -> None:
         """Write what is left, and list the parts: points first, then cell by cell."""
         self._flush()
+        self._wait()
         if self._points_file is None:
             return
         geo = geo_metadata(self._crs, np.concatenate(self._bounds).tolist())
@@ -139,15 +147,25 @@ class PartWriter:
         self.parts = [points, *(part for parts in every for part in parts)]
 
     def _flush(self) -> None:
-        parts: list[Callable[[], None]] = [self._write_points] if self._points else []
-        parts += [partial(self._write_levels, cell) for cell in sorted(self._levels)]
-        with ThreadPoolExecutor(self._writers) as pool:
-            for written in [pool.submit(write) for write in parts]:
-                written.result()
+        points, levels = self._points, self._levels
         self._points, self._levels, self._waiting = [], {}, 0
+        # The parts of a cell are numbered, and the points follow each other.
+        self._wait()
+        parts: list[Callable[[], None]] = [partial(self._write_points, points)] if points else []
+        parts += [partial(self._write_levels, cell, levels[cell]) for cell in sorted(levels)]
+        if self._pool is not None:
+            self._writing = [self._pool.submit(write) for write in parts]
+        else:
+            for write in parts:
+                write()
 
-    def _write_points(self) -> None:
-        table = pa.concat_tables(self._points).unify_dictionaries().replace_schema_metadata(None)
+    def _wait(self) -> None:
+        writing, self._writing = self._writing, []
+        for written in writing:
+            written.result()
+
+    def _write_points(self, tables: list[pa.Table]) -> None:
+        table = pa.concat_tables(tables).unify_dictionaries().replace_schema_metadata(None)
         if self._points_file is None:
             self._points_file = open_writer(table.schema, self._folder / POINTS)
         self._points_file.write_table(table, row_group_size=_ROWS_IN_A_GROUP)
@@ -156,9 +174,9 @@ class PartWriter:
             low, high = self._bounds
             self._bounds = np.minimum(low, places.min(axis=0)), np.maximum(high, places.max(axis=0))
 
-    def _write_levels(self, cell: int) -> None:
+    def _write_levels(self, cell: int, rows: Sequence[LevelsRows]) -> None:
         cell_id = self._cell_ids[cell]
-        table = levels_table(cell_id, self._levels[cell])
+        table = levels_table(cell_id, rows)
         written = self._written.setdefault(cell, [])
         file = self._folder / self._folders[cell_id] / f"part-{len(written)}.parquet"
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -15,9 +15,9 @@ from mapfilter.database.sources import RoutePart
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.sampling import Places, levels_at
 from mapfilter.roads.lattice import RouteLattice
 
-_CELLS_AT_A_TIME = 128
 _MAX_TILES = 64
 """Tiles of a group, however few cells reach them."""
 _AT_POINTS = ("best", "best_level_dbm", "margin_db")
@@ -100,7 +100,9 @@ class TileRows:
         return cls(points.drop_columns(list(_AT_POINTS)), TileLevels(**columns))
 
 
-def grouped(tasks: Iterable[TileTask], max_pixels: int) -> Iterator[list[TileTask]]:
+def grouped(
+    tasks: Iterable[TileTask], max_pixels: int, total: int = 0, shares: int = 1
+) -> Iterator[list[TileTask]]:
     """Yield the tasks in groups, in order, each made when it is due.
 
     Parameters
@@ -108,13 +110,21 @@ def grouped(tasks: Iterable[TileTask], max_pixels: int) -> Iterator[list[TileTas
     tasks : iterable of TileTask
     max_pixels : int
         Pixels that a group reads; one tile is a group however many it reads.
+    total : int
+        Number of tasks, where it is known.
+    shares : int
+        A group has at most this part of the tasks that are left, so that the last ones are small
+        and all workers end at about one time.
     """
     group: list[TileTask] = []
-    pixels = 0
+    pixels, left, most = 0, total, _MAX_TILES
     for task in tasks:
-        if group and (pixels + task.pixels > max_pixels or len(group) == _MAX_TILES):
+        if group and (pixels + task.pixels > max_pixels or len(group) >= most):
             yield group
+            left -= len(group)
             group, pixels = [], 0
+        if not group and total:
+            most = min(max(-(-left // shares), 1), _MAX_TILES)
         group.append(task)
         pixels += task.pixels
     if group:
@@ -123,22 +133,29 @@ def grouped(tasks: Iterable[TileTask], max_pixels: int) -> Iterator[list[TileTas
 
 def read_tiles(tasks: Sequence[TileTask]) -> list[bytes]:
     """Make some tiles, on a worker."""
-    return [read_tile(task).to_bytes() for task in tasks]
+    return [tile.to_bytes() for tile in tiles_of(tasks)]
 
 
 def read_tile(task: TileTask) -> TileRows:
-    """Lay the points of a tile and read its levels, a few cells at a time."""
-    lattice, (top, left, _, _) = task.rasters.lattice, task.window
+    """Lay the points of a tile, and read its levels."""
+    return next(tiles_of([task]))
+
+
+def tiles_of(tasks: Sequence[TileTask]) -> Iterator[TileRows]:
+    """Lay the points of some tiles near each other, and read their levels: each file once."""
+    laid = [_laid(task) for task in tasks]
+    levels = levels_at([places for _, places in laid])
+    for task, (table, _) in zip(tasks, laid, strict=True):
+        level = levels.pop(0).astype(np.float64)
+        yield TileRows(table, received_levels(level, task.floor_dbm).of_cells(task.numbers))
+
+
+def _laid(task: TileTask) -> tuple[pa.Table, Places]:
     routes = task.part if isinstance(task.part, RouteLattice) else task.part()
-    places = places_table(routes, lattice)
-    row, col = (places[name].to_numpy().astype(np.int64) for name in ("row", "col"))
-    ids = task.plan.ids if task.numbers else ()
-    level = np.empty((len(ids), row.size), dtype=np.float64)
-    for first in range(0, len(ids) if row.size else 0, _CELLS_AT_A_TIME):
-        some = ids[first : first + _CELLS_AT_A_TIME]
-        window_dbm = task.rasters.read_levels_dbm(task.plan, task.window, some)
-        level[first : first + len(some)] = window_dbm[:, row - top, col - left]
-    return TileRows(places, received_levels(level, task.floor_dbm).of_cells(task.numbers))
+    table = places_table(routes, task.rasters.lattice)
+    row, col = (table[name].to_numpy().astype(np.int64) for name in ("row", "col"))
+    ids, (top, left, _, _) = task.plan.ids if task.numbers else (), task.window
+    return table, Places(task.rasters, task.plan, ids, task.window, row - top, col - left)
 
 
 def roads_tile(part: RoutePart, lattice: Lattice) -> TileRows:

@@ -185,15 +185,22 @@ class RxLevRasters:
         InputError
             As :meth:`read`, or the plan lacks a cell, or the files hold deviations.
         """
+        self.check_holds_levels()
+        ids = self.cell_ids if cells is None else tuple(cells)
+        return self.levels_dbm(self.read(window, ids), plan, ids)
+
+    def check_holds_levels(self) -> None:
+        """Raise InputError where the files hold deviations."""
         if self.quantity == "deviation":
             hint = "the deviations of a survey given for its levels"
             raise fail(InputError, str(self.path), "levels or losses", "deviations", hint)
-        values = self.read(window, cells)
+
+    def levels_dbm(self, values: Floats32, plan: CellPlan, cells: Sequence[str]) -> Floats32:
+        """Return levels (dBm) for values of the files, the first axis being that of the cells."""
         if self.quantity == "level":
             return values
-        ids = self.cell_ids if cells is None else cells
-        eirp_dbm = np.array([plan[cell_id].eirp_dbm for cell_id in ids], dtype=np.float32)
-        return eirp_dbm[:, None, None] - values
+        eirp_dbm = np.array([plan[cell_id].eirp_dbm for cell_id in cells], dtype=np.float32)
+        return eirp_dbm.reshape(-1, *[1] * (values.ndim - 1)) - values
 
     def _check_request(self, window: Window, ids: tuple[str, ...]) -> None:
         row, col, rows, cols = window

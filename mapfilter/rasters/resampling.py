@@ -163,9 +163,15 @@ def _nearest(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> 
         top = int(rows[done])
         part = rows[done : done + (int(np.searchsorted(rows[done:], top + step)) or 1)]
         strip = file.read(bands, (top, left, int(part[-1]) - top + 1, width))
-        inside[:, done : done + part.size] = strip[:, (part - top)[:, None], cols - left]
+        if not (_without_gap(part) and _without_gap(cols)):
+            strip = strip[:, (part - top)[:, None], cols - left]
+        inside[:, done : done + part.size] = strip
         done += part.size
     return values
+
+
+def _without_gap(numbers: Ints) -> bool:
+    return bool((np.diff(numbers) == 1).all())
 
 
 def _bilinear(

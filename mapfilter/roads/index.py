@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import shapely
 from numba import njit
+from numpy.typing import NDArray
 from shapely import STRtree
 
 from mapfilter._types import Bools, Floats, Ints
@@ -81,6 +82,14 @@ class WayIndex:
         half_width_m = by_code[ways.way_class[of_way]] if of_way.size else np.empty(0)
         return cls(ways, STRtree(shapely.linestrings(ends_m)), of_way, ends_m, half_width_m)
 
+    def __reduce__(self) -> tuple[Callable[..., WayIndex], tuple[Any, ...]]:
+        # Shapes one by one take as long to send as a tile's other work.
+        ways = self.ways
+        columns = ways.crs, ways.way_id, ways.way_class, ways.class_names
+        marks = ways.covered, ways.oneway
+        lines = shapely.to_wkb(ways.geometry)
+        return _unpacked_index, (columns, lines, marks, self.way, self.ends_m, self.half_width_m)
+
     def segments_near(self, window: Lattice, least_m: float = 0.0) -> Ints:
         """Return the segments that reach a window, or are at most ``least_m`` away from it."""
         west, south, east, north = window.bounds_m
@@ -143,6 +152,18 @@ def _note_half_widths(faults: Faults, half_width_m: float, by_class_m: Mapping[s
             faults.add(f"half_width_by_class_m, {name}", "metres >= 0", width_m)
 
 
+def _unpacked_index(
+    columns: tuple[str, Ints, NDArray[np.int16], tuple[str, ...]],
+    lines: NDArray[np.object_],
+    marks: tuple[Bools, NDArray[np.int8]],
+    way: Ints,
+    ends_m: Floats,
+    half_width_m: Floats,
+) -> WayIndex:
+    ways = Ways(*columns, shapely.from_wkb(lines), *marks)
+    return WayIndex(ways, STRtree(shapely.linestrings(ends_m)), way, ends_m, half_width_m)
+
+
 def areas_near(areas: STRtree, window: Lattice) -> Geometries:
     """Return the polygons about a window, in their order."""
     near = np.sort(areas.query(shapely.box(*window.bounds_m)))
@@ -196,6 +217,11 @@ class RouteSource:
             index.inside(water.geometry) if water else None,
         )
 
+    def __reduce__(self) -> tuple[Callable[..., RouteSource], tuple[Any, ...]]:
+        areas = self.squares, self.buildings, self.water
+        packed = [None if tree is None else shapely.to_wkb(tree.geometries) for tree in areas]
+        return _unpacked_source, (self.crs, self.ways, packed, self.bridges)
+
     def tile(self, window: Lattice) -> RouteLattice:
         """Return the route lattice of a window; the same points as on the whole lattice."""
         on_square = inside_areas(self.squares, window)
@@ -234,6 +260,15 @@ class RouteSource:
             joined("distance_to_way_m"),
             joined("on_square"),
         )
+
+
+def _unpacked_source(
+    crs: str, ways: WayIndex, packed: list[NDArray[np.object_] | None], bridges: WayIndex | None
+) -> RouteSource:
+    squares, buildings, water = (
+        None if areas is None else STRtree(shapely.from_wkb(areas)) for areas in packed
+    )
+    return RouteSource(crs, ways, squares, buildings, water, bridges)
 
 
 def described(

@@ -28,8 +28,6 @@ from mapfilter.workflows.world import (
     raster_world,
 )
 
-PIXELS_A_TASK = 10_000_000
-"""Pixels of a task for a worker on a cluster, to whom sending one costs time."""
 _TASKS_A_WORKER = 4
 
 
@@ -90,7 +88,6 @@ def run_build(
             measured=_measured(config),
             executor=executor,
             in_flight=_TASKS_A_WORKER * at_once,
-            pixels_a_task=PIXELS_A_TASK if cluster is not None else 0,
             writers=at_once,
             resume=resume,
             progress=progress,

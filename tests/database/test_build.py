@@ -1,5 +1,6 @@
 """Building a database against the same computed point by point from the whole rasters."""
 
+import errno
 from pathlib import Path
 
 import duckdb
@@ -116,6 +117,38 @@ def test_small_parts_hold_the_same_rows(world, database, tmp_path, monkeypatch):
         a, b = getattr(split.points(), name), getattr(database.points(), name)
         np.testing.assert_array_equal(a, b)
     assert info(split)["levels_per_cell"] == info(database)["levels_per_cell"]
+
+
+def test_parts_written_beside_the_tiles_have_the_same_bytes(world, tmp_path, monkeypatch):
+    monkeypatch.setattr(parts, "ROWS_IN_MEMORY", 60)
+    inputs = world.rasters, world.plan, world.routes
+    options = {"floor_dbm": FLOOR_DBM, "tile_px": 8}
+    found = [
+        contents(build(*inputs, tmp_path / f"{writers}", writers=writers, **options).path)
+        for writers in (1, 3)
+    ]
+    assert sum("part-" in name.name for name in found[0]) > 2 * len(IDS)
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("writers", [1, 3])
+def test_a_part_that_cannot_be_written_ends_the_build(world, tmp_path, monkeypatch, writers):
+    monkeypatch.setattr(parts, "ROWS_IN_MEMORY", 60)
+    write, begun = parts.write_columns, []
+
+    def full(table, file, rows):
+        begun.append(file)
+        if len(begun) == 4:
+            raise OSError(errno.ENOSPC, "No space left on device", str(file))
+        write(table, file, rows)
+
+    monkeypatch.setattr(parts, "write_columns", full)
+    with pytest.raises(OutputError, match="No space left"):
+        build(
+            world.rasters, world.plan, world.routes, tmp_path / "db",
+            floor_dbm=FLOOR_DBM, tile_px=8, writers=writers,
+        )  # fmt: skip
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("tile_px", [7, 64])
@@ -261,6 +294,7 @@ def test_the_old_database_survives_a_build_that_dies(world, tmp_path):
             out,
             tile_px=8,
             executor=DiesAtThirdTile(),
+            pixels_a_task=0,
             in_flight=1,
         )
     assert contents(out) == before

@@ -10,7 +10,8 @@ from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_wo
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.sampling import levels_at
 
 # row, col, rows, cols of each cell's own raster: none covers the square's middle alone.
 EXTENTS = ((0, 0, 20, 30), (0, 25, 40, 25), (18, 5, 22, 20))
@@ -45,13 +46,12 @@ def test_only_what_reaches_a_tile_is_read_and_nothing_else_changes(tmp_path, mon
     one = open_rasters(tmp_path / "whole.tif")
     expected = build(one, make_plan(), make_routes(), tmp_path / "a", **options)
     asked = []
-    read = RxLevRasters.read
 
-    def counted(self, window=None, cells=None):
-        asked.append(len(cells))
-        return read(self, window, cells)
+    def counted(places):
+        asked.extend(len(one.cells) for one in places)
+        return levels_at(places)
 
-    monkeypatch.setattr(RxLevRasters, "read", counted)
+    monkeypatch.setattr("mapfilter.database.tiles.levels_at", counted)
     many = open_rasters(tmp_path / "cells")
     found = build(many, make_plan(), make_routes(), tmp_path / "b", **options)
     assert parts_of(found) == parts_of(expected)

@@ -89,6 +89,6 @@ def test_no_more_tiles_wait_than_asked(world, tmp_path):
     most = []
     build(
         world.rasters, world.plan, world.routes, tmp_path / "db", tile_px=8, executor=Lazy(),
-        in_flight=3, progress=lambda done, _: most.append(len(waiting) - done),
+        in_flight=3, pixels_a_task=0, progress=lambda done, _: most.append(len(waiting) - done),
     )  # fmt: skip
     assert max(most) == 2

@@ -1,6 +1,7 @@
 """Builds that are cut short, go on, run on a cluster, and lay their points in the workers."""
 
 import multiprocessing
+import pickle
 import time
 from pathlib import Path
 from threading import Event
@@ -20,7 +21,7 @@ from mapfilter.errors import InputError, MapfilterError
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.routes import route_lattice
-from mapfilter.roads.ways import Buildings, Squares, Ways
+from mapfilter.roads.ways import Buildings, Squares, Water, Ways
 
 OPTIONS = {"floor_dbm": FLOOR_DBM, "tile_px": 8}
 TILE_PIXELS = 8 * 8 * len(IDS)
@@ -42,7 +43,9 @@ def contents(folder: Path):
 
 
 def again(world, out, **more):
-    return build(world.rasters, world.plan, world.routes, out, **OPTIONS, **more)
+    # A tile a task, so that counting tasks counts tiles.
+    given = {**OPTIONS, "pixels_a_task": 0, **more}
+    return build(world.rasters, world.plan, world.routes, out, **given)
 
 
 class Counting(SerialExecutor):
@@ -122,7 +125,7 @@ def test_who_stops_does_not_wait_for_the_checksum_of_the_rasters(world, tmp_path
         raise InputError(())
 
     monkeypatch.setattr(RxLevRasters, "sha256", slow)
-    monkeypatch.setattr(RxLevRasters, "read", damaged)
+    monkeypatch.setattr("mapfilter.rasters.sampling.read_on", damaged)
     with pytest.raises(InputError):
         again(world, tmp_path / "db")
     assert done == []
@@ -225,3 +228,25 @@ def test_points_laid_by_the_workers_are_those_of_the_whole_lattice(world, tmp_pa
     assert contents(tmp_path / "laid") == contents(tmp_path / "tiled")
     estimate = dry_run(world.rasters, world.plan, tiled, **options)
     assert estimate.points == pytest.approx(len(laid), rel=0.3)
+
+
+def test_layers_that_were_sent_lay_the_same_points():
+    ways, squares, buildings = layers()
+    west, _, _, north = LATTICE.bounds_m
+    water = Water(CRS, np.array([shapely.box(west + 120, north - 60, west + 180, north)]))
+    source = RouteSource.of(ways, squares, buildings, water=water)
+    routes = LayerRoutes(source, LATTICE)
+    count = 0
+    for window in LATTICE.tiles(16):
+        part = routes.part(LATTICE.window(*window))
+        laid, sent = part(), pickle.loads(pickle.dumps(part))()
+        count += len(laid)
+        assert sent.lattice == laid.lattice
+        assert sent.class_names == laid.class_names
+        for name in ("row", "col", "way_id", "way_class", "distance_to_way_m", "on_square"):
+            found, expected = getattr(sent, name), getattr(laid, name)
+            assert found.dtype == expected.dtype
+            np.testing.assert_array_equal(found, expected)
+    assert count > 100
+    whole = pickle.loads(pickle.dumps(routes))
+    assert whole.digest() == routes.digest()

@@ -57,6 +57,7 @@ def inputs(tmp_path_factory):
         "routes": make_routes(),
         "floor_dbm": FLOOR_DBM,
         "tile_px": 8,
+        "pixels_a_task": 0,
     }
 
 
@@ -167,6 +168,7 @@ def test_tiles_of_rasters_whose_side_car_changed_are_made_again(tmp_path):
     plan = make_plan()
     write_rasters(tmp_path / "rxlev.tif", LATTICE, levels_of(plan, seed=3), plan.ids)
     given = {"plan": plan, "routes": make_routes(), "floor_dbm": FLOOR_DBM, "tile_px": 8}
+    given["pixels_a_task"] = 0
     with pytest.raises(KeyboardInterrupt):
         build(rasters(), **given, out=tmp_path / "db", executor=Counting(FINISHED), in_flight=1)
     bands = "".join(

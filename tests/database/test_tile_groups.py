@@ -89,3 +89,10 @@ def test_groups_are_made_when_they_are_due(tmp_path):
     tasks = iter(tasks_of(tmp_path / "due", [EVERYWHERE]))
     assert len(next(grouped(tasks, 3 * TILE_PX**2))) == 3
     assert sum(1 for _ in tasks) == 64 - 4
+
+
+def test_the_last_groups_are_small_so_that_workers_end_together(tmp_path):
+    tasks = tasks_of(tmp_path / "area", [EVERYWHERE])
+    groups = list(grouped(tasks, 10 * TILE_PX**2, total=len(tasks), shares=4))
+    assert [task for group in groups for task in group] == tasks
+    assert [len(group) for group in groups] == [10, 10, 10, 9, 7, 5, 4, 3, 2, 1, 1, 1, 1]
