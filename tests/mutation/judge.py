@@ -159,7 +159,9 @@ class _Worker:
         limits = {file: _PATIENCE * s + _PATIENCE_S for file, s in seconds.items()}
         whole = _PATIENCE * sum(seconds.values()) + 4 * _PATIENCE_S
         request = workshop.request(ordered, limits_s=limits, limit_s=whole)
-        outcome = workshop.judge(mutant, request)
+        # Without a file pytest would run all of the repository.
+        unseen = Outcome(NO_TESTS, "", 0.0, {})
+        outcome = workshop.judge(mutant, request) if ordered else unseen
         noticed = Path(outcome.test.partition("::")[0])
         verdict = Verdict(
             mutant.id,
