@@ -223,6 +223,11 @@ def test_kernels_hold_constants_and_compiled_functions():
     assert inlined("from numba import njit\n\n\ndef f():\n    return 2\n") == [True]
 
 
+def test_a_mutant_that_no_test_is_near_to_survives_and_nothing_is_run(toy):
+    (toy / "toy" / "alone.py").write_text("A = 1\n")
+    assert judged(toy, near=3)["1 → 21"] == record.SURVIVED
+
+
 def test_tests_that_fail_anyway_are_an_error(toy):
     (toy / "tests" / "test_more.py").write_text("def test_no():\n    assert False\n")
     with pytest.raises(RuntimeError, match="without any mutant"):

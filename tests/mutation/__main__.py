@@ -3,6 +3,7 @@
     python -m tests.mutation --sample 40 --seed 1            every room
     python -m tests.mutation --room models --room filters    some rooms
     python -m tests.mutation --room models --list            what would be planted
+    python -m tests.mutation --room models --near 5          by the five nearest files of tests
 
 Verdicts go to ``out/mutants/verdicts.jsonl``; what was judged already is not judged again.
 """

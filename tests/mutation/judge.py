@@ -14,12 +14,12 @@ from .operators import Mutant, applied, mutants
 from .record import KILLED, SURVIVED, TIMEOUT, Reviewed, Verdict, reason
 from .rooms import ROOMS, Imports, Room, checksum
 from .server import Outcome
-from .workshop import Workshop
+from .workshop import Workshop, is_inlined
 
 _PATIENCE = 4.0
-_PATIENCE_S = 45.0
-"""A test may take this many times as long as its whole file does, and this much longer: kernels
-of the mutant are compiled in it."""
+_PATIENCE_S, _COMPILING_S = 10.0, 35.0
+"""A test may take this many times as long as its whole file does, and this much longer; still
+longer where kernels of the mutant are compiled in it."""
 _INDIRECT = 4
 """A test that does not import the file itself is as likely to notice as one that takes so many
 times as long."""
@@ -156,8 +156,10 @@ class _Worker:
     def _verdict(self, workshop: Workshop, task: Task, seconds: Mapping[str, float]) -> Verdict:
         mutant, tests = task.mutant, task.tests
         ordered = self._ordered(workshop.imports, mutant, tests, seconds)
-        limits = {file: _PATIENCE * s + _PATIENCE_S for file, s in seconds.items()}
-        whole = _PATIENCE * sum(seconds.values()) + 4 * _PATIENCE_S
+        text = (workshop.copy / mutant.file).read_text()
+        more_s = _PATIENCE_S + (_COMPILING_S if is_inlined(text, mutant) else 0.0)
+        limits = {file: _PATIENCE * s + more_s for file, s in seconds.items()}
+        whole = _PATIENCE * sum(seconds.values()) + 4 * more_s
         request = workshop.request(ordered, limits_s=limits, limit_s=whole)
         # Without a file pytest would run all of the repository.
         unseen = Outcome(NO_TESTS, "", 0.0, {})
