@@ -20,8 +20,11 @@ settings.load_profile("mapfilter")
 # Commands, with imports from several rooms: python -m tests.fuzz, python -m tests.faults.
 collect_ignore = ["faults.py", "serve_load.py", "fuzz_command.py", "fuzz_readers.py"]
 if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1":
-    # Run by a test in a process of its own.
-    collect_ignore.append("positioning/simulated_device.py")
+    # Each is run by a test in a process of its own.
+    collect_ignore += [
+        "filters/simulated_copies.py", "models/simulated_models.py",
+        "positioning/simulated_device.py",
+    ]  # fmt: skip
 
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
 

@@ -7,7 +7,7 @@ import pytest
 from mutation import judge, record
 from mutation.operators import applied, mutants
 from mutation.rooms import ROOMS, Imports, Room
-from mutation.workshop import Workshop
+from mutation.workshop import Workshop, is_inlined
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -146,11 +146,11 @@ def toy(tmp_path, monkeypatch):
     return tmp_path / "toy"
 
 
-def judged(toy, **more):
-    tasks = judge.plan(toy, "toy", None, 1, rooms=ROOM)
+def judged(toy, near=None, **more):
+    tasks = judge.plan(toy, "toy", None, 1, rooms=ROOM, near=near, package="toy")
     path = toy / "out" / "verdicts.jsonl"
-    holding = judge.known(toy, tasks, record.read(path), rooms=ROOM)
-    made = list(judge.judged(toy, toy / "out", tasks, holding, rooms=ROOM, package="toy", **more))
+    holding = judge.known(toy, tasks, record.read(path))
+    made = list(judge.judged(toy, toy / "out", tasks, holding, package="toy", **more))
     for verdict in made:
         record.append(path, verdict)
     return {v.change + v.id.split(":")[1]: v.status for v in made}
@@ -171,6 +171,61 @@ def test_killed_survived_timed_out_and_not_judged_twice(toy):
     again = judged(toy, jobs=2)
     assert again["- → +11"] == record.KILLED
     assert "+ → -2" not in again
+
+
+def test_a_mutant_is_judged_by_the_nearest_tests_alone(toy):
+    (toy / "tests" / "test_any.py").write_text(
+        "import toy.other\nfrom toy.sums import unseen\n\n\n"
+        "def test_unseen():\n    assert unseen(3, 2) == 1\n"
+    )
+    (toy / "toy" / "other.py").write_text("")
+    # Of two that import the file, the one that imports less.
+    assert judged(toy, near=1)["- → +11"] == record.SURVIVED
+    assert judged(toy, near=1) == {}
+    # One that no test noticed is judged again by more tests; one that a test noticed is not.
+    again = judged(toy, near=2)
+    assert again["- → +11"] == record.KILLED
+    assert "+ → -2" not in again
+    assert judged(toy) == {}
+
+
+def test_the_nearest_tests_import_a_file_through_the_fewest_others(tmp_path):
+    texts = {
+        "toy/far.py": "",
+        "toy/kernel.py": "from toy import far",
+        "toy/door.py": "import toy.kernel",
+        "tests/test_a.py": "import toy.door",
+        "tests/test_b.py": "import toy.door\nimport toy.kernel",
+        "tests/test_c.py": "from toy.kernel import x",
+        "tests/test_d.py": "import os",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    tests = [Path(name) for name in texts if name.startswith("tests")]
+    imports = Imports(tmp_path, "toy")
+
+    def nearest(file, count):
+        found = imports.nearest(Path("toy", file), tests[::-1], count)
+        return "".join(test.stem[-1] for test in found)
+
+    assert nearest("kernel.py", 9) == nearest("far.py", 9) == "cba"
+    assert nearest("door.py", 9) == "ab"
+    assert nearest("far.py", 1) == "c"
+
+
+def test_kernels_hold_constants_and_compiled_functions():
+    def inlined(text):
+        return [is_inlined(text, mutant) for mutant in mutants(text, "file.py")]
+
+    assert inlined("A = 1\n\n\ndef f():\n    return 2\n") == [True, False]
+    assert inlined("class A:\n    b = 1\n\n    def f(self):\n        return 2\n") == [True, False]
+    assert inlined("from numba import njit\n\n\ndef f():\n    return 2\n") == [True]
+
+
+def test_a_mutant_that_no_test_is_near_to_survives_and_nothing_is_run(toy):
+    (toy / "toy" / "alone.py").write_text("A = 1\n")
+    assert judged(toy, near=3)["1 → 21"] == record.SURVIVED
 
 
 def test_tests_that_fail_anyway_are_an_error(toy):

@@ -266,5 +266,10 @@ def test_an_edited_manifest_names_what_is_twice_or_elsewhere(tmp_path):
     assert complaint(lambda m: m["lattice"].update(rows=0))
     assert complaint(lambda m: m["counts"].update(points=-1))
     assert complaint(lambda m: m["parts"][level].update(sha256="0" * 63))
+    manifest = json.loads(json.dumps(whole)) | {"cells": "x" * 300}
+    file.write_text(json.dumps(sealed(manifest)))
+    with pytest.raises(StoreError) as caught:
+        read_manifest(database.path)
+    assert [fault.got for fault in caught.value.faults] == ["'" + 79 * "x"]
     file.write_text(json.dumps(whole))
     assert read_manifest(database.path)[0] == whole

@@ -137,6 +137,16 @@ def test_databases_that_do_not_fit(world, database, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_where_no_level_is_left_nothing_is_written(world, tmp_path):
+    """Of two cells the one that stays is below the floor everywhere."""
+    quiet = world.levels_dbm.copy()
+    quiet[0] = -120.0
+    made = some(world, tmp_path / "one", IDS[:2], levels_dbm=quiet)
+    with pytest.raises(InputError, match="a point with a level of a cell, found none"):
+        merge([made], tmp_path / "out", without=[IDS[1]])
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_damaged_part_is_told(world, tmp_path):
     database = make_database(world, tmp_path)
     (part,) = (one.file for one in database.level_parts[IDS[0]])

@@ -54,6 +54,15 @@ def test_far_away_hypotheses_lie_in_the_last_ring():
     assert_agree(summarise_arrays(state, weight, BINS), summarise(state, weight, BINS))
 
 
+def test_a_share_that_a_ring_reaches_exactly_ends_with_it():
+    """Half of the belief is here, half of it 100 m away."""
+    state = np.array([[500.0, 600.0], [300.0, 300.0]], dtype=np.float32)
+    weight = np.array([0.5, 0.5], dtype=np.float32)
+    found = summarise_arrays(state, weight, BINS)
+    assert found.radii_m[0] == pytest.approx((1 / 30) ** 2)
+    assert_agree(found, summarise(state, weight, BINS))
+
+
 def test_shares_that_rounding_leaves_out_lie_beyond_the_last_ring():
     state, weight = np.full((2, 2), 300.0, np.float32), np.array([0.5, 0.4], np.float32)
     assert_agree(summarise_arrays(state, weight, BINS), summarise(state, weight, BINS))

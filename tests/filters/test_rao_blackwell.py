@@ -203,6 +203,7 @@ def test_regularising_keeps_the_spread():
         (lambda rng: rb.predict(START, np.eye(3), np.eye(4), rng), "motion"),
         (lambda rng: rb.update(START, LINEAR, np.zeros(3), rng), "reading"),
         (lambda rng: rb.update(START, LINEAR, np.full(5, np.inf), rng), "infinity"),
+        (lambda rng: rb.update(START, LINEAR, [1.0, -np.inf, 0.0, np.nan, 2.0], rng), "infinity"),
         (lambda rng: rb.update(PART, LINEAR, np.zeros(5), rng), "sampled"),
         (lambda rng: rb.update(START, LINEAR, np.zeros(5), rng, SIR, np.zeros((2, 2))), "loading"),
         (

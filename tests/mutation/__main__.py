@@ -3,6 +3,7 @@
     python -m tests.mutation --sample 40 --seed 1            every room
     python -m tests.mutation --room models --room filters    some rooms
     python -m tests.mutation --room models --list            what would be planted
+    python -m tests.mutation --room models --near 5          by the five nearest files of tests
 
 Verdicts go to ``out/mutants/verdicts.jsonl``; what was judged already is not judged again.
 """
@@ -31,6 +32,7 @@ def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--all", action="store_true", help="all mutants of each room")
     parser.add_argument("--list", action="store_true", help="list them and end")
     parser.add_argument("--anew", action="store_true", help="judge again what was judged already")
+    parser.add_argument("--near", type=int, help="only so many files of tests, the nearest ones")
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time (1)")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "mutants", help="folder")
     return parser.parse_args(arguments)
@@ -41,10 +43,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parsed(arguments)
     rooms, count = options.room or list(ROOMS), None if options.all else options.sample
     entries = record.reviewed(EQUIVALENT)
-    tasks = [task for room in rooms for task in plan(ROOT, room, count, options.seed, entries)]
+    tasks = [
+        task
+        for room in rooms
+        for task in plan(ROOT, room, count, options.seed, entries, near=options.near)
+    ]
     if options.list:
         for task in tasks:
             print(f"{task.room:<12}{task.mutant.id}  {task.mutant.change}")  # noqa: T201
+            if options.near is not None:
+                print(" " * 12 + " ".join(test.name for test in task.tests))  # noqa: T201
         return 0
     path = options.out / "verdicts.jsonl"
     verdicts = {} if options.anew else known(ROOT, tasks, record.read(path))

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
+from .baseline import NO_TESTS, Baseline
 from .operators import Mutant, applied, mutants
 from .record import KILLED, SURVIVED, TIMEOUT, Reviewed, Verdict, reason
 from .rooms import ROOMS, Imports, Room, checksum
 from .server import Outcome
-from .workshop import Workshop
+from .workshop import Workshop, is_inlined
 
 _PATIENCE = 4.0
-_PATIENCE_S = 45.0
-"""A test may take this many times as long as its whole file does, and this much longer: kernels
-of the mutant are compiled in it."""
-_NO_TESTS = 5
+_PATIENCE_S, _COMPILING_S = 10.0, 35.0
+"""A test may take this many times as long as its whole file does, and this much longer; still
+longer where kernels of the mutant are compiled in it."""
 _INDIRECT = 4
 """A test that does not import the file itself is as likely to notice as one that takes so many
 times as long."""
@@ -31,10 +30,11 @@ Rooms = Mapping[str, Room]
 
 @dataclass(frozen=True)
 class Task:
-    """A mutant of a room, and why nobody can notice it, if so."""
+    """A mutant of a room, the files of tests that judge it, and why nobody can notice it, if so."""
 
     room: str
     mutant: Mutant
+    tests: tuple[Path, ...]
     equivalent: str | None = None
 
 
@@ -45,12 +45,17 @@ def plan(
     seed: int,
     entries: Sequence[Reviewed] = (),
     rooms: Rooms = ROOMS,
+    near: int | None = None,
+    package: str = "mapfilter",
 ) -> list[Task]:
     """Return a random sample of a room's mutants, or all of them.
 
     The order is that of a checksum of seed and mutant: a larger sample begins with a smaller one,
-    and a change of one line leaves the mutants of others where they were.
+    and a change of one line leaves the mutants of others where they were. With ``near`` only so
+    many files of tests judge a mutant, those nearest to its file (:meth:`.rooms.Imports.nearest`).
     """
+    imports, tests = Imports(root, package), tuple(rooms[room].test_files(root))
+    nearest: dict[str, tuple[Path, ...]] = {}
     texts = {file: (root / file).read_text() for file in rooms[room].sources(root)}
     found = [m for file, text in texts.items() for m in mutants(text, file.as_posix())]
     found.sort(key=lambda m: hashlib.sha256(f"{seed}:{m.stable}".encode()).digest())
@@ -58,8 +63,11 @@ def plan(
     for mutant in found:
         if len(chosen) == (len(found) if count is None else count):
             break
-        if _is_sound(applied(texts[Path(mutant.file)], mutant)):
-            chosen.append(Task(room, mutant, reason(mutant, entries)))
+        if not _is_sound(applied(texts[Path(mutant.file)], mutant)):
+            continue
+        if near is not None and mutant.file not in nearest:
+            nearest[mutant.file] = tuple(imports.nearest(Path(mutant.file), tests, near))
+        chosen.append(Task(room, mutant, nearest.get(mutant.file, tests), reason(mutant, entries)))
     return chosen
 
 
@@ -71,24 +79,22 @@ def _is_sound(text: str) -> bool:
     return True
 
 
-def known(
-    root: Path, tasks: Iterable[Task], verdicts: Iterable[Verdict], rooms: Rooms = ROOMS
-) -> dict[Key, Verdict]:
+def known(root: Path, tasks: Iterable[Task], verdicts: Iterable[Verdict]) -> dict[Key, Verdict]:
     """Return the verdicts that still hold: neither the file nor the tests have changed."""
     wanted = {(task.room, task.mutant.stable): task for task in tasks}
-    sums: dict[str, str] = {}
+    sums: dict[tuple[Path, ...], str] = {}
     holding = {}
     for verdict in verdicts:
         key = (verdict.room, verdict.stable)
         if key not in wanted:
             continue
-        tests = rooms[verdict.room].test_files(root)
-        if verdict.room not in sums:
-            sums[verdict.room] = checksum(root, tests)
+        tests = wanted[key].tests
+        if tests not in sums:
+            sums[tests] = checksum(root, tests)
         file = Path(wanted[key].mutant.file)
         noticed = Path(verdict.test.partition("::")[0])
         same_test = noticed in tests and checksum(root, [noticed]) == verdict.test_sha
-        same_tests = verdict.tests_sha == sums[verdict.room]
+        same_tests = verdict.tests_sha == sums[tests]
         if checksum(root, [file]) == verdict.file_sha and (same_tests or same_test):
             holding[key] = verdict
     return holding
@@ -100,7 +106,6 @@ def judged(
     tasks: Sequence[Task],
     verdicts: Mapping[Key, Verdict],
     jobs: int = 1,
-    rooms: Rooms = ROOMS,
     package: str = "mapfilter",
 ) -> Iterator[Verdict]:
     """Judge the mutants that have no verdict and can be noticed, room by room.
@@ -117,7 +122,7 @@ def judged(
     ]
     shares = [new[n::jobs] for n in range(min(jobs, len(new)))]
     workers = [
-        _Worker(root, out / f"worker-{n}", rooms, package, list(verdicts.values()))
+        _Worker(root, out / f"worker-{n}", package, list(verdicts.values()))
         for n in range(len(shares))
     ]
     if len(shares) == 1:
@@ -137,52 +142,33 @@ def judged(
 class _Worker:
     """Judges mutants one after the other in a workshop of its own."""
 
-    def __init__(
-        self, root: Path, folder: Path, rooms: Rooms, package: str, past: list[Verdict]
-    ) -> None:
-        self._root, self._folder, self._rooms = root, folder, rooms
-        self._package = package
+    def __init__(self, root: Path, folder: Path, package: str, past: list[Verdict]) -> None:
+        self._root, self._folder, self._package = root, folder, package
         self._kills = Counter((_file(v), _killer(v)) for v in past if v.status == KILLED)
 
     def verdicts(self, tasks: Sequence[Task]) -> Iterator[Verdict]:
         """Yield a verdict for each task."""
         with Workshop(self._root, self._folder, self._package) as workshop:
-            for room in dict.fromkeys(task.room for task in tasks):
-                seconds = self._baseline(workshop, room)
-                for task in tasks:
-                    if task.room == room:
-                        yield self._verdict(workshop, task.mutant, room, seconds)
+            baseline = Baseline(workshop, self._folder / "baseline.json", self._package)
+            for task in sorted(tasks, key=lambda task: task.room):
+                yield self._verdict(workshop, task, baseline.seconds(task.tests))
 
-    def _baseline(self, workshop: Workshop, room: str) -> dict[str, float]:
-        """Run the tests without a mutant and return the time that each file takes."""
-        root = workshop.copy
-        tests = self._rooms[room].test_files(root)
-        sources = [file.relative_to(root) for file in root.glob(f"{self._package}/**/*.py")]
-        of = checksum(root, [*tests, *sources])
-        note = self._folder / f"baseline-{room}.json"
-        if note.exists() and (kept := json.loads(note.read_text()))["of"] == of:
-            return dict(kept["seconds"])
-        outcome = workshop.warm(workshop.request(tests, keep_bytecode=True))
-        if outcome.code not in (0, _NO_TESTS):
-            said = workshop.said()
-            raise RuntimeError(f"{room}: the tests fail without any mutant\n{said}")
-        note.write_text(json.dumps({"of": of, **asdict(outcome), "seconds": outcome.files_s}))
-        return outcome.files_s
-
-    def _verdict(
-        self, workshop: Workshop, mutant: Mutant, room: str, seconds: Mapping[str, float]
-    ) -> Verdict:
-        tests = self._rooms[room].test_files(workshop.copy)
+    def _verdict(self, workshop: Workshop, task: Task, seconds: Mapping[str, float]) -> Verdict:
+        mutant, tests = task.mutant, task.tests
         ordered = self._ordered(workshop.imports, mutant, tests, seconds)
-        limits = {file: _PATIENCE * s + _PATIENCE_S for file, s in seconds.items()}
-        whole = _PATIENCE * sum(seconds.values()) + 4 * _PATIENCE_S
+        text = (workshop.copy / mutant.file).read_text()
+        more_s = _PATIENCE_S + (_COMPILING_S if is_inlined(text, mutant) else 0.0)
+        limits = {file: _PATIENCE * s + more_s for file, s in seconds.items()}
+        whole = _PATIENCE * sum(seconds.values()) + 4 * more_s
         request = workshop.request(ordered, limits_s=limits, limit_s=whole)
-        outcome = workshop.judge(mutant, request)
+        # Without a file pytest would run all of the repository.
+        unseen = Outcome(NO_TESTS, "", 0.0, {})
+        outcome = workshop.judge(mutant, request) if ordered else unseen
         noticed = Path(outcome.test.partition("::")[0])
         verdict = Verdict(
             mutant.id,
             mutant.stable,
-            room,
+            task.room,
             mutant.change,
             _status(outcome),
             outcome.test,
@@ -223,4 +209,4 @@ def _killer(verdict: Verdict) -> str:
 def _status(outcome: Outcome) -> str:
     if outcome.timed_out:
         return TIMEOUT
-    return SURVIVED if outcome.code in (0, _NO_TESTS) else KILLED
+    return SURVIVED if outcome.code in (0, NO_TESTS) else KILLED

@@ -83,11 +83,29 @@ class Imports:
 
     def importers(self, file: Path) -> frozenset[Path]:
         """Return the package's files that import a file, be it through others."""
-        reached, front = set(), {file}
+        return frozenset(self._steps(file)) - {file}
+
+    def nearest(self, file: Path, tests: Iterable[Path], count: int) -> list[Path]:
+        """Return the files of tests that are nearest to a file, the nearest first.
+
+        Nearest are those that import it themselves, then those that import a file that does, and so
+        on; among equals those that import the fewest files. None reaches it through no import.
+        """
+        steps = self._steps(file)
+        ranked = []
+        for test in tests:
+            imported = self.direct(test)
+            if reached := imported & steps.keys():
+                ranked.append((min(steps[f] for f in reached), len(imported), test))
+        return [test for _, _, test in sorted(ranked)[:count]]
+
+    def _steps(self, file: Path) -> dict[Path, int]:
+        """Return the files that import a file, and through how many imports; itself by none."""
+        steps, front = {file: 0}, {file}
         while front:
-            front = {a for a, b in self._graph.items() if b & front} - reached
-            reached |= front
-        return frozenset(reached - {file})
+            front = {a for a, b in self._graph.items() if b & front} - steps.keys()
+            steps |= dict.fromkeys(front, max(steps.values()) + 1)
+        return steps
 
     @cached_property
     def _files(self) -> dict[str, Path]:

@@ -7,6 +7,7 @@ at the file in which the kernel itself stands.
 
 from __future__ import annotations
 
+import ast
 import fcntl
 import json
 import os
@@ -21,6 +22,7 @@ from types import TracebackType
 from .operators import Mutant, applied
 from .rooms import Imports
 from .server import BROKEN, Outcome, Request
+from .source import Source
 
 PARTS = ("data", "pipelines", "tests", "docs", "pyproject.toml", "README.md")
 LIBRARIES = (
@@ -95,7 +97,8 @@ class Workshop:
         file = self.copy / mutant.file
         pristine, stamp = file.read_text(), file.stat()
         self._restore_kernels()
-        self._forget(self._kernels, Path(mutant.file))
+        if is_inlined(pristine, mutant):
+            self._forget(self._kernels, Path(mutant.file))
         try:
             file.write_text(applied(pristine, mutant))
             os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns + _LATER_NS))
@@ -183,6 +186,18 @@ class Workshop:
         files = [whole] if whole.is_file() else (p for p in whole.rglob("*") if p.is_file())
         relative = (file.relative_to(root) for file in files)
         return [file for file in relative if not set(file.parts) & set(_NEVER_COPIED)]
+
+
+def is_inlined(text: str, mutant: Mutant) -> bool:
+    """Return whether kernels may hold what a mutant changes: constants and compiled functions.
+
+    Functions of a file without numba are compiled nowhere.
+    """
+    if "numba" in text or "on_demand" in text:
+        return True
+    source = Source(text)
+    functions = [node for node in ast.walk(source.tree) if isinstance(node, ast.FunctionDef)]
+    return not any(source.start(f) <= mutant.start < source.end(f) for f in functions)
 
 
 def _stamp(file: Path) -> tuple[int, int]:

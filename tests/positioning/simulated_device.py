@@ -5,7 +5,7 @@ simulator has to be asked for before numba is loaded.
 """
 
 from dataclasses import replace
-from math import nan, radians
+from math import radians
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,17 +18,13 @@ from small_area import HEIGHT_M, SOUTH_M, WEST_M, WIDTH_M, make_area
 from mapfilter import _cuda
 from mapfilter._device import PROCESSOR, Device
 from mapfilter._kernels import draw_key
-from mapfilter.filters import cuda_copies
-from mapfilter.filters.array_resampling import normalise_arrays, systematic_arrays
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.grid import GridFilter as BeliefGrid
 from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
-from mapfilter.models import cuda_motion
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.models.street_motion import MapWeights, MotionErrors, move
-from mapfilter.models.way_map import WayMap, weigh_by_ways
+from mapfilter.models.street_motion import MotionErrors
 from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start
@@ -67,33 +63,6 @@ def report(limit_dbm=-95.0, offset_db=3.0, cells=(0, 2)):
     return LevelReport(cell, level, absent, limit_dbm, offset_db)
 
 
-@pytest.mark.parametrize(("rows", "step_m"), [(8, 1.4), (9, -0.7), (8, 0.0)])
-def test_motion(rows, step_m):
-    state, _ = particles(rows)
-    errors, key = MotionErrors(disturbances_per_m=0.3), np.uint64(2**63 + 11)
-    found = np.empty_like(state)
-    cuda_motion.move(state, step_m, 2.5, errors, key, found, 0.2)
-    expected = move(state, step_m, 2.5, errors, key, 0.2)
-    np.testing.assert_allclose(found, expected, rtol=2e-6, atol=1e-5)
-    assert step_m == 0 or np.abs(found[:2] - state[:2]).max() > 0.5
-
-
-@pytest.mark.parametrize("beyond", [-0.2, nan])
-def test_map(beyond):
-    state, log_weight = particles()
-    area, weights = make_area(), MapWeights()
-    log_map, factors = area.log_map(weights.sd_m), weights.over(9.0)
-    found, weighed = state.copy(), log_weight.copy()
-    cuda_motion.weigh_by_ways(found, log_map, 10.0, area.size_m, factors, beyond, weighed)
-    expected = state.copy()
-    ways = WayMap(log_map, 10.0, *area.size_m)
-    expected_weight = np.empty(COUNT)
-    weigh_by_ways(0, COUNT, expected, ways, factors, beyond, log_weight, expected_weight)
-    np.testing.assert_allclose(found, expected, rtol=2e-6, atol=1e-6)
-    np.testing.assert_allclose(weighed, expected_weight, rtol=0, atol=5e-6)
-    assert np.ptp(weighed - log_weight) > 0.1
-
-
 @pytest.mark.parametrize("remember", [True, False])
 def test_reports(remember):
     """Two reports one after the other: aged errors, a new cell, absent ones."""
@@ -117,33 +86,6 @@ def test_reports(remember):
         for name in ("covariance_db2", "other_dbm", "other_log_likelihood"):
             one, other = getattr(there.shared, name), getattr(here.shared, name)
             np.testing.assert_array_equal(one, other)
-
-
-@pytest.mark.parametrize("wanted", [1, COUNT // 3, 2 * COUNT])
-def test_choice_and_copies(wanted):
-    state, log_weight = particles()
-    log_weight[::7] = -np.inf
-    log_weight += 3.0
-    expected_weight, expected_log = np.empty(COUNT, np.float32), log_weight.copy()
-    log_total, effective = normalise(expected_log, expected_weight)
-    weight, found_total, found_effective = normalise_arrays(log_weight)
-    assert (found_total, found_effective) == pytest.approx((log_total, effective), rel=1e-5)
-    np.testing.assert_allclose(weight, expected_weight, rtol=1e-5, atol=1e-12)
-    np.testing.assert_allclose(log_weight, expected_log, rtol=0, atol=1e-6)
-    expected = np.empty(wanted, dtype=np.int32)
-    systematic(expected_weight, 0.37, expected)
-    chosen = systematic_arrays(expected_weight, 0.37, wanted)
-    assert chosen.dtype == np.int32
-    np.testing.assert_array_equal(chosen, expected)
-    copies, noisy = np.empty((8, wanted), np.float32), np.empty((8, wanted), np.float32)
-    cuda_copies.copy_with_jitter(state, chosen, JITTER, np.uint64(5), noisy)
-    copy_with_jitter(0, wanted, state, chosen, JITTER, np.uint64(5), copies)
-    np.testing.assert_allclose(noisy, copies, rtol=2e-6, atol=1e-5)
-
-
-def test_weights_of_none_are_none():
-    weight, log_total, effective = normalise_arrays(np.full(4, -np.inf))
-    assert (weight.tolist(), log_total, effective) == ([0.0] * 4, -np.inf, 0.0)
 
 
 def test_a_whole_step_gives_the_estimate_of_the_processor():

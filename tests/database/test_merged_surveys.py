@@ -1,0 +1,81 @@
+"""Merged databases of surveys keep what was measured, each at its place on the merged lattice."""
+
+import numpy as np
+import pytest
+from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
+
+from mapfilter.database.build import build
+from mapfilter.database.measured import Readings
+from mapfilter.database.merge import merge
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
+
+WINDOWS = {"west": (0, 0, 40, 22), "east": (4, 22, 36, 28)}
+
+
+def readings(count, seed):
+    rng = np.random.default_rng(seed)
+    number = np.arange(count, dtype=np.int32)
+    places = 531_000.0 + rng.uniform(0, 200, count), 4_556_000.0 - rng.uniform(0, 150, count)
+    return Readings(
+        IDS, (number % 3).astype(np.int32), number, number // 2, *places,
+        -60.0 - number, np.full(count, np.nan), number % 2 == 0,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    return make_world(tmp_path_factory.mktemp("rasters"))
+
+
+def surveyed(world, folder, name, *, measured=True):
+    """Build a database of a part of the area; the deviation is that of the pixel in the whole."""
+    row, col, rows, cols = WINDOWS[name]
+    lattice, made = LATTICE.window(*WINDOWS[name]), {}
+    level = world.levels_dbm[:, row : row + rows, col : col + cols]
+    number = np.arange(LATTICE.rows * LATTICE.cols).reshape(LATTICE.rows, LATTICE.cols)
+    sd = 1 + 0.001 * number[row : row + rows, col : col + cols]
+    bands = {"level": level, "deviation": np.stack([sd, sd + 3, sd + 6]).astype(np.float32)}
+    for quantity, values in bands.items():
+        file = folder / f"{name}-{quantity}.tif"
+        write_rasters(file, lattice, zip(IDS, values, strict=True), IDS, {}, quantity=quantity)
+        made[quantity] = open_rasters(file)
+    given = (readings(6, len(name)), made["deviation"]) if measured else None
+    options = {"floor_dbm": FLOOR_DBM, "tile_px": 16, "measured": given}
+    out = folder / f"{name}-{measured}"
+    return build(made["level"], make_plan(), make_routes(lattice), out, **options)
+
+
+def test_readings_and_deviations_of_both_are_kept_at_their_places(world, tmp_path):
+    west, east = (surveyed(world, tmp_path, name) for name in WINDOWS)
+    merged = merge([west, east], tmp_path / "all")
+    assert merged.lattice.crs == CRS
+    assert (merged.lattice.rows, merged.lattice.cols) == (40, 50)
+    found = merged.measured()
+    given = [west.measured(), east.measured()]
+    for name in ("east_m", "north_m", "level_dbm", "serving"):
+        expected = np.concatenate([getattr(one.readings, name) for one in given])
+        np.testing.assert_array_equal(getattr(found.readings, name), expected)
+    # Reports and drives of different surveys differ.
+    assert found.readings.report.tolist() == list(range(12))
+    assert found.readings.session.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+    deviations = found.deviations
+    assert len(deviations) == sum(len(one.deviations) for one in given) > 100
+    number = deviations.row * LATTICE.cols + deviations.col
+    expected = 1 + 0.001 * number + 3 * deviations.cell
+    np.testing.assert_allclose(deviations.deviation_db, expected, atol=0.006)
+
+
+def test_of_cells_that_are_left_out_nothing_is_kept(world, tmp_path):
+    west = surveyed(world, tmp_path, "west")
+    found = merge([west], tmp_path / "one", without=[IDS[0]]).measured()
+    assert found.readings.cell_ids == IDS[1:]
+    assert found.readings.level_dbm.tolist() == [-61.0, -62.0, -64.0, -65.0]
+    assert set(found.deviations.cell.tolist()) == {0, 1}
+
+
+def test_beside_a_database_without_a_survey_nothing_is_kept(world, tmp_path):
+    west = surveyed(world, tmp_path, "west")
+    plain = surveyed(world, tmp_path, "east", measured=False)
+    for order in ([west, plain], [plain, west]):
+        assert merge(order, tmp_path / "mixed").measured() is None

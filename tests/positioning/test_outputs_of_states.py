@@ -1,0 +1,95 @@
+"""The output of a state: position, way, levels and runner-up, and nothing where there is none."""
+
+from math import isnan, nan
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.hypotheses import BeliefSummary
+from mapfilter.positioning.bayes.state import step_output
+
+AREA = SimpleNamespace(origin_m=(1000.0, 2000.0), matched_way=lambda *_: (7, 0.75))
+PLACES = np.array([[30.0, 31.0, 29.0], [40.0, 40.0, 41.0]], dtype=np.float32)
+SUMMARY = BeliefSummary(
+    np.array([30.0, 40.0, 0.5]), np.array([[4.0, 1.0], [1.0, 9.0]]), np.array([1.0, 2.0, 3.0]),
+    0.9, np.array([[70.0, 80.0, 0.08], [5.0, 6.0, 0.02]]), 1.5,
+)  # fmt: skip
+
+
+def belief(summary=SUMMARY, count=3):
+    weight = np.full(3, 1 / 3, dtype=np.float32)
+    return SimpleNamespace(
+        summary=summary, count=count, state=PLACES, weight=weight, log_evidence=-4.0
+    )
+
+
+def state(belief, status=Status.TRACKING, reported=None):
+    null = SimpleNamespace(probability=0.125)
+    return SimpleNamespace(
+        belief=belief, status=status, null=null, reported=reported, with_output=lambda one: one
+    )
+
+
+def output_of(given, **more):
+    return step_output(AREA, given, 5.0, Reason.USED, (), **more)
+
+
+def test_a_position_is_that_of_the_belief_in_the_areas_system():
+    _, found = output_of(state(belief()))
+    fix = found.fix
+    assert (fix.time_s, fix.east_m, fix.north_m) == (5.0, 1030.0, 2040.0)
+    assert (fix.status, fix.reason, fix.hypotheses) == (Status.TRACKING, Reason.USED, 3)
+    assert (fix.mass_50m, fix.way_id, fix.way_probability) == (0.9, 7, 0.75)
+    np.testing.assert_array_equal(fix.radii_m, [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(fix.covariance_m2, SUMMARY.covariance_m2)
+    assert fix.protection_m >= fix.radius_99_m > 0
+    assert found.tail.p_none == 0.125
+    # The runner-up, in the same system.
+    assert found.evidence == (1070.0, 2080.0, 0.08, 1.5, -4.0)
+
+
+@pytest.mark.parametrize("given", [state(belief(), Status.OUTSIDE), state(None, Status.SEARCHING)])
+def test_outside_and_before_the_start_there_is_no_position(given):
+    _, found = output_of(given)
+    fix = found.fix
+    assert isnan(fix.east_m)
+    assert isnan(fix.north_m)
+    assert np.isnan(fix.radii_m).all()
+    assert (fix.hypotheses, fix.way_id, fix.status) == (0, 0, given.status)
+    assert isnan(fix.mass_50m)
+    assert isnan(fix.protection_m)
+    assert found.tail is None
+    assert np.isnan(found.evidence[:4]).all()
+    np.testing.assert_equal(found.evidence[4], -4.0 if given.belief else nan)
+
+
+def test_without_a_runner_up_its_mass_is_zero():
+    alone = SUMMARY._replace(runners_up=np.empty((0, 3)))
+    _, found = output_of(state(belief(alone)))
+    np.testing.assert_equal(found.evidence, (nan, nan, 0.0, 1.5, -4.0))
+
+
+def test_positions_alone_have_neither_ways_nor_levels():
+    _, found = output_of(state(belief()), positions_only=True)
+    assert found.fix.east_m == 1030.0
+    assert found.fix.way_id == 0
+    assert np.isnan(
+        [found.fix.way_probability, found.fix.radius_99_m, found.fix.protection_m]
+    ).all()
+    assert found.tail is None
+
+
+def test_what_was_summarised_is_not_summarised_again():
+    held = belief()
+    reported, before = output_of(state(held))
+    again = state(held, reported=reported)
+    same, found = step_output(AREA, again, 6.0, Reason.NOT_MOVED_ENOUGH, ("unused",))
+    assert same is again
+    assert (found.fix.time_s, found.fix.reason) == (6.0, Reason.NOT_MOVED_ENOUGH)
+    assert (found.fix.east_m, found.evidence) == (before.fix.east_m, before.evidence)
+    assert (found.unused, found.tail) == (("unused",), before.tail)
+    for other in (state(belief(), reported=reported), state(held, Status.LOST, reported)):
+        changed, _ = output_of(other)
+        assert changed is not other

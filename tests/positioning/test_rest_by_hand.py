@@ -1,0 +1,139 @@
+"""Rests by their levels: blocks, serving cells, bounds and the doubt, by hand."""
+
+from dataclasses import replace
+from math import exp, nan
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from mapfilter.positioning.bayes.rest import Rest, _added, _left, levels_of
+from mapfilter.positioning.epochs import ReportRow
+
+
+def row(cell, level_dbm, role="neighbour", censored=0, **more):
+    return ReportRow(role, cell, more.get("arfcn"), more.get("bsic"), level_dbm, censored)
+
+
+def test_levels_by_their_cells_or_carriers():
+    rows = (row("A", -70.0), row(None, -80.0, arfcn=12, bsic=3), row("B", nan),
+            row("C", -99.0, censored=-1), row(None, -81.0, arfcn=12))  # fmt: skip
+    assert levels_of(rows) == [("A", -70.0), ("12/3", -80.0), ("12/None", -81.0)]
+
+
+@pytest.mark.parametrize("way_m", [0.0, 8.0, 60.0, 500.0])
+@pytest.mark.parametrize("changes", [(3.0,), (2.0, -9.0), (8.0, 7.5, 9.0)])
+def test_likelihoods_of_a_way_and_of_a_rest_are_those_of_normal_vectors(changes, way_m):
+    """Means of two and of three levels; half of the log-likelihood ratio counts."""
+    names = "ABCD"[: len(changes)]
+    first = dict.fromkeys(names, (2 * -80.0, 2))
+    now = {name: (3 * (-80.0 + x), 3) for name, x in zip(names, changes, strict=True)}
+    count = len(changes)
+    at_rest = 2.7**2 + 3.3**2 * (1 / 2 + 1 / 3)
+    on_way = at_rest + 10.5**2 * (1 - exp(-way_m / 60))
+
+    def ratio(seen):
+        one, other = (
+            multivariate_normal.logpdf(
+                seen, np.zeros(count), own * np.eye(count) + 36.0 * np.ones((count, count))
+            )
+            for own in (on_way, at_rest)
+        )
+        return 0.5 * (one - other)
+
+    found = _left(first, {**now, "Z": (-50.0, 1)}, way_m)
+    expected = (ratio(changes), ratio([0.0] * count)) if way_m else (0.0, 0.0)
+    assert found == pytest.approx(expected)
+    assert _left(first, {"Z": (-50.0, 1)}, way_m) == (0.0, 0.0)
+
+
+def test_what_a_block_gains_is_bounded_and_so_is_the_sum_below():
+    assert _added(1.0, 2.0) == 3.0
+    assert _added(1.0, 9.0) == 4.0
+    assert _added(1.0, -9.0) == -2.0
+    assert _added(-11.0, -2.0) == -12.0
+    assert _added(100.0, 1.0) == 101.0
+
+
+def test_levels_are_added_up_by_blocks_of_ten_seconds():
+    rest = Rest(0.0, pace_mps=1.4)
+    for time_s, level_dbm in ((5.0, -70.0), (9.0, -72.0), (14.9, -74.0)):
+        rest = rest.heard(time_s, (row("A", level_dbm),))
+    assert (rest.block_s, rest.began_s, rest.first) == (5.0, 5.0, {})
+    assert rest.present == {"A": (-216.0, 3)}
+    assert rest.heard_s == 14.9
+    rest = rest.heard(15.0, (row("A", -90.0), row("B", -60.0)))
+    assert (rest.block_s, rest.began_s) == (15.0, 5.0)
+    assert rest.first == {"A": (-216.0, 3)}
+    assert rest.present == {"A": (-90.0, 1), "B": (-60.0, 1)}
+    rest = rest.heard(25.0, ())
+    # The first mean of each cell stays; others come in with theirs.
+    assert rest.first == {"A": (-216.0, 3), "B": (-60.0, 1)}
+    assert rest.present == {}
+    # The way to the second block at the pace before.
+    gained, unchanged = _left({"A": (-216.0, 3)}, {"A": (-90.0, 1)}, 14.0)
+    assert (rest.left_nats, rest.still_nats) == pytest.approx((gained, unchanged))
+    assert gained > 0 > unchanged
+
+
+def serving(cell):
+    return (row(cell, nan, "serving"),)
+
+
+def test_three_cells_serve_at_rest_and_each_further_one_counts():
+    rest, found = Rest(0.0), []
+    for k, cell in enumerate("ABCDAE"):
+        rest = rest.heard(float(k), serving(cell))
+        found.append(rest.carried_nats)
+    assert found[:3] == [0.0, 0.0, 0.0]
+    # What is forgotten in a second is a three-hundredth.
+    assert found[3:] == pytest.approx([2.5, 2.5 - 1 / 300, 5.0 - 2 / 300])
+    assert rest.served == {"A": 4.0, "B": 1.0, "C": 2.0, "D": 3.0, "E": 5.0}
+    assert not rest.is_carried
+    last = rest.heard(6.0, serving("F"))
+    assert last.carried_nats == 6.0
+    assert last.is_carried
+    assert last.heard(7.0, serving("G")) is last
+
+
+def test_cells_that_served_long_ago_are_forgotten():
+    rest = Rest(0.0, served={"A": 0.0, "B": 100.0, "C": 100.0})
+    assert rest.heard(600.0, serving("D")).carried_nats == 2.5
+    late = rest.heard(600.1, serving("D"))
+    assert late.carried_nats == 0.0
+    assert set(late.served) == {"B", "C", "D"}
+    # Neighbours and rows without a cell are no serving cells.
+    other = rest.heard(1.0, (row("X", -70.0), row(None, -70.0, "serving"), row("Y", -70.0)))
+    assert set(other.served) == {"A", "B", "C"}
+
+
+def test_the_sum_forgets_to_zero_and_no_further():
+    rest = Rest(0.0, carried_nats=1.0, heard_s=0.0)
+    assert rest.heard(150.0, ()).carried_nats == pytest.approx(0.5)
+    assert rest.heard(900.0, ()).carried_nats == 0.0
+    assert replace(rest, heard_s=nan).heard(900.0, ()).carried_nats == 1.0
+
+
+@pytest.mark.parametrize(
+    ("time_s", "left", "still", "doubtful", "expected"),
+    [
+        (45.0, -0.9, -2.5, False, True),
+        (44.9, -0.9, -2.5, False, False),
+        (45.0, -0.9, -2.4, False, False),
+        (45.0, -1.0, -2.5, False, False),
+        # A doubt lasts until more is shown.
+        (45.0, -1.0, -2.5, True, True),
+        (45.0, -4.9, -2.5, True, True),
+        (45.0, -5.0, -2.5, True, False),
+    ],
+)
+def test_when_a_rest_is_in_doubt(time_s, left, still, doubtful, expected):
+    rest = Rest(0.0, pace_mps=1.0, left_nats=left, still_nats=still, is_doubtful=doubtful)
+    assert rest.heard(time_s, ()).is_doubtful == expected
+    carried = replace(rest, carried_nats=5.9, served=dict.fromkeys("ABC", time_s))
+    assert not carried.heard(time_s, serving("D")).is_doubtful
+
+
+def test_the_probability_of_having_left():
+    assert Rest(0.0).left_probability == 0.5
+    assert Rest(0.0, left_nats=2.0).left_probability == pytest.approx(1 / (1 + exp(-2)))

@@ -1,0 +1,106 @@
+"""Levels and timing advances of a report that Kalman-type filters use, and why not the others."""
+
+from math import nan
+
+import pytest
+
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
+from mapfilter.positioning.kalman.readings import site_readings
+from mapfilter.radio.cells import Cell, CellPlan
+
+FAR_M = KalmanOptions().reach_m + 1.0
+
+
+def cell(name, arfcn, bsic, east_m=0.0):
+    return Cell(
+        name, "S", 500_000.0 + east_m, 4_000_000.0, 30.0, None, 50.0, 1800.0, antenna="omni",
+        arfcn=arfcn, bsic=bsic,
+    )  # fmt: skip
+
+
+SITES = SiteModels(
+    CellPlan(
+        "EPSG:32629",
+        (cell("A", 10, 1), cell("B", 11, 1), cell("C", 11, 2), cell("D", 11, 2, 500.0),
+         cell("E", 12, 1), cell("F", 12, 1, FAR_M), cell("G", 13, 1, FAR_M)),
+    ),
+    KalmanOptions(),
+)  # fmt: skip
+
+
+def row(role, name, level_dbm=-70.0, arfcn=None, bsic=None, censored=0, steps=nan):
+    return ReportRow(role, name, arfcn, bsic, level_dbm, censored, steps)
+
+
+def read(*rows):
+    return site_readings(SITES, Epoch(3.0, radio=rows))
+
+
+def reasons(found):
+    assert all(one.time_s == 3.0 for one in found.unused)
+    return [(one.kind, one.what, one.reason) for one in found.unused]
+
+
+def test_levels_are_those_of_known_cells_in_their_order():
+    found = read(row("neighbour", "B", -80.0), row("serving", "A", -71.0))
+    assert (found.cells, found.levels_dbm) == (("B", "A"), (-80.0, -71.0))
+    assert (found.timed, found.steps, found.unused) == ((), (), ())
+
+
+def test_an_unknown_cell_is_named():
+    found = read(row("serving", "X"), row("neighbour", "Y"))
+    assert found.cells == ()
+    assert reasons(found) == [
+        ("serving", "X", Reason.UNKNOWN_CELL), ("neighbour", "Y", Reason.UNKNOWN_CELL),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("given", [{"level_dbm": nan}, {"censored": -1}, {"censored": 1}])
+def test_missing_levels_and_bounds_are_not_used(given):
+    assert reasons(read(row("serving", "A", **given))) == [
+        ("serving", "A", Reason.NOT_USED_BY_FILTER)
+    ]
+    # But a timing advance without a level is.
+    timed = read(row("serving", "A", steps=3.0, **given))
+    assert (timed.cells, timed.timed, timed.steps, timed.unused) == ((), ("A",), (3,), ())
+
+
+def test_timing_advances_of_known_cells():
+    found = read(row("serving", "A", steps=2.0), row("neighbour", "X", steps=5.0))
+    assert (found.timed, found.steps) == (("A",), (2,))
+    assert reasons(found) == [("neighbour", "X", Reason.UNKNOWN_CELL)]
+
+
+@pytest.mark.parametrize(
+    ("arfcn", "bsic", "name", "reason"),
+    [
+        (11, 1, "B", None),
+        (11, 2, None, Reason.AMBIGUOUS_CELL),
+        (11, None, None, Reason.AMBIGUOUS_CELL),
+        # Of two the one within reach of the serving cell, and none beyond it.
+        (12, 1, "E", None),
+        (13, 1, None, Reason.UNKNOWN_CELL),
+        # The serving cell is no neighbour of itself.
+        (10, 1, None, Reason.UNKNOWN_CELL),
+        (99, 1, None, Reason.UNKNOWN_CELL),
+    ],
+)
+def test_neighbours_are_named_by_carrier_and_bsic(arfcn, bsic, name, reason):
+    found = read(row("serving", "A", -71.0), row("neighbour", None, -85.0, arfcn, bsic))
+    if name is not None:
+        assert (found.cells, found.levels_dbm) == (("A", name), (-71.0, -85.0))
+        assert found.unused == ()
+        return
+    assert found.cells == ("A",)
+    what = f"ARFCN {arfcn}, BSIC {'unknown' if bsic is None else bsic}"
+    assert reasons(found) == [("neighbour", what, reason)]
+
+
+def test_without_a_serving_cell_all_of_a_carrier_may_be_meant():
+    found = read(row("neighbour", None, -85.0, 12, 1), row("serving", None, -70.0))
+    assert reasons(found) == [
+        ("neighbour", "ARFCN 12, BSIC 1", Reason.AMBIGUOUS_CELL), ("serving", "", Reason.NO_CELL),
+    ]  # fmt: skip
+    assert read(row("neighbour", None, -85.0, 13, 1)).cells == ("G",)

@@ -1,0 +1,25 @@
+"""Tests of kernels of a graphics processor, run in numba's simulator.
+
+The simulator has to be asked for before numba is loaded: hence a process of its own.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def run_simulated(file: Path) -> None:
+    """Run a file of tests in a process that simulates the device."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider"]
+    done = subprocess.run(
+        [*command, str(file), "-W", "default"],
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1"},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
+    assert " passed" in done.stdout
