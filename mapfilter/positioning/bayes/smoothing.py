@@ -196,7 +196,8 @@ def _paths(
     weight = np.exp(last.log_weight - last.log_weight.max())
     chosen = np.empty(paths, dtype=np.int32)
     systematic((weight / weight.sum()).astype(np.float32), rng.random(), chosen)
-    states = [last.state[:, chosen]]
+    # An index of columns would give rows that are not contiguous, for which kernels are compiled anew.
+    states = [np.take(last.state, chosen, axis=1)]
     width_m, height_m = area.size_m
     for later, earlier in zip(kept[:0:-1], kept[-2::-1], strict=True):
         length_m = later.travelled_m - earlier.travelled_m
@@ -221,7 +222,7 @@ def _paths(
             log_jump,
             draw_key(rng),
         )
-        states.append(earlier.state[:, chosen])
+        states.append(np.take(earlier.state, chosen, axis=1))
     return states[::-1]
 
 
