@@ -10,14 +10,15 @@ export PIP_BUILD_CONSTRAINT := $(CURDIR)/constraints.txt
 # Every process of a test would compile every module again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check docs mutants clean
+.PHONY: demo test check docs kernels mutants clean
 
 demo: $(VENV)/.demo
 	$(BIN)/mapfilter demo --out out/demo
 
-# Style and documentation beside each other; the tests alone, as some of them watch a clock.
+# Style and documentation beside each other, and kernels when style is done, which otherwise both
+# processes of the tests would compile at once; the tests alone, as some of them watch a clock.
 test: $(VENV)/.test
-	$(MAKE) -j2 check docs
+	$(MAKE) -j2 check docs kernels
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 check: $(VENV)/.test
@@ -28,6 +29,9 @@ check: $(VENV)/.test
 
 docs: $(VENV)/.test
 	$(BIN)/sphinx-build -j auto -q -W --keep-going -b html docs docs/_build/html
+
+kernels: $(VENV)/.test
+	$(BIN)/python -m mapfilter.workflows.kernels
 
 $(VENV)/.demo: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

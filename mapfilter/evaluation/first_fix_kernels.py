@@ -265,10 +265,14 @@ def try_all(rng, start, journeys, points, walked, levels, judgement):  # type: i
         rows_own, cols_own = row[own], col[own]
         for j in range(journeys):
             rows, cols, gone_m = walk(rng, on_way, row[here], col[here], resolution_m, most_m)
-            found[i, j, 0:2] = judged_by_cells(
+            clear_m, bits = judged_by_cells(
                 rows, cols, gone_m, rows_own, cols_own, levels, near_px, path_m
             )
-            found[i, j, 2:7] = judged_by_levels(
+            by_levels = judged_by_levels(
                 rng, rows, cols, gone_m, rows_own, cols_own, own, levels, judgement
             )
+            # One by one: for parts of arrays numba compiles checks of shapes, which take seconds.
+            found[i, j, 0], found[i, j, 1] = clear_m, bits
+            found[i, j, 2], found[i, j, 3], found[i, j, 4] = by_levels[:3]
+            found[i, j, 5], found[i, j, 6] = by_levels[3:]
     return found

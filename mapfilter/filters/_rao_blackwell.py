@@ -199,7 +199,10 @@ def weigh(measure: Any, given: Weighing, state: Floats, log_weight: Floats) -> f
         points, mean = np.empty((uses.size, lanes)), np.empty((m, lanes))
         white, square = np.empty(lanes), np.zeros(lanes)
         for a in range(uses.size):
-            points[a] = state[uses[a], begin : begin + lanes]
+            # A loop: to assign arrays numba compiles a check of their shapes, for two seconds.
+            to, source = points[a], state[uses[a]]
+            for k in range(lanes):
+                to[k] = source[begin + k]
         measure(points, slots, rows, patterns, mean, slope, False)
         for e in range(entry.size):
             to, source, value = mean[row[e]], state[column[e]], entry[e]

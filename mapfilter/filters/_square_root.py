@@ -249,7 +249,9 @@ def solve_lanes(seen: Floats, residual: Floats) -> tuple[Floats, Floats, Floats]
             target[w] /= pivot[w]
     for i in range(n - 1, -1, -1):
         target, source, pivot = z[i], half[i], information[i, i]
-        target[:] = source
+        # A loop: to assign arrays numba compiles a check of their shapes, for two seconds.
+        for w in range(lanes):
+            target[w] = source[w]
         for k in range(i + 1, n):
             left, right = information[k, i], z[k]
             for w in range(lanes):
@@ -310,7 +312,9 @@ def correct_lanes(information: Floats, z: Floats, lanes: Lanes) -> None:
             # Row j of C⁻¹ Lᵀ, column i.
             target = factor[i, j]
             if j <= i:
-                target[:] = lower[i, j]
+                source = lower[i, j]
+                for w in range(count):
+                    target[w] = source[w]
             else:
                 target[:] = 0.0
             for k in range(j):

@@ -275,7 +275,10 @@ def run_lanes(
     evidence, nis = np.empty((steps, lanes)), np.empty((steps, lanes))
     for k in range(steps):
         advance(update, measure, problem, readings[k], mean, factor, evidence[k], nis[k])
-        means[k] = mean
+        # A loop: to assign arrays numba compiles a check of their shapes, for two seconds.
+        for i in range(n):
+            for w in range(lanes):
+                means[k, i, w] = mean[i, w]
         if keep:
             covariance_lanes(factor, covariances[k])
     return means, covariances, evidence, nis

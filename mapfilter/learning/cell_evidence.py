@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from scipy.special import logsumexp
 
 from mapfilter._types import Floats, Ints
 from mapfilter.learning.likelihood import (
     OFFSETS_DB,
     LevelNoise,
     log_likelihoods,
+    log_sum,
     marginal,
     posterior_offset,
 )
@@ -106,7 +106,7 @@ class CellEvidence:
         self.visits = scene.visits.where(self.own)
         self.place = scene.place[self.own]
         self.weight, self.shift = scene.weight[self.own], scene.shift_db[self.own]
-        self._known: dict[tuple[str, float, float, int], Explanation] = {}
+        self._known: dict[tuple[float, int], tuple[Explanation, Explanation]] = {}
 
     @property
     def planned_deg(self) -> float | None:
@@ -116,16 +116,16 @@ class CellEvidence:
 
     def fine(self, turn_deg: float = 0.0, other: int = -1) -> Explanation:
         """Return the usual state: turned by an angle, or with the levels of another cell."""
-        return self._of("fine", turn_deg, self.scene.noise.cells_sd_db, other)
+        return self._of(turn_deg, other)[0]
 
     def offset(self, turn_deg: float = 0.0, other: int = -1) -> Explanation:
         """Return the same with an offset that is a fault."""
-        return self._of("offset", turn_deg, self.scene.noise.fault_sd_db, other)
+        return self._of(turn_deg, other)[1]
 
     def mixed(self, turn_deg: float = 0.0, other: int = -1) -> float:
         """Return the evidence of a pattern, with or without an offset."""
         p = PRIOR["offset"]
-        fine, offset = self.fine(turn_deg, other), self.offset(turn_deg, other)
+        fine, offset = self._of(turn_deg, other)
         return float(
             np.logaddexp(np.log1p(-p) + fine.log_evidence, np.log(p) + offset.log_evidence)
         )
@@ -154,10 +154,9 @@ class CellEvidence:
         alone = self.fine().log_evidence, self.offset().log_evidence
         best = int(np.flatnonzero(far)[np.argmax(by_place[far])])
         place = float(places[best, 0]), float(places[best, 1])
-        found = self._explained(
-            "moved", patterns.elsewhere(self.cell, *place)[self.place], scene.noise.fault_sd_db
-        )
-        evidence = float(logsumexp(by_place[far])) - np.log(far.sum())
+        level = patterns.elsewhere(self.cell, *place)[self.place]
+        (found,) = self._explained({"moved": scene.noise.fault_sd_db}, level)
+        evidence = log_sum(by_place[far]) - np.log(far.sum())
         # Without its buildings a prediction fits worse, wherever the cell is taken to be.
         evidence = max(alone) + evidence - max(here, *alone)
         return replace(found, log_evidence=evidence, value=float(away[best]), place_m=place)
@@ -168,38 +167,47 @@ class CellEvidence:
         each = log_likelihoods(self.visits, expected, floor_dbm, sd_db, _COARSE_DB)
         return marginal(self.weight @ each, self.scene.noise.fault_sd_db / 2, _COARSE_DB)
 
-    def _of(self, kind: StateKind, turn_deg: float, sd_db: float, other: int) -> Explanation:
-        key = kind, turn_deg % 360.0, sd_db, other
+    def _of(self, turn_deg: float, other: int) -> tuple[Explanation, Explanation]:
+        """Return a pattern in the usual state, and with an offset that is a fault."""
+        key = turn_deg % 360.0, other
         if key not in self._known:
-            patterns = self.scene.patterns
+            patterns, noise = self.scene.patterns, self.scene.noise
             if other >= 0:
                 level = patterns.level_dbm[:, other]
             elif turn_deg % 360.0 and self.planned_deg is not None:
                 level = patterns.turned(self.cell, self.planned_deg + turn_deg)
             else:
                 level = patterns.level_dbm[:, self.cell]
-            self._known[key] = self._explained(kind, level[self.place], sd_db, turn_deg)
+            kinds: dict[StateKind, float] = {
+                "fine": noise.cells_sd_db,
+                "offset": noise.fault_sd_db,
+            }
+            fine, offset = self._explained(kinds, level[self.place], turn_deg)
+            self._known[key] = fine, offset
         return self._known[key]
 
     def _explained(
-        self, kind: StateKind, level_dbm: Floats, sd_db: float, value: float = float("nan")
-    ) -> Explanation:
+        self, kinds: Mapping[StateKind, float], level_dbm: Floats, value: float = float("nan")
+    ) -> Iterator[Explanation]:
+        """Yield what levels say under the deviation of the cell's offset in each kind of state."""
         scene = self.scene
         floor_dbm, noise_db = scene.patterns.floor_dbm, scene.noise.sd_db
         each = log_likelihoods(self.visits, level_dbm + self.shift, floor_dbm, noise_db)
         total = self.weight @ each if len(self.visits) else np.zeros(OFFSETS_DB.size)
-        mean, spread = posterior_offset(total, sd_db)
-        at = int(np.argmin(np.abs(OFFSETS_DB - mean)))
-        return Explanation(
-            kind,
-            marginal(total, sd_db),
-            level_dbm,
-            mean,
-            spread,
-            self._by_journey(each[:, at]),
-            self._by_journey(each[:, OFFSETS_DB.size // 2]),
-            value,
-        )
+        unshifted = self._by_journey(each[:, OFFSETS_DB.size // 2])
+        for kind, sd_db in kinds.items():
+            mean, spread = posterior_offset(total, sd_db)
+            at = int(np.argmin(np.abs(OFFSETS_DB - mean)))
+            yield Explanation(
+                kind,
+                marginal(total, sd_db),
+                level_dbm,
+                mean,
+                spread,
+                self._by_journey(each[:, at]),
+                unshifted,
+                value,
+            )
 
     def _by_journey(self, each: Floats) -> Floats:
         counted = np.bincount(self.visits.journey, each * self.weight, self.scene.journeys)

@@ -8,10 +8,11 @@ same place on every journey, so visits count in part: their likelihoods are rais
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr
 
 from mapfilter._types import Bools, Floats
 from mapfilter.learning.visits import Visits
@@ -98,6 +99,21 @@ def report_log_likelihood(z: Floats, received: Bools, sd_db: float) -> Floats:
     return found
 
 
+def log_sum(values: Floats | Sequence[float]) -> float:
+    """Return the logarithm of the sum of the exponentials of some finite numbers.
+
+    For thirty of them SciPy's takes twenty times as long, nearly all of it to look at their types.
+
+    Examples
+    --------
+    >>> round(log_sum([1000.0, 1000.0]) - 1000.0, 6)
+    0.693147
+    """
+    values = np.asarray(values, dtype=np.float64)
+    most = values.max()
+    return float(most + np.log(np.exp(values - most).sum()))
+
+
 def marginal(by_offset: Floats, sd_db: float, offsets_db: Floats = OFFSETS_DB) -> float:
     """Return the log-likelihood with the offset integrated over N(0, sd²).
 
@@ -107,7 +123,7 @@ def marginal(by_offset: Floats, sd_db: float, offsets_db: Floats = OFFSETS_DB) -
         Log-likelihood of all visits for each offset.
     """
     prior = -0.5 * (offsets_db / sd_db) ** 2
-    return float(logsumexp(by_offset + prior) - logsumexp(prior))
+    return log_sum(by_offset + prior) - log_sum(prior)
 
 
 def posterior_offset(
@@ -115,7 +131,7 @@ def posterior_offset(
 ) -> tuple[float, float]:
     """Return mean and standard deviation of the offset under the prior N(0, sd²)."""
     weight = by_offset - 0.5 * (offsets_db / sd_db) ** 2
-    weight = np.exp(weight - logsumexp(weight))
+    weight = np.exp(weight - log_sum(weight))
     mean = float(weight @ offsets_db)
     # The grid's step does not let it vanish.
     variance = float(weight @ (offsets_db - mean) ** 2)

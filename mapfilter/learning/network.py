@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from mapfilter.learning.cell_evidence import (
     PRIOR,
@@ -17,6 +16,7 @@ from mapfilter.learning.cell_evidence import (
     FaultKind,
     Scene,
 )
+from mapfilter.learning.likelihood import log_sum
 
 _SURE = 0.95
 """A finding is as probable as this."""
@@ -121,7 +121,7 @@ def _cases(mast: Sequence[int], evidence: Sequence[CellEvidence]) -> Iterator[_C
     """Yield the hypotheses of a mast."""
     alone = [_alone(evidence[cell]) for cell in mast]
     best = tuple(max(cases, key=lambda case: case[0])[1] for cases in alone)
-    total = sum(float(logsumexp([score for score, _ in cases])) for cases in alone)
+    total = sum(log_sum([score for score, _ in cases]) for cases in alone)
     pointed = [cell for cell in mast if evidence[cell].planned_deg is not None]
     usual = np.log1p(-PRIOR["rotated"] - PRIOR["swapped"]) if len(pointed) > 1 else 0.0
     yield _Case(usual + total, best)
@@ -155,7 +155,7 @@ def _turned_case(
         fine, offset = one.fine(turn), one.offset(turn)
         states.append((np.log1p(-PRIOR["offset"]) + fine.log_evidence, fine))
         states.append((np.log(PRIOR["offset"]) + offset.log_evidence, offset))
-        score += float(logsumexp([s for s, _ in states]))
+        score += log_sum([s for s, _ in states])
         cells.append(max(states, key=lambda state: state[0])[1])
     value = next(iter(turns_deg.values())) % 360.0 if kind == "rotated" else float("nan")
     return _Case(float(score), tuple(cells), ((kind, tuple(turns_deg), value),))
@@ -170,7 +170,7 @@ def _named(
 ) -> list[Finding]:
     """Return the findings that the best hypothesis of a mast stands for."""
     found = []
-    every = logsumexp([case.score for case in cases])
+    every = log_sum([case.score for case in cases])
     cells_of = [cell for cell in mast if evidence[cell].planned_deg is not None]
     share = float(np.exp(best.score - every))
     for kind, cells, value in best.faults:

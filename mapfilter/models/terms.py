@@ -264,7 +264,9 @@ def measure(
             _add_level(points, slots, row, patterns, work, mean[i], slope[i], derive)
         elif kind == COMPONENT:
             slot = int(row[4])
-            mean[i, :] = points[slot]
+            # A loop: to assign arrays numba compiles a check of their shapes, for two seconds.
+            for w in range(points.shape[1]):
+                mean[i, w] = points[slot, w]
             if derive:
                 slope[i, slot, :] = 1.0
         else:

@@ -97,6 +97,30 @@ def compile_resampling() -> None:
     systematic(weight, 0.5, chosen)
 
 
+def compile_gaussian() -> None:
+    """Compile Kalman-type filters, and the weighing of Rao-Blackwellised particles."""
+    # A replay by another filter does without these modules.
+    from mapfilter.filters._rao_blackwell import weigh_kernel
+    from mapfilter.filters._updates import kernel_of, run_lanes_kernel
+    from mapfilter.filters.gaussian import METHODS
+    from mapfilter.models.terms import measure_kernel
+
+    for kernel in (measure_kernel, run_lanes_kernel, weigh_kernel):
+        kernel()
+    for method in METHODS.values():
+        kernel_of(method)
+
+
+def compile_all() -> None:
+    """Compile what filters need, so that no first run on this machine has to: for an image, say.
+
+    ``python -m mapfilter.workflows.kernels`` does this; it takes about a minute, and two seconds
+    where all is compiled already.
+    """
+    for task in (*_TASKS, compile_gaussian):
+        task()
+
+
 # The longest first; what each compiles last shows that it has ended.
 _TASKS = (compile_motion, compile_evidence, compile_summaries, compile_resampling)
 _LAST: tuple[Any, ...] = (all_inside, weigh_by_bound, flattened, systematic)
@@ -122,3 +146,7 @@ def _made() -> tuple[BayesModel, Cloud, Floats]:
     state = np.ones((STATES, _PARTICLES), dtype=np.float32)
     log_weight = np.full(_PARTICLES, -np.log(_PARTICLES))
     return BayesModel(area), Cloud(state, np.empty((0, _PARTICLES), dtype=np.float32)), log_weight
+
+
+if __name__ == "__main__":
+    compile_all()

@@ -3,6 +3,10 @@
 import subprocess
 import sys
 
+from mapfilter.filters._rao_blackwell import weigh_kernel
+from mapfilter.filters._updates import _compiled, kernel_of, run_lanes_kernel
+from mapfilter.filters.gaussian import METHODS
+from mapfilter.models.terms import measure_kernel
 from mapfilter.workflows import kernels
 
 # In a process of its own: in this one other tests have called the kernels already.
@@ -58,6 +62,27 @@ def test_nothing_is_started_where_all_is_kept(monkeypatch):
     monkeypatch.setattr(kernels, "_is_kept", lambda _: True)
     with kernels.compiled_beside():
         pass
+
+
+def test_kalman_filters_and_rao_blackwellised_particles_are_compiled():
+    kernels.compile_gaussian()
+    kept = (run_lanes_kernel, weigh_kernel, measure_kernel)
+    before = [one.cache_info().misses for one in (*kept, _compiled)]
+    for one in kept:
+        assert one().signatures
+    for method in METHODS.values():
+        assert kernel_of(method).signatures
+    assert [one.cache_info().misses for one in (*kept, _compiled)] == before
+
+
+def test_all_kernels_are_compiled_by_one_call(monkeypatch):
+    done = []
+    for name in ("compile_motion", "compile_evidence", "compile_summaries", "compile_resampling"):
+        assert getattr(kernels, name) in kernels._TASKS
+    monkeypatch.setattr(kernels, "_TASKS", (lambda: done.append("replay"),))
+    monkeypatch.setattr(kernels, "compile_gaussian", lambda: done.append("gaussian"))
+    kernels.compile_all()
+    assert done == ["replay", "gaussian"]
 
 
 def test_a_kernel_is_kept_by_its_line():

@@ -1,6 +1,7 @@
 """Inputs are never written to, and one area means one area for all commands."""
 
 import ctypes
+import json
 import os
 import shutil
 import signal
@@ -11,7 +12,15 @@ import time
 import numpy as np
 import pytest
 import rasterio
-from command_line import ONE, assert_done, assert_refused, contents, mapfilter, settings
+from command_line import (
+    ONE,
+    Outcome,
+    assert_done,
+    assert_refused,
+    contents,
+    mapfilter,
+    settings,
+)
 
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.tracks.store import list_logs, read_log
@@ -137,6 +146,14 @@ def as_anybody():
             raise OSError("PR_CAPBSET_DROP")
 
 
+ONE_AFTER_ANOTHER = """
+import dataclasses, json, sys
+from command_line import mapfilter
+outcomes = [dataclasses.asdict(mapfilter(*command)) for command in json.loads(sys.argv[1])]
+print(json.dumps(outcomes))
+"""
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="gives up capabilities")
 @pytest.mark.long
 def test_folders_that_nobody_may_write_to_are_read_and_refused_as_outputs(own_world):
@@ -144,21 +161,27 @@ def test_folders_that_nobody_may_write_to_are_read_and_refused_as_outputs(own_wo
     for path in places:
         path.chmod(path.stat().st_mode & ~0o222)
 
-    def run(*args):
-        given = [sys.executable, "-m", "mapfilter", *map(str, args)]
-        return subprocess.run(
-            given, capture_output=True, text=True, check=False, preexec_fn=as_anybody
-        )
+    def run(*commands):
+        """Run commands one after another in a process that may not more than anybody."""
+        given = [sys.executable, "-c", ONE_AFTER_ANOTHER, json.dumps(commands, default=str)]
+        done = subprocess.run(
+            given, capture_output=True, text=True, check=True, preexec_fn=as_anybody,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        )  # fmt: skip
+        return [Outcome(**one) for one in json.loads(done.stdout)]
 
     try:
         before = contents(own_world.folder)
-        assert run("info", own_world.database).returncode == 0
         given = ["--db", own_world.database, "--log", own_world.journeys / ONE]
-        for words in (["build", "--resume"], ["simulate"], ["sweep"], ["replay", *given]):
-            refused = run(*words, "-c", own_world.toml)
-            assert refused.returncode == 2, (words, refused.stderr)
-            assert "a place that can be written, found Permission denied" in refused.stderr
-            assert "Traceback" not in refused.stderr
+        writing = (["build", "--resume"], ["simulate"], ["sweep"], ["replay", *given])
+        others = [[*words, "-c", own_world.toml] for words in writing]
+        read, *refusals = run(["info", own_world.database], *others)
+        assert_done(read)
+        for words, refused in zip(writing, refusals, strict=True):
+            assert refused.code == 2, (words, refused.err)
+            assert "a place that can be written, found Permission denied" in refused.err
+            assert "Traceback" not in refused.err
+        assert len(refusals) == len(writing)
         assert contents(own_world.folder) == before
     finally:
         for path in places:

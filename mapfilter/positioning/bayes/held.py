@@ -220,7 +220,9 @@ def _smaller(
     state = belief.state[:STATES, chosen].copy()
     state[BIAS] = wrap_rad(state[BIAS] + 2**0.5 * white_rad * rng.standard_normal(count))
     log_weight = np.full(count, -log(count))
-    return replace(belief, state=state, log_weight=log_weight, kept=belief.kept[:, chosen])
+    # An index of columns gives rows that are not contiguous: kernels are compiled anew for them.
+    kept = np.take(belief.kept, chosen, axis=1)
+    return replace(belief, state=state, log_weight=log_weight, kept=kept)
 
 
 def still_open(

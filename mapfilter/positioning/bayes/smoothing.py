@@ -78,6 +78,7 @@ class BayesSmoother:
     alternative: list[Kept] = field(default_factory=list)
     moved: list[tuple[float, float, float, float]] = field(default_factory=list)
     last: BayesState | None = None
+    _kept_bytes: int = 0
 
     def add(self, before: BayesState, after: BayesState) -> None:
         """Record the states before and after one epoch; a takeover replaces beliefs kept since."""
@@ -93,21 +94,28 @@ class BayesSmoother:
             if not starts_m and before.alternative is not None:
                 starts_m = [before.alternative.start_m]
             since_m = min(starts_m, default=now.travelled_m)
-            self.kept = [k for k in self.kept if k.travelled_m < since_m]
+            self._keep_only([k for k in self.kept if k.travelled_m < since_m])
             self.alternative = []
         elif before.alternative is not None and after.alternative is None:
             if taken_over:
                 start_m = before.alternative.start_m
-                self.kept = [k for k in self.kept if k.travelled_m < start_m] + self.alternative
+                ours = [k for k in self.kept if k.travelled_m < start_m]
+                self._keep_only(ours + self.alternative)
             self.alternative = []
         due = not self.kept or now.travelled_m - self.kept[-1].travelled_m >= self.every_m
         if after.belief is None or not due:
             return
         self.kept.append(self._keep(after.belief))
+        # A sum over all that is kept, at each epoch, would take longest of all in a long log.
+        self._kept_bytes += _bytes_of(self.kept[-1])
         if after.alternative is not None:
             self.alternative.append(self._keep(after.alternative.belief))
-        if sum(k.state.nbytes + k.log_weight.nbytes for k in self.kept) > _MAX_BYTES:
-            self.kept, self.every_m = self.kept[::2], 2 * self.every_m
+        if self._kept_bytes > _MAX_BYTES:
+            self._keep_only(self.kept[::2])
+            self.every_m *= 2
+
+    def _keep_only(self, kept: list[Kept]) -> None:
+        self.kept, self._kept_bytes = kept, sum(map(_bytes_of, kept))
 
     def _read_in_another_unit(self, factor: float) -> None:
         """Lengthen all dead reckoning so far, and keep the beliefs that were moved in this unit.
@@ -118,7 +126,8 @@ class BayesSmoother:
         scale = np.array([factor, factor, factor, factor**2])
         lengthened = end - scale * (end - np.array(self.moved))
         self.moved = [(float(e), float(n), float(s), float(v)) for e, n, s, v in lengthened]
-        self.kept, self.alternative = [self._moved_as(k) for k in self.alternative], []
+        self._keep_only([self._moved_as(k) for k in self.alternative])
+        self.alternative = []
 
     def _moved_as(self, kept: Kept) -> Kept:
         east_m, north_m, travelled_m, sampling_m2 = self.moved[kept.epoch]
@@ -183,6 +192,10 @@ class BayesSmoother:
         return replace(estimate, **new)
 
 
+def _bytes_of(kept: Kept) -> int:
+    return kept.state.nbytes + kept.log_weight.nbytes
+
+
 def _paths(
     kept: list[Kept],
     area: AreaFrame,
@@ -196,7 +209,8 @@ def _paths(
     weight = np.exp(last.log_weight - last.log_weight.max())
     chosen = np.empty(paths, dtype=np.int32)
     systematic((weight / weight.sum()).astype(np.float32), rng.random(), chosen)
-    states = [last.state[:, chosen]]
+    # An index of columns gives rows that are not contiguous: kernels are compiled anew for them.
+    states = [np.take(last.state, chosen, axis=1)]
     width_m, height_m = area.size_m
     for later, earlier in zip(kept[:0:-1], kept[-2::-1], strict=True):
         length_m = later.travelled_m - earlier.travelled_m
@@ -221,7 +235,7 @@ def _paths(
             log_jump,
             draw_key(rng),
         )
-        states.append(earlier.state[:, chosen])
+        states.append(np.take(earlier.state, chosen, axis=1))
     return states[::-1]
 
 

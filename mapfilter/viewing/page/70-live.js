@@ -33,7 +33,7 @@
       // The browser comes back by itself after a cut, with the number of its last event; not after a refusal.
       events.addEventListener("error", () => {
         if (events.readyState !== EventSource.CLOSED) tell("reconnecting");
-        else again();
+        else again("reconnecting", SETTLE_MS);
       });
     };
     // An event source does not say why it was refused; a request for the same stream does.
