@@ -62,6 +62,13 @@ class ParticleOptions(Options):
         and has done so for so many metres travelled.
     split_mass : float
         It searches again when less than this lies there.
+    narrow_share : float
+        Share of ``min_particles`` that is enough for a narrow belief while weighings leave so many
+        of them effective as before a usual resampling; sharper ones, such as by satellites, get
+        more, up to all. 1 for all of them always.
+    wide_bins : float
+        Bins of 25 m that a belief covers from which on it gets all, and by which narrower ones get
+        their share.
     """
 
     max_particles: _Count = 20_000
@@ -75,6 +82,27 @@ class ParticleOptions(Options):
     switch_mass: Probability = 0.99
     switch_hold_m: NotNegative = 14.0
     split_mass: Share = 0.5
+    narrow_share: Annotated[float, Gt(0), Le(1)] = 1.0
+    wide_bins: Positive = 20.0
+
+    def least_found(self, effective_share: float, effective_bins: float) -> int:
+        """Return the least number of particles of a belief that has converged.
+
+        ``effective_share`` is the effective sample size as a share of the particles, after the last
+        weighing; ``effective_bins`` how many bins the belief covers.
+
+        Examples
+        --------
+        >>> options = ParticleOptions(min_particles=3000, narrow_share=1 / 3)
+        >>> options.least_found(0.5, 4.0), options.least_found(0.25, 4.0)
+        (1000, 2000)
+        >>> options.least_found(0.5, 10.0), options.least_found(0.01, 4.0)
+        (1500, 3000)
+        """
+        sharp = self.narrow_share * self.resample_below
+        sharp = sharp / effective_share if effective_share > sharp else 1.0
+        share = max(self.narrow_share, sharp, effective_bins / self.wide_bins)
+        return round(min(share, 1.0) * self.min_particles)
 
     def check(self, faults: Faults) -> None:
         """Add a lower limit above the upper one."""
@@ -295,7 +323,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         if searching and options.mass_exponent < 1:
             weight = flattened(state, weight, belief.bins, options.mass_exponent)
             effective = 1.0 / float(np.dot(weight, weight))
-        least = options.min_search_particles if searching else options.min_particles
+        least = options.min_search_particles
+        if not searching:
+            least = options.least_found(effective / weight.size, summary.effective_bins)
         by_bins = options.particles_per_bin * summary.effective_bins
         wanted = int(min(max(by_bins, least), options.max_particles))
         if effective < options.resample_below * weight.size or 2 * wanted < weight.size:

@@ -112,7 +112,8 @@ class BeliefFilters:
         if self.by_carriageways(state) is not None:
             return self._by_carriageways
         if self.positioned is None or self.by_map_alone(state):
-            return self.by_compass[state.compass]
+            undecided = state.alternative is not None or bool(state.held)
+            return (self._with_all if undecided else self.by_compass)[state.compass]
         return self._positioned_by_compass[state.compass]
 
     @cached_property
@@ -124,6 +125,11 @@ class BeliefFilters:
                 for compass in (True, False)
             }
         return self._particle_filters(self.options)
+
+    @cached_property
+    def _with_all(self) -> dict[bool, MapFilter]:
+        """The same for beliefs beside which others are weighed: narrow ones keep all particles."""
+        return self.by_compass if self.grid else self._particle_filters(_whole(self.options))
 
     def _street_grid(self, *, compass: bool) -> StreetGrid:
         model = replace(self.model, remember=False, threads=ONE)
@@ -140,7 +146,7 @@ class BeliefFilters:
         """The filter of beliefs in which the phone was turned: smaller ones."""
         few = min(self.holds.particles, self.options.max_particles)
         options = replace(
-            self.options, max_particles=2 * few, min_particles=few, min_search_particles=few
+            _whole(self.options), max_particles=2 * few, min_particles=few, min_search_particles=few
         )
         return ParticleFilter(self.model, options, self.model.threads)
 
@@ -227,3 +233,7 @@ class BeliefFilters:
             return belief
         state = remounted(belief.state, length_m, self.model.motion, rng)
         return belief if state is belief.state else replace(belief, state=state)
+
+
+def _whole(options: ParticleOptions) -> ParticleOptions:
+    return replace(options, narrow_share=1.0)

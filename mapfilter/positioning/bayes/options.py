@@ -55,6 +55,8 @@ _VEHICLE_MOTION: Mapping[str, float] = {
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
 
+_NARROW_SHARE = 1 / 3
+"""Share of the least number of particles for narrow beliefs, in a database with cells."""
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
 _CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
@@ -130,7 +132,8 @@ class BayesFilter(Options):
     min_search_particles : int
         Least number of particles until the filter has converged.
     min_particles : int
-        Least number of particles afterwards.
+        Least number of particles afterwards; a third of it while the belief is narrow, the evidence
+        is not sharp, and nothing is tested against it.
     switch_mass : float
         Share of the belief within 50 m of the leading hypothesis from which on the filter has
         converged.
@@ -263,6 +266,7 @@ class BayesFilter(Options):
             min_particles=self.min_particles,
             switch_mass=self.switch_mass,
             switch_hold_m=self.switch_hold_m,
+            narrow_share=_NARROW_SHARE if area.cell_ids else 1.0,
         )
         rules = AlternativeRules()
         rules = replace(
