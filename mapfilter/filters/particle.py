@@ -63,12 +63,10 @@ class ParticleOptions(Options):
     split_mass : float
         It searches again when less than this lies there.
     narrow_share : float
-        Share of ``min_particles`` that is enough for a narrow belief while weighings leave so many
-        of them effective as before a usual resampling; sharper ones, such as by satellites, get
-        more, up to all. 1 for all of them always.
+        Share of ``min_particles`` that is enough for a narrow belief; 1 for all of them always.
     wide_bins : float
-        Bins of 25 m that a belief covers from which on it gets all, and by which narrower ones get
-        their share.
+        Bins of 25 m that a belief covers from which on it gets all; narrower ones get a share in
+        proportion, if that is larger.
     """
 
     max_particles: _Count = 20_000
@@ -85,23 +83,21 @@ class ParticleOptions(Options):
     narrow_share: Annotated[float, Gt(0), Le(1)] = 1.0
     wide_bins: Positive = 20.0
 
-    def least_found(self, effective_share: float, effective_bins: float) -> int:
+    def least_found(self, effective_bins: float) -> int:
         """Return the least number of particles of a belief that has converged.
 
-        ``effective_share`` is the effective sample size as a share of the particles, after the last
-        weighing; ``effective_bins`` how many bins the belief covers.
+        Parameters
+        ----------
+        effective_bins : float
+            Number of bins that it covers.
 
         Examples
         --------
         >>> options = ParticleOptions(min_particles=3000, narrow_share=1 / 3)
-        >>> options.least_found(0.5, 4.0), options.least_found(0.25, 4.0)
-        (1000, 2000)
-        >>> options.least_found(0.5, 10.0), options.least_found(0.01, 4.0)
-        (1500, 3000)
+        >>> options.least_found(4.0), options.least_found(10.0), options.least_found(200.0)
+        (1000, 1500, 3000)
         """
-        sharp = self.narrow_share * self.resample_below
-        sharp = sharp / effective_share if effective_share > sharp else 1.0
-        share = max(self.narrow_share, sharp, effective_bins / self.wide_bins)
+        share = max(self.narrow_share, effective_bins / self.wide_bins)
         return round(min(share, 1.0) * self.min_particles)
 
     def check(self, faults: Faults) -> None:
@@ -325,7 +321,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             effective = 1.0 / float(np.dot(weight, weight))
         least = options.min_search_particles
         if not searching:
-            least = options.least_found(effective / weight.size, summary.effective_bins)
+            least = options.least_found(summary.effective_bins)
         by_bins = options.particles_per_bin * summary.effective_bins
         wanted = int(min(max(by_bins, least), options.max_particles))
         if effective < options.resample_below * weight.size or 2 * wanted < weight.size:

@@ -112,9 +112,19 @@ class BeliefFilters:
         if self.by_carriageways(state) is not None:
             return self._by_carriageways
         if self.positioned is None or self.by_map_alone(state):
-            undecided = state.alternative is not None or bool(state.held)
-            return (self._with_all if undecided else self.by_compass)[state.compass]
+            return (self.by_compass if self.few_do(state) else self._with_all)[state.compass]
         return self._positioned_by_compass[state.compass]
+
+    def few_do(self, state: BayesState) -> bool:
+        """Return whether a narrow belief may go on with fewer particles.
+
+        Not while others are tested against it, nor while positions or satellites are measured:
+        these are so sharp that few particles have what they allow.
+        """
+        if state.alternative is not None or state.held:
+            return False
+        gnss: GnssState = state.sources[GnssSource.name]
+        return state.reckoning.travelled_m - gnss.used_at_m > _POSITIONED_M
 
     @cached_property
     def by_compass(self) -> dict[bool, MapFilter]:
@@ -128,7 +138,7 @@ class BeliefFilters:
 
     @cached_property
     def _with_all(self) -> dict[bool, MapFilter]:
-        """The same for beliefs beside which others are weighed: narrow ones keep all particles."""
+        """The same where narrow beliefs, too, keep all particles."""
         return self.by_compass if self.grid else self._particle_filters(_whole(self.options))
 
     def _street_grid(self, *, compass: bool) -> StreetGrid:

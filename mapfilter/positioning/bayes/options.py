@@ -132,8 +132,8 @@ class BayesFilter(Options):
     min_search_particles : int
         Least number of particles until the filter has converged.
     min_particles : int
-        Least number of particles afterwards; a third of it while the belief is narrow, the evidence
-        is not sharp, and nothing is tested against it.
+        Least number of particles afterwards; in a database with cells a third of it for a narrow
+        belief that nothing is tested against, while no position and no satellite is measured.
     switch_mass : float
         Share of the belief within 50 m of the leading hypothesis from which on the filter has
         converged.
