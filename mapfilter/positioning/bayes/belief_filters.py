@@ -118,10 +118,10 @@ class BeliefFilters:
     def few_do(self, state: BayesState) -> bool:
         """Return whether a narrow belief may go on with fewer particles.
 
-        Not while others are tested against it, nor while positions or satellites are measured:
-        these are so sharp that few particles have what they allow.
+        Not while an alternative is tested against it, nor while positions or satellites are
+        measured: these are so sharp that few particles have what they allow.
         """
-        if state.alternative is not None or state.held:
+        if state.alternative is not None:
             return False
         gnss: GnssState = state.sources[GnssSource.name]
         return state.reckoning.travelled_m - gnss.used_at_m > _POSITIONED_M
