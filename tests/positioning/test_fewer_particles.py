@@ -66,16 +66,13 @@ def test_who_may_have_fewer(area):
     beliefs = filter_.beliefs
     state = filter_.begin_at(100.0, 100.0, 5.0, np.random.default_rng(0))
     few, usual = beliefs.filter_of(state), ParticleOptions()
-    assert few.options.narrow_share == pytest.approx(1 / 3)
+    assert few.options.narrow_share == 0.5
     assert few.options.min_particles == usual.min_particles
     other = AlternativeHypothesis(state.belief, 0.0, 0.0)
     tested = replace(state, alternative=other)
     assert beliefs.filter_of(tested).options.narrow_share == 1.0
     assert beliefs.held_otherwise.options.narrow_share == 1.0
-    fixed = GnssState(fix_used_at_m=-150.0)
-    for gone_m, share in ((40.0, 1.0), (60.0, 1 / 3)):
-        sources = {**state.sources, "gnss": fixed}
-        reckoning = replace(state.reckoning, travelled_m=gone_m)
-        moved = replace(state, sources=sources, reckoning=reckoning)
-        found = beliefs.filter_of(moved).options.narrow_share
-        assert found == pytest.approx(share)
+    met = {**state.sources, "gnss": GnssState(compared_at_m=0.0)}
+    far = replace(state.reckoning, travelled_m=1000.0)
+    moved = replace(state, sources=met, reckoning=far)
+    assert beliefs.filter_of(moved).options.narrow_share == 1.0

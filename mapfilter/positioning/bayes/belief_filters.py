@@ -118,13 +118,11 @@ class BeliefFilters:
     def few_do(self, state: BayesState) -> bool:
         """Return whether a narrow belief may go on with fewer particles.
 
-        Not while an alternative is tested against it, nor while positions or satellites are
-        measured: these are so sharp that few particles have what they allow.
+        Not while an alternative is tested against it, nor once a position or satellites were
+        measured: what they tell of headings and scale is so sharp that few particles have it.
         """
-        if state.alternative is not None:
-            return False
         gnss: GnssState = state.sources[GnssSource.name]
-        return state.reckoning.travelled_m - gnss.used_at_m > _POSITIONED_M
+        return state.alternative is None and not gnss.met
 
     @cached_property
     def by_compass(self) -> dict[bool, MapFilter]:

@@ -55,7 +55,7 @@ _VEHICLE_MOTION: Mapping[str, float] = {
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
 
-_NARROW_SHARE = 1 / 3
+_NARROW_SHARE = 1 / 2
 """Share of the least number of particles for narrow beliefs, in a database with cells."""
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
@@ -132,8 +132,8 @@ class BayesFilter(Options):
     min_search_particles : int
         Least number of particles until the filter has converged.
     min_particles : int
-        Least number of particles afterwards; in a database with cells a third of it for a narrow
-        belief that nothing is tested against, while no position and no satellite is measured.
+        Least number of particles afterwards; in a database with cells half of it for a narrow
+        belief that no alternative is tested against, where no position or satellite was measured.
     switch_mass : float
         Share of the belief within 50 m of the leading hypothesis from which on the filter has
         converged.
