@@ -62,7 +62,7 @@ def weight_inside(
     for i in range(weight.size):
         along = (east_m[i] >= zero) & (east_m[i] <= wide)
         inside = along & (north_m[i] >= zero) & (north_m[i] <= high)
-        total += weight[i] if inside else zero
+        total += float(weight[i]) if inside else 0.0
     return total
 
 
