@@ -72,7 +72,7 @@ def test_who_may_have_fewer(area):
     tested = replace(state, alternative=other)
     assert beliefs.filter_of(tested).options.narrow_share == 1.0
     assert beliefs.held_otherwise.options.narrow_share == 1.0
-    met = {**state.sources, "gnss": GnssState(compared_at_m=0.0)}
     far = replace(state.reckoning, travelled_m=1000.0)
-    moved = replace(state, sources=met, reckoning=far)
-    assert beliefs.filter_of(moved).options.narrow_share == 1.0
+    for gnss, share in ((GnssState(fix_used_at_m=0.0), 1.0), (GnssState(compared_at_m=0.0), 0.5)):
+        moved = replace(state, sources={**state.sources, "gnss": gnss}, reckoning=far)
+        assert beliefs.filter_of(moved).options.narrow_share == share

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -119,10 +119,10 @@ class BeliefFilters:
         """Return whether a narrow belief may go on with fewer particles.
 
         Not while an alternative is tested against it, nor once a position or satellites were
-        measured: what they tell of headings and scale is so sharp that few particles have it.
+        used: what they tell of headings and scale is so sharp that few particles have it.
         """
         gnss: GnssState = state.sources[GnssSource.name]
-        return state.alternative is None and not gnss.met
+        return state.alternative is None and gnss.used_at_m == -inf
 
     @cached_property
     def by_compass(self) -> dict[bool, MapFilter]:
