@@ -25,6 +25,7 @@ from mapfilter.models.cell_faults import mixed
 from mapfilter.options import NotNegative, Options, Positive
 
 _F = np.float32
+_BLOCK = 256
 STEPS_PER_SD, REACH_SD = 32, 8
 STEPS_PER_DB, REACH_DB = 4, 64
 
@@ -167,21 +168,37 @@ def weigh_by_bound(
     reported, share = _F(bound.level_dbm), _F(1.0 / cells.size)
     middle, last = _F(REACH_SD * STEPS_PER_SD), _F(2 * REACH_SD * STEPS_PER_SD)
     width = np.uint32(bands)
-    for i in range(pixel.size):
-        at = np.uint32(np.uint32(pixel[i]) * width)
-        total = zero
+    value, total = np.empty(_BLOCK, dtype=np.float32), np.empty(_BLOCK, dtype=np.float32)
+    place = np.empty(_BLOCK, dtype=np.int32)
+    # Loops that look up are apart from those that compute, which are vectorised.
+    for first in range(0, pixel.size, _BLOCK):
+        count, own = min(_BLOCK, pixel.size - first), pixel[first:]
+        total[:] = zero
         for j in range(cells.size):
-            v = (reported - level_dbm[at + np.uint32(cells[j])]) * per_db
+            cell = np.uint32(cells[j])
+            for i in range(count):
+                value[i] = level_dbm[np.uint32(np.uint32(own[i]) * width) + cell]
             if censored == 0:
-                v = v if v < _F(4.0) else _F(4.0)
-                v = v if v > _F(-4.0) else _F(-4.0)
-                total += exp32(_F(-0.5) * v * v)
+                for i in range(count):
+                    v = (reported - value[i]) * per_db
+                    v = v if v < _F(4.0) else _F(4.0)
+                    v = v if v > _F(-4.0) else _F(-4.0)
+                    total[i] += exp32(_F(-0.5) * v * v)
             else:
-                place = (v if censored < 0 else -v) * _F(STEPS_PER_SD) + middle + _F(0.5)
-                place = place if place > zero else zero
-                place = place if place < last else last
-                total += exp32(table[np.int32(place)])
-        log_weight[i] += w * log32(total * share)
+                for i in range(count):
+                    v = (reported - value[i]) * per_db
+                    v = v if censored < 0 else -v
+                    step = v * _F(STEPS_PER_SD) + middle + _F(0.5)
+                    step = step if step > zero else zero
+                    step = step if step < last else last
+                    place[i] = np.int32(step)
+                for i in range(count):
+                    value[i] = table[np.uint32(place[i])]
+                for i in range(count):
+                    total[i] += exp32(value[i])
+        into = log_weight[first:]
+        for i in range(count):
+            into[i] += w * log32(total[i] * share)
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)

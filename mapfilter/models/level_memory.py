@@ -7,6 +7,7 @@ all hypotheses of a belief; the means and the odds of faults are theirs.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import exp, log
 from typing import Any
 
@@ -98,10 +99,13 @@ class LevelMemory:
         """Numbers that each hypothesis keeps: means of errors, then log odds of faults."""
         return 3 * self.slots + 1
 
-    @property
+    @cached_property
     def slot_of(self) -> dict[int, int]:
         """Slot of each band that has one."""
         return {band: slot for slot, band in enumerate(self.band.tolist()) if band >= 0}
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
 
     def start(self, count: int, arrays: Any = np) -> Floats32:
         """Return what hypotheses keep before the first report, (width, count), by a module."""
@@ -190,7 +194,7 @@ class LevelMemory:
             (self.other_dbm, OTHER_DBM, keep),
             (self.other_db2, OTHER_SD_DB**2, keep**2),
         )
-        return LevelMemory(
+        memory = LevelMemory(
             errors,
             self.site,
             self.band,
@@ -201,7 +205,8 @@ class LevelMemory:
             self.used,
             self.reports,
             self.other_log_likelihood,
-        ), decay
+        )
+        return memory._with_slots_of(self), decay
 
     def updated(
         self, report: LevelReport, rough_db2: Floats | None = None
@@ -243,7 +248,29 @@ class LevelMemory:
             self.reports + 1,
             self.other_log_likelihood,
         )
+        memory._with_slots_of(self)
         return memory, LevelTerms(report.cell, slot, report.level_dbm, gain, variance, other)
+
+    def with_other(self, log_likelihood: float) -> LevelMemory:
+        """Return the memory with the last report's log-likelihood under wrong predictions."""
+        memory = LevelMemory(
+            self.errors,
+            self.site,
+            self.band,
+            self.prior_db2,
+            self.covariance_db2,
+            self.other_dbm,
+            self.other_db2,
+            self.used,
+            self.reports,
+            log_likelihood,
+        )
+        return memory._with_slots_of(self)
+
+    def _with_slots_of(self, before: LevelMemory) -> LevelMemory:
+        """Take over the look-up of slots from a memory with the same bands."""
+        self.__dict__["slot_of"] = before.slot_of
+        return self
 
     def absence(self, report: LevelReport) -> LevelTerms:
         """Return the terms of absent cells that have slots; levels are the limit."""

@@ -53,6 +53,19 @@ def all_inside(east_m: Floats32, north_m: Floats32, width_m: float, height_m: fl
     return inside
 
 
+@njit(error_model="numpy", cache=True)
+def weight_inside(
+    east_m: Floats32, north_m: Floats32, weight: Floats32, width_m: float, height_m: float
+) -> float:
+    """Return the sum of the weights (N,) of the places that lie in an area."""
+    wide, high, zero, total = _F(width_m), _F(height_m), _F(0.0), 0.0
+    for i in range(weight.size):
+        along = (east_m[i] >= zero) & (east_m[i] <= wide)
+        inside = along & (north_m[i] >= zero) & (north_m[i] <= high)
+        total += float(weight[i]) if inside else 0.0
+    return total
+
+
 @njit(error_model="numpy", cache=True, nogil=True)
 def weigh_by_ways(
     first: int,

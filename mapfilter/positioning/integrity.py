@@ -247,14 +247,21 @@ def _held_radius(distance: Floats, mass: Floats, share: float) -> float:
 def _kernel_radius(distance: Floats, mass: Floats, scale: float, share: float) -> float:
     """Return the radius beyond which the kernels have a share; one grid for all shares."""
     low, high = 0.0, float(distance[-1] + _REACH * scale)
+    nearer = np.empty(mass.size)
+    total = 0.0
+    for k in range(mass.size):
+        nearer[k] = total
+        total += mass[k]
     for _ in range(_STEPS):
         middle, beyond = 0.5 * (low + high), 0.0
         for k in range(mass.size - 1, -1, -1):
             away = (middle - distance[k]) / scale
             if away > _REACH:
                 break
-            beyond += mass[k] / (1.0 + exp(away)) if away > -_REACH else mass[k]
-            if beyond > share:
+            each = 1.0 / (1.0 + exp(away)) if away > -_REACH else 1.0
+            beyond += mass[k] * each
+            # Nearer samples have less beyond it, each: not enough, or enough already.
+            if beyond > share or beyond + nearer[k] * each <= share:
                 break
         if beyond > share:
             low = middle

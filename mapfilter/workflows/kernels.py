@@ -27,7 +27,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import STATES
-from mapfilter.models.way_map import all_inside
+from mapfilter.models.way_map import all_inside, weight_inside
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
@@ -70,6 +70,8 @@ def compile_motion() -> None:
     """Compile steps, and the weighing by the map."""
     model, cloud, log_weight = _made()
     model.move(cloud.state, log_weight, MotionStep(1.0, 0.0), draw_key(np.random.default_rng(0)))
+    east_m, north_m = cloud.state[:2]
+    weight_inside(east_m, north_m, log_weight.astype(np.float32), *model.area.size_m)
     model.area.clear_of_edge(cloud.state)
 
 

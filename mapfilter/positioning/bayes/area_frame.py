@@ -11,7 +11,7 @@ import numpy as np
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
-from mapfilter.models.way_map import all_inside, places_beyond
+from mapfilter.models.way_map import all_inside, places_beyond, weight_inside
 from mapfilter.radio.cells import CellPlan
 
 BELOW_FLOOR_DB = 6.0
@@ -128,11 +128,9 @@ class AreaFrame(ABC):
 
     def holds(self, east_m: Floats32, north_m: Floats32, weight: Floats32) -> bool:
         """Return whether most of a belief in the local frame lies in the area."""
-        width_m, height_m = self.size_m
         if self.holds_all(east_m, north_m):
             return bool(weight.size)
-        inside = (east_m >= 0) & (east_m <= width_m) & (north_m >= 0) & (north_m <= height_m)
-        return bool(np.sum(weight[inside]) > 0.5)
+        return bool(weight_inside(east_m, north_m, weight, *self.size_m) > 0.5)
 
 
 def carriers_of(plan: CellPlan, cell_ids: Iterable[str]) -> dict[tuple[int, int], tuple[int, ...]]:

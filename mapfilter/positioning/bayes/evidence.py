@@ -109,6 +109,23 @@ class RadioReading:
     serving_under_null: float = SERVING_UNDER_NULL
     belief: MapBelief | None = None
 
+    def weighing(self, belief: MapBelief, *, tracked: bool, doubted: bool) -> RadioReading:
+        """Return the reading with what it depends on besides: the belief that it weighs."""
+        return RadioReading(
+            self.serving,
+            self.serving_weight,
+            self.levels,
+            self.bounds,
+            self.terms,
+            self.under_null,
+            self.length_m,
+            self.timing_advance,
+            doubted,
+            tracked,
+            self.serving_under_null,
+            belief,
+        )
+
     def for_other_hypotheses(self) -> RadioReading:
         """Return the reading without terms that hold for the hypotheses of one belief only."""
         own = [isinstance(one, FixedTerm) and one.value.size > 1 for one in self.terms]

@@ -7,7 +7,7 @@ map of ways, by radio reports and by the terms of other sources.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 from math import exp, isfinite, log, nan, sqrt
 
@@ -236,7 +236,7 @@ class BayesModel:
         """Return what is added to the deviation of levels, in tenths of a dB, flat as levels."""
         return self.whole.flat_rough_db
 
-    @property
+    @cached_property
     def prediction(self) -> Prediction:
         """Predicted levels of the area, as kernels take them."""
         share = self.evidence.levels.roughness
@@ -333,8 +333,7 @@ class BayesModel:
             calls.append((weigh_by_absence, kept, own, predicted, *terms_of, weight, log_weight))
         self.threads.over(log_weight.size, *calls)
         other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
-        memory = replace(memory, other_log_likelihood=other)
-        return Cloud(cloud.state, kept, memory)
+        return Cloud(cloud.state, kept, memory.with_other(other))
 
     def _expected_absent(self, pixel: Ints32, report: LevelReport) -> Ints32:
         if not isinstance(self.area, TiledArea):

@@ -140,7 +140,7 @@ class Weighing:
         other_m = beliefs.other_unit_m(state)
         doubt = doubt or is_unit_open(state, before, other_m)
         tracked = measured and before.status is Status.TRACKING
-        reading = replace(evidence, tracked=tracked, doubted=doubt, belief=before)
+        reading = evidence.weighing(before, tracked=tracked, doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
@@ -178,16 +178,26 @@ class Weighing:
             and (now.null.log_odds >= rules.start_log_odds or disputed or gone)
         ):
             alternative = self._alternative(state, now.belief, epoch, rng)
-        after = replace(
-            state,
+        after = BayesState(
             belief=now.belief,
             status=now.status,
+            unclear=state.unclear,
+            contested=state.contested,
             sources=sources,
+            reckoning=state.reckoning,
+            heading_rad=state.heading_rad,
+            compass=state.compass,
             null=null if by_map_alone and not now.taken_over else now.null,
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
+            path=state.path,
+            reported=state.reported,
+            watch=state.watch,
+            last_fix=state.last_fix,
+            twin=state.twin,
             # An alternative reads headings as they are.
             hold=hold_after_takeover(state) if now.taken_over else state.hold,
+            walking_rad=state.walking_rad,
             held=() if now.taken_over else state.held,
             alternatives=state.alternatives + (alternative is not now.alternative),
         )
