@@ -87,6 +87,8 @@ def convert(
     given = [given_path(path) or path for path in files]
     true = [given_path(path) or path for path in truth or ()]
     place = numbers(origin, 2, "--origin")
+    if no_steps and step_length is not None:
+        raise fail(ConfigError, "--step-length", "no --no-steps beside it", "both")
     if place is not None and not (abs(place[0]) <= 90 and abs(place[1]) <= 180):
         raise fail(ConfigError, "--origin", "a latitude and a longitude in degrees", repr(origin))
     options = OpenOptions(
@@ -120,7 +122,8 @@ def _walk(
     if declination_deg is not None and not abs(declination_deg) <= 180:
         faults.add("--declination", "degrees in -180..180", declination_deg)
     if step_m is not None and not 0 < step_m < 3:
-        faults.add("--step-length", "metres above 0 and below 3", step_m, "centimetres")
+        hint = "centimetres" if step_m >= 3 else ""
+        faults.add("--step-length", "metres above 0 and below 3", step_m, hint)
     faults.raise_if_any(ConfigError)
     options = WalkOptions(pose=pose, declination_deg=declination_deg)
     return options if step_m is None else replace(options, step_m=step_m)

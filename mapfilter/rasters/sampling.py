@@ -14,7 +14,7 @@ from mapfilter.rasters.files import RasterFile, Window, check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.resampling import read_on
 
-_BANDS_AT_A_TIME = 128
+_BANDS_AT_A_TIME, _MOST_BYTES = 128, 1 << 32
 _MOST_UNUSED = 2.0
 """Pixels of a box about windows, over those of the windows, up to which it is read whole."""
 
@@ -72,8 +72,11 @@ def levels_at(places: Sequence[Places]) -> list[Floats32]:
     rows = [{cell: n for n, cell in enumerate(one.cells)} for one in places]
     for file, numbers in of_file.values():
         bands = [n for n, cell in enumerate(file.cell_ids) if any(cell in rows[i] for i in numbers)]
-        for first in range(0, len(bands), _BANDS_AT_A_TIME):
-            some = bands[first : first + _BANDS_AT_A_TIME]
+        # Of many bands and large windows some at a time, so that what is read fits into memory.
+        largest = max(places[i].window[2] * places[i].window[3] for i in numbers)
+        most = min(_BANDS_AT_A_TIME, max(_MOST_BYTES // (4 * largest), 1))
+        for first in range(0, len(bands), most):
+            some = bands[first : first + most]
             for together in _together(places, numbers, len(some)):
                 _read(file, some, places, together, rows, found)
     return found

@@ -112,9 +112,9 @@ def journey_motion(
         if walked is not None:
             notes += walked.notes
             return Moved(walked.motion, walked.imu, walked.reckoning)
-        counted, noise, told = reckon_counted(sensors, walk, frame.convergence_rad)
+        counted, noise, reasons = reckon_counted(sensors, walk, frame.convergence_rad)
         notes += words if counted is None else ()
-        notes += told
+        notes += reasons
         return Moved(counted, noise)
     return Moved()
 

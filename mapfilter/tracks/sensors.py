@@ -28,7 +28,7 @@ SENSOR_COLUMNS: dict[str, tuple[str, ...]] = {
     "orientation": ("time_s", "qx", "qy", "qz", "qw"),
     "barometer": ("time_s", "pressure_hpa"),
     "steps": ("time_s", "count"),
-    "compass": ("time_s", "azimuth_deg"),
+    "compass": ("time_s", "magnetic_deg"),
     "odometry": ("time_s", "speed_mps", "yaw_rate_radps", "speed_sd_mps", "yaw_rate_sd_radps"),
     "velocity": ("time_s", "speed_mps", "heading_rad"),
     "reckoning": ("time_s", "heading_sd_rad", "disturbed", "climb", "height_m"),

@@ -114,7 +114,11 @@ def compile_gaussian() -> None:
 
 
 def compile_all() -> None:
-    """Compile what filters need, so that no first run on this machine has to: for an image, say.
+    """Compile what the usual filters need, so that no first run has to: for an image, say.
+
+    These are the Bayes map filter on a map that is held whole, Kalman-type filters and weighing by
+    Rao-Blackwellised particles. What large areas, smoothing and Gaussian sums need besides is
+    compiled when it is first called.
 
     ``python -m mapfilter.workflows.kernels`` does this; it takes about a minute, and two seconds
     where all is compiled already.

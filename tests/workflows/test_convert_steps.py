@@ -103,11 +103,11 @@ def test_counted_steps_of_a_csv_have_the_length_that_is_given(tmp_path):
     given = ("--declination", "10", "--step-length", "0.8")
     done = mapfilter("convert", path, *given, "--out", tmp_path / "log")
     assert done.code == 0
-    assert "motion: 78 counted steps of 0.8 m, headings of the compass" in done.out
+    assert "motion: 78 steps of 0.8 m by a counter, with a compass" in done.out
     log = mf.read_log(tmp_path / "log")
     assert log.motion["step_m"].sum() == pytest.approx(78 * 0.8)
     np.testing.assert_allclose(headings_deg(log), 0 - 1.8, atol=0.2)
-    assert read_sensors(tmp_path / "log")["compass"]["azimuth_deg"].unique().tolist() == [80.0]
+    assert read_sensors(tmp_path / "log")["compass"]["magnetic_deg"].unique().tolist() == [80.0]
     refused = mapfilter("convert", path, "--step-length", "80", "--out", tmp_path / "other")
     assert refused.code == 2
     assert "metres above 0 and below 3, found 80" in refused.err

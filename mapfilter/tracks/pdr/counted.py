@@ -7,20 +7,25 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Floats
+from mapfilter._types import Floats, Ints
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.walk import DECLINATION_SD_RAD
 from mapfilter.tracks.pdr.walk_noise import SCALE, STEP_SHARE
 
-_NEAR_S = 2.0
-_MOST_FALLS = 0.01
+_STEPS_PER_S = 5.0
+"""More than these nobody walks or runs."""
+_LATE_S, _JITTER = 10.0, 20.0
+"""Counters are read up to so many seconds late; falls of fewer steps are of rows out of order."""
+_NEAR_S, _PAUSE_S = 2.0, 30.0
+_TURNED = 0.9
 _COUNTED_LATE = 0.5
 _LEAST_HEADING_DEG, _MOST_HEADING_DEG = 3.0, 45.0
 _MAD_TO_SD = 1.4826
 _CARRIED_SD_DEG = 15.0
 _CORRELATION_S = 6.0
+_OWN_COUNTS = "counted in each row"
 
 
 def reckon_counted(
@@ -33,8 +38,9 @@ def reckon_counted(
     Parameters
     ----------
     sensors : mapping of str to pandas.DataFrame
-        ``steps`` (time_s, count: since some start, or in each row) and ``compass`` (time_s,
-        azimuth_deg, clockwise from magnetic north).
+        ``steps`` (time_s, count: since some start, or in each row where counts fall and none
+        exceeds what can be walked between two rows) and ``compass`` (time_s, magnetic_deg,
+        clockwise from magnetic north).
     options : WalkOptions, optional
         Of which the length of a step and the magnetic declination are used.
     convergence_rad : float
@@ -43,7 +49,9 @@ def reckon_counted(
     Returns
     -------
     motion : pandas.DataFrame or None
-        time_s, step_m, heading_rad, turn_rad (NaN); None where no step was counted.
+        time_s, step_m, heading_rad, turn_rad (NaN); None where no step was counted. A step is
+        unknown (NaN) where the counter began anew, grew faster than anybody walks, or after more
+        than 30 s without a row.
     imu : ImuNoise or None
         Its errors.
     notes : tuple of str
@@ -52,7 +60,7 @@ def reckon_counted(
     Examples
     --------
     >>> steps = pd.DataFrame({"time_s": [0.0, 1.0, 2.0], "count": [7.0, 9.0, 10.0]})
-    >>> compass = pd.DataFrame({"time_s": [0.0, 1.0, 2.0], "azimuth_deg": 90.0})
+    >>> compass = pd.DataFrame({"time_s": [0.0, 1.0, 2.0], "magnetic_deg": 90.0})
     >>> motion, _, _ = reckon_counted({"steps": steps, "compass": compass})
     >>> motion["step_m"].round(2).tolist(), motion["heading_rad"].tolist()
     ([0.0, 1.4, 0.7], [0.0, 0.0, 0.0])
@@ -61,65 +69,97 @@ def reckon_counted(
     if "steps" not in sensors:
         return None, None, ()
     if "compass" not in sensors:
-        return None, None, ("steps are counted, but no compass gives their headings: no motion",)
+        return None, None, ("steps are counted, but no compass_deg is beside them: no motion",)
     rows = sensors["steps"].sort_values("time_s", kind="stable").drop_duplicates("time_s")
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
-    counted = _counted(rows["count"].to_numpy(dtype=np.float64))
+    counted, how = _counted(time_s, rows["count"].to_numpy(dtype=np.float64))
+    unknown = int(np.isnan(counted).sum())
     if not np.nansum(counted) > 0:
-        return None, None, (f"the step counter counts no step in {len(rows)} rows",)
-    compass = sensors["compass"].sort_values("time_s", kind="stable")
-    azimuth_deg = _mean_azimuth_deg(time_s, compass) + (options.declination_deg or 0.0)
-    heading = heading_from_azimuth_rad(azimuth_deg, convergence_rad)
+        reason = f"the step counter stands still in {len(rows)} rows: no motion"
+        return None, None, (f"{reason} (steps of each row alone are given as step_m)",)
+    magnetic_deg, straight = _mean_direction(time_s, sensors["compass"])
+    north_deg = options.declination_deg or 0.0
     motion = pd.DataFrame(
         {
             "time_s": time_s,
-            "step_m": options.step_m * counted,
-            "heading_rad": heading,
+            "step_m": options.step_m * counted * straight,
+            "heading_rad": heading_from_azimuth_rad(magnetic_deg + north_deg, convergence_rad),
             "turn_rad": np.nan,
         }
     )
-    note = (
-        f"motion: {np.nansum(counted):.0f} counted steps of {options.step_m:g} m, headings of the "
-        "compass"
-    )
-    notes = [note]
+    without = int((motion["heading_rad"].isna() & (motion["step_m"] > 0)).sum())
+    if motion["heading_rad"].isna().all():
+        reason = "compass and step counter have no time in common: no motion"
+        return None, None, (reason,)
+    notes = [
+        f"motion: {np.nansum(counted):.0f} steps of {options.step_m:g} m {how}, with a compass"
+    ]
+    if unknown:
+        notes.append(f"motion unknown in {unknown} rows: the counter jumped, or paused for 30 s")
+    if without:
+        notes.append(f"no compass within {_NEAR_S:g} s of {without} rows with steps")
     if options.declination_deg is None:
         notes.append("no magnetic declination given: magnetic north taken for true north")
     return motion, _errors(motion, options), tuple(notes)
 
 
-def _counted(count: Floats) -> Floats:
-    """Return the steps of each row: of a counter that grows, or of rows that count their own.
+def _counted(time_s: Floats, count: Floats) -> tuple[Floats, str]:
+    """Return the steps of each row, NaN where unknown, and what the counts were taken for."""
+    lasted_s = np.diff(time_s)
+    usual_s = max(float(np.median(lasted_s)), 1.0) if lasted_s.size else 1.0
+    falls = bool((np.diff(count) < 0).any())
+    is_own = falls and count.max() <= _STEPS_PER_S * usual_s
+    if is_own:
+        change, how = count[1:], _OWN_COUNTS
+    else:
+        # A counter begins anew when a phone is started.
+        change, how = np.diff(_without_jitter(count)), "by a counter"
+    walkable = (change >= 0) & (change <= _STEPS_PER_S * np.maximum(lasted_s, _LATE_S))
+    # Where a counter is written only when it grows, a few steps end a long rest.
+    paused = (lasted_s > _PAUSE_S) & (change > _JITTER)
+    steps = np.where(walkable & ~paused, change, np.nan)
+    return np.concatenate([count[:1] if is_own else [0.0], steps]), how
 
-    A counter begins anew when a phone is started: the steps between are not known.
+
+def _without_jitter(count: Floats) -> Floats:
+    """Return a counter that grows: small falls are of rows out of order, large ones stay."""
+    begins = np.concatenate([[True], np.diff(count) < -_JITTER])
+    grown = [np.maximum.accumulate(part) for part in np.split(count, np.flatnonzero(begins)[1:])]
+    return np.concatenate(grown)
+
+
+def _mean_direction(time_s: Floats, compass: pd.DataFrame) -> tuple[Floats, Floats]:
+    """Return the mean azimuth of each row (degrees), and the chord of its way over its length.
+
+    The mean is that of the time since the row before, of at most 30 s, or the nearest azimuth
+    within 2 s; NaN without one. Where the walker turned, the chord is shorter than the way.
     """
-    change = np.diff(count)
-    if (change < 0).sum() > max(_MOST_FALLS * change.size, 1.0):
-        return count
-    return np.concatenate([[0.0], np.where(change < 0, np.nan, change)])
-
-
-def _mean_azimuth_deg(time_s: Floats, compass: pd.DataFrame) -> Floats:
-    """Return the mean azimuth since the row before, or that of the nearest time within 2 s."""
-    known = compass.dropna(subset=["azimuth_deg"])
+    known = compass.dropna(subset=["magnetic_deg"]).sort_values("time_s", kind="stable")
     at_s = known["time_s"].to_numpy(dtype=np.float64)
     if not at_s.size:
-        return np.full(len(time_s), np.nan)
-    turn = np.radians(known["azimuth_deg"].to_numpy(dtype=np.float64))
+        return np.full(len(time_s), np.nan), np.ones(len(time_s))
+    turn = np.radians(known["magnetic_deg"].to_numpy(dtype=np.float64))
     sums = np.concatenate([np.zeros((1, 2)), np.cumsum([np.cos(turn), np.sin(turn)], axis=1).T])
-    last = np.searchsorted(at_s, time_s, side="right")
-    first = np.concatenate([[0], last[:-1]])
-    first[0] = max(int(last[0]) - 1, 0)
+    begin_s = np.concatenate([time_s[:1] - _NEAR_S, time_s[:-1]])
+    lasted_s = time_s - begin_s
+    begin_s = np.where(lasted_s > _PAUSE_S, time_s - _LATE_S, begin_s)
+    first, last = (np.searchsorted(at_s, edge_s, side="right") for edge_s in (begin_s, time_s))
     inside = sums[last] - sums[first]
     mean = np.degrees(np.arctan2(inside[:, 1], inside[:, 0]))
-    nearest = np.clip(last, 1, at_s.size - 1) if at_s.size > 1 else np.zeros(len(time_s), np.int64)
-    before = np.maximum(nearest - 1, 0)
-    is_nearer = np.abs(at_s[before] - time_s) <= np.abs(at_s[nearest] - time_s)
-    nearest = np.where(is_nearer, before, nearest)
+    chord = np.hypot(inside[:, 0], inside[:, 1]) / np.maximum(last - first, 1)
+    nearest = _nearest(at_s, time_s)
     near = np.abs(at_s[nearest] - time_s) <= _NEAR_S
     alone = np.where(near, np.degrees(turn[nearest]), np.nan)
-    result: Floats = np.where(last > first, mean, alone)
-    return result
+    # Noise of the compass shortens a mean vector, too.
+    turned = (last - first > 2) & (chord < _TURNED)
+    return np.where(last > first, mean, alone), np.where(turned, chord, 1.0)
+
+
+def _nearest(known_s: Floats, time_s: Floats) -> Ints:
+    after = np.minimum(np.searchsorted(known_s, time_s), len(known_s) - 1)
+    before = np.maximum(after - 1, 0)
+    is_before = np.abs(known_s[before] - time_s) <= np.abs(known_s[after] - time_s)
+    return np.where(is_before, before, after)
 
 
 def _errors(motion: pd.DataFrame, options: WalkOptions) -> ImuNoise:
@@ -135,7 +175,7 @@ def _errors(motion: pd.DataFrame, options: WalkOptions) -> ImuNoise:
     late_m = _COUNTED_LATE * options.step_m
     return ImuNoise(
         period_s=float(np.median(between_s)) if between_s.size else 1.0,
-        sigma_trans_m=float(np.hypot(STEP_SHARE * float(stepped["step_m"].mean()), late_m)),
+        sigma_trans_m=float(np.hypot(STEP_SHARE * float(stepped["step_m"].median()), late_m)),
         sigma_orient_deg=float(np.clip(white_deg, _LEAST_HEADING_DEG, _MOST_HEADING_DEG)),
         bias_sd_deg=float(np.hypot(_CARRIED_SD_DEG, north_sd_deg)),
         scale=SCALE,

@@ -254,10 +254,10 @@ def _add_sensors(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
             value = mapped.number(field)
             columns = {"time_s": time_s, column: value}
             _add(reading, table, columns, mapped.rows, np.isfinite(value))
-    if mapped.has("compass_deg") and not mapped.has("step_m"):
-        azimuth = mapped.number("compass_deg")
-        columns = {"time_s": time_s, "azimuth_deg": azimuth}
-        _add(reading, "compass", columns, mapped.rows, np.isfinite(azimuth))
+    if mapped.has("steps", "compass_deg") and not mapped.has("step_m"):
+        magnetic = mapped.number("compass_deg")
+        columns = {"time_s": time_s, "magnetic_deg": magnetic}
+        _add(reading, "compass", columns, mapped.rows, np.isfinite(magnetic))
 
 
 def _add_cells(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:

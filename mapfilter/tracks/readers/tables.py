@@ -171,7 +171,7 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         ),
     ),
     "steps": (_TIME, Field("count", 0, 1e9, "steps >= 0", required=True)),
-    "compass": (_TIME, Field("azimuth_deg", -180, 360, "degrees in -180..360", required=True)),
+    "compass": (_TIME, Field("magnetic_deg", -180, 360, "degrees in -180..360", required=True)),
     "ephemerides": (
         _TIME,
         _text("satellite", required=True),
