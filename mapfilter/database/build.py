@@ -274,7 +274,7 @@ class BuildJob:
         """Yield the tiles in order, finished ones from disk."""
         every = range(len(self.windows))
         missing = [n for n in every if not finished.keep or finished.load(n) is None]
-        shares = max(in_flight // 2, 1)
+        shares = 1 if isinstance(executor, SerialExecutor) else max(in_flight // 2, 1)
         todo = tuple(missing)
         tasks = grouped(map(self.task, todo), pixels_a_task, len(todo), shares)
         results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)
