@@ -33,14 +33,17 @@ docs: $(VENV)/.test
 kernels: $(VENV)/.test
 	$(BIN)/python -m mapfilter.workflows.kernels
 
-$(VENV)/.demo: pyproject.toml constraints.txt
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
-	touch $@
+$(VENV)/.demo: EXTRAS :=
+$(VENV)/.test: EXTRAS := [test,docs]
 
-$(VENV)/.test: pyproject.toml constraints.txt
+# pip compiles modules one after the other, other packages' tests among them: half of its time. A few
+# modules are templates that no Python compiles. Kernels are compiled here, or the first replay would
+# wait for them.
+$(VENV)/.demo $(VENV)/.test: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,docs]'
+	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.$(EXTRAS)'
+	$(BIN)/python -m compileall -qq -j 0 -x /tests/ $(VENV)/lib || true
+	$(BIN)/python -m mapfilter.workflows.kernels --replay
 	touch $@
 
 mutants: $(VENV)/.test

@@ -44,7 +44,7 @@ from mapfilter.database.tiles import read_tiles
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.index import HALF_WIDTH_M, RouteSource
 
 REACH_PX = 400

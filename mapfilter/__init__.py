@@ -17,6 +17,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mapfilter._kernel_cache import keep_kernels
+
 if TYPE_CHECKING:
     from mapfilter.api.located import Score as Score
     from mapfilter.api.located import Track as Track
@@ -52,8 +54,8 @@ if TYPE_CHECKING:
     from mapfilter.positioning.kalman.filter import KalmanFilter as KalmanFilter
     from mapfilter.radio.cells import CellPlan as CellPlan
     from mapfilter.radio.cells import read_cell_plan as read_cell_plan
+    from mapfilter.rasters.opening import open_rasters as open_rasters
     from mapfilter.rasters.raster_set import RxLevRasters as RxLevRasters
-    from mapfilter.rasters.raster_set import open_rasters as open_rasters
     from mapfilter.roads.lattice import RouteLattice as RouteLattice
     from mapfilter.roads.routes import read_routes as read_routes
     from mapfilter.simulation.reports import ReportModel as ReportModel
@@ -85,7 +87,8 @@ _NAMES = {
     "positioning.fingerprints.tables": "read_fingerprint_table",
     "positioning.kalman.filter": "KalmanFilter",
     "radio.cells": "CellPlan read_cell_plan",
-    "rasters.raster_set": "RxLevRasters open_rasters",
+    "rasters.opening": "open_rasters",
+    "rasters.raster_set": "RxLevRasters",
     "roads.lattice": "RouteLattice",
     "roads.routes": "read_routes",
     "simulation.reports": "ReportModel",
@@ -109,6 +112,7 @@ def __getattr__(name: str) -> Any:
     home = _HOMES.get(name)
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    keep_kernels()
     return getattr(import_module(f"{__name__}.{home}"), name)
 
 

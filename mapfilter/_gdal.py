@@ -10,6 +10,7 @@ import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,12 @@ from mapfilter.errors import InputError, MapfilterError, fail
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _BESIDE = (".ovr", ".msk")
 """Files beside a raster that GDAL opens as rasters."""
-_READ_BESIDE = (".tfw", ".tifw", ".tiffw", ".wld", ".tab", ".prj", ".aux", ".rrd", ".imd", ".rpb")
+_READ_BESIDE = (
+    *(".tfw", ".tifw", ".tiffw", ".wld", ".tab", ".prj", ".aux", ".rrd", ".imd", ".rpb"),
+    *(".xml", ".txt", ".rpc", ".pvl", ".pass", ".dim"),
+)
+"""Ends of names that GDAL reads beside a raster: georeference, and what the operator of a satellite
+says of an image, some under names of their own."""
 _OVERVIEWS = "OVERVIEWS"
 """Domain of metadata by which GDAL finds overviews, wherever they are."""
 _LARGEST_SIDECAR_BYTES = 16 << 20
@@ -65,14 +71,11 @@ def open_raster(path: Path, *, quiet: bool = True) -> Iterator[Any]:
 
 def _check_sidecars(path: Path) -> None:
     """Check a raster and what GDAL would read beside it."""
-    name, stem = str(path), str(path.with_suffix(""))
+    name = str(path)
     _check_is_tiff(path)
-    for suffix in _READ_BESIDE:
-        for base in {stem, name}:
-            for sidecar in (f"{base}{suffix}", f"{base}{suffix.upper()}"):
-                # Most are not there, and paths take longer to make than to look for.
-                if os.path.exists(sidecar):  # noqa: PTH110
-                    check_file(Path(sidecar))
+    folder = path.absolute().parent
+    for strange in _no_files_in(folder, folder.stat().st_mtime_ns):
+        check_file(folder / strange)
     settings = Path(f"{name}.aux.xml")
     if settings.exists():
         size = check_file(settings)
@@ -89,6 +92,18 @@ def _check_sidecars(path: Path) -> None:
                     got = str(error).splitlines()[0]
                     raise fail(InputError, str(beside), "a TIFF", got, "damaged") from error
                 raise
+
+
+@lru_cache(maxsize=16)
+def _no_files_in(folder: Path, _changed_ns: int) -> tuple[str, ...]:
+    """Return what lies in a folder under a name that GDAL may read, and is a pipe or a device."""
+    try:
+        named = [one for one in os.scandir(folder) if one.name.lower().endswith(_READ_BESIDE)]
+        others = [Path(one) for one in named if not (one.is_file() or one.is_dir())]
+    except OSError:
+        # A folder that may not be listed; what it holds is then not looked for either.
+        return ()
+    return tuple(path.name for path in others if path.exists())
 
 
 def _check_is_tiff(path: Path) -> None:

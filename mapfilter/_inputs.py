@@ -6,17 +6,35 @@ and :func:`open_input` neither waits for a pipe that took the place of a file af
 
 from __future__ import annotations
 
+import codecs
 import errno
+import json
 import os
+import re
 import stat
+import sys
+from collections.abc import Callable
 from io import BufferedReader
 from pathlib import Path
+from typing import Any
 
 from mapfilter.errors import InputError, MapfilterError, fail
 
 _NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
 _NO_FILE = "a pipe, socket or device"
+_WIDE = {
+    codecs.BOM_UTF32_LE: "UTF-32",
+    codecs.BOM_UTF32_BE: "UTF-32",
+    codecs.BOM_UTF16_LE: "UTF-16",
+    codecs.BOM_UTF16_BE: "UTF-16",
+}
+"""By their marks; that of UTF-32 begins with one of UTF-16, and is looked for first."""
 _SHOWN = 60
+_FILE_OF_CRS = re.compile(
+    r"(?:grids|init|file|catalog|model)=[^\s\"=]*[/\\~]|"
+    r"PARAMETERFILE\[\"[^\"]*\",\s?\"[^\"]*[/\\~]",
+    re.IGNORECASE,
+)
 
 
 def check_file(path: Path, kind: type[MapfilterError] = InputError) -> int:
@@ -97,7 +115,7 @@ def path_fault(path: Path) -> str:
         str(path).encode()
         mode = path.stat().st_mode
     except UnicodeEncodeError:
-        return "a path in UTF-8"
+        return _unnamed_letters(path)
     except ValueError:
         return "a path without a zero byte"
     except OSError as error:
@@ -105,6 +123,55 @@ def path_fault(path: Path) -> str:
         return f"a path that the system takes ({error.strerror})" if refused else ""
     usable = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
     return "" if usable else f"a file or a folder, not {_NO_FILE}"
+
+
+def wide_encoding(data: bytes) -> str:
+    """Return ``UTF-16`` or ``UTF-32`` where a text begins with the mark of one, else nothing.
+
+    Examples
+    --------
+    >>> [wide_encoding("a".encode(codec)) for codec in ("utf-32", "utf-16", "utf-8")]
+    ['UTF-32', 'UTF-16', '']
+    """
+    return next((name for mark, name in _WIDE.items() if data.startswith(mark)), "")
+
+
+def json_value(data: bytes, constant: Callable[[str], Any] | None = None) -> Any:
+    """Return the value of a JSON text in UTF-8, with or without a byte order mark.
+
+    ``constant`` is called for NaN and infinities, which are taken by default.
+
+    Raises
+    ------
+    ValueError
+        It is no JSON, in another encoding, or a key stands twice in one object.
+    RecursionError
+        It is nested too deeply.
+
+    Examples
+    --------
+    >>> json_value(b'{"a": 1, "a": 2}')
+    Traceback (most recent call last):
+    ValueError: the key 'a' twice in one object
+    """
+    if wide := wide_encoding(data):
+        raise ValueError(f"{wide} text; save as UTF-8")
+    text = data.decode("utf-8-sig")
+    return json.loads(text, object_pairs_hook=_without_repeats, parse_constant=constant)
+
+
+def named_file(crs_text: str) -> str:
+    """Return what a CRS names of the machine's files, or an empty text.
+
+    Grids of PROJ are named without a folder; what has one is any file.
+
+    Examples
+    --------
+    >>> named_file("+proj=utm +zone=35 +nadgrids=@null"), named_file("+init=./my:crs")
+    ('', 'init=./')
+    """
+    found = _FILE_OF_CRS.search(crs_text)
+    return found[0] if found else ""
 
 
 def is_unicode(value: object) -> bool:
@@ -140,6 +207,25 @@ def shown(value: object) -> str:
     """
     text = repr(value)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the key {shown(twice)} twice in one object")
+    return found
+
+
+def _unnamed_letters(path: Path) -> str:
+    """Return the expected kind of path where its bytes are no letters of the locale."""
+    codec = sys.getfilesystemencoding()
+    try:
+        os.fsencode(path).decode()
+    except UnicodeError:
+        return "a path in UTF-8"
+    return f"a path in {codec}, the encoding of the locale (set PYTHONUTF8=1 to use UTF-8)"
 
 
 def _check_regular(path: Path, mode: int, kind: type[MapfilterError]) -> None:

@@ -21,7 +21,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
-from mapfilter._inputs import is_unicode, open_input, read_input
+from mapfilter._inputs import is_unicode, json_value, open_input, read_input
 from mapfilter._partial import is_left, new_partial, partials
 from mapfilter._replace import ASIDE, NEW, discard, exchange, note_old
 from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fail
@@ -213,9 +213,10 @@ def read_json(path: Path) -> dict[str, Any]:
 def parse_json(data: bytes, where: str) -> dict[str, Any]:
     """Return the JSON object that a file's bytes hold; raise StoreError for something else."""
     try:
-        value = json.loads(data.decode("utf-8"))
+        value = json_value(data)
     except (ValueError, RecursionError) as error:
-        raise fail(StoreError, where, "JSON", f"no JSON ({error})", "cut off") from error
+        hint = "cut off" if isinstance(error, json.JSONDecodeError) else "edited or damaged"
+        raise fail(StoreError, where, "JSON", f"no JSON ({error})", hint) from error
     if not is_unicode(value):
         hint = "half of a surrogate pair: text cut off, or decoded twice"
         raise fail(StoreError, where, "text in Unicode", "a lone surrogate", hint)

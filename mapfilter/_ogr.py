@@ -7,6 +7,7 @@ looked at before GDAL sees it, and GDAL is given one file of a ZIP instead of al
 
 from __future__ import annotations
 
+import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
@@ -35,6 +36,9 @@ _SHP_LENGTH = slice(24, 28)
 # Marks of files that only refer to data elsewhere, and of XML that brings other files in.
 _POINTERS = b"<OGRVRTDataSource <OGRWFSDataSource <OGRCSWDataSource gdal_streamed_alg".split()
 _POINTERS += b"<WFS_Capabilities <VRTDataset <GDAL_WMS <!DOCTYPE <!ENTITY".split()
+_LINKED_CRS = re.compile(
+    rb'"crs"\s{0,9}:\s{0,9}\{[^{}]{0,99}"type"\s{0,9}:\s{0,9}"(?:link|url)"', re.IGNORECASE
+)
 _TAB_POINTERS = (b"open table", b"isseamless", b"type linked", b"create view")
 _MAINS = frozenset(
     [
@@ -57,11 +61,15 @@ _ELSEWHERE = "a vector file that holds its data itself"
 _OPEN_OPTIONS = {"GML": {"WRITE_GFS": "NO", "DOWNLOAD_SCHEMA": "NO"}}
 
 
+_NO_PROXY = "none://"
 _SEALED = {
     # Else a table of a SQLite file may be one of any other file or address, opened as it is listed.
     "OGR_SQLITE_STATIC_VIRTUAL_OGR": "NO",
     # GDAL's own default, which the environment may have changed.
     "ALLOW_OGR_SQL_FUNCTIONS_FROM_TRIGGER_AND_VIEW": "NO",
+    # A CRS may be an address, wherever it stands in a file; requests end at a proxy that is none.
+    "GDAL_HTTP_PROXY": _NO_PROXY,
+    "GDAL_HTTPS_PROXY": _NO_PROXY,
 }
 
 
@@ -154,6 +162,9 @@ def _format(path: Path, name: str, head: bytes, size_bytes: int) -> str:
         return "FlatGeobuf"
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n\x1e")
     if text.startswith(b"{") and ".gdalg" not in name.lower():
+        if _LINKED_CRS.search(head):
+            hint = "write the CRS by its name, or convert the layer to WGS 84"
+            raise fail(InputError, f"{where}, crs", _ELSEWHERE, "an address of its CRS", hint)
         return "GeoJSON"
     if text.startswith(b"<"):
         root = _root(text)

@@ -61,7 +61,14 @@ def local_executor(workers: int) -> Iterator[Executor]:
     if workers <= 1:
         yield SerialExecutor()
         return
-    with LocalWorkers(workers) as pool:
+    with worker_processes(workers) as pool:
+        yield pool
+
+
+@contextlib.contextmanager
+def worker_processes(count: int) -> Iterator[Executor]:
+    """Give an executor of local processes, even if it is one; they end as in ``local_executor``."""
+    with LocalWorkers(count) as pool:
         try:
             yield pool
         except BaseException:
@@ -69,6 +76,22 @@ def local_executor(workers: int) -> Iterator[Executor]:
             pool.end_workers()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def begun(workers: Executor, task: Callable[[], T]) -> Callable[[], T]:
+    """Hand out a task; what is returned waits for its result, and does it where workers died."""
+    try:
+        begun = workers.submit(task)
+    except BrokenExecutor:
+        return task
+
+    def result() -> T:
+        try:
+            return begun.result()
+        except BrokenExecutor:
+            return task()
+
+    return result
 
 
 @contextlib.contextmanager
@@ -101,6 +124,8 @@ def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
             stack.enter_context(dask.config.set(_QUICK_WORKERS))
             sizes = {"n_workers": int(count), "threads_per_worker": 1, "dashboard_address": None}
             place = stack.enter_context(LocalCluster(**sizes))  # type: ignore[no-untyped-call]
+        # Closing a client that tries to connect again has it log this with its traceback.
+        stack.enter_context(_quiet("distributed.utils", "distributed.client"))
         # Results come from the workers themselves where these can be reached, not by the scheduler.
         direct = True if place is not address else None
         try:
@@ -114,7 +139,6 @@ def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
             raise fail(MapfilterError, "cluster", expected, address, hint) from error
         workers = sum(client.nthreads().values())
         _check_hosts(client)
-        stack.enter_context(_quiet("distributed.utils", "distributed.client"))
         try:
             yield _ClusterExecutor(client, place), max(workers, 1)
         except KilledWorker as error:

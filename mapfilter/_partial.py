@@ -12,6 +12,7 @@ import hashlib
 import os
 import platform
 import re
+import shutil
 import tempfile
 import time
 import uuid
@@ -19,8 +20,11 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from mapfilter._replace import ASIDE
+
 ABANDONED_S = 7 * 86400.0
 """So long after its last change, the folder of a process of another host is taken for left."""
+_LOOK_S = 0.02
 _NAME = re.compile(r"(?:(?P<host>h[0-9a-f]{8})-)?(?P<pid>[0-9]{1,20})-[^-]{0,64}")
 
 
@@ -47,6 +51,20 @@ def is_left(partial: Path) -> bool:
     if found["host"] in (None, _host()):
         return not _is_alive(found["pid"])
     return time.time() - _changed_s(partial) > ABANDONED_S
+
+
+def remove_left(folder: Path, wait_s: float) -> None:
+    """Remove what processes left half-written in a folder and in those in it.
+
+    Each process that still lives is waited for, as long as ``wait_s``. An older result that was set
+    aside stays for the next write, which puts it back.
+    """
+    for partial in sorted(folder.rglob(".*.partial-*")):
+        until_s = time.monotonic() + wait_s
+        while not is_left(partial) and time.monotonic() < until_s:
+            time.sleep(_LOOK_S)
+        if is_left(partial) and not (partial / ASIDE).exists():
+            shutil.rmtree(partial, ignore_errors=True)
 
 
 def _prefix(path: Path) -> str:

@@ -1,7 +1,8 @@
 """Exchanging folders, and removing of the older one no more than what was there at the beginning.
 
 While a result is written, which may take hours, somebody may put a file into the folder that it is
-going to replace, or change one there. Such files are kept beside it, in ``NAME.kept``.
+going to replace, or change one there. Such files are kept beside it, in ``NAME.kept``, unless the
+new result holds the same bytes under their names, as after two equal commands at once.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import errno
+import filecmp
 import itertools
 import json
 import os
@@ -50,7 +52,8 @@ def discard(partial: Path, target: Path) -> None:
         # Where nothing was there at first, whatever was replaced came meanwhile.
         if found == new or inode not in (None, found):
             continue
-        others = [path for path, stamp in _files(old).items() if files.get(path) != stamp]
+        changed = (path for path, stamp in _files(old).items() if files.get(path) != stamp)
+        others = [path for path in changed if not _same(old / path, target / path)]
         if others:
             try:
                 _keep(old, others, target)
@@ -89,6 +92,16 @@ def _files(folder: Path) -> dict[str, list[int]]:
                 name = path.relative_to(folder).as_posix()
                 found[name] = [stat.st_ino, stat.st_size, stat.st_mtime_ns]
     return found
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Return whether two regular files hold the same bytes."""
+    if one.is_symlink() or other.is_symlink() or not (one.is_file() and other.is_file()):
+        return False
+    try:
+        return filecmp.cmp(one, other, shallow=False)
+    except OSError:
+        return False
 
 
 def _keep(old: Path, paths: list[str], target: Path) -> None:

@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._memory import search_cycles_rarely
+
 # Just under the size from which on glibc adapts no more.
 LARGE_BLOCK_BYTES = 31 << 20
 
@@ -78,6 +80,7 @@ class _Context(SpawnContext):
 
 
 def _start_worker(parent: int, watched: Connection) -> None:
+    search_cycles_rarely()
     # The main process ends its workers on Ctrl-C.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
+from mapfilter._inputs import named_file, shown
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 
@@ -94,6 +95,26 @@ def grid_convergence_rad(crs: str, lon_deg: float, lat_deg: float) -> float:
     return float(np.radians(convergence_deg))
 
 
+def known_crs(spec: Any, where: str = "crs") -> CRS:
+    """Return a CRS that names no files, which PROJ would open wherever they are.
+
+    Raises
+    ------
+    InputError
+        It names one, such as a grid with its folder.
+    pyproj.exceptions.CRSError, TypeError, ValueError
+        It is none.
+    """
+    found = named_file(spec) if isinstance(spec, str) else ""
+    if not found:
+        crs = CRS.from_user_input(spec)
+        found = named_file(crs.to_wkt())
+        if not found:
+            return crs
+    hint = "leave the file out, or install the grid where PROJ finds it by its name"
+    raise fail(InputError, where, "a CRS without files", shown(found), hint)
+
+
 def projected_crs(spec: Any, where: str = "crs") -> str:
     """Return the canonical text of a projected CRS in metres ("EPSG:32629", else WKT).
 
@@ -105,7 +126,7 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     if spec is None or spec == "":
         raise fail(InputError, where, "a projected CRS in metres", "none", "CRS left out on export")
     try:
-        crs = CRS.from_user_input(spec)
+        crs = known_crs(spec, where)
     except (CRSError, TypeError, ValueError) as error:
         raise fail(InputError, where, "a CRS such as EPSG:32629", repr(spec)) from error
     if crs.is_geographic:

@@ -26,6 +26,9 @@ if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1":
         "positioning/simulated_device.py",
     ]  # fmt: skip
 
+# Several have this name: as modules with doctests they could not be imported beside each other.
+collect_ignore_glob = ["*/conftest.py"]
+
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 

@@ -41,7 +41,7 @@ from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.tracks.store import write_log
 from mapfilter.workflows.learn import run_learn
 from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world

@@ -23,7 +23,7 @@ from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
 from mapfilter.radio.cells import read_cell_plan
 from mapfilter.radio.msi import read_msi
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.layers import read_layer_roads
 from mapfilter.roads.osm import read_ways

@@ -95,7 +95,7 @@ class Track:
         return self.estimate.to_geodataframe()
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the track over the streets of the database, with its 95 % radii.
+        """Draw the track and the ground truth over the streets of the database.
 
         Parameters
         ----------

@@ -11,7 +11,8 @@ import typer
 from typer.main import get_command
 
 from mapfilter._io import VERSION
-from mapfilter._memory import keep_freed_memory
+from mapfilter._kernel_cache import keep_kernels
+from mapfilter._memory import keep_freed_memory, search_cycles_rarely
 from mapfilter.cli.chain import (
     bound,
     build,
@@ -95,5 +96,12 @@ def main() -> None:
     # when NumPy is loaded, would take several times as long, most of it waiting for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     keep_freed_memory()
+    search_cycles_rarely()
     # The command itself, because a Typer app puts its own hook for exceptions in place.
-    sys.exit(guarded(get_command(app)))
+    sys.exit(guarded(_run))
+
+
+def _run() -> int | None:
+    keep_kernels()
+    code: int | None = get_command(app)()
+    return code

@@ -13,6 +13,7 @@ from mapfilter.cli.options import (
     ClusterOption,
     ConfigOption,
     DatabaseArgument,
+    DeclinationOption,
     DryRunOption,
     FilterOption,
     JsonOption,
@@ -21,12 +22,14 @@ from mapfilter.cli.options import (
     ResumeOption,
     SeedOption,
     SetOption,
+    StepLengthOption,
     WorkersOption,
     check_custom_filter,
     given_path,
     refuse,
     seeded,
     toml,
+    walk_changes,
 )
 from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.schema import Without
@@ -325,6 +328,8 @@ def replay(
             "--course-motion", help="Make motion from speed and course of GNSS, else its positions."
         ),
     ] = False,
+    declination: DeclinationOption = None,
+    step_length: StepLengthOption = None,
     filter_name: FilterOption = None,
     without: Annotated[
         str | None,
@@ -373,6 +378,8 @@ def replay(
             given.append(f"{key}={toml([str(file) for file in files])}")
     if course_motion:
         given.append("track.course_motion=true")
+    walk = walk_changes(declination, step_length)
+    given += [f"track.walk.{name}={value!r}" for name, value in walk.items()]
     if filter_name is not None:
         given.append(f"filter.name={toml(filter_name)}")
     if without is not None:
@@ -382,6 +389,8 @@ def replay(
     if protection is not None:
         given.append(f"integrity.risk={protection!r}")
     loaded = load_config(config, given)
+    if walk and not loaded.track.steps:
+        refuse({"--declination": declination, "--step-length": step_length}, "track.steps = false")
     check_custom_filter(loaded)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:

@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from mapfilter.cli.options import JsonOption, given_path, numbers
-from mapfilter.errors import ConfigError, Faults, fail
+from mapfilter.cli.options import (
+    DeclinationOption,
+    JsonOption,
+    StepLengthOption,
+    given_path,
+    numbers,
+    refuse,
+    walk_changes,
+)
+from mapfilter.errors import ConfigError, fail
 from mapfilter.workflows.terminal import print_result, print_text
 
 if TYPE_CHECKING:
@@ -66,17 +74,11 @@ def convert(
         bool, typer.Option("--no-steps", help="Make no motion from the sensors of a phone.")
     ] = False,
     pose: Annotated[
-        Literal["auto", "device", "any"],
+        Literal["auto", "device", "any"] | None,
         typer.Option("--pose", help="Walking direction: the phone's axis, by the steps, or auto."),
-    ] = "auto",
-    declination: Annotated[
-        float | None,
-        typer.Option("--declination", metavar="DEG", help="Magnetic declination, east positive."),
     ] = None,
-    step_length: Annotated[
-        float | None,
-        typer.Option("--step-length", metavar="M", help="Length of a step that is only counted."),
-    ] = None,
+    declination: DeclinationOption = None,
+    step_length: StepLengthOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Convert recordings of other programs to a track log."""
@@ -87,8 +89,13 @@ def convert(
     given = [given_path(path) or path for path in files]
     true = [given_path(path) or path for path in truth or ()]
     place = numbers(origin, 2, "--origin")
-    if no_steps and step_length is not None:
-        raise fail(ConfigError, "--step-length", "no --no-steps beside it", "both")
+    if no_steps:
+        given_beside = {
+            "--pose": pose,
+            "--declination": declination,
+            "--step-length": step_length,
+        }
+        refuse(given_beside, "--no-steps")
     if place is not None and not (abs(place[0]) <= 90 and abs(place[1]) <= 180):
         raise fail(ConfigError, "--origin", "a latitude and a longitude in degrees", repr(origin))
     options = OpenOptions(
@@ -112,21 +119,14 @@ def convert(
 
 
 def _walk(
-    pose: Literal["auto", "device", "any"],
+    pose: Literal["auto", "device", "any"] | None,
     declination_deg: float | None,
     step_m: float | None,
 ) -> WalkOptions:
     from mapfilter.tracks.pdr.options import WalkOptions
 
-    faults = Faults()
-    if declination_deg is not None and not abs(declination_deg) <= 180:
-        faults.add("--declination", "degrees in -180..180", declination_deg)
-    if step_m is not None and not 0 < step_m < 3:
-        hint = "centimetres" if step_m >= 3 else ""
-        faults.add("--step-length", "metres above 0 and below 3", step_m, hint)
-    faults.raise_if_any(ConfigError)
-    options = WalkOptions(pose=pose, declination_deg=declination_deg)
-    return options if step_m is None else replace(options, step_m=step_m)
+    options = replace(WalkOptions(), **walk_changes(declination_deg, step_m))
+    return options if pose is None else replace(options, pose=pose)
 
 
 def _offsets(pairs: dict[str, str], files: list[Path]) -> dict[Path, float]:

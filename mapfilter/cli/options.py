@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -56,6 +56,14 @@ FilterOption = Annotated[
         help=f"{', '.join(BUILT_IN)}, or a custom filter, package.module:Name. Default: {DEFAULT}.",
     ),
 ]
+DeclinationOption = Annotated[
+    float | None,
+    typer.Option("--declination", metavar="DEG", help="Magnetic declination, east positive."),
+]
+StepLengthOption = Annotated[
+    float | None,
+    typer.Option("--step-length", metavar="M", help="Length of a step that is only counted."),
+]
 BoxOption = Annotated[
     str | None,
     typer.Option("--bbox", metavar="W,S,E,N", help="Part of the map, in degrees; else all of it."),
@@ -90,6 +98,25 @@ def numbers(text: str | None, count: int, where: str) -> list[float] | None:
     if len(found) != count:
         raise fail(ConfigError, where, f"{count} numbers with commas between them", repr(text))
     return found
+
+
+def walk_changes(declination_deg: float | None, step_m: float | None) -> dict[str, Any]:
+    """Return what ``--declination`` and ``--step-length`` set of the options of a walk.
+
+    Raises
+    ------
+    ConfigError
+        One of them is out of range.
+    """
+    faults = Faults()
+    if declination_deg is not None and not abs(declination_deg) <= 180:
+        faults.add("--declination", "degrees in -180..180", declination_deg)
+    if step_m is not None and not 0 < step_m < 3:
+        hint = "centimetres" if step_m >= 3 else ""
+        faults.add("--step-length", "metres above 0 and below 3", step_m, hint)
+    faults.raise_if_any(ConfigError)
+    given = {"declination_deg": declination_deg, "step_m": step_m}
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def check_custom_filter(config: Config) -> None:

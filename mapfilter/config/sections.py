@@ -34,8 +34,8 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.readers.csv_fields import FIELDS as RECORDED_FIELDS
 from mapfilter.tracks.readers.formats import FORMATS
-from mapfilter.tracks.readers.plain_csv import FIELDS as RECORDED_FIELDS
 from mapfilter.tracks.schema import Without
 
 

@@ -30,7 +30,6 @@ from mapfilter.errors import Fault, Faults, StoreError, fail
 _LARGEST_BYTES = 1 << 30
 FORMAT = "mapfilter radio-route database"
 VERSION = 2
-VERSION = 2
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
 READINGS = "readings.parquet"

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pyproj import CRS
 
+from mapfilter._inputs import json_value
 from mapfilter._types import Floats
 from mapfilter.database.checked import HeldPart, Part
 from mapfilter.errors import MapfilterError, StoreError, fail
@@ -109,7 +110,7 @@ def check_extent(source: Source, lattice: Lattice) -> None:
         names = {found.schema.column(i).name: i for i in range(found.num_columns)}
         groups = [found.row_group(i) for i in range(found.num_row_groups)]
         ends = np.array([[_ends(one, names[axis]) for axis in ("row", "col")] for one in groups])
-        column = json.loads(found.metadata[b"geo"])["columns"]["geometry"]
+        column = json_value(found.metadata[b"geo"])["columns"]["geometry"]
         crs, box = CRS.from_json_dict(column["crs"]).to_wkt(), np.array(column["bbox"], float)
         (top, left), (bottom, right) = ends[:, :, 0].min(axis=0), ends[:, :, 1].max(axis=0)
     if not same_crs(crs, lattice.crs):

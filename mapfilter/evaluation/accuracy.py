@@ -8,15 +8,18 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from math import ceil, inf, nan
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import TrackEstimate
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SUCCESS_RADIUS_M = 50.0
 """An error of at most this at the switch counts as success (section 6.2)."""

@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numba import njit
-from scipy.spatial import cKDTree
 
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Floats32
@@ -134,6 +133,8 @@ class MapBound:
 
         What is only known at the starts is taken from the nearest one.
         """
+        from scipy.spatial import cKDTree
+
         fix, most_m = self.fix, self.options.most_m
         place = np.column_stack([self.radio.row, self.radio.col])
         nearest = cKDTree(place[fix.start]).query(place)[1]

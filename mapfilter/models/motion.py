@@ -13,7 +13,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import block_diag
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
@@ -147,6 +146,8 @@ def constant_velocity(
     [[4.0, 4.0], [4.0, 4.0]]
     """
     t = _positive("interval_s", interval_s)
+    from scipy.linalg import block_diag
+
     sigma = np.broadcast_to(np.asarray(sigma_mps2, dtype=np.float64), (dimensions,))
     if not (np.isfinite(sigma) & (sigma >= 0)).all():
         raise fail(InputError, "sigma_mps2", "m/s² >= 0", sigma)
@@ -195,6 +196,8 @@ def clock_motion(
 
 def together(parts: Sequence[LinearMotion]) -> LinearMotion:
     """Return the motion of several independent parts of a state, one after the other."""
+    from scipy.linalg import block_diag
+
     if not parts:
         raise fail(InputError, "motion", "at least one part", "none")
     return LinearMotion(

@@ -8,7 +8,6 @@ from math import nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
@@ -17,6 +16,7 @@ from mapfilter.positioning.integrity import DEFAULT_RISK, RadialTail
 
 if TYPE_CHECKING:
     import geopandas as gpd
+    import pandas as pd
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,6 +272,9 @@ class TrackEstimate:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each epoch, as in the Parquet file of a replay."""
+        # A process that draws does without.
+        import pandas as pd
+
         columns: dict[str, Any] = {
             "time_s": self.time_s,
             "east_m": self.east_m,

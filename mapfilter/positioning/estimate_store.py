@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import shapely
 from pyarrow.lib import ArrowException
 
-from mapfilter._inputs import open_input
+from mapfilter._inputs import json_value, open_input
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.filters.contract import Reason, Status
@@ -80,7 +80,7 @@ def read_estimate(path: str | Path) -> TrackEstimate:
     if _META not in (table.schema.metadata or {}):
         raise fail(StoreError, str(path), "an estimate", "Parquet that mapfilter did not write")
     try:
-        return _estimate(table, json.loads(table.schema.metadata[_META]), path)
+        return _estimate(table, json_value(table.schema.metadata[_META]), path)
     except (ArrowException, InputError, KeyError, TypeError, ValueError) as error:
         raise fail(StoreError, str(path), "an estimate", repr(error), "damaged") from error
 

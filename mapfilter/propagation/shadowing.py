@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import fft
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError, fail
@@ -63,6 +62,8 @@ def correlated_field(
         got = f"{correlation_m:g} m, {lattice.rows} x {lattice.cols} pixels"
         hint = "a correlation length in the wrong unit, or too fine a resolution"
         raise fail(InputError, "shadowing, correlation_m", expected, got, hint)
+    from scipy import fft
+
     shape = tuple(fft.next_fast_len(n + pad, real=True) for n in (lattice.rows, lattice.cols))
     amplitude = _spectral_amplitude(shape, length_px)
     field = fft.irfft2(amplitude * fft.rfft2(rng.standard_normal(shape)), s=shape)
@@ -131,6 +132,8 @@ def named_rng(seed: int, *names: str) -> np.random.Generator:
 
 def _spectral_amplitude(shape: tuple[int, ...], length_px: float) -> Floats:
     """Return the square root of the torus covariance's eigenvalues, for a unit variance."""
+    from scipy import fft
+
     rows, cols = (np.minimum(np.arange(n), n - np.arange(n)) for n in shape)
     covariance = np.exp(-np.hypot(rows[:, None], cols[None, :]) / length_px)
     eigenvalues = fft.fft2(covariance).real

@@ -13,14 +13,15 @@ from typing import Any
 
 from python_calamine import CalamineError, CalamineWorkbook
 
-from mapfilter._inputs import read_input
+from mapfilter._inputs import read_input, wide_encoding
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
 
 _LARGEST_BYTES = 1 << 26
 _LARGEST_UNPACKED_BYTES = 1 << 29
 _MOST_FIELDS = 5_000_000
+_MOST_COLUMNS = 1000
 _SEPARATORS = (",", ";", "\t")
-_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+_WIDE_SHARE = 0.4
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx and .ods, and of .xls."""
 
@@ -74,8 +75,8 @@ def number(text: str, *, decimal_comma: bool = False) -> float | None:
 def read_table(path: Path, what: str) -> Table:
     """Read a table whose first line names its columns.
 
-    Text has commas, semicolons or tabs, and is UTF-8, UTF-16 with a byte order mark, or else
-    Windows-1252 (with a note). Of a workbook (.xlsx, .xls, .ods) the first sheet is read.
+    Text has commas, semicolons or tabs, and is UTF-8, UTF-16 or UTF-32 with a byte order mark, or
+    else Windows-1252 (with a note). Of a workbook (.xlsx, .xls, .ods) the first sheet is read.
 
     Parameters
     ----------
@@ -108,6 +109,9 @@ def read_table(path: Path, what: str) -> Table:
     if not lines:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "an empty file")
     header = tuple(name.strip() for name in lines[0][1])
+    if len(header) > _MOST_COLUMNS:
+        expected = f"{what} of at most {_MOST_COLUMNS} columns"
+        raise fail(InputError, f"{path}, header", expected, len(header), "another file")
     return Table(path, separator, header, tuple(lines[1:]), notes)
 
 
@@ -119,18 +123,22 @@ def _too_large(path: Path, what: str, lines: int) -> MapfilterError:
 def _decoded(path: Path, data: bytes) -> tuple[str, tuple[str, ...]]:
     """Return a file's text, and a note where its encoding was assumed."""
     notes: tuple[str, ...] = ()
-    encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "utf-8")
+    wide = wide_encoding(data)
     try:
-        text = data.decode(encoding)
+        text = data.decode(wide or "utf-8-sig")
     except UnicodeDecodeError as error:
-        expected, got = "text in UTF-8, UTF-16 or Windows-1252", f"other bytes at {error.start}"
-        if encoding == "utf-16":
+        expected = "text in UTF-8, UTF-16, UTF-32 or Windows-1252"
+        got = f"other bytes at {error.start}"
+        if wide:
             raise fail(InputError, str(path), expected, got, "cut off, or no text file") from error
         try:
             text = data.decode("cp1252")
         except UnicodeDecodeError:
             raise fail(InputError, str(path), expected, got, "no text file") from error
         notes = (f"{path.name}: no UTF-8 (byte {error.start}); read as Windows-1252",)
+    if text.count("\0") > _WIDE_SHARE * len(text):
+        got, hint = "UTF-16 text without a byte order mark", "saved as Unicode; save as UTF-8"
+        raise fail(InputError, str(path), "text in UTF-8", got, hint)
     if "\0" in text:
         raise fail(InputError, str(path), "text in UTF-8", "NUL characters", "no text file")
     return text, notes

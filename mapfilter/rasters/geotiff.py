@@ -203,7 +203,7 @@ class GeoTiff(RasterFile):
     def read(self, bands: Sequence[int], window: Window) -> Floats32:
         """Read bands in a window; see :meth:`RasterFile.read`."""
         row, col, rows, cols = window
-        numbers = [band + 1 for band in bands]
+        bands, numbers = list(bands), [band + 1 for band in bands]
         try:
             with open_raster(self.path, quiet=False) as source:
                 values = _masked(source, numbers, RasterioWindow(col, row, cols, rows))

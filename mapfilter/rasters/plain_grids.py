@@ -22,13 +22,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from mapfilter._inputs import read_input
 from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, projected_crs, same_crs
+from mapfilter.geodesy import Lattice, known_crs, projected_crs, same_crs
 from mapfilter.radio.tables import number
 from mapfilter.rasters.files import RasterFile, Window, without_nodata
 
@@ -160,7 +159,7 @@ def grid_crs(path: Path, declared: str | None) -> str:
         return declared
     try:
         text = read_input(found, _LARGEST_HEADER_BYTES, "a CRS").decode("utf-8-sig").strip()
-        stated = CRS.from_user_input(text)
+        stated = known_crs(text, str(found))
     except (CRSError, UnicodeDecodeError, OSError, ValueError) as error:
         if declared is not None:
             return declared

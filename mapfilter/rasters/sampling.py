@@ -62,7 +62,7 @@ def levels_at(places: Sequence[Places]) -> list[Floats32]:
     InputError
         As :meth:`mapfilter.rasters.raster_set.RxLevRasters.read_levels_dbm`.
     """
-    found = [np.empty((len(one.cells), one.row.size), dtype=np.float32) for one in places]
+    found = [np.full((len(one.cells), one.row.size), np.nan, np.float32) for one in places]
     of_file: dict[Path, tuple[RasterFile, list[int]]] = {}
     for number, one in enumerate(places):
         if one.row.size and one.cells:
@@ -117,7 +117,7 @@ def _read(
         check_plausible(inside, rasters.quantity, file.path)
         wanted = [n for n, cell in enumerate(ids) if cell in rows[number]]
         taken = [ids[n] for n in wanted]
-        at_points = inside[np.array(wanted)[:, None], one.row, one.col]
+        at_points = inside[np.array(wanted, np.intp)[:, None], one.row, one.col]
         found[number][[rows[number][cell] for cell in taken]] = rasters.levels_dbm(
             at_points, one.plan, taken
         )

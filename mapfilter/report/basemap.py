@@ -6,7 +6,7 @@ Maps are drawn in metres or kilometres east and north of their south-western cor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import floor, log10
 from typing import Any
 
@@ -20,11 +20,11 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults
 from mapfilter.geodesy import Lattice
 from mapfilter.report.canvas import BLACK, GREY, STREET, Look, figure_of, new_figure
-
-Bounds = tuple[float, float, float, float]
+from mapfilter.report.ground import BaseMap as BaseMap
+from mapfilter.report.ground import Bounds as Bounds
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
 """White rim that keeps text and marks readable on any ground."""
@@ -41,43 +41,6 @@ MAP_IN = 7.0
 _KILOMETRE_FROM_M = 1500.0
 _MOST_PX = 2400
 _ROW_IN, _HEADING_IN = 0.205, 0.55
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BaseMap:
-    """What lies under the data of a map picture; all in metres of one projected CRS.
-
-    Raises
-    ------
-    InputError
-        The extent is not finite or is empty.
-    """
-
-    bounds_m: Bounds
-    """West, south, east, north; the south-western corner is the local origin of the axes."""
-    streets: tuple[Floats, ...] = ()
-    """Lines, arrays (k, 2), as east, north."""
-    points_m: Floats | None = None
-    """Points of the map, (n, 2), as east, north, on a lattice; drawn as pale pixels."""
-    attribution: str = ""
-    """Owner of the map, such as "© OpenStreetMap contributors"; drawn small in a corner."""
-    resolution_m: float = 5.0
-    """Distance between neighbouring points."""
-
-    def __post_init__(self) -> None:
-        west, south, east, north = self.bounds_m
-        faults = Faults()
-        if not np.isfinite(self.bounds_m).all():
-            faults.add("map extent", "four finite numbers", self.bounds_m)
-        elif west >= east or south >= north:
-            faults.add("map extent", "west < east and south < north", self.bounds_m)
-        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0):
-            faults.add("map resolution", "metres > 0", self.resolution_m)
-        faults.raise_if_any(InputError)
-
-    def zoomed(self, bounds_m: Bounds) -> BaseMap:
-        """Return the same map with another extent (and so another local origin)."""
-        return replace(self, bounds_m=bounds_m)
 
 
 @dataclass(frozen=True, slots=True)

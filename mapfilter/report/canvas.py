@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -136,9 +137,22 @@ def save(drawn: Drawn, path: Path) -> Path:
     if kind not in _METADATA:
         raise fail(OutputError, str(path), "a name that ends in .png, .svg or .pdf", path.name)
     figure = drawn if isinstance(drawn, Figure) else figure_of(drawn)
-    with atomic_file(path) as temporary, _laid_out(figure):
-        figure.savefig(temporary, format=kind, dpi=DPI, metadata=_METADATA[kind], **_WRITER[kind])
+    with atomic_file(path) as temporary:
+        _write(figure, temporary, kind)
     return path
+
+
+@styled
+def png_of(drawn: Drawn) -> bytes:
+    """Return the bytes of the PNG that :func:`save` would write."""
+    stream = BytesIO()
+    _write(drawn if isinstance(drawn, Figure) else figure_of(drawn), stream, "png")
+    return stream.getvalue()
+
+
+def _write(figure: Figure, target: Path | BytesIO, kind: str) -> None:
+    with _laid_out(figure):
+        figure.savefig(target, format=kind, dpi=DPI, metadata=_METADATA[kind], **_WRITER[kind])
 
 
 @contextmanager

@@ -37,8 +37,7 @@ from mapfilter.report.canvas import (
     new_figure,
     styled,
 )
-
-MAX_PANELS = 6
+from mapfilter.report.ground import MAX_PANELS as MAX_PANELS
 
 _PANEL_IN = 4.0
 _SIDE_M, _MOST_SQUARES = 10.0, 200

@@ -21,9 +21,11 @@ from mapfilter.report.canvas import (
     BLUE,
     GREEN,
     ORANGE,
+    SKY,
     VERMILLION,
     Look,
     legend,
+    mark,
     new_figure,
     styled,
 )
@@ -32,6 +34,7 @@ _MAP_IN = 8.0
 _MARGIN_SHARE = 0.08
 _LEAST_MARGIN_M = 40.0
 _TRUTH = "#868686"
+_CLAIMED = (Status.CONVERGED, Status.TRACKING)
 
 
 @styled
@@ -46,9 +49,10 @@ def plot_track(
 ) -> Axes:
     """Draw truth and estimate over the streets, and where the filter switched to tracking.
 
-    Estimates more than 50 m off are drawn in another colour and shape, epochs without a position
-    are not drawn. Without a title it is the filter's name and the outcome of the track; ``zoom``
-    shows only the surroundings of truth and estimate, not the whole area.
+    Tracked estimates more than 50 m off are drawn in another colour and shape; those while the
+    filter searched or was lost are no claims, and small and pale whatever their error. Epochs
+    without a position are not drawn. Without a title it is the filter's name and the outcome of the
+    track; ``zoom`` shows only the surroundings of truth and estimate, not the whole area.
     """
     if truth is not None and not truth.time_s.size:
         truth = None
@@ -69,13 +73,19 @@ def plot_track(
         name.set(ha="center", fontsize=9, path_effects=HALO, zorder=3.5)
         axes.scatter(x[:1], y[:1], s=50, color="white", edgecolors=BLACK, zorder=11)
         off = position_errors_m(estimate, truth) > SUCCESS_RADIUS_M
-    near = located & ~off
-    groups = ((near, BLUE, "o", "estimate"), (located & off, ORANGE, "v", "more than 50 m off"))
-    for which, colour, marker, label in groups:
+    claimed = np.array([status in _CLAIMED for status in estimate.status], dtype=bool)
+    tracked = located & claimed
+    groups = (
+        (tracked & ~off, Look(marker="o", color=BLUE, s=9.0, zorder=6), "estimate"),
+        (located & ~claimed, Look(marker="o", color=SKY, s=3.5, zorder=5), _unclaimed(estimate)),
+        (tracked & off, Look(marker="v", color=ORANGE, s=9.0, zorder=7), "more than 50 m off"),
+    )
+    for which, look, label in groups:
         if which.any():
             at = frame(estimate.east_m[which], estimate.north_m[which])
-            look = Look(s=9, marker=marker, color=colour, linewidths=0)
-            axes.scatter(*at, zorder=6, label=label, **look)
+            axes.scatter(*at, linewidths=0, **look)
+            # Marks as small as on the map would not show their colour in the legend.
+            axes.add_line(mark(label, look["marker"], 2 * look["s"] ** 0.5, color=look["color"]))
     switch = estimate.converged_at
     if switch is not None and located[switch]:
         x, y = frame(estimate.east_m[[switch]], estimate.north_m[[switch]])
@@ -89,8 +99,13 @@ def plot_track(
             axes.scatter(true_x, true_y, s=70, marker="D", label="truth at the switch", **rim)
     axes.set_title(title or f"{estimate.filter} filter: {_outcome(estimate, truth)}")
     attribute(axes, shown)
-    legend(axes, ax, 5)
+    legend(axes, ax, 3)
     return axes
+
+
+def _unclaimed(estimate: TrackEstimate) -> str:
+    """Return what estimates that are not tracked are called in the legend."""
+    return "while searching" + (" or lost" if Status.LOST in estimate.status else "")
 
 
 def _outcome(estimate: TrackEstimate, truth: Truth | None) -> str:

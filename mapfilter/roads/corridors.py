@@ -11,16 +11,18 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.roads.corridor_net import grown_lines
 from mapfilter.roads.ways import Ways
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 _CLASS = "corridor"
 CORRIDOR_HALF_WIDTH_M = 15.0
@@ -109,6 +111,8 @@ def corridors(
     >>> len(found.ways), found.sessions.tolist(), shapely.length(found.ways.geometry).tolist()
     (1, [2], [95.0])
     """
+    from scipy.spatial import cKDTree
+
     lengths_m = {"max_accuracy_m": max_accuracy_m, "max_gap_m": max_gap_m}
     _check(sessions, min_sessions, half_width_m=half_width_m, **lengths_m)
     step_m = half_width_m / 2

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter.errors import InputError, fail
@@ -55,6 +53,8 @@ class StreetNetwork:
 
         Entry (i, j) exists where i to j is allowed; of parallel edges the shortest counts.
         """
+        from scipy.sparse import csr_array
+
         forth, back = self.oneway >= 0, self.oneway <= 0
         start = np.concatenate([self.node_a[forth], self.node_b[back]])
         end = np.concatenate([self.node_b[forth], self.node_a[back]])
@@ -90,6 +90,9 @@ def street_network(ways: Ways, allowed: RouteLattice | None = None) -> StreetNet
     InputError
         No edge is left.
     """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
     corner, origin = shapely.get_coordinates(ways.geometry, return_index=True)
     # Shared vertices are equal up to the rounding of the projection.
     _, node = np.unique(np.round(corner, 3), axis=0, return_inverse=True)

@@ -26,6 +26,7 @@ from mapfilter._inputs import open_input
 from mapfilter._ogr import PARQUET, VectorSource, sealed_gdal, vector_source
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.geodesy import known_crs
 from mapfilter.roads.maps import box_deg, boxes_overlap
 from mapfilter.roads.ways import Bounds, Geometries, on_earth
 
@@ -119,6 +120,7 @@ def read_layer(
         source_crs, covered = about["crs"], about["total_bounds"]
     if source_crs is None:
         raise fail(InputError, f"{name}, crs", "a layer with a CRS", "none", hint)
+    _guarded(name, lambda: known_crs(source_crs, f"{name}, crs"))
     box = _box(name, crs, bounds_m, source_crs)
     if frame is None:
         settings: dict[str, Any] = {"columns": columns, "bbox": box, **place.options}

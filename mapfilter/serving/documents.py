@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
-from mapfilter._inputs import is_unicode, shown
+from mapfilter._inputs import is_unicode, json_value, shown
 from mapfilter.errors import Fault, Faults, InputError, fail
 
 BODY = "body"
@@ -79,9 +78,7 @@ def read_object(data: bytes) -> dict[str, Any]:
     if not data.strip():
         return {}
     try:
-        value = json.loads(
-            data.decode("utf-8"), object_pairs_hook=_without_repeats, parse_constant=_refuse
-        )
+        value = json_value(data, _refuse)
     except RecursionError:
         raise RequestError(400, "parseError", f"{BODY}: nested too deeply") from None
     except ValueError as error:
@@ -93,15 +90,6 @@ def read_object(data: bytes) -> dict[str, Any]:
         text = f"{BODY}: expected a JSON object, found {type_name(value)}"
         raise RequestError(400, "parseError", text)
     return value
-
-
-def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"the key {shown(twice)} twice in one object")
-    return found
 
 
 def _refuse(name: str) -> None:

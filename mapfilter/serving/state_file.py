@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._inputs import read_input
+from mapfilter._inputs import json_value, read_input
 from mapfilter._io import atomic_file, check_version
 from mapfilter.errors import StoreError, fail
 from mapfilter.filters.contract import Reason, Status
@@ -42,7 +42,7 @@ from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.integrity import SampleTail
 
-FORMAT, VERSION = "mapfilter session", 3
+FORMAT, VERSION = "mapfilter session", 4
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -119,7 +119,7 @@ def decode(data: bytes, where: str) -> dict[str, Any]:
     line, _, rest = data[: _LARGEST_LINE + 1].partition(b"\n")
     rest = data[len(line) + 1 :]
     try:
-        head = json.loads(line)
+        head = json_value(line)
         known = head["format"] == FORMAT
         version, size, digest = head["version"], head["document_bytes"], head["sha256"]
     except (ValueError, TypeError, KeyError, RecursionError):
@@ -131,7 +131,7 @@ def decode(data: bytes, where: str) -> dict[str, Any]:
         expected, got = "bytes as they were written", "others, by their SHA-256"
         raise fail(StoreError, where, expected, got, "cut off or changed")
     try:
-        value = _Reader(rest[size:]).value(json.loads(rest[:size]))
+        value = _Reader(rest[size:]).value(json_value(rest[:size]))
         if not isinstance(value, dict):
             raise TypeError(type(value).__name__)
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError) as error:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.roads.network import StreetNetwork
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _STARTS = 50
 
@@ -127,6 +129,8 @@ def _leg(
     rng: np.random.Generator,
 ) -> list[int] | None:
     """Return the nodes after ``here`` on a shortest path to a random goal."""
+    from scipy.sparse.csgraph import dijkstra
+
     away_m = np.hypot(
         network.east_m - network.east_m[here], network.north_m - network.north_m[here]
     )
@@ -167,6 +171,8 @@ def _through(network: StreetNetwork) -> Bools:
 def _without_edge(graph: csr_array, start: int, end: int) -> csr_array:
     if end < 0:
         return graph
+    from scipy.sparse import csr_array
+
     lengths = graph.data.copy()
     first, last = graph.indptr[start], graph.indptr[start + 1]
     lengths[first:last][graph.indices[first:last] == end] = np.inf

@@ -5,8 +5,8 @@ nothing. It is fitted by generalised least squares, because neighbouring levels 
 normal priors, because a cell may have been received along one street only. Residuals are those of a
 Gaussian process, or of nearest neighbours.
 
-scikit-learn is imported where it is used: every command reads the options of a survey, few fit one,
-and the import takes a sixth of the start of a command.
+scikit-learn and SciPy are imported where they are used: every command reads the options of a
+survey, few fit one, and the imports take a fifth of the start of a command.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
-from scipy.optimize import minimize
 
 from mapfilter._types import Floats, Ints
 from mapfilter.survey.measured_points import Points
@@ -93,6 +91,8 @@ def fit_trend(
     covariate: Covariate | None, points: Points, covariance_db2: Floats, prior: Prior
 ) -> Trend:
     """Fit offset and slope of a covariate to levels with a covariance of errors (N, N)."""
+    from scipy.linalg import cholesky
+
     east_m, level_dbm = points.east_m, points.level_dbm
     values = np.zeros_like(east_m) if covariate is None else covariate(east_m, points.north_m)
     centre = float(values.mean())
@@ -109,6 +109,8 @@ def locate_antenna(points: Points, covariance_db2: Floats, prior: Prior) -> Dist
     The place with the largest marginal likelihood of the levels under the path-loss trend, offset
     and exponent integrated out, on a grid that is refined about the best point of each round.
     """
+    from scipy.linalg import cholesky
+
     east_m, north_m, level_dbm = points.east_m, points.north_m, points.level_dbm
     root = cholesky(covariance_db2, lower=True)
     centre = np.array([(east_m.min() + east_m.max()) / 2, (north_m.min() + north_m.max()) / 2])
@@ -133,6 +135,8 @@ def _profile(
     root: Floats, level_dbm: Floats, values: Floats, prior: Prior
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Fit many covariates at once, ``values`` (N, M): offset, slope, their covariance, cost (M)."""
+    from scipy.linalg import solve_triangular
+
     white = solve_triangular(
         root, np.column_stack([np.ones(len(values)), level_dbm - prior.offset_dbm]), lower=True
     )
@@ -205,6 +209,7 @@ def learn_shadowing(
     There are one of ``points`` and ``trends`` per cell, see :func:`most_telling`. ``start`` is also
     returned where there is none.
     """
+    from scipy.optimize import minimize
     from sklearn.gaussian_process import GaussianProcessRegressor
 
     processes = []

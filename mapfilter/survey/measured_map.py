@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
-from scipy.spatial import cKDTree
 from threadpoolctl import ThreadpoolController
 
 from mapfilter._types import Floats
@@ -38,6 +37,9 @@ from mapfilter.survey.cell_model import (
 )
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 _ROUNDS = 2
 _LOCATED_FROM = 300
@@ -183,6 +185,8 @@ def fit_survey(
             for cell_id, some in found.items()
             if cell_id in predicted
         }
+    from scipy.spatial import cKDTree
+
     points = [some for some in found.values() if len(some) >= options.min_points]
     if len(points) < len(found):
         few = len(found) - len(points)

@@ -15,7 +15,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
-from mapfilter._inputs import open_input
+from mapfilter._inputs import open_input, wide_encoding
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.tables import number
 from mapfilter.survey.measurement_rows import FIELDS, IDENTITY, REQUIRED, Rows
@@ -244,11 +244,11 @@ def _iso(time: str) -> str:
 def _open_text(path: Path) -> TextIO:
     """Open a file as text in which an invalid byte invalidates only its own row."""
     with open_input(path) as stream:
-        head = stream.read(2)
+        head = stream.read(4)
     if not head:
         raise fail(InputError, str(path), "measurements", "an empty file")
-    if head in (b"\xff\xfe", b"\xfe\xff"):
-        raise fail(InputError, str(path), "text in UTF-8", "UTF-16", "saved as Unicode by Excel")
-    if head == b"\x1f\x8b":
+    if wide := wide_encoding(head):
+        raise fail(InputError, str(path), "text in UTF-8", wide, "saved as Unicode by Excel")
+    if head.startswith(b"\x1f\x8b"):
         raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
     return io.TextIOWrapper(open_input(path), encoding="utf-8-sig", errors="replace")

@@ -1,4 +1,4 @@
-"""Headings of a log compared with the course of its positions: sense of rotation and reference."""
+"""Checks of headings: sense of rotation and reference by positions, and the unit of a compass."""
 
 from __future__ import annotations
 
@@ -6,12 +6,17 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
+from mapfilter.geodesy import wrap_rad
 
 _LEAST_M = 2.0
 _FEWEST = 20
 _CONSTANT = 0.9
 _LEAST_GAIN = 0.3
 _OFF_RAD = np.deg2rad(45.0)
+_WALKED_M = 100.0
+_TURNED = np.pi / 2
+_ROUNDED = 0.005
+_LASTING = 0.25
 
 
 def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
@@ -56,6 +61,44 @@ def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
         origin = "; counted from north?" if abs(off_deg - 90) <= 20 else ""
         return f"headings are {off_deg:.0f} degrees off the course of the positions{origin}"
     return ""
+
+
+def compass_fault(azimuth_deg: Floats, walked_m: float) -> str:
+    """Return what is wrong with the unit of azimuths; an empty text for nothing.
+
+    Radians read as degrees all lie within one turn, 0 to 2π or -π to π, however the walk turns: in
+    degrees that is a walk straight to the north, whose compass scatters by degrees from row to row.
+    Azimuths are taken for radians where they lie so over 100 m, differ by π/2 or more, and keep
+    their value from one row to the next. Whole numbers are degrees.
+
+    Parameters
+    ----------
+    azimuth_deg : (N,) array
+        Azimuths of rows with steps, a second or more apart; NaN where unknown.
+    walked_m : float
+        Length of the way.
+
+    Examples
+    --------
+    >>> way = np.repeat([0.1, 1.6, 3.2, 1.6], 40)
+    >>> compass_fault(way, 110.0)
+    'compass_deg: all azimuths lie within 0.1..3.2 over 110 m: radians for degrees?'
+    >>> compass_fault(np.degrees(way), 110.0)
+    ''
+    """
+    known = azimuth_deg[np.isfinite(azimuth_deg)]
+    if known.size < _FEWEST or walked_m < _WALKED_M:
+        return ""
+    low, high = float(known.min()), float(known.max())
+    begin = 0.0 if low >= -_ROUNDED else -np.pi
+    within = low >= begin - _ROUNDED and high <= begin + 2 * np.pi + _ROUNDED
+    if not within or high - low < _TURNED or (known == np.round(known)).all():
+        return ""
+    # The median is that of straight ways: corners do not count.
+    if np.median(np.abs(wrap_rad(np.diff(known)))) > _LASTING * np.std(known):
+        return ""
+    span = f"{low:.1f}..{high:.1f} over {walked_m:.0f} m"
+    return f"compass_deg: all azimuths lie within {span}: radians for degrees?"
 
 
 def _both(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:

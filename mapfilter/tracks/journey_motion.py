@@ -13,6 +13,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.frame import Frame
+from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import (
     by_compass,
@@ -21,7 +22,7 @@ from mapfilter.tracks.moved import (
     motion_from_poses,
 )
 from mapfilter.tracks.pdr.counted import reckon_counted
-from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.pdr.options import WalkOptions, without_effect
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.position_motion import motion_from_positions
@@ -29,6 +30,7 @@ from mapfilter.tracks.readers.recording import Recording
 
 _PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
 _LONGEST_GAP_S = 3600.0
+_OF_RECEIVER = "motion comes from GNSS"
 
 
 def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
@@ -47,12 +49,16 @@ def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A motion table, its errors, its rows' further columns, and whose it is, as far as known."""
+    """A motion table, its errors, its rows' further columns, and whose it is, as far as known.
+
+    ``source`` is, in notes, where motion comes from that is no walk by a phone's sensors.
+    """
 
     rows: pd.DataFrame | None = None
     imu: ImuNoise | None = None
     reckoning: pd.DataFrame | None = None
     vehicle: bool | None = None
+    source: str = ""
 
 
 def journey_motion(
@@ -90,33 +96,73 @@ def journey_motion(
         Odometry pauses for more than an hour, or there are no positions where motion is to come
         from them.
     """
+    moved = _recorded(recordings, frame, notes)
+    if moved is None and course_motion:
+        moved = _course([*recordings, *true], sensors, frame, notes)
+    if moved is not None:
+        notes += without_effect(walk, (), moved.source) if walk is not None else ()
+        return moved
+    return Moved() if walk is None else _walked(sensors, walk, frame, notes)
+
+
+def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -> Moved | None:
+    """Return motion that a recording holds as such, odometry or poses; None without any."""
     for name in ("motion", "odometry", "poses"):
         having = [r for r in recordings if name in r.tables]
         if not having:
             continue
         for other in having[1:]:
             notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
-        rows = having[0].tables[name]
+        rows, source = having[0].tables[name], f"motion is that of {having[0].path.name}"
         if name == "odometry":
             _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))
             moved, imu, words = reckon_odometry(rows)
             notes += words
-            return Moved(moved, imu, vehicle=True)
+            return Moved(moved, imu, vehicle=True, source=source)
         poses = name == "poses"
+        if "compass_deg" in rows and rows["compass_deg"].notna().any():
+            source += ", whose compass_deg counts from true north"
+            stepped = rows[rows["step_m"] > 0]
+            azimuth_deg = stepped["compass_deg"].to_numpy(dtype=np.float64)
+            fault = compass_fault(azimuth_deg, float(stepped["step_m"].sum()))
+            notes += [fault] if fault else []
         moved = motion_from_poses(rows) if poses else by_compass(rows, frame.convergence_rad)
-        return Moved(moved.assign(heading_rad=wrap_rad(moved["heading_rad"])))
-    if course_motion:
-        return _course([*recordings, *true], sensors, frame, notes)
-    if walk is not None:
-        walked, words = reckon_walk(sensors, walk, frame.convergence_rad)
-        if walked is not None:
-            notes += walked.notes
-            return Moved(walked.motion, walked.imu, walked.reckoning)
-        counted, noise, reasons = reckon_counted(sensors, walk, frame.convergence_rad)
-        notes += words if counted is None else ()
-        notes += reasons
-        return Moved(counted, noise)
-    return Moved()
+        moved = moved.assign(heading_rad=wrap_rad(moved["heading_rad"]))
+        return Moved(moved, source=source)
+    return None
+
+
+def _walked(
+    sensors: Mapping[str, pd.DataFrame], walk: WalkOptions, frame: Frame, notes: list[str]
+) -> Moved:
+    """Return motion of the steps that a phone's sensors show, else of those that it counted."""
+    walked, words = reckon_walk(sensors, walk, frame.convergence_rad)
+    if walked is not None:
+        notes += walked.notes
+        with_compass, why = _compass_of(walked.motion)
+        why = f"steps and their lengths are those of the accelerometer, {why}"
+        used = {"step_factor"} | (
+            {"pose", "declination_deg", "field_ut"} if with_compass else set()
+        )
+        notes += without_effect(walk, used, why)
+        return Moved(walked.motion, walked.imu, walked.reckoning)
+    counted, noise, reasons = reckon_counted(sensors, walk, frame.convergence_rad)
+    notes += words if counted is None else ()
+    notes += reasons
+    if counted is None:
+        notes += without_effect(walk, (), "the log has no motion")
+        return Moved()
+    with_compass, why = _compass_of(counted)
+    why = f"steps are counted by the phone, {why}"
+    used = {"step_m", "declination_deg"} if with_compass else {"step_m"}
+    notes += without_effect(walk, used, why)
+    return Moved(counted, noise)
+
+
+def _compass_of(motion: pd.DataFrame) -> tuple[bool, str]:
+    """Return whether a walk has headings, and so in words."""
+    found = bool(motion["heading_rad"].notna().any())
+    return found, "with a compass" if found else "without a compass"
 
 
 def _check_gaps(recording: Recording, time_s: Floats) -> None:
@@ -153,7 +199,7 @@ def _course(
     turned = reckon_velocity(sensors) if "gyroscope" in sensors else None
     if turned is not None:
         notes += ["motion from the speed of positions and the gyroscope", *turned[2]]
-        return Moved(turned[0], turned[1])
+        return Moved(turned[0], turned[1], source=_OF_RECEIVER)
     placed = [(r, rows) for r in recordings if (rows := _placed(r)) is not None]
     for recording, rows in placed:
         if "course_deg" in rows and rows["course_deg"].notna().any():
@@ -161,13 +207,13 @@ def _course(
             imu = course_errors(motion, *frame.east_north(rows, recording.crs))
             told = "speed and course of its fixes", "as they differ from its positions"
             notes.append(_receiver_note(recording, imu, *told))
-            return Moved(motion, imu)
+            return Moved(motion, imu, source=_OF_RECEIVER)
     for recording, rows in placed:
         time_s = rows["time_s"].to_numpy(dtype=np.float64)
         motion, imu = motion_from_positions(time_s, *frame.east_north(rows, recording.crs))
         told = "its positions, one to the next", "by their scatter about straight lines, with turns"
         notes.append(_receiver_note(recording, imu, *told))
-        return Moved(motion, imu)
+        return Moved(motion, imu, source=_OF_RECEIVER)
     names = ", ".join(r.path.name for r in recordings)
     expected = "positions, with speed and course or without"
     raise fail(InputError, names, expected, "none", "leave out --course-motion")

@@ -13,6 +13,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.combine import CombineOptions, combine
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.pdr.options import without_effect
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.readers.recording import Recording
@@ -20,6 +21,8 @@ from mapfilter.tracks.readers.times import parse_zone
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.tracks.store import HEAD, is_log, list_logs, read_log
+
+_READY = "the motion of a track log is used as it is; convert the recording with it"
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,11 @@ def open_log(
     given = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
     options = options or OpenOptions()
     if len(given) == 1 and _is_own(given[0]):
-        opened = OpenedLog(given[0].name, read_log(given[0]), read_sensors(given[0]))
+        log = read_log(given[0])
+        walk = options.combine.walk
+        unused = () if walk is None else without_effect(walk, (), _READY)
+        log = replace(log, notes=(*log.notes, *unused)) if unused else log
+        opened = OpenedLog(given[0].name, log, read_sensors(given[0]))
     else:
         recordings, notes = read_recordings(given, options)
         wanted = with_measured(options.combine, given)

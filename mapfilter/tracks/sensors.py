@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from mapfilter._inputs import open_input
 from mapfilter._io import read_json, sha256_file, sha256_of
 from mapfilter.errors import Faults, InputError, StoreError, fail
+from mapfilter.tracks.table_files import as_frame
 
 FOLDER = "sensors"
 
@@ -29,6 +30,7 @@ SENSOR_COLUMNS: dict[str, tuple[str, ...]] = {
     "barometer": ("time_s", "pressure_hpa"),
     "steps": ("time_s", "count"),
     "compass": ("time_s", "magnetic_deg"),
+    "turns": ("time_s", "turn_rad", "yaw_rate_radps"),
     "odometry": ("time_s", "speed_mps", "yaw_rate_radps", "speed_sd_mps", "yaw_rate_sd_radps"),
     "velocity": ("time_s", "speed_mps", "heading_rad"),
     "reckoning": ("time_s", "heading_sd_rad", "disturbed", "climb", "height_m"),
@@ -37,7 +39,8 @@ SENSOR_COLUMNS: dict[str, tuple[str, ...]] = {
 
 ``accelerometer`` includes gravity, ``linear_acceleration`` does not; ``orientation`` is the
 rotation from the device to east, north and up; ``steps`` counts since some start, or in each row;
-``compass`` is clockwise from magnetic north; ``velocity`` is that of a GNSS receiver, with headings
+``compass`` is clockwise from magnetic north; ``turns`` are those of the walker since the row
+before, or their rate, counter-clockwise; ``velocity`` is that of a GNSS receiver, with headings
 counter-clockwise from grid east; ``reckoning`` belongs to motion made of these sensors, see
 :class:`mapfilter.tracks.pdr.walk.Reckoned`.
 """
@@ -80,12 +83,15 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
         name: path
         for name in SENSOR_COLUMNS
         for path in (folder / FOLDER / f"{name}.parquet", folder / FOLDER / f"{name}.csv")
-        if path.is_file()
+        if path.exists() or path.is_symlink()
     }
     head = folder / "log.json"
     listed = read_json(head).get("parts", []) if head.is_file() else []
     sums = {part.get("path"): part.get("sha256") for part in listed if isinstance(part, dict)}
     faults, tables = Faults(), {}
+    read = {f"{FOLDER}/{path.name}" for path in paths.values()}
+    for lost in sorted({str(one) for one in sums if str(one).startswith(f"{FOLDER}/")} - read):
+        raise fail(StoreError, str(folder / lost), "a table of the log", "none", "not copied whole")
     for name, path in paths.items():
         known = sums.get(f"{FOLDER}/{path.name}")
         try:
@@ -94,12 +100,16 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
                     hint = "changed or cut off"
                     raise fail(StoreError, str(path), f"SHA-256 {known}", "another", hint)
                 is_csv = path.suffix == ".csv"
-                rows = pd.read_csv(stream) if is_csv else pq.read_table(stream).to_pandas()
+                rows = pd.read_csv(stream) if is_csv else as_frame(pq.read_table(stream))
         except (pa.ArrowException, ValueError, OSError) as error:
             got = (str(error).splitlines() or ["nothing"])[0]
             raise fail(InputError, str(path), "a readable table", got, "cut off") from error
         if lacking := [column for column in SENSOR_COLUMNS[name] if column not in rows]:
             faults.add(str(path), f"columns {', '.join(SENSOR_COLUMNS[name])}", f"no {lacking[0]}")
+        for column in SENSOR_COLUMNS[name]:
+            values = rows.get(column, pd.Series(dtype=float))
+            if values.notna().any() and not pd.api.types.is_numeric_dtype(values):
+                faults.add(f"{path}, {column}", "numbers", "others", "text among them")
         tables[name] = rows
     faults.raise_if_any(InputError)
     return tables

@@ -7,7 +7,7 @@ almanac beside it (``almanac.txt``, YUMA) gives the places of satellites whose r
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict
 from difflib import get_close_matches
 from math import inf, isnan, nan
@@ -73,8 +73,10 @@ def _parts_by_name(folder: Path) -> dict[str, Path]:
     """Return the tables of a log made by hand; InputError for tables present twice or misspelt."""
     faults = Faults()
     paths = {}
+    # What cannot be read is named by its reader: a link to nothing, a pipe, a folder.
+    there = [path for path in _table_places(folder) if path.exists() or path.is_symlink()]
     for table in TABLES:
-        found = [path for path in _table_files(folder) if path.stem == table]
+        found = [path for path in there if path.stem == table]
         if len(found) > 1:
             faults.add(str(folder), f"one file of {table}", "both Parquet and CSV")
         elif found:
@@ -91,8 +93,11 @@ def _parts_by_name(folder: Path) -> dict[str, Path]:
 
 def _table_files(folder: Path) -> list[Path]:
     """Return the files of a folder that have the name of a table of a log."""
-    named = (folder / f"{table}{suffix}" for table in TABLES for suffix in _SUFFIXES)
-    return [path for path in named if path.is_file()]
+    return [path for path in _table_places(folder) if path.is_file()]
+
+
+def _table_places(folder: Path) -> Iterator[Path]:
+    yield from (folder / f"{table}{suffix}" for table in TABLES for suffix in _SUFFIXES)
 
 
 def _others(folder: Path, used: Collection[Path]) -> list[Path]:
@@ -186,7 +191,7 @@ def read_log(folder: str | Path) -> TrackLog:
     return make_log(
         head.get("crs"),
         **{table: read.rows for table, read in tables.items()},
-        almanac=read_yuma(beside) if beside.is_file() else None,
+        almanac=read_yuma(beside) if beside.exists() or beside.is_symlink() else None,
         start_utc_s=start_utc_s,
         notes=(*head.get("notes", ()), *ignored, *notes),
         imu=parse_imu_noise(head.get("imu"), f"{where}, imu"),

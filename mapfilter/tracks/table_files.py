@@ -6,6 +6,7 @@ import codecs
 import csv
 import io
 import warnings
+from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ import pyarrow as pa
 import pyarrow.csv as arrow_csv
 import pyarrow.parquet as pq
 
-from mapfilter._inputs import open_input, read_input
+from mapfilter._inputs import open_input, read_input, wide_encoding
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.tracks.schema import SCHEMA
@@ -24,8 +25,8 @@ _SEPARATORS = (",", ";", "\t")
 _LARGEST_BYTES = 2 << 30
 _LONGEST_ROW_BYTES = 1 << 16
 _BLOCK_BYTES = 1 << 22
+_MOST_COLUMNS = 1000
 _DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
-_WIDE = "UTF-16 text"
 
 
 class ReadTable(NamedTuple):
@@ -54,7 +55,7 @@ def read_table(table: str, path: Path) -> ReadTable:
         if path.suffix == ".csv":
             return _read_csv(table, path)
         with open_input(path) as stream, pq.ParquetFile(stream) as source:
-            rows = _as_frame(source.read(use_threads=False))
+            rows = as_frame(source.read(use_threads=False))
         return ReadTable(rows, np.arange(1, len(rows) + 1))
     except pd.errors.EmptyDataError as error:
         raise fail(InputError, str(path), "a header line", "an empty file", "cut off") from error
@@ -67,7 +68,7 @@ def read_table(table: str, path: Path) -> ReadTable:
         raise fail(InputError, str(path), "a readable table", got, "cut off") from error
 
 
-def _as_frame(table: pa.Table) -> pd.DataFrame:
+def as_frame(table: pa.Table) -> pd.DataFrame:
     """Return the columns of a Parquet file.
 
     What pandas wrote about its index and its types is left out: the columns hold everything, and
@@ -97,7 +98,10 @@ def _read_csv(table: str, path: Path) -> ReadTable:
     header = first.splitlines()[0].decode() if first else ""
     separator = max(_SEPARATORS, key=header.count)
     names = [name.strip() for name in next(csv.reader([header], delimiter=separator), [])]
-    if twice := sorted({name for name in names if name and names.count(name) > 1}):
+    if len(names) > _MOST_COLUMNS:
+        expected = f"at most {_MOST_COLUMNS} columns"
+        raise fail(InputError, f"{path}, header", expected, len(names), "no table of a log")
+    if twice := sorted(name for name, times in Counter(names).items() if name and times > 1):
         raise fail(InputError, f"{path}, header", "each column once", f"{listed(twice)} more often")
     rows = _plain_rows(data, begin, names, separator)
     if rows is None:
@@ -118,13 +122,14 @@ def _read_csv(table: str, path: Path) -> ReadTable:
 
 
 def _check_encoding(path: Path, data: bytes) -> None:
-    """Refuse UTF-16, with a mark or without one, and bytes of no text."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise fail(InputError, str(path), "text in UTF-8", _WIDE, "saved as Unicode by Excel")
+    """Refuse UTF-16 and UTF-32, with a mark or without one, and bytes of no text."""
+    if wide := wide_encoding(data):
+        hint = "saved as Unicode; save as UTF-8"
+        raise fail(InputError, str(path), "text in UTF-8", f"{wide} text", hint)
     head = data[:512]
     zeros = head.count(b"\0")
     if zeros and max(head[::2].count(b"\0"), head[1::2].count(b"\0")) >= 0.4 * len(head):
-        got = f"{_WIDE} without a byte order mark"
+        got = "UTF-16 or UTF-32 text without a byte order mark"
         raise fail(InputError, str(path), "text in UTF-8", got, "saved as Unicode; save as UTF-8")
     if (at := data.find(b"\0")) >= 0:
         got = f"a zero byte (byte {at + 1})"

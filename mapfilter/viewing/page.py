@@ -15,7 +15,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from mapfilter._inputs import read_input
+from mapfilter._inputs import json_value, read_input
 from mapfilter._io import atomic_file
 from mapfilter.errors import StoreError, fail
 from mapfilter.viewing.bundle import FORMAT, VERSION
@@ -119,7 +119,7 @@ def read_page(path: Path) -> dict[str, Any]:
         raise fail(StoreError, where, what, "no bundle in it")
     try:
         packed = b64decode(rest.partition("<")[0].strip(), validate=True)
-        bundle = json.loads(_unzipped(packed))
+        bundle = json_value(_unzipped(packed))
     except (ValueError, OSError, EOFError) as error:
         raise fail(StoreError, where, what, f"{error}", "cut off") from error
     if not isinstance(bundle, dict) or bundle.get("format") != FORMAT:

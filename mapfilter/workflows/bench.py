@@ -24,7 +24,8 @@ from mapfilter.errors import ConfigError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:

@@ -21,6 +21,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.database.store import open_database
+from mapfilter.errors import MapfilterError, fail
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
@@ -96,6 +97,11 @@ def bench_peers(
         Numbers of particles.
     settings : sequence of str
         ``section.key=value`` of the world.
+
+    Raises
+    ------
+    MapfilterError
+        A peer is installed, but a package that it needs is not.
     """
     with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
         database, folders = make_world(Path(name), ["journeys.count=1", *settings])
@@ -149,7 +155,13 @@ def memory_limit(rows: int, kept: int, count: int, runs: int) -> tuple[float, in
 
 def _compared(inputs: StepInputs, belief: ParticleBelief, runs: int) -> PeerStep:
     count = belief.log_weight.size
-    ns = compare(inputs, belief, runs)
+    try:
+        ns = compare(inputs, belief, runs)
+    except ModuleNotFoundError as error:
+        expected = "peers with all packages that they need, or none of them"
+        hint = "installed without its dependencies"
+        got = f"no module {error.name}"
+        raise fail(MapfilterError, "bench filter --peers", expected, got, hint) from error
     rows, kept = belief.state.shape[0], belief.kept.shape[0]
     limit_ns, limit_bytes = memory_limit(rows, kept, count, runs)
     ratio = {name: took / ns[OWN] for name, took in ns.items()}

@@ -16,9 +16,11 @@ from mapfilter.database.floor import floor_notes
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.measured import Readings, read_checked_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, StoreError, fail
 from mapfilter.rasters.geotiff import READINGS_TAG, tag_of
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
 from mapfilter.workflows.world import (
     World,
@@ -171,6 +173,15 @@ def _measured(config: Config) -> tuple[Readings, RxLevRasters] | None:
         raise fail(StoreError, str(config.deviation_path), expected, "another one", hint)
     readings = read_checked_readings(config.readings_path, readings_sha256)
     return readings, open_rasters(config.deviation_path)
+
+
+def draw_database(config: Config) -> tuple[Path, ...]:
+    """Draw the database that was built by a configuration.
+
+    Pictures of an older one are removed in any case.
+    """
+    rasters, _, world = raster_world(config, planned_rasters(config))
+    return _draw(config, rasters, open_database(config.database_path), world)
 
 
 def _draw(

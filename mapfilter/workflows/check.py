@@ -22,7 +22,8 @@ from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.measurement_rows import NO_TIME
 from mapfilter.survey.measurements import Measurements
 from mapfilter.workflows.check_logs import check_logs

@@ -2,34 +2,41 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import wait
 from contextlib import contextmanager
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from mapfilter._io import ensure_writable_folder
+from mapfilter._parallel import begun, local_executor
+from mapfilter._partial import remove_left
 from mapfilter.config.load import load_config
-from mapfilter.workflows.build import run_build
-from mapfilter.workflows.kernels import compiled_beside
+from mapfilter.workflows.build import draw_database, run_build
+from mapfilter.workflows.kernels import WORKERS, submit_kernels, to_compile
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import run_replay
 from mapfilter.workflows.replayed import ReplayedLog
 from mapfilter.workflows.simulate import run_simulate
+from mapfilter.workflows.track_pictures import get_ready_to_draw
 from mapfilter.workflows.views import run_view
 
 _STAGES = {
     "predict": "predicting levels (the first run compiles kernels, some 20 s once)",
-    "build": "building the database, with its pictures",
+    "build": "building the database",
     "simulate": "simulating a walk",
-    "replay": "replaying it by the Bayes map filter, with its pictures",
-    "candidate": "replaying it by the candidate filter",
+    "replay": "replaying it by two filters, with pictures",
+    "candidate": "drawing what is left",
     "view": "putting both into one page",
 }
 """Names of the stages, and what the bar says of each."""
 
 VIEW_HTML = "replay.html"
+_ENDING_S = 3.0
 
 WHAT_ONE_SEES = """\
 The page plays the walk. Space starts and stops it, the arrow keys step, the slider seeks.
@@ -61,7 +68,8 @@ def run_demo(
 ) -> dict[str, Any]:
     """Predict, build, simulate a walk and replay it by two filters, with the pictures of each.
 
-    A page shows both replays side by side.
+    A page shows both replays side by side. Pictures of the database and the second replay are made
+    by other processes meanwhile.
 
     Parameters
     ----------
@@ -98,23 +106,37 @@ def run_demo(
         taken_s = seconds.get(counted or name, 0.0) + time.perf_counter() - began_s
         seconds[counted or name] = round(taken_s, 3)
 
-    with compiled_beside():
+    undrawn = config.model_copy(
+        update={"output": config.output.model_copy(update={"pictures": "none"})}
+    )
+    old_filter = config.filter.model_copy(update={"name": _OLD_FILTER})
+    old_config = config.model_copy(update={"filter": old_filter})
+    beside = min(WORKERS, os.cpu_count() or 1)
+    with _cleared(out), local_executor(beside) as workers:
+        # Workers start here, and import what a replay and its pictures need; on a single processor
+        # each task is done when it is handed out.
+        workers.submit(callable, run_replay)
+        workers.submit(get_ready_to_draw)
+        compiled = submit_kernels(workers) if to_compile() else []
         with stage("predict"):
             predicted = run_predict(config)
         with stage("build"):
-            built = run_build(config)
+            built = run_build(undrawn)
+            drawn = begun(workers, partial(draw_database, config))
         with stage("simulate"):
             simulated = run_simulate(config)
-    with stage("replay"):
-        walk = run_replay(config, out / "replay", html=True).logs[0]
-    with stage("candidate", "replay"):
-        old_filter = config.filter.model_copy(update={"name": _OLD_FILTER})
-        old_config = config.model_copy(update={"filter": old_filter})
-        old = run_replay(old_config, out / _OLD_FILTER, html=True).logs[0]
+        with stage("replay"):
+            by_old = partial(run_replay, old_config, out / _OLD_FILTER, html=True)
+            replayed = begun(workers, by_old)
+            # A process that fails to compile costs time only.
+            wait(compiled)
+            walk = run_replay(config, out / "replay", html=True).logs[0]
+        with stage("candidate", "replay"):
+            pictures, old = drawn(), replayed().logs[0]
     with stage("view", "replay"):
         view = run_view([out / "replay", out / _OLD_FILTER], out / VIEW_HTML)
     files = [predicted.rasters, predicted.ground_truth, predicted.plan, built.database]
-    pictures = (simulated.path, *built.pictures, *walk.outputs, *old.outputs)
+    walked = (simulated.path, *pictures, *walk.outputs, *old.outputs)
     return {
         "points": built.points,
         "cells": built.cells,
@@ -122,9 +144,19 @@ def run_demo(
         **_figures(walk),
         "candidate": _figures(old),
         "seconds": seconds,
-        "outputs": (*(file for file in files if file is not None), *pictures, view["html"]),
+        "outputs": (*(file for file in files if file is not None), *walked, view["html"]),
         "open": view["open"],
     }
+
+
+@contextmanager
+def _cleared(out: Path) -> Iterator[None]:
+    """Remove what workers leave half-written where they are stopped."""
+    try:
+        yield
+    except BaseException:
+        remove_left(out, _ENDING_S)
+        raise
 
 
 def _figures(walk: ReplayedLog) -> dict[str, Any]:

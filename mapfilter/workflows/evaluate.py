@@ -37,7 +37,7 @@ from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.satellites import NlosModel, ReceptionModel
 from mapfilter.workflows.evaluate_recorded import ALL

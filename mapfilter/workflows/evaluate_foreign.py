@@ -36,7 +36,7 @@ from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.index import inside_areas
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reports import array_sampler

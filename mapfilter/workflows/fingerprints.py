@@ -22,6 +22,7 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenOptions, list_journeys, open_log
 from mapfilter.tracks.readers import plain_csv
 from mapfilter.tracks.readers.columns import header_names, likely_separator
+from mapfilter.tracks.readers.csv_fields import FIELDS
 from mapfilter.tracks.readers.formats import find_format, format_of
 from mapfilter.tracks.readers.text import read_text
 from mapfilter.tracks.store import is_log
@@ -110,5 +111,5 @@ def _is_fingerprints(path: Path) -> bool:
         return found is None and not is_log(path.parent)
     # Times and positions are in both; levels in one column are those of a recording.
     names = header_names(text.first_line, likely_separator(text.first_line))
-    levels = {*plain_csv.FIELDS["level_dbm"], *plain_csv.FIELDS["bars"], *plain_csv.FIELDS["cell"]}
+    levels = {*FIELDS["level_dbm"], *FIELDS["bars"], *FIELDS["cell"]}
     return not levels & set(names)

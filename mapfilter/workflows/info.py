@@ -22,7 +22,7 @@ from mapfilter.evaluation.map_bound import BANDS as BOUND_BANDS
 from mapfilter.geodesy import short_crs
 from mapfilter.radio.cell_layouts import ATOLL, COLUMNS
 from mapfilter.radio.tables import read_table
-from mapfilter.rasters.raster_set import is_raster_folder, open_rasters
+from mapfilter.rasters.opening import is_raster_folder, open_rasters
 from mapfilter.roads.maps import map_bounds_deg
 from mapfilter.tracks.open_log import list_journeys
 from mapfilter.tracks.readers.formats import format_of, read_recording

@@ -6,10 +6,11 @@ not compiled here is compiled when it is first called: only the time of a first 
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from collections.abc import Iterator
-from concurrent.futures import wait
+from concurrent.futures import Executor, Future, wait
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,8 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.estimate import protected_m
 from mapfilter.positioning.integrity import sample_tail
 
-_WORKERS = 2
+WORKERS = 2
+"""Processes that compile beside this one."""
 _PARTICLES, _PIXELS, _PIXEL_M = 64, 4, 5.0
 
 
@@ -44,14 +46,24 @@ def compiled_beside() -> Iterator[None]:
 
     At its end all is compiled. Nothing is done where it is already, or on a single processor.
     """
-    if all(map(_is_kept, _LAST)) or (os.cpu_count() or 1) < _WORKERS:
+    if not to_compile():
         yield
         return
-    with local_executor(_WORKERS) as workers:
-        tasks = [workers.submit(task) for task in _TASKS]
+    with local_executor(WORKERS) as workers:
+        tasks = submit_kernels(workers)
         yield
         # A process that fails costs time only.
         wait(tasks)
+
+
+def to_compile() -> bool:
+    """Return whether kernels are not compiled yet, and there are processors to do it beside."""
+    return (os.cpu_count() or 1) >= WORKERS and not all(map(_is_kept, _LAST))
+
+
+def submit_kernels(workers: Executor) -> list[Future[None]]:
+    """Hand out the compilation of what the Bayes filter needs."""
+    return [workers.submit(task) for task in _TASKS]
 
 
 def compile_evidence() -> None:
@@ -121,7 +133,8 @@ def compile_all() -> None:
     compiled when it is first called.
 
     ``python -m mapfilter.workflows.kernels`` does this; it takes about a minute, and two seconds
-    where all is compiled already.
+    where all is compiled already. With ``--replay`` it compiles those of the Bayes map filter
+    alone, in two processes.
     """
     for task in (*_TASKS, compile_gaussian):
         task()
@@ -154,5 +167,15 @@ def _made() -> tuple[BayesModel, Cloud, Floats]:
     return BayesModel(area), Cloud(state, np.empty((0, _PARTICLES), dtype=np.float32)), log_weight
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Compile kernels as the command line says."""
+    parser = argparse.ArgumentParser(description="Compile kernels ahead of their first use.")
+    parser.add_argument("--replay", action="store_true", help="of the Bayes map filter alone")
+    if parser.parse_args().replay:
+        with compiled_beside():
+            return
     compile_all()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,26 +1,23 @@
-"""Pictures of a database and of located logs; removal of those of an older run."""
+"""Pictures of a database; removal of those of an older run."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, read_json
-from mapfilter._types import Floats, Floats32
+from mapfilter._io import ensure_writable_folder
+from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import OutputError, StoreError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.errors import OutputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.positioning.estimate import PositionedTrack, Snapshot
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLUE, ORANGE, Drawn, save
-from mapfilter.report.errors import plot_error_over_distance, plot_evidence
 from mapfilter.report.network import (
     plot_best_server,
     plot_landuse,
@@ -28,12 +25,9 @@ from mapfilter.report.network import (
     plot_margin,
     plot_points_per_cell,
 )
-from mapfilter.report.snapshots import MAX_PANELS, plot_belief, plot_candidates
-from mapfilter.report.track import plot_track
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.ways import Buildings
-from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.served import (
     MOST_READ_PX,
     ServedPoints,
@@ -44,12 +38,6 @@ from mapfilter.workflows.served import (
     thinned_lattice,
 )
 
-ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")
-FIGURES = "figures.json"
-REPLAY_HTML = "replay.html"
-SUMMARY = "summary.json"
-
-PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
 NETWORK_PICTURES = (
     "coverage.png",
     "best-server.png",
@@ -59,22 +47,9 @@ NETWORK_PICTURES = (
     "land-use.png",
 )
 
-_OF_ONE_LOG = {*ESTIMATES, FIGURES, REPLAY_HTML, *PICTURES}
 _NEARLY_ALL = (1.0, 99.0)
 _IF_NONE_DBM = (-110.0, -50.0)
 _SQUARE_M = 5.0
-
-
-def older_results(out: Path) -> list[Path]:
-    """Return the files of an older replay in a folder, so that no figures of two replays mix.
-
-    Those of a folder in it are among them where it is named as the log of its figures and holds
-    nothing else.
-    """
-    found = [path for name in (*_OF_ONE_LOG, SUMMARY) if (path := out / name).is_file()]
-    for inner in filter(_is_result, sorted(out.iterdir())):
-        found += inner.iterdir()
-    return found
 
 
 def clear_pictures(folder: Path, names: Iterable[str]) -> None:
@@ -97,17 +72,6 @@ def _removal(folder: Path) -> Iterator[None]:
     except OSError as error:
         what, where = error.strerror or error, error.filename or folder
         raise fail(OutputError, str(where), "a file that can be removed", what) from error
-
-
-def _is_result(folder: Path) -> bool:
-    figures = folder / FIGURES
-    if folder.is_symlink() or not figures.is_file():
-        return False
-    try:
-        of = read_json(figures).get("log")
-    except StoreError:
-        return False
-    return of == folder.name and {file.name for file in folder.iterdir()} <= _OF_ONE_LOG
 
 
 def draw_network(
@@ -238,64 +202,3 @@ def _ends(level_dbm: Floats32) -> tuple[float, float]:
     low, high = np.percentile(known, _NEARLY_ALL) if known.size else _IF_NONE_DBM
     low, high = 10 * np.floor(low / 10), 10 * np.ceil(high / 10)
     return float(low), float(max(high, low + 10))
-
-
-def draw_track(
-    database: RadioRouteDatabase,
-    log: TrackLog,
-    track: PositionedTrack,
-    folder: Path,
-    single_reports_m: Floats | None = None,
-) -> tuple[Path, ...]:
-    """Draw one located log: its belief at a few moments, the track, error and evidence.
-
-    Of the candidate filter these are candidates thinning out (Fig. 1 of the paper). Beside the
-    error the median of those of single reports is drawn, where they are given.
-    """
-    base, truth = street_map(database, served_points(database)), Truth.of_table(log.truth)
-    estimate, evidence = track.estimate, track.estimate.evidence
-    drawn: dict[str, Drawn] = {}
-    if track.snapshots and evidence is None:
-        chosen = choose_snapshots(track.snapshots, lambda one: one.weight.size)
-        drawn["candidates.png"] = plot_candidates(chosen, truth, base)
-    elif track.snapshots:
-        chosen = choose_snapshots(track.snapshots, _places)
-        drawn["belief.png"] = plot_belief(chosen, truth, base)
-    drawn["track.png"] = plot_track(estimate, truth, base)
-    if truth is not None:
-        drawn["error.png"] = plot_error_over_distance(
-            estimate, truth, single_reports_m=single_reports_m
-        )
-    if evidence is not None and len(estimate):
-        drawn["evidence.png"] = plot_evidence(estimate, truth)
-    return tuple(save(picture, folder / name) for name, picture in drawn.items())
-
-
-def choose_snapshots(
-    snapshots: Sequence[Snapshot], spread: Callable[[Snapshot], float]
-) -> list[Snapshot]:
-    """Choose at most six: the first, the last, and between them even steps of the thinning out.
-
-    Steps are even in the logarithm of ``spread``, the number of places in a belief.
-    """
-    if len(snapshots) <= MAX_PANELS:
-        return list(snapshots)
-    counts = np.array([max(spread(s), 1.0) for s in snapshots])
-    last = len(snapshots) - 1
-    depth = np.log(counts[0] / counts) + 1e-9 * np.arange(len(snapshots))
-    chosen = {0, last}
-    for goal in np.linspace(0, depth[last], MAX_PANELS)[1:-1]:
-        free = [i for i in range(1, last) if i not in chosen]
-        chosen.add(free[int(np.argmin(np.abs(depth[free] - goal)))])
-    return [snapshots[i] for i in sorted(chosen)]
-
-
-def _places(snapshot: Snapshot) -> float:
-    """Return the effective number of squares in a belief (the exponential of its entropy)."""
-    if not snapshot.weight.size:
-        return 0.0
-    at_m = np.array([snapshot.hypothesis_east_m, snapshot.hypothesis_north_m])
-    _, square = np.unique(np.round(at_m / _SQUARE_M), axis=1, return_inverse=True)
-    mass = np.bincount(square.ravel(), snapshot.weight)
-    mass = mass[mass > 0]
-    return float(np.exp(-np.sum(mass * np.log(mass))))

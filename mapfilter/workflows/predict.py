@@ -23,7 +23,8 @@ from mapfilter.propagation.predict import (
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.plan_notes import carrier_notes
 from mapfilter.rasters.geotiff import is_as_written, write_rasters
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.apart import check_no_input_replaced
 from mapfilter.workflows.world import World, check_cells_near, map_cover
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from mapfilter._inputs import path_fault, shown
-from mapfilter._io import replaced_files, write_json
-from mapfilter._parallel import Progress
+from mapfilter._io import atomic_file, replaced_files, write_json
+from mapfilter._parallel import Progress, SerialExecutor
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
@@ -27,8 +27,6 @@ from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, f
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
-from mapfilter.report.canvas import save
-from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.open_log import OpenedLog
@@ -42,14 +40,6 @@ from mapfilter.viewing.trace import TraceRecorder
 from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.logs import journeys_of, open_journey
-from mapfilter.workflows.pictures import (
-    ESTIMATES,
-    FIGURES,
-    REPLAY_HTML,
-    SUMMARY,
-    draw_track,
-    older_results,
-)
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
 from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
 from mapfilter.workflows.replayed import (
@@ -59,7 +49,17 @@ from mapfilter.workflows.replayed import (
     summary_figures,
     summary_of,
 )
+from mapfilter.workflows.results import ESTIMATES, FIGURES, REPLAY_HTML, SUMMARY, older_results
+from mapfilter.workflows.served import served_points, street_map
 from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.track_pictures import (
+    Handed,
+    TrackPictures,
+    begin_pictures,
+    drawn_beside,
+    track_pictures,
+    with_error_picture,
+)
 from mapfilter.workflows.views import run_figures
 from mapfilter.workflows.world import filter_choice, plan_antennas, planned_cells
 
@@ -187,12 +187,12 @@ def run_replay(
         recorder = TraceRecorder(filter_) if html else None
         track = locate(log, filter_, rng, snapshots=drawn, risk=risk, recorder=recorder)
         into = new if count == 1 else new / name
+        shown = _shown(database, log, track) if drawn else None
+        pictures = begin_pictures(shown, drawers) if shown is not None else {}
         baseline = baselines.of(log)
-        if database is None:
-            pictures = _draw_errors(log, track, into) if drawn else ()
-        else:
+        if shown is not None:
             beside_m = baseline.error_m if baseline is not None else None
-            pictures = draw_track(database, log, track, into, beside_m) if drawn else ()
+            pictures = with_error_picture(pictures, shown, drawers, beside_m)
         if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
         lack = lack_of(opened, log, options, track.estimate, database)
@@ -203,7 +203,10 @@ def run_replay(
         return replace(written, outputs=files)
 
     # Older results stay until all of these are whole.
-    with replaced_files(out, partial(older_results, out)) as new:
+    with (
+        nullcontext(SerialExecutor()) if wanted == "none" else drawn_beside() as drawers,
+        replaced_files(out, partial(older_results, out)) as new,
+    ):
         logs = []
         for index, path in enumerate(journeys.paths):
             logs.append(located(index, path, new))
@@ -254,11 +257,11 @@ def _database(config: Config, options: FilterOptions) -> RadioRouteDatabase | No
     return open_database(config.database_path, verify="full")
 
 
-def _draw_errors(log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:
-    truth = Truth.of_table(log.truth)
-    if truth is None:
-        return ()
-    return (save(plot_error_over_distance(track.estimate, truth), into / "error.png"),)
+def _shown(
+    database: RadioRouteDatabase | None, log: TrackLog, track: PositionedTrack
+) -> TrackPictures:
+    base = street_map(database, served_points(database)) if database is not None else None
+    return track_pictures(track, Truth.of_table(log.truth), base)
 
 
 def _write(
@@ -266,7 +269,7 @@ def _write(
     log: TrackLog,
     track: PositionedTrack,
     out: Path,
-    pictures: tuple[Path, ...],
+    pictures: Handed,
     lack: str,
     baseline: SingleReports | None,
 ) -> ReplayedLog:
@@ -282,10 +285,13 @@ def _write(
         log.notes,
         lack,
         track.filter_s,
-        (*files, out / FIGURES, *pictures),
+        (*files, out / FIGURES, *(out / picture for picture in pictures)),
         route_of(log),
         baseline,
     )
     head = {"log": name, "filter": track.estimate.filter}
     write_json(out / FIGURES, {**head, **to_jsonable(replayed.figures)})
+    for picture, png in pictures.items():
+        with atomic_file(out / picture) as temporary:
+            temporary.write_bytes(png())
     return replayed

@@ -15,7 +15,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.report.basemap import BaseMap
+from mapfilter.report.ground import BaseMap
 from mapfilter.workflows.area_lattice import pixels_on
 
 MOST_PX = 1200

@@ -19,7 +19,8 @@ from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
 from mapfilter.rasters.geotiff import READINGS_TAG
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels

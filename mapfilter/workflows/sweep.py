@@ -29,7 +29,7 @@ from mapfilter.evaluation.success import (
     varied_keys,
 )
 from mapfilter.experiments.sweep.plan import NOISE_AXES
-from mapfilter.experiments.sweep.run import seconds_per_run, sweep
+from mapfilter.experiments.sweep.run import run_batch, seconds_per_run, sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.report.canvas import Drawn, save
 from mapfilter.report.success import (
@@ -200,9 +200,12 @@ def run_sweep(
     began_s = time.perf_counter()
     plans, databases = sweep_plans(config, axes)
     out = config.output.dir / "sweep"
-    world = sweep_world(config, plans[0].radios)
-    ensure_writable_folder(out)
     with sweep_executor(workers, cluster) as (executor, in_flight):
+        # Workers start, and import what a batch needs, while the world is read.
+        for _ in range(workers):
+            executor.submit(callable, run_batch)
+        world = sweep_world(config, plans[0].radios)
+        ensure_writable_folder(out)
         table = sweep(
             plans,
             world,

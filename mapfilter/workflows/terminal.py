@@ -8,6 +8,7 @@ import dataclasses
 import errno
 import json
 import math
+import os
 import signal
 import sys
 import threading
@@ -39,7 +40,9 @@ _STOPS = tuple(
 def print_message(text: str, kind: str = "") -> None:
     """Write lines to stderr, each with the program's name and ``kind`` before it."""
     for line in text.split("\n"):
-        write(sys.stderr, f"mapfilter: {kind}{printable(line)}\n")
+        # A message that cannot be shown is no reason to fail otherwise than by the exit code.
+        with contextlib.suppress(OSError):
+            write(sys.stderr, f"mapfilter: {kind}{printable(line)}\n")
 
 
 def print_text(text: str) -> None:
@@ -197,6 +200,7 @@ def guarded(run: Callable[[], int | None]) -> int:
 
     When a signal stops it, stderr gets what is kept, and the code is 128 and the signal's number.
     """
+    _open_closed_outputs()
     try:
         with quiet_callbacks(), stop_signals():
             return run() or 0
@@ -214,6 +218,17 @@ def guarded(run: Callable[[], int | None]) -> int:
         where = error.filename or "the output"
         print_message(f"{where}: expected space on the disk, found none left", "error: ")
     return WRONG
+
+
+def _open_closed_outputs() -> None:
+    """Let what goes to an output that the caller closed go nowhere.
+
+    Without it a file that is opened later would take the output's number, and get the text.
+    """
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            mode = "r" if name == "stdin" else "w"
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
 
 
 def to_jsonable(value: Any) -> Any:

@@ -23,14 +23,14 @@ from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
 from mapfilter.rasters.names import named_by_plan
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.maps import map_bounds_deg, resolve_map
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
-from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.workflows.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.area_lattice import area_lattice as area_lattice
 from mapfilter.workflows.area_lattice import check_scale as check_scale
@@ -255,6 +255,8 @@ class World:
             return read_cell_plan(surveyed, self.lattice.crs)
         if cells.plan is not None:
             return planned_cells(self.config, self.lattice.crs, self.lattice)
+        from mapfilter.simulation.layout import lay_out_plan
+
         return lay_out_plan(
             self.lattice,
             cells.sites,

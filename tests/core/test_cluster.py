@@ -1,6 +1,7 @@
 """A Dask cluster that ends in mid-work, or whose hosts differ in what they have installed."""
 
 import contextlib
+import logging
 import os
 import shutil
 import subprocess
@@ -66,9 +67,18 @@ def test_a_scheduler_that_is_killed_in_mid_work_is_named(tmp_path):
                     if found == 2:
                         scheduler.kill()
 
-        began_s = time.monotonic()
-        with pytest.raises(MapfilterError, match=r"expected a running Dask scheduler.*--resume"):
-            work()
+        began_s, logged = time.monotonic(), []
+        handler = logging.Handler()
+        handler.emit = logged.append
+        logger = logging.getLogger("distributed.client")
+        logger.addHandler(handler)
+        try:
+            error = r"expected a running Dask scheduler.*--resume"
+            with pytest.raises(MapfilterError, match=error):
+                work()
+        finally:
+            logger.removeHandler(handler)
+        assert [record.getMessage() for record in logged] == []
         assert time.monotonic() - began_s < PATIENCE_S
 
 

@@ -9,7 +9,8 @@ from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Squares, Ways

@@ -29,7 +29,7 @@ from mapfilter.database.tiles import z_order
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from mapfilter.database.store import info
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 

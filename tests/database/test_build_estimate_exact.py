@@ -10,7 +10,7 @@ from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.store import info
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 
 

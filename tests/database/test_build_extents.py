@@ -10,7 +10,7 @@ from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_wo
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.sampling import levels_at
 
 # row, col, rows, cols of each cell's own raster: none covers the square's middle alone.

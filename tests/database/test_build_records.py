@@ -15,7 +15,7 @@ from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import InputFile
 from mapfilter.errors import OutputError
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 
 @pytest.fixture(scope="module")

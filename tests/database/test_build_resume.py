@@ -18,7 +18,8 @@ from mapfilter.database.estimate import dry_run
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, MapfilterError
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Buildings, Squares, Water, Ways

@@ -28,7 +28,7 @@ from mapfilter.database.parquet import write_columns
 from mapfilter.errors import InputError, StoreError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 LATTICE = Lattice(CRS, 1000.0, 2000.0, 10.0, 5, 7)
 NAMES = ("report", "session", "east_m", "north_m", "level_dbm", "timing_advance", "serving")

@@ -27,7 +27,7 @@ from mapfilter.errors import InputError, OutputError, StoreError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from mapfilter.database.tiles import grouped, tile_windows
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 WHOLE = Lattice("EPSG:32632", 400_000.0, 5_600_000.0, 5.0, 64, 64)
 TILE_PX = 8

@@ -33,7 +33,7 @@ from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.workflows.evaluate_ottawa import Task, find_left_out, run_ottawa
 
 CRS = "EPSG:32618"

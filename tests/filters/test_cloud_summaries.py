@@ -5,6 +5,7 @@ from math import log2
 import numpy as np
 import pytest
 
+from mapfilter.filters.array_summary import summarise_arrays
 from mapfilter.filters.hypotheses import NEAR_M, SHARES, Bins, empty_summary, flattened, summarise
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 
@@ -12,9 +13,13 @@ BINS = Bins(0.0, 0.0, 25.0, 40, 30)
 
 
 def say(*points, bins=BINS):
-    """BeliefSummary of (east, north, weight, more of the state...)."""
+    """BeliefSummary of (east, north, weight, more of the state...), by either way the same."""
     table = np.array([[east, north, *more] for east, north, _, *more in points]).T
-    return summarise(table.astype("f4"), np.array([p[2] for p in points], "f4"), bins)
+    state, weight = table.astype("f4"), np.array([p[2] for p in points], "f4")
+    said = summarise(state, weight, bins)
+    for one, other in zip(said, summarise_arrays(state, weight, bins), strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-5, atol=1e-4)
+    return said
 
 
 def ring(number, part):
@@ -121,6 +126,42 @@ def test_a_bin_of_no_weight_is_no_place():
     assert not len(said.runners_up)
 
 
+def test_hypotheses_without_any_weight_lie_nowhere():
+    said = say((100.0, 100.0, 0.0), (500.0, 300.0, 0.0))
+    assert (said.mean.tolist(), said.mass_50m) == ([0.0, 0.0], 0.0)
+    assert said.radii_m == pytest.approx([ring(4097, 1.0)] * 3)
+
+
+def test_a_ring_that_ends_with_a_share_holds_it():
+    """Half here, 17 % 100 m away, 28 % 200 m away, and the rest beyond."""
+    weight = (0.5, 0.17, 0.28, 0.05)
+    said = say(*((500.0 + 100.0 * n, 300.0, w) for n, w in enumerate(weight)))
+    # The first ring ends with a half; rounding leaves the others to either side of theirs.
+    assert said.radii_m[0] == pytest.approx(ring(0, 1.0))
+    quarter = say((500.0, 300.0, 0.25), (500.0, 300.0, 0.375), (700.0, 300.0, 0.375))
+    assert quarter.radii_m == pytest.approx(
+        [ring(0, 0.8), ring(424, 0.045 / 0.375), ring(424, 0.325 / 0.375)], rel=1e-5
+    )
+
+
+@pytest.mark.parametrize("cols", [3, 40])
+def test_bins_of_an_oblong_area_and_of_a_corner_elsewhere(cols):
+    rows = 43 - cols
+    bins = Bins(-1000.0, 2000.0, 10.0, cols, rows)
+    for col, row in ((0, 0), (cols - 1, rows - 1), (0, rows - 1), (cols - 1, 0), (1, 2)):
+        east, north = -1000.0 + 10.0 * col, 2000.0 + 10.0 * row
+        other = (
+            -1000.0 + 10.0 * ((col + cols // 2) % cols),
+            2000.0 + 10.0 * ((row + rows // 2) % rows),
+        )
+        # The lower edges of a bin are its own.
+        said = say((east + 0.01, north + 9.9, 0.25), (east, north, 0.35), (*other, 0.4), bins=bins)
+        entropy = -0.6 * log2(0.6) - 0.4 * log2(0.4)
+        assert said.entropy_bits == pytest.approx(entropy, rel=1e-5)
+        middle = pytest.approx([other[0] + 5.0, other[1] + 5.0, 0.4])
+        assert said.runners_up.tolist() == [middle]
+
+
 def test_nothing_is_unknown():
     said = empty_summary(3)
     assert (said.mean.shape, said.covariance_m2.shape, said.radii_m.shape) == ((3,), (2, 2), (3,))
@@ -217,3 +258,5 @@ def test_runners_up_lead_once_the_places_before_them_are_taken_away(seed):
         [25 * c + 12.5, 25 * r + 12.5, pytest.approx(m, rel=1e-5)] for r, c, m in leaders[1:]
     ]
     assert said.runners_up.tolist() == expected
+    arrays = summarise_arrays(points.astype("f4"), weight, BINS)
+    assert arrays.runners_up.tolist() == expected

@@ -110,6 +110,9 @@ def test_factors_of_covariances():
     for given in (4.0 * np.eye(2), [4.0 * np.eye(2), 9.0 * np.eye(2)]):
         found = run_trials(*still, given, nothing, covariances=True).covariances[:, 0]
         np.testing.assert_allclose(found, np.broadcast_to(given, (2, 2, 2)))
+    # As many trials as components: a matrix is still one covariance.
+    found = run_trials(*still, [[4.0, 1.0], [1.0, 9.0]], nothing, covariances=True).covariances
+    np.testing.assert_allclose(found, np.full((2, 1, 2, 2), [[4.0, 1.0], [1.0, 9.0]]))
     belief = kalman.as_belief([1, 2], [[1, 0], [0, 0]])
     assert (belief.mean.tolist(), belief.covariance.tolist()) == ([1.0, 2.0], [[1.0, 0], [0, 0]])
 

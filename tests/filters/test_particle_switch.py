@@ -64,6 +64,36 @@ def test_particles_are_drawn_anew_where_too_few_carry_the_weight():
     assert updated(0.0, mass_exponent=1.0, resample_below=0.999)[0].weight[0] == 1 / 64
 
 
+def test_by_flattened_weights_more_particles_count():
+    """Masses of 2/3 and 1/3 have roots whose shares are 0.586 and 0.414."""
+    root = np.sqrt([2 / 3, 1 / 3])
+    share = root / root.sum() / 32
+    effective = 1 / (32 * share**2).sum() / 64
+    assert effective == pytest.approx(0.9714, abs=1e-4)
+    for below, drawn in ((0.97, False), (0.973, True)):
+        after, _ = updated(log(2.0), mass_exponent=0.5, resample_below=below)
+        copies = np.count_nonzero(after.state[0] < 150.0)
+        assert abs(copies - 64 * 32 * share[0]) <= 1 if drawn else copies == 32
+        mass = after.weight[after.state[0] < 150.0].sum()
+        assert mass == pytest.approx(2 / 3, rel=0.03 if drawn else 1e-5)
+
+
+class Withholding(Two):
+    """Part of the log evidence is not in the weights."""
+
+    def weigh(self, cloud, log_weight, reading):
+        cloud, reason = super().weigh(cloud, log_weight, reading)
+        return cloud._replace(withheld=-3.0), reason
+
+
+def test_log_evidence_that_is_withheld_counts():
+    filter_, rng = ParticleFilter(Withholding(), ParticleOptions(**STILL)), np.random.default_rng(0)
+    once, _ = filter_.update(filter_.init(0.0, rng), log(0.5), rng)
+    assert once.log_evidence == pytest.approx(log(0.75) - 3.0, abs=1e-5)
+    twice, _ = filter_.update(once, 0.0, rng)
+    assert twice.log_evidence == pytest.approx(log(0.75) - 6.0, abs=1e-5)
+
+
 def test_the_number_of_particles_follows_the_bins_that_are_covered():
     # Two bins of one half each: ten for each of two bins.
     after, info = updated(0.0, mass_exponent=1.0, min_search_particles=4, particles_per_bin=10.0)

@@ -11,7 +11,7 @@ from mapfilter.learning.patterns import Patterns
 from mapfilter.learning.visits import Visits
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.tracks.log import make_log
 

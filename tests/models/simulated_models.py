@@ -1,7 +1,7 @@
 """Kernels of a graphics processor beside those of the processor, in numba's simulator.
 
 Run by :mod:`test_device_models` in a process of its own. What the kernels of the processor are
-given is that of :mod:`test_kernel_parts`.
+given is that of :mod:`test_model_kernel_parts`.
 """
 
 from math import nan
@@ -9,7 +9,7 @@ from math import nan
 import numpy as np
 import pytest
 from numba import config
-from test_kernel_parts import (
+from test_model_kernel_parts import (
     BANDS,
     COLS,
     FRAME,

@@ -35,7 +35,10 @@ def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--near", type=int, help="only so many files of tests, the nearest ones")
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time (1)")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "mutants", help="folder")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    # Tests run in the copy, from where a relative path leads elsewhere.
+    options.out = options.out.resolve()
+    return options
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

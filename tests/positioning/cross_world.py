@@ -14,7 +14,7 @@ from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.tracks.log import make_log
 

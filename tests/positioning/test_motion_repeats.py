@@ -107,9 +107,19 @@ def test_the_spread_of_a_way_without_direction_adds_up_to_that_of_a_way_that_for
     assert np.sum(np.square(spread_m)) == pytest.approx(expected_m2, rel=1e-6)
 
 
+def test_a_row_that_stands_still_as_a_whole_is_found_though_it_turns():
+    """With the same turn in each row beside one heading."""
+    before = [MotionStep(0.7, step.heading_rad, 0.01) for step in walk(200)]
+    frozen = [MotionStep(0.7, before[-1].heading_rad, 0.123)] * 100
+    found = reasons(followed([*before, *frozen], again_s=1.0))
+    assert Reason.HEADING_STUCK not in found[:208]
+    assert set(found[230:]) == {Reason.HEADING_STUCK}
+
+
 def test_a_gyroscope_that_goes_on_keeps_its_turns():
-    before = walk(200)
-    turning = [MotionStep(0.7, before[-1].heading_rad, 0.01)] * 200
+    before, rng = walk(200), np.random.default_rng(3)
+    heading_rad = before[-1].heading_rad
+    turning = [MotionStep(0.7, heading_rad, turn) for turn in rng.normal(0.01, 0.02, 200).tolist()]
     assert set(reasons(followed([*before, *turning]))) == {Reason.USED}
 
 

@@ -335,7 +335,7 @@ def one_of(log_odds, east_m=100.0, start_m=0.0, status=Status.TRACKING, null=-9.
 
 
 MAIN = SimpleNamespace(log_evidence=-50.0, summary=SimpleNamespace(mean=(0.0, 0.0)))
-RULES = HoldRules(max_beliefs=2)
+RULES = HoldRules(max_beliefs=2, lost_log_odds=1.0)
 
 
 def test_which_beliefs_stay_open():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from mapfilter.positioning.bayes.rest import Rest, _added, _left, levels_of
+from mapfilter.positioning.bayes.rest import Rest, _added, _carried, _left, levels_of
 from mapfilter.positioning.epochs import ReportRow
 
 
@@ -21,30 +21,50 @@ def test_levels_by_their_cells_or_carriers():
     assert levels_of(rows) == [("A", -70.0), ("12/3", -80.0), ("12/None", -81.0)]
 
 
+@pytest.mark.parametrize("measured_m", [0.0, 6.0])
 @pytest.mark.parametrize("way_m", [0.0, 8.0, 60.0, 500.0])
 @pytest.mark.parametrize("changes", [(3.0,), (2.0, -9.0), (8.0, 7.5, 9.0)])
-def test_likelihoods_of_a_way_and_of_a_rest_are_those_of_normal_vectors(changes, way_m):
+def test_likelihoods_of_ways_and_rests_are_those_of_normal_vectors(changes, way_m, measured_m):
     """Means of two and of three levels; half of the log-likelihood ratio counts."""
     names = "ABCD"[: len(changes)]
     first = dict.fromkeys(names, (2 * -80.0, 2))
     now = {name: (3 * (-80.0 + x), 3) for name, x in zip(names, changes, strict=True)}
     count = len(changes)
     at_rest = 2.7**2 + 3.3**2 * (1 / 2 + 1 / 3)
-    on_way = at_rest + 10.5**2 * (1 - exp(-way_m / 60))
+    on_way, as_measured = (at_rest + 10.5**2 * (1 - exp(-m / 60)) for m in (way_m, measured_m))
 
     def ratio(seen):
         one, other = (
             multivariate_normal.logpdf(
                 seen, np.zeros(count), own * np.eye(count) + 36.0 * np.ones((count, count))
             )
-            for own in (on_way, at_rest)
+            for own in (on_way, as_measured)
         )
         return 0.5 * (one - other)
 
-    found = _left(first, {**now, "Z": (-50.0, 1)}, way_m)
+    found = _left(first, {**now, "Z": (-50.0, 1)}, way_m, measured_m)
     expected = (ratio(changes), ratio([0.0] * count)) if way_m else (0.0, 0.0)
     assert found == pytest.approx(expected)
-    assert _left(first, {"Z": (-50.0, 1)}, way_m) == (0.0, 0.0)
+    assert _left(first, {"Z": (-50.0, 1)}, way_m, measured_m) == (0.0, 0.0)
+
+
+def test_levels_elsewhere_differ_by_nine_decibels_and_by_less_along_the_way_measured():
+    first, now = {"A": (-80.0, 1), "B": (-90.0, 1)}, {"A": (-146.0, 2), "B": (-98.0, 1)}
+    changes = (7.0, -8.0)
+    for measured_m in (0.0, 20.0, 60.0, 900.0):
+        as_measured = 4.0**2 + 10.5**2 * (1 - exp(-measured_m / 60)) / 2
+        one, other = (
+            multivariate_normal.logpdf(changes, np.zeros(2), own * np.eye(2) + 36.0)
+            for own in (81.0, as_measured)
+        )
+        assert _carried(first, now, measured_m) == pytest.approx(one - other)
+
+
+def test_what_is_measured_is_added_up_and_no_doubt():
+    rest = Rest(0.0, pace_mps=1.0, left_nats=-0.9, still_nats=-2.5)
+    assert rest.heard(20.0, (), 4.0).heard(40.0, (), 5.0).measured_m == 9.0
+    assert rest.heard(53.9, (), 9.0).is_doubtful is False
+    assert rest.heard(54.1, (), 9.0).is_doubtful is True
 
 
 def test_what_a_block_gains_is_bounded_and_so_is_the_sum_below():
@@ -71,7 +91,7 @@ def test_levels_are_added_up_by_blocks_of_ten_seconds():
     assert rest.first == {"A": (-216.0, 3), "B": (-60.0, 1)}
     assert rest.present == {}
     # The way to the second block at the pace before.
-    gained, unchanged = _left({"A": (-216.0, 3)}, {"A": (-90.0, 1)}, 14.0)
+    gained, unchanged = _left({"A": (-216.0, 3)}, {"A": (-90.0, 1)}, 14.0, 0.0)
     assert (rest.left_nats, rest.still_nats) == pytest.approx((gained, unchanged))
     assert gained > 0 > unchanged
 

@@ -132,14 +132,14 @@ def test_the_speed_is_that_of_all_the_time():
     assert 1.0 < watch.speed_mps < 2.1
 
 
-def at_rest(rng, seconds, elsewhere_db_per_s=0.0):
+def at_rest(rng, seconds, elsewhere_db_per_s=0.0, motion=STILL):
     """Levels of seven cells, as they fade at rest, or wander as one is carried on."""
     lasting, levels = rng.normal(0, 2.0, 7), rng.uniform(-100, -70, 7)
     for second in range(seconds):
         lasting = 0.98 * lasting + 0.4 * rng.normal(size=7)
         levels = levels + elsewhere_db_per_s**0.5 * rng.normal(size=7)
         heard = np.round(levels + lasting + rng.normal(0, 3.3, 7))
-        yield Epoch(20.0 + second, STILL, report(heard))
+        yield Epoch(20.0 + second, motion, report(heard))
 
 
 def test_a_phone_at_rest_for_20_minutes_is_at_rest():
@@ -161,6 +161,47 @@ def test_steps_of_zero_while_levels_wander_are_stuck():
         # The whole way since the last step is made up for.
         assert unmeasured(found)[0] == pytest.approx(1.4 * (len(found) - 20), rel=0.02)
     assert np.median(after_s) < 90
+
+
+STROLL = (MotionStep(0.35, 0.0),)
+
+
+def walked_before(steps, rng, db_per_s, mps=1.4):
+    """Watch a minute of steps at a speed, then five with these steps and levels that wander."""
+    before = [Epoch(second - 40.0, (MotionStep(mps, 0.0),)) for second in range(60)]
+    return told([*before, *at_rest(rng, 300, db_per_s, steps)])[1]
+
+
+def test_steps_that_shrink_to_a_tenth_while_levels_change_as_before_are_stuck():
+    after_s = []
+    for seed in range(20):
+        found = walked_before((MotionStep(0.14, 0.0),), np.random.default_rng(seed), 1.2)
+        stuck = [k for k, (_, why, _) in enumerate(found) if why is Reason.MOTION_STUCK]
+        assert stuck, seed
+        after_s.append(stuck[0] - 60)
+        assert 0.85 * 420 < unmeasured(found)[0] <= 420
+    assert np.median(after_s) < 150
+
+
+def test_a_stroll_is_as_slow_as_it_is_measured():
+    """Levels wander as along a street at 0.35 m/s: in five minutes few are taken for carried on.
+
+    A vehicle in a jam is slow, too.
+    """
+    stuck = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        found = walked_before(STROLL, rng, 0.3)
+        stuck += Reason.MOTION_STUCK in {why for _, why, _ in found}
+        found = walked_before((MotionStep(1.0, 0.0),), rng, 1.2, mps=10.0)
+        assert {why for _, why, _ in found} == {Reason.USED}, seed
+    assert stuck <= 8
+
+
+def test_one_who_always_strolls_moves():
+    watch, _ = told([Epoch(float(second), STROLL) for second in range(400)])
+    assert watch.rest is None
+    assert watch.speed_mps == pytest.approx(0.35, abs=0.01)
 
 
 def test_serving_cells_one_after_another_are_stuck_too():
@@ -216,8 +257,8 @@ def test_likelihoods_of_changes_are_those_of_normal_vectors(changes):
         )
 
     expected = log_density(9.0) - log_density(4.0)
-    assert rest._carried(first, now) == pytest.approx(expected)
-    assert rest._carried(first, {"Z": (-80.0, 1)}) == 0.0
+    assert rest._carried(first, now, 0.0) == pytest.approx(expected)
+    assert rest._carried(first, {"Z": (-80.0, 1)}, 0.0) == 0.0
 
 
 @pytest.mark.parametrize(("levels", "least_m", "most_m"), [(1, 60, 70), (3, 20, 26), (7, 20, 26)])

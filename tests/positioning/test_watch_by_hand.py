@@ -57,7 +57,7 @@ def test_the_speed_is_learnt_by_time():
 
 @pytest.mark.parametrize(("length_m", "moves"), [(0.19, False), (0.21, True)])
 def test_less_than_a_decimetre_a_second_is_a_rest(length_m, moves):
-    usual = SensorWatch(motion_s=0.0, rows=100, interval_s=2.0, moving_s=0.0, known_s=0.0)
+    usual = SensorWatch(motion_s=0.0, rows=29, interval_s=2.0, moving_s=0.0, known_s=0.0)
     watch = after(epoch(2.0, length_m), watch=usual)
     assert (watch.rest is None) == moves
     assert watch.moving_s == (2.0 if moves else 0.0)
@@ -66,6 +66,51 @@ def test_less_than_a_decimetre_a_second_is_a_rest(length_m, moves):
     late = after(epoch(60.0, 0.61), watch=usual)
     assert late.rest is None
     assert after(epoch(60.0, 0.59), watch=usual).rest is not None
+
+
+@pytest.mark.parametrize(
+    ("rows", "speed_mps", "unit_m", "recent_mps", "moves"),
+    [
+        (30, 1.4, 1.0, 0.41, False),
+        (30, 1.4, 1.0, 0.43, True),
+        (29, 1.4, 1.0, 0.41, True),
+        (30, 2.6, 1.0, 0.41, True),
+        # In feet: 0.3 of 4.6 feet a second.
+        (30, 4.6, 0.3048, 1.37, False),
+        (30, 4.6, 0.3048, 1.39, True),
+        (30, 0.3, 1.0, 0.11, True),
+    ],
+)
+def test_steps_far_shorter_than_a_walkers_before_may_be_missed_ones(
+    rows, speed_mps, unit_m, recent_mps, moves
+):
+    usual = SensorWatch(motion_s=0.0, rows=rows, interval_s=2.0, moving_s=0.0, known_s=0.0)
+    usual = replace(usual, speed_mps=speed_mps, recent_mps=recent_mps)
+    length_m = 2.0 * recent_mps
+    watch, seen, _ = watched(usual, epoch(2.0, length_m), unit_m)
+    assert (watch.rest is None) == moves
+    # The way counts as it is measured, and a slow one is no rest that is reported.
+    assert seen.motion[0].step_m == length_m
+    assert watch.moved_m == length_m
+    assert not watch.rests
+    if watch.rest is not None:
+        assert watch.rest.measured_m == pytest.approx(length_m * unit_m)
+
+
+@pytest.mark.parametrize(("recent_mps", "speed_mps"), [(0.69, 1.4), (0.71, 1.3655)])
+def test_the_speed_of_a_walker_who_is_far_slower_is_not_learnt(recent_mps, speed_mps):
+    usual = SensorWatch(motion_s=0.0, rows=100, interval_s=2.0, moving_s=0.0, known_s=0.0)
+    watch = after(epoch(2.0, 2 * recent_mps), watch=replace(usual, recent_mps=recent_mps))
+    assert watch.speed_mps == pytest.approx(speed_mps)
+
+
+def test_the_recent_speed_is_the_mean_of_the_last_seconds_by_time():
+    usual = SensorWatch(motion_s=0.0, rows=100, interval_s=1.0, moving_s=0.0, known_s=0.0)
+    halves = after(epoch(0.5, 0.1), epoch(1.0, 0.1), watch=usual)
+    assert halves.recent_mps == pytest.approx(0.2 + 1.2 * exp(-1 / 2.5))
+    assert after(epoch(1.0, 0.2), watch=usual).recent_mps == pytest.approx(halves.recent_mps)
+    # Rows without a length say nothing of it.
+    assert after(epoch(1.0, nan), epoch(1.5), watch=usual).recent_mps == 1.4
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ from raster_files import HDR, INDEX_HEADER, index_row, write_bil
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)

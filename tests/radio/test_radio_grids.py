@@ -12,7 +12,8 @@ from raster_files import HDR, write_ascii, write_bil
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 2.5, 5, 7)

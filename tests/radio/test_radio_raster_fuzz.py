@@ -12,7 +12,7 @@ from raster_files import INDEX_HEADER, index_row, write_ascii, write_bil
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 12, 9)

@@ -18,7 +18,7 @@ from mapfilter.rasters.geotiff import (
     _quantity,
     write_rasters,
 )
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)
@@ -46,7 +46,9 @@ def placed(transform, known):
     [
         (Affine(5, 0, 385000, 0, -5, 6673000), []),
         (Affine(5, 0, 385000, 0, -5.000004, 6673000), []),
-        (Affine(5, 0, 385000, 0, -5.00001, 6673000), ["square pixels; "]),
+        (Affine(5, 0, 385000, 0, -5.000006, 6673000), ["square pixels; "]),
+        (Affine(5, 0, 385000, 0, -4.999994, 6673000), ["square pixels; "]),
+        (Affine(1e-3, 0, 385000, 0, -1e-3, 6673000), []),
         (Affine(5, 0, 385000, 0, 5, 6673000), ["row 0 in the north, column 0 in the west; "]),
         (Affine(-5, 0, 385000, 0, -5, 6673000), ["row 0 in the north, column 0 in the west; "]),
         (Affine(5, 0, 385000, 0, 0, 6673000), ["row 0 in the north, column 0 in the west; "]),
@@ -62,8 +64,8 @@ def test_where_the_pixels_lie(transform, said):
     assert len(found) == len(said)
     assert all(one.startswith(other) for one, other in zip(found, said, strict=True))
     if not said:
-        side_m = LATTICE.resolution_m
-        assert placed(transform, True) == Lattice(CRS, transform.c, transform.f, side_m, 6, 8)
+        expected = Lattice(CRS, transform.c, transform.f, transform.a, 6, 8)
+        assert placed(transform, True) == expected
     (unplaced,) = complaints(placed, transform, False)
     assert unplaced.startswith("where the pixels lie")
 

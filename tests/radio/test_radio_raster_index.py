@@ -115,3 +115,88 @@ def test_what_stands_in_for_a_header():
     assert [float(header[1][key]) for key in ("NROWS", "NCOLS", "NBITS")] == [6, 8, 16]
     for missing in ("resolution_m", "bits", "area_m"):
         assert row(**{missing: None}).header() is None
+
+
+def test_a_hundredth_of_a_pixel_is_the_same_place():
+    """At the origin edges are exact: a hundredth belongs to it, on each side of a limit."""
+    lattice = Lattice(CRS, 0.0, 0.0, 1.0, 6, 8)
+
+    def told(west, south, east, north):
+        faults = Faults()
+        area = (west, south - 6.0, east + 8.0, north)
+        note = IndexRow("row 2", "A", Path("a.bil"), 1.0, None, area).check(lattice, 16, faults)
+        return note, [(fault.got, fault.hint) for fault in faults.found]
+
+    beyond = "rasters reach beyond their areas in the index"
+    for edges in ((0.01, 0, 0, 0), (-0.01, 0, 0, 0), (0, 0, 0, 0.01), (0, 0, 0, -0.01)):
+        assert told(*edges) == ("", [])
+    assert told(0.012, 0, 0, 0) == told(0, 0, 0, -0.012) == (beyond, [])
+    # A hundredth within a larger area is none without.
+    assert told(1, 1, -1, 0.01) == told(-0.01, 1, -1, -1) == (beyond, [])
+    for edges in ((-0.012, 1, -1, -1), (1, 1, -1, 0.012), (1, -0.012, -1, -1), (1, 1, 0.012, -1)):
+        assert told(*edges)[1][0][1] == "index and rasters of different runs"
+    centres = "area limits are centres of pixels in the index"
+    assert told(0.505, 0.495, -0.505, -0.495) == (centres, [])
+    assert told(0.515, 0.5, -0.5, -0.5) == (beyond, [])
+    half = "half a pixel: a corner where the header has to hold the pixel's centre"
+    runs = "index and rasters of different runs"
+    for west, south, right, up, hint in (
+        (0.5, 0.5, "-0.50", "-0.50", half),
+        (-0.5, 0.004, "+0.50", "+0.00", half),
+        (0.004, -0.5, "+0.00", "+0.50", half),
+        (-0.506, 0.0, "+0.51", "+0.00", half),
+        (0.0, 0.494, "+0.00", "-0.49", half),
+        (0.5, 0.25, "-0.50", "-0.25", runs),
+        (0.516, 0.0, "-0.52", "+0.00", runs),
+        (1.0, 0.5, "-1.00", "-0.50", runs),
+    ):
+        note, faults = told(west, south, west, south)
+        assert note == ""
+        assert faults == [(f"a.bil shifted by {right} pixels east, {up} north", hint)]
+
+
+def test_a_table_without_one_of_its_columns_is_no_index_of_a_folder(tmp_path):
+    index(tmp_path, "TX_NAME;FILE\nA;a.bil\n")
+    assert find_index(tmp_path) is None
+    head = "TX_NAME;FILE_NAME".rjust(1 << 16)
+    index(tmp_path, head + "\nA;a.bil\n")
+    assert find_index(tmp_path) == tmp_path / "index.txt"
+    index(tmp_path, " " + head + "\nA;a.bil\n")
+    assert find_index(tmp_path) is None
+
+
+def test_of_many_indexes_five_are_named(tmp_path):
+    for n in range(7):
+        index(tmp_path, INDEX_HEADER, f"i{n}.txt")
+    with pytest.raises(InputError) as caught:
+        find_index(tmp_path)
+    (fault,) = caught.value.faults
+    assert fault.got == "i0.txt, i1.txt, i2.txt, i3.txt, i4.txt"
+
+
+def test_rows_are_checked_one_by_one(tmp_path):
+    write_bil(tmp_path / "a.bil", LATTICE, np.full((6, 8), 100, np.int16))
+    lines = [
+        "A;a.bil;5;385000;385040;6672970;6673000;16",
+        f"B;{'y' * 90};;;;;;",
+        f"C;a.bil;{'x' * 90};;;;;",
+        "D;a.bil;-5;;;;;",
+        "A;a.bil;5;;;;;",
+        "A;A.BIL;;;;;;",
+        "E;a.bil;5;385000;385040;6672970;;16",
+    ]
+    with pytest.raises(InputError) as caught:
+        read_index(index(tmp_path, INDEX_HEADER + "\n".join(lines)))
+    found = [(fault.where.rpartition(" row ")[2], fault.got) for fault in caught.value.faults]
+    first = f"{tmp_path / 'index.txt'} row 2"
+    assert found == [
+        ("3, FILE_NAME", repr("y" * 80)),
+        ("4, RESOLUTION", repr("x" * 80)),
+        ("5, RESOLUTION", "-5"),
+        ("6, TX_NAME", f"'A', as in {first}"),
+        ("7, TX_NAME", f"'A', as in {first}"),
+    ]
+    rows = read_index(index(tmp_path, INDEX_HEADER + "\n".join([lines[0], lines[-1]])))
+    assert [row.path for row in rows] == [tmp_path / "a.bil"] * 2
+    assert [row.where.rpartition(" ")[2] for row in rows] == ["2", "3"]
+    assert (rows[0].area_m, rows[1].area_m) == (LATTICE.bounds_m, None)

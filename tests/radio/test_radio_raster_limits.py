@@ -8,8 +8,8 @@ from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.ascii_grids import open_ascii_grid
 from mapfilter.rasters.files import Declared, check_plausible, without_nodata
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.plain_grids import GridHeader
-from mapfilter.rasters.raster_set import open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)

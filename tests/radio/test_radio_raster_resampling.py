@@ -199,3 +199,116 @@ def test_files_that_reach_a_window_by_a_pixel():
         found = upper.reaching((row, 0, 1, 8))
         assert found.cell_ids == ids
         assert found.parts == ((Path("0.tif"),) if ids and found is not upper else ())
+
+
+@pytest.mark.parametrize(("axis", "shift_px", "same"), [
+    ("west_m", 0.0009, True), ("west_m", 0.0015, False),
+    ("north_m", -0.0009, True), ("north_m", 0.0015, False),
+])  # fmt: skip
+def test_a_thousandth_of_a_pixel_is_the_same_place(axis, shift_px, same):
+    file = made()
+    moved = replace(LATTICE, **{axis: getattr(LATTICE, axis) + 5.0 * shift_px})
+    found = read_on(file, [0, 1], moved, (1, 1, 4, 6), "bilinear")
+    exact = np.array_equal(found, file.values[:, 1:5, 1:7], equal_nan=True)
+    assert exact == same
+    lattice, _ = common_lattice([made(), made(moved)], None, "nearest")
+    more = 0 if same else 1
+    assert (lattice.rows - 6, lattice.cols - 8) == ((0, more) if axis == "west_m" else (more, 0))
+
+
+@pytest.mark.parametrize(("rows", "cols", "side_m", "same"), [
+    (49, 2, 5.0001, True), (2, 49, 5.0001, True), (51, 2, 5.0001, False),
+    (2, 51, 5.0001, False), (49, 49, 4.9999, True), (3, 51, 4.9999, False),
+])  # fmt: skip
+def test_pixels_are_those_of_a_lattice_as_long_as_they_do_not_drift_away(rows, cols, side_m, same):
+    """A thousandth of a pixel over all rows and columns."""
+    source = Lattice(CRS, 385000.0, 6673000.0, side_m, rows, cols)
+    file, target = made(source), replace(source, resolution_m=5.0)
+    found = read_on(file, [0, 1], target, (0, 0, rows, cols), "bilinear")
+    assert np.array_equal(found, file.values, equal_nan=True) == same
+
+
+@pytest.mark.parametrize(("asked_m", "same"), [(5.0000045, True), (5.000006, False),
+                                               (4.9999955, True), (4.999994, False)])  # fmt: skip
+def test_a_millionth_of_the_resolution_is_the_same(asked_m, same):
+    lattice, _ = common_lattice([made()], asked_m, "nearest")
+    assert (lattice == LATTICE) == same
+
+
+def test_forty_thousand_million_pixels_are_the_most():
+    one = Lattice(CRS, 0.0, 1_000_000.0, 5.0, 2, 2)
+    corner = Lattice(CRS, 5.0 * 199_998, 10.0, 5.0, 2, 2)
+    lattice, _ = common_lattice([made(one), made(corner)], None, "nearest")
+    assert (lattice.rows, lattice.cols) == (200_000, 200_000)
+    with pytest.raises(InputError) as caught:
+        common_lattice([made(one), made(replace(corner, cols=3))], None, "nearest")
+    (fault,) = caught.value.faults
+    assert fault.where == "rasters"
+    assert (fault.expected, fault.got) == (
+        "rasters that 4e+10 pixels can cover", "1000 km x 1000 km at 5 m")  # fmt: skip
+
+
+def test_edges_within_a_thousandth_of_a_pixel_need_no_pixel_more():
+    for shift_m in (0.004, -0.004, 0.006, -0.006):
+        other = replace(LATTICE, west_m=385000.0 + shift_m, north_m=6673000.0 + shift_m)
+        lattice, _ = common_lattice([made(), made(), made(other)], None, "nearest")
+        wider = abs(shift_m) > 0.005
+        assert (lattice.rows, lattice.cols) == ((7, 9) if wider else (6, 8))
+        west_m, north_m = (385000.0 - 5 * (wider and shift_m < 0),
+                           6673000.0 + 5 * (wider and shift_m > 0))  # fmt: skip
+        assert (lattice.west_m, lattice.north_m) == (west_m, north_m)
+
+
+def test_files_of_two_systems_are_each_named():
+    files = [made(replace(LATTICE, crs=crs), path=Path(f"{n}.tif"))
+             for n, crs in enumerate((CRS, "EPSG:32634", CRS, "EPSG:3067"))]  # fmt: skip
+    with pytest.raises(InputError) as caught:
+        common_lattice(files, None, "nearest")
+    assert [(f.where, f.expected, f.got) for f in caught.value.faults] == [
+        ("1.tif, CRS", f"{CRS}, as in 0.tif", "EPSG:32634"),
+        ("3.tif, CRS", f"{CRS}, as in 0.tif", "EPSG:3067"),
+    ]
+
+
+def test_five_resolutions_are_named():
+    files = [made()] + [
+        made(Lattice(CRS, 385000.0, 6673000.0, 5.0 * n, 2, 2), path=Path(f"{n}.tif"))
+        for n in range(2, 8)
+    ]
+    notes = common_lattice(files, None, "nearest")[1]
+    assert " from 10 m, 15 m, 20 m, 25 m, 30 m to 5 m: " in notes[-1]
+
+
+def test_only_the_pixels_between_the_outer_ones_are_read():
+    reads = []
+    file = replace(made(), reads=reads)
+    for window, read in (((2, 3, 2, 4), (1, 0, 2, 4)), ((4, 5, 5, 3), (3, 2, 3, 3))):
+        lattice = Lattice(CRS, 384985.0, 6673005.0, 5.0, 12, 12)
+        read_on(file, [0], lattice, window, "nearest")
+        assert reads.pop() == read
+    found = read_on(file, [1, 0], Lattice(CRS, 385000.0, 6673000.0, 10.0, 3, 4), (1, 1, 2, 2),
+                    "nearest")  # fmt: skip
+    assert reads == [(3, 3, 3, 3)]
+    np.testing.assert_array_equal(found, file.values[[1, 0]][:, 3:6:2, 3:6:2])
+
+
+@pytest.mark.parametrize("rows_at_a_time", [1, 2, 3])
+def test_strips_of_pixels_that_coincide(monkeypatch, rows_at_a_time):
+    reads = []
+    file = replace(made(), reads=reads)
+    limit_bytes = rows_at_a_time * 4 * 2 * 7
+    for limit in (limit_bytes, limit_bytes + 55):
+        monkeypatch.setattr(_resampling, "_LARGEST_SOURCE_BYTES", limit)
+        found = read_on(file, [0, 1], TARGETS["in step"], (0, 0, 12, 9), "nearest")
+        np.testing.assert_array_equal(found[:, 2:8, 2:], file.values[:, :, :7])
+        assert np.isnan(found).sum() == 2 * (12 * 9 - 6 * 7) + np.isnan(file.values[:, :, :7]).sum()
+    assert reads == [
+        (top, 0, rows_at_a_time, 7) for _ in range(2) for top in range(0, 6, rows_at_a_time)
+    ]
+
+
+def test_less_memory_than_a_row_needs_is_a_row(monkeypatch):
+    monkeypatch.setattr(_resampling, "_LARGEST_SOURCE_BYTES", 1)
+    reads = []
+    read_on(replace(made(), reads=reads), [0], TARGETS["in step"], (2, 2, 6, 2), "nearest")
+    assert reads == [(row, 0, 1, 2) for row in range(6)]

@@ -15,7 +15,7 @@ from mapfilter._io import sha256_file
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 CRS = "EPSG:32635"
 FINE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 12, 16)

@@ -10,7 +10,7 @@ from mapfilter.errors import OutputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters import geotiff as raster_writer
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 LATTICE = Lattice("EPSG:32629", 531_000.0, 4_556_000.0, 5.0, 512, 512)
 

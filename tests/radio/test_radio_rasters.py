@@ -18,7 +18,8 @@ from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import check_against_plan, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import check_against_plan
 
 LATTICE = Lattice("EPSG:32635", 385000.0, 6673000.0, 5.0, 300, 280)
 IDS = ("A", "B", "C")

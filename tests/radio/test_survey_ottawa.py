@@ -6,7 +6,7 @@ import shapely
 
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Ways
 from mapfilter.survey.leave_out import leave_out

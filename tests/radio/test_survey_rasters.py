@@ -11,7 +11,8 @@ from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import check_against_plan, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.survey.measured_map import SurveyOptions, fit_survey
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 

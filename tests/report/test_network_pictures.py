@@ -12,7 +12,7 @@ from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.report.basemap import BaseMap, draw_base, largest
 from mapfilter.report.canvas import BLUE, ORANGE, save
 from mapfilter.report.network import plot_landuse, plot_margin

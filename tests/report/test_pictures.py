@@ -6,7 +6,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
@@ -17,7 +18,7 @@ from mapfilter.geodesy import Lattice, grid_convergence_rad, unproject
 from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base
-from mapfilter.report.canvas import BLUE, DPI, ORANGE, VERMILLION, save
+from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION, save
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.network import draw_cells, plot_best_server, plot_level, plot_points_per_cell
 from mapfilter.report.snapshots import plot_candidates
@@ -214,6 +215,31 @@ def test_track_tells_near_from_far(area, tmp_path):
     assert pixels_near(tmp_path / "near.png", BLUE) > 0
     assert pixels_near(tmp_path / "far.png", ORANGE) > 0
     assert pixels_near(tmp_path / "far.png", BLUE) == 0
+
+
+@pytest.mark.parametrize(
+    ("status", "name"),
+    [(Status.SEARCHING, "while searching"), (Status.LOST, "while searching or lost")],
+)
+def test_estimates_that_are_not_claimed_are_pale_and_small(area, status, name):
+    # 70 m off: marked as such where it is tracked, and only there.
+    tracked = estimate(area, 0.0, error_m=70.0)
+    half = len(tracked) // 2
+    part = replace(tracked, status=(*[status] * half, *tracked.status[half:]))
+    sizes = {}
+    for key, one in (("all", tracked), ("part", part)):
+        axes = plot_track(one, area.truth, area.base)
+        marks = [m for m in axes.collections if isinstance(m, PathCollection)]
+        sizes[key] = {
+            to_hex(m.get_facecolors()[0]): (len(m.get_offsets()), m.get_sizes()[0]) for m in marks
+        }
+        _, names = axes.get_legend_handles_labels()
+        assert (name in names) is (key == "part")
+        assert "more than 50 m off" in names
+    assert SKY not in sizes["all"]
+    assert sizes["part"][SKY][0] == half
+    assert sizes["part"][ORANGE][0] == sizes["all"][ORANGE][0] - half
+    assert sizes["part"][SKY][1] < sizes["part"][ORANGE][1] / 2
 
 
 def test_error_plot_shows_lost_and_radius(area, tmp_path):

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from mapfilter.errors import InputError, OutputError
@@ -110,7 +111,7 @@ def test_each_of_five_estimates_has_a_panel_with_the_others_in_grey():
 def test_truth_is_wider_than_the_estimate_over_it():
     axes = plot_track(estimate(), TRUTH, BaseMap((0.0, 0.0, 90.0, 90.0)))
     truth = next(line for line in axes.lines if line.get_label() == "truth")
-    marks = next(marks for marks in axes.collections if marks.get_label() == "estimate")
+    marks = next(m for m in axes.collections if to_hex(m.get_facecolors()[0]) == BLUE)
     assert truth.get_linewidth() > 1.5 * np.sqrt(marks.get_sizes()[0])
     assert truth.get_zorder() < marks.get_zorder()
     assert truth.get_color() != BLACK

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels

@@ -19,7 +19,7 @@ from positioning.cross_world import LATTICE, levels_dbm, make_plan, make_routes
 
 from mapfilter.database.build import build
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.serving.store import LOCK
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "serve.rst"

@@ -11,7 +11,7 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.rxlev import resolve_neighbours
 from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.simulation.reports import (
     ReportModel,
     array_sampler,

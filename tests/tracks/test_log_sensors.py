@@ -1,6 +1,10 @@
 """Raw sensors beside a log, and reports by technology."""
 
+from decimal import Decimal
+
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from mapfilter.errors import InputError, OutputError, StoreError
@@ -67,6 +71,41 @@ def test_sensors_made_by_hand_need_their_columns(log, tmp_path):
         read_sensors(folder)
     with pytest.raises(OutputError, match="other files"):
         write_log(log, folder)
+
+
+def test_a_sensor_table_that_a_log_lists_and_lacks_is_named(log, sensors, tmp_path):
+    write_log(log, tmp_path / "log", sensors=sensors)
+    (tmp_path / "log" / "sensors" / "gyroscope.parquet").unlink()
+    with pytest.raises(StoreError, match=r"gyroscope\.parquet: expected a table of the log"):
+        read_sensors(tmp_path / "log")
+
+
+@pytest.fixture
+def barometer(tmp_path):
+    """Return the path of a sensor table in a log made by hand, without its suffix."""
+    (tmp_path / "sensors").mkdir()
+    (tmp_path / "log.json").write_text('{"crs": "EPSG:32635"}')
+    return tmp_path / "sensors" / "barometer"
+
+
+def test_sensor_tables_are_numbers(barometer):
+    path = barometer.with_suffix(".csv")
+    path.write_text("time_s,pressure_hpa\n0,1013\n1_0,1013\n")
+    with pytest.raises(InputError, match=r"barometer\.csv, time_s: expected numbers"):
+        read_sensors(path.parents[1])
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    with pytest.raises(InputError, match="pipe, socket or device"):
+        read_sensors(path.parents[1])
+
+
+def test_damaged_metadata_and_decimals_of_sensor_tables_are_read(barometer):
+    path = barometer.with_suffix(".parquet")
+    pressures = pa.array([Decimal("1013.5")])
+    table = pa.table({"time_s": [0.0], "pressure_hpa": pressures})
+    strange = {b"pandas": b'{"index_columns": ["zz"], "columns": [1]}'}
+    pq.write_table(table.replace_schema_metadata(strange), path)
+    assert read_sensors(path.parents[1])["barometer"]["pressure_hpa"].tolist() == [1013.5]
 
 
 def report(**columns):

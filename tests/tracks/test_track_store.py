@@ -1,6 +1,7 @@
 """Logs on disk: round trips, hand-made folders, damage."""
 
 import json
+import os
 import shutil
 from dataclasses import replace
 
@@ -171,6 +172,23 @@ def test_two_files_of_one_table(tmp_path, log):
     (tmp_path / "walk" / "log.json").write_text('{"crs": "EPSG:32629"}')
     (tmp_path / "walk" / "motion.csv").write_text("time_s\n1\n")
     with pytest.raises(InputError, match="both Parquet and CSV"):
+        read_log(tmp_path / "walk")
+
+
+@pytest.mark.parametrize("kind", ["link", "device", "pipe", "folder"])
+@pytest.mark.parametrize("name", ["motion.csv", "radio.csv", "almanac.txt"])
+def test_a_table_that_is_no_file_is_refused_and_not_left_out(tmp_path, log, name, kind):
+    write_log(log, tmp_path / "walk", "csv")
+    (tmp_path / "walk" / "log.json").write_text('{"crs": "EPSG:32629"}')
+    path = tmp_path / "walk" / name
+    path.unlink(missing_ok=True)
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to("/dev/zero" if kind == "device" else tmp_path / "gone")
+    with pytest.raises(InputError, match=f"{name}: expected a readable file"):
         read_log(tmp_path / "walk")
 
 

@@ -9,7 +9,7 @@ from command_line import assert_done, assert_refused, mapfilter, settings
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 EVERY = ["coverage", "best-server", "margin", "points-per-cell", "points-of-one-site", "land-use"]
 TABLE = """class,walkable,r,g,b

@@ -11,7 +11,7 @@ import pytest
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.tracks.store import read_log
 
 DEMO_KEYS = [

@@ -11,7 +11,7 @@ from command_line import ONE, assert_done, assert_refused, mapfilter, settings
 from conftest import PLAN, TOML
 from made_recordings import MADE
 
-from mapfilter.geodesy import unproject
+from mapfilter.geodesy import azimuth_from_heading_deg, unproject
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.tracks.store import read_log, write_log
 
@@ -84,6 +84,54 @@ def test_recordings_of_a_journey_are_located(database, recordings, tmp_path, wor
     estimate = read_estimate(tmp_path / "out" / "estimate.parquet")
     motion_s = original.motion["time_s"].to_numpy()
     assert np.isin(np.round(motion_s, 3), np.round(estimate.time_s, 3)).mean() > 0.95
+
+
+@pytest.fixture
+def counted(world, recordings):
+    """The journey as a phone that counts steps of 0.5 m, and whose compass is 10 degrees off."""
+    motion = read_log(world.journeys / ONE).motion
+    steps = (motion["step_m"].fillna(0.0).cumsum() / 0.5).round().astype(int)
+    azimuth_deg = (azimuth_from_heading_deg(motion["heading_rad"]) - 10.0) % 360
+    table = pd.DataFrame({"time": START_UTC_S + motion["time_s"], "steps": steps})
+    table.assign(compass_deg=azimuth_deg).to_csv(recordings / "steps.csv", index=False)
+    return ("--log", recordings / "steps.csv", "--log", recordings / "cells.csv")
+
+
+def test_steps_are_counted_with_the_length_and_declination_given(database, counted, tmp_path):
+    truth = ("--truth", tmp_path / "truth.csv")
+    given = ("--step-length", "0.5", "--declination", "10")
+    found = replayed(database, tmp_path / "out", *counted, *truth, *given)
+    assert found.code == 0, found.err
+    assert any("steps of 0.5 m by a counter" in note for note in found.json["notes"])
+    assert not any("declination" in note for note in found.json["notes"])
+    assert not any("no effect" in note for note in found.json["notes"])
+    keys = ("--set", "track.walk.step_m=0.5", "--set", "track.walk.declination_deg=10")
+    same = replayed(database, tmp_path / "same", *counted, *truth, *keys).json
+    assert same["error_mean_m"] == found.json["error_mean_m"]
+    for option, value, expected in (
+        ("--step-length", "50", "metres above 0 and below 3, found 50"),
+        ("--declination", "200", "degrees in -180..180, found 200"),
+    ):
+        wrong = mapfilter("replay", "--db", database, *counted, option, value)
+        assert_refused(wrong, option, expected)
+    off = ("--set", "track.steps=false")
+    refused = mapfilter("replay", "--db", database, *counted, *given, *off)
+    assert_refused(refused, "--step-length", "track.steps = false takes none")
+
+
+def test_options_of_walks_that_a_log_does_not_use_are_noted(database, recordings, tmp_path):
+    files = ("--log", recordings / "steps.csv", "--log", recordings / "cells.csv")
+    truth = ("--truth", tmp_path / "truth.csv")
+    log = tmp_path / "log"
+    assert_done(mapfilter("convert", recordings, *truth, "--out", log, "--crs", "EPSG:32635"))
+    for given, why in (
+        ((*files, *truth), "motion is that of steps.csv"),
+        (("--log", log), "the motion of a track log is used as it is"),
+    ):
+        options = ("--step-length", "0.8", "--declination", "10")
+        notes = replayed(database, tmp_path / "out", *given, *options).json["notes"]
+        for option in ("step_m = 0.8 (--step-length)", "declination_deg = 10 (--declination)"):
+            assert any(note.startswith(f"{option} has no effect: {why}") for note in notes), why
 
 
 def test_the_section_names_recordings(database, recordings, tmp_path):

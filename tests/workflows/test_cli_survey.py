@@ -8,7 +8,7 @@ import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
 from mapfilter.geodesy import unproject
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 
 OF_SURVEY = ("readings.parquet", "deviation.tif")
 HEADER = "cell,lat,lon,level_dbm,time,accuracy_m\n"

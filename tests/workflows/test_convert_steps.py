@@ -114,6 +114,79 @@ def test_counted_steps_of_a_csv_have_the_length_that_is_given(tmp_path):
     assert not (tmp_path / "other").exists()
 
 
+COUNTED = [f"2026-05-01T10:00:{k:02d}Z,{2 * k},80,0.0,60.17,24.94" for k in range(40)]
+OPTIONS = ("--pose", "any", "--declination", "10", "--step-length", "0.8")
+
+
+def written(path, columns):
+    """Write some columns of a phone's table of counted steps."""
+    names = ["time", "steps", "compass_deg", "turn_rad", "latitude", "longitude"]
+    kept = [names.index(name) for name in columns]
+    rows = [",".join(row.split(",")[i] for i in kept) for row in COUNTED]
+    path.write_text("\n".join([",".join(columns), *rows]) + "\n")
+    return path
+
+
+def told(notes):
+    """Return the options that notes call without effect."""
+    found = [note.split("no effect")[0] for note in notes if "has no effect: " in note]
+    return [one.split("(")[1].split(")")[0] for one in found]
+
+
+@pytest.mark.parametrize(
+    ("columns", "without"),
+    [
+        (("steps", "compass_deg"), ["--pose"]),
+        (("steps", "turn_rad"), ["--pose", "--declination"]),
+        ((), ["--pose", "--declination", "--step-length"]),
+    ],
+)
+def test_options_without_effect_are_noted(columns, without, tmp_path):
+    path = written(tmp_path / "phone.csv", ("time", *columns, "latitude", "longitude"))
+    done = mapfilter("convert", path, *OPTIONS, "--out", tmp_path / "log", "--json")
+    assert done.code == 0
+    assert told(done.json["notes"]) == without
+    plain = mapfilter("convert", path, "--out", tmp_path / "plain", "--json")
+    assert told(plain.json["notes"]) == []
+
+
+def test_a_length_of_steps_has_no_effect_on_raw_sensors(recording, tmp_path):
+    done = mapfilter("convert", recording, *PLACE, *OPTIONS, "--out", tmp_path / "log", "--json")
+    assert told(done.json["notes"]) == ["--step-length"]
+    assert any("lengths are those of the accelerometer" in note for note in done.json["notes"])
+
+
+def test_motion_that_a_file_holds_takes_no_options(tmp_path):
+    rows = [f"{k},0.7,{3 * k},48.0,11.0" for k in range(40)]
+    path = tmp_path / "steps.csv"
+    path.write_text("\n".join(["time_s,step_m,compass_deg,latitude,longitude", *rows]) + "\n")
+    done = mapfilter("convert", path, *OPTIONS, "--out", tmp_path / "log", "--json")
+    assert told(done.json["notes"]) == ["--pose", "--declination", "--step-length"]
+    assert any("steps.csv, whose compass_deg counts from true" in n for n in done.json["notes"])
+
+
+def test_a_track_log_takes_no_options_of_walks(tmp_path):
+    path = written(
+        tmp_path / "phone.csv", ("time", "steps", "compass_deg", "latitude", "longitude")
+    )
+    assert mapfilter("convert", path, *OPTIONS, "--out", tmp_path / "log").code == 0
+    walk = mf.WalkOptions(declination_deg=10.0, step_m=0.8)
+    assert told(mf.read_log(tmp_path / "log", walk=walk).notes)[-2:] == [
+        "--declination",
+        "--step-length",
+    ]
+    assert mf.read_log(tmp_path / "log").notes == mf.read_log(tmp_path / "log", walk=None).notes
+
+
+@pytest.mark.parametrize("given", [OPTIONS[:2], OPTIONS[2:4], OPTIONS[4:], ("--pose", "auto")])
+def test_options_of_walks_are_refused_without_steps(given, tmp_path):
+    path = written(tmp_path / "phone.csv", ("time", "steps", "latitude", "longitude"))
+    done = mapfilter("convert", path, "--no-steps", *given, "--out", tmp_path / "log")
+    assert done.code == 2
+    assert f"{given[0]}: expected nothing, as --no-steps takes none" in done.err
+    assert not (tmp_path / "log").exists()
+
+
 def test_a_configuration_and_python_take_the_same_options(recording, tmp_path):
     text = f"""
     [track]

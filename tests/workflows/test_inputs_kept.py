@@ -22,7 +22,7 @@ from command_line import (
     settings,
 )
 
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.tracks.store import list_logs, read_log
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError
+from mapfilter.errors import ConfigError, MapfilterError
 from mapfilter.filters.resampling import systematic
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import STATES
@@ -142,3 +142,12 @@ def test_filterpys_ekf_is_the_same_filter():
     rates, off = kalman_peers.compare(trials=20, runs=1)
     assert min(rates.values()) > 0
     assert off < 1e-6
+
+
+def test_a_peer_without_what_it_needs_is_named(monkeypatch):
+    def lacking(*_):
+        raise ModuleNotFoundError("No module named 'ordered_set'", name="ordered_set")
+
+    monkeypatch.setattr("mapfilter.workflows.bench_peers.stone_soup_step", lacking)
+    with pytest.raises(MapfilterError, match="no module ordered_set"):
+        bench_peers(runs=1, particles=(400,), settings=SMALL)

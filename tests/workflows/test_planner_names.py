@@ -10,7 +10,8 @@ from rasterio.warp import Resampling, reproject
 
 from mapfilter.radio.cells import read_cell_plan
 from mapfilter.rasters.names import named_by_plan
-from mapfilter.rasters.raster_set import check_against_plan, open_rasters
+from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import check_against_plan
 
 NAMES = ("HD{}_RSRP", "{}_best", "net-{}", "{}")
 

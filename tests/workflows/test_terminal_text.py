@@ -101,3 +101,16 @@ def test_a_terminal_without_the_letters_costs_no_result(tmp_path, options):
         assert json.loads(done.stdout)["notes"] == ["Straße ²"]
     else:
         assert rb"Stra\xdfe \xb2" in done.stdout
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&- <&-"])
+def test_an_output_that_is_closed_costs_no_traceback(tmp_path, closed):
+    (tmp_path / "log.json").write_text('{"crs": "EPSG:32635"}')
+    (tmp_path / "motion.csv").write_text("time_s,step_m\n0,1\n1,1\n")
+    command = f"'{sys.executable}' -m mapfilter info"
+    for given, code in ((tmp_path, 0), (tmp_path / "absent", 2)):
+        done = subprocess.run(
+            ["/bin/sh", "-c", f"{command} '{given}' {closed}"], capture_output=True, check=False
+        )
+        assert done.returncode == code
+        assert b"Traceback" not in done.stderr

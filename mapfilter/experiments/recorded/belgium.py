@@ -10,7 +10,6 @@ towers.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mapfilter._inputs import read_input
+from mapfilter._inputs import json_value, read_input
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, position_errors_m
@@ -146,7 +145,7 @@ def read_walk(file: Path) -> TrackLog:
 def read_towers(file: Path, crs: str) -> CellPlan:
     """Read the table of towers; heights and powers, which it lacks, are usual ones."""
     try:
-        table: dict[str, Any] = json.loads(read_input(file, _LARGEST_BYTES, "a table of towers"))
+        table: dict[str, Any] = json_value(read_input(file, _LARGEST_BYTES, "a table of towers"))
         cells = [_cell(name, row, crs) for name, row in table.items()]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         expected = "cells with latitude, longitude, pci, earfcn and azimuth"

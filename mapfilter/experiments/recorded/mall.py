@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from mapfilter._inputs import read_input
+from mapfilter._inputs import json_value, read_input
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.benchmarks.single_reports import BASELINE, METHODS
@@ -202,8 +202,8 @@ def unpack(archive: Path, target: Path) -> None:
 def walkable(folder: Path, crs: str) -> RouteLattice:
     """Return the floor without its shops, as open ground in the frame of the plan."""
     try:
-        plan = json.loads(read_input(folder / _PLAN, _LARGEST_BYTES, "a floor plan"))
-        info = json.loads(read_input(folder / _INFO, _LARGEST_BYTES, "a floor's size"))
+        plan = json_value(read_input(folder / _PLAN, _LARGEST_BYTES, "a floor plan"))
+        info = json_value(read_input(folder / _INFO, _LARGEST_BYTES, "a floor's size"))
         size_m = (float(info["map_info"]["width"]), float(info["map_info"]["height"]))
         shapes: list[Any] = [
             shapely.from_geojson(json.dumps(feature["geometry"])) for feature in plan["features"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import sqrt
+from math import radians, sqrt
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from mapfilter._threads import ONE
 from mapfilter.filters.contract import BeliefFilter, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
-from mapfilter.models.street_motion import NORTH, remounted
+from mapfilter.geodesy import wrap_one_rad, wrap_rad
+from mapfilter.models.street_motion import BIAS, NORTH, remounted
 from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -215,6 +216,29 @@ class BeliefFilters:
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
         kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
         return replace(belief, state=state, log_weight=log_weight, kept=kept)
+
+    def turned(self, belief: MapBelief, changed_rad: float, rng: np.random.Generator) -> MapBelief:
+        """Turn the phone of some hypotheses of a search where its heading jumped.
+
+        They walk straight on; the others have turned a corner there.
+
+        Parameters
+        ----------
+        belief : MapBelief
+            Before the step; one on a grid is returned as it is.
+        changed_rad : float
+            Change of the direction that headings stand for, from the row before.
+        rng : numpy.random.Generator
+        """
+        if isinstance(belief, GridBelief):
+            return belief
+        rules = self.holds
+        around = abs(wrap_one_rad(changed_rad)) > radians(rules.around_deg)
+        probability = rules.around_probability if around else rules.probability
+        chosen = rng.random(belief.log_weight.size) < probability
+        state = belief.state.copy()
+        state[BIAS, chosen] = wrap_rad(state[BIAS, chosen] - changed_rad)
+        return replace(belief, state=state)
 
     def remounted(self, belief: MapBelief, length_m: float, rng: np.random.Generator) -> MapBelief:
         """Turn the phone of some hypotheses, once a position is tracked.

@@ -6,7 +6,9 @@ smaller beliefs follow the second, weighed by the same readings: one for a phone
 so that all further headings are off by the jump, and one for a phone whose headings are *mirrored*
 from there on. The difference of their log evidence, with the odds of such an event, decides: while
 one of them is ahead elsewhere, the position is LOST; when it is far ahead, it takes over, and
-headings are read as it reads them. Walks without a jump have no such beliefs.
+headings are read as it reads them. Walks without a jump have no such beliefs. While the belief
+searches, some of its own hypotheses have a turned phone instead
+(:meth:`mapfilter.positioning.bayes.belief_filters.BeliefFilters.turned`).
 """
 
 from __future__ import annotations

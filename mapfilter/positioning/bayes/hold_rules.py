@@ -56,7 +56,7 @@ class HoldRules(Options):
     probability: Probability = 0.006
     around_probability: Probability = 0.25
     mirrored_odds: Positive = 0.25
-    lost_log_odds: float = 1.0
+    lost_log_odds: float = -1.0
     lost_after_m: NotNegative = 7.0
     win_log_odds: float = 8.0
     abandon_threshold: float = -4.0

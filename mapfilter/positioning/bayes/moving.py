@@ -76,7 +76,7 @@ def moved(
     reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
     twin = state.twin
     hold, walking_rad, rules = state.hold, state.walking_rad, beliefs.holds
-    positioned = epoch.fix is not None or bool(epoch.ranges)
+    positioned = epoch.fix is not None or any(isfinite(one.range_m) for one in epoch.ranges)
     held = state.held
     if positioned:
         # Positions leave no doubt of a jump, and tell whether headings are still read rightly.
@@ -115,8 +115,11 @@ def moved(
                 compass, belief = False, beliefs.without_compass(belief, rng)
             predict = beliefs.moving_filter(state, compass=compass).predict
             tracked = state.status is Status.TRACKING and belief.status is Status.TRACKING
-            fork = tracked and compass and not positioned and jumps(walking_rad, raw, rules)
-            if fork and isinstance(belief, ParticleBelief):
+            jumped = compass and not positioned and jumps(walking_rad, raw, rules)
+            if jumped and belief.status is Status.SEARCHING:
+                changed_rad = raw.heading_rad - walking_rad
+                belief = beliefs.turned(belief, hold.sign * changed_rad, own.forking)
+            if tracked and jumped and isinstance(belief, ParticleBelief):
                 more = forked(
                     rules,
                     belief,

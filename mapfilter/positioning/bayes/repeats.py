@@ -144,7 +144,8 @@ def _followed(
     row = step.step_m, step.heading_rad, step.turn_rad
     is_equal = all(map(_equal, row, repeats.last))
     pairs = repeats.pairs + is_equal if is_equal != repeats.was_equal else 0
-    turns = abs(step.turn_rad) > _TURNS_RAD
+    # A turn that repeats, too, is that of a row that stands still as a whole.
+    turns = abs(step.turn_rad) > _TURNS_RAD and step.turn_rad != repeats.last[2]
     interval_s = time_s - repeats.time_s
     within_s = interval_s if is_equal else repeats.within_s
     between_s = repeats.between_s if is_equal else interval_s

@@ -1,8 +1,8 @@
-"""A phone that reports no motion: by its levels, whether it rests or is carried on.
+"""A phone that reports no motion, or hardly any: by its levels, whether it is carried on.
 
-At rest levels change by fading alone. Each block of a rest is compared with its first one, by the
-likelihoods of "still there" and "carried elsewhere", and their ratio is added up from zero (a
-CUSUM; Page, 1954).
+At rest levels change by fading alone, and by more along a short way. Each block of a rest is
+compared with its first one, by the likelihoods of "still there", or as far away as measured, and
+"carried elsewhere", and their ratio is added up from zero (a CUSUM; Page, 1954).
 
 A walker whose steps are no longer counted is 50 m away before that ratio can be large. So the
 rest itself has to be shown, too: where levels could have shown it, and did not, the position is in
@@ -24,10 +24,11 @@ _AT_REST_DB, _ELSEWHERE_DB, _ALL_DB = 4.0, 9.0, 6.0
 phone is put into a pocket."""
 _BLOCK_SHARE = 0.5
 """Power of a block's likelihoods: blocks near each other repeat the same deviation."""
-_CELLS_AT_REST, _NATS_PER_CELL, _CELLS_S = 3, 2.5, 600.0
+_CELLS_AT_REST, _M_PER_CELL, _NATS_PER_CELL, _CELLS_S = 3, 30.0, 2.5, 600.0
 _NATS_PER_S = 1 / 300
-"""Serving cells that are usual at rest, gain from each further one that has not served for so long,
-and what is forgotten with time: now and then others serve, also at rest."""
+"""Serving cells that are usual at rest, the measured way for each that is usual besides, gain from
+each further one that has not served for so long, and what is forgotten with time: now and then
+others serve, also at rest."""
 _CARRIED_NATS = 6.0
 _FADING_DB, _WHITE_DB = 2.7, 3.3
 """Deviation of a level at rest from its earlier mean, and of a single level besides."""
@@ -36,6 +37,9 @@ _WAY_DB, _WAY_M = 10.5, 60.0
 variance."""
 _MOST_NATS, _LEAST_NATS = 3.0, -12.0
 """The most that a block gains, either way, and the least sum."""
+_STROLL_SHARE = 0.5
+"""Share of that variance which a way as measured explains, where it is compared with being
+elsewhere: with all of it, the two could hardly be told apart after 30 m."""
 _LEFT_M, _SHOWABLE_NATS = 45.0, -2.5
 _SHOWN_NATS, _SHOWN_AGAIN_NATS = -1.0, -5.0
 """Way from which on a position is in doubt, and sum of levels that do not change at all above which
@@ -70,6 +74,8 @@ class Rest:
         The same, had no level changed.
     is_doubtful : bool
         Whether levels could have shown the rest by now, and did not.
+    measured_m : float
+        Way that was measured since the last step at a walker's pace: 0 at rest.
     """
 
     since_s: float
@@ -84,14 +90,20 @@ class Rest:
     left_nats: float = 0.0
     still_nats: float = 0.0
     is_doubtful: bool = False
+    measured_m: float = 0.0
 
-    def heard(self, time_s: float, rows: tuple[ReportRow, ...]) -> Rest:
-        """Add a report; a phone that was carried on stays so until a step is measured."""
+    def heard(self, time_s: float, rows: tuple[ReportRow, ...], gone_m: float = 0.0) -> Rest:
+        """Add a report, and what was measured since the last one.
+
+        A phone that was carried on stays so until it moves.
+        """
         if self.is_carried:
             return self
+        measured_m = self.measured_m + gone_m
         cells = {row.cell for row in rows if row.role == SERVING and row.cell is not None}
         recent = {cell: at_s for cell, at_s in self.served.items() if time_s - at_s <= _CELLS_S}
-        known, all_cells = max(len(recent), _CELLS_AT_REST), len(cells | recent.keys())
+        usual = _CELLS_AT_REST + int(measured_m / _M_PER_CELL)
+        known, all_cells = max(len(recent), usual), len(cells | recent.keys())
         gone_s = time_s - self.heard_s if isfinite(self.heard_s) else 0.0
         kept = max(self.carried_nats - _NATS_PER_S * gone_s, 0.0)
         nats = min(kept + _NATS_PER_CELL * max(all_cells - known, 0), _CARRIED_NATS)
@@ -101,8 +113,10 @@ class Rest:
         if not isfinite(block_s):
             block_s = began_s = time_s
         elif time_s - block_s >= _BLOCK_S:
-            nats = min(max(nats + _BLOCK_SHARE * _carried(first, present), 0.0), _CARRIED_NATS)
-            gained, unchanged = _left(first, present, self.pace_mps * (block_s - began_s))
+            nats = max(nats + _BLOCK_SHARE * _carried(first, present, measured_m), 0.0)
+            nats = min(nats, _CARRIED_NATS)
+            way_m = self.pace_mps * (block_s - began_s)
+            gained, unchanged = _left(first, present, way_m, measured_m)
             left_nats, still_nats = _added(left_nats, gained), _added(still_nats, unchanged)
             block_s, first, present = time_s, {**present, **first}, {}
         for name, level_dbm in levels_of(rows):
@@ -120,12 +134,15 @@ class Rest:
             began_s,
             left_nats,
             still_nats,
-            self._in_doubt(time_s, left_nats, still_nats) and nats < _CARRIED_NATS,
+            self._in_doubt(time_s, left_nats, still_nats, measured_m) and nats < _CARRIED_NATS,
+            measured_m,
         )
 
-    def _in_doubt(self, time_s: float, left_nats: float, still_nats: float) -> bool:
+    def _in_doubt(
+        self, time_s: float, left_nats: float, still_nats: float, measured_m: float
+    ) -> bool:
         """Return whether the rest is in doubt at a time, with these sums."""
-        far = self.pace_mps * (time_s - self.since_s) >= _LEFT_M
+        far = self.pace_mps * (time_s - self.since_s) - measured_m >= _LEFT_M
         shown_nats = _SHOWN_AGAIN_NATS if self.is_doubtful else _SHOWN_NATS
         return far and still_nats <= _SHOWABLE_NATS and left_nats > shown_nats
 
@@ -149,8 +166,12 @@ def levels_of(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:
     ]
 
 
-def _carried(first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[float, int]]) -> float:
-    """Return the log-likelihood ratio of "elsewhere" to "still there", by the levels of both."""
+def _carried(
+    first: Mapping[str, tuple[float, int]],
+    now: Mapping[str, tuple[float, int]],
+    measured_m: float,
+) -> float:
+    """Return the log-likelihood ratio of "elsewhere" to "as measured", by the levels of both."""
     changes = [
         now[name][0] / now[name][1] - first[name][0] / first[name][1]
         for name in now
@@ -158,27 +179,39 @@ def _carried(first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[flo
     ]
     if not changes:
         return 0.0
-    return _log_density(changes, _ELSEWHERE_DB) - _log_density(changes, _AT_REST_DB)
+    as_measured_db = sqrt(_AT_REST_DB**2 + _STROLL_SHARE * _on_way_db2(measured_m))
+    return _log_density(changes, _ELSEWHERE_DB) - _log_density(changes, as_measured_db)
 
 
 def _left(
-    first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[float, int]], way_m: float
+    first: Mapping[str, tuple[float, int]],
+    now: Mapping[str, tuple[float, int]],
+    way_m: float,
+    measured_m: float,
 ) -> tuple[float, float]:
-    """Return the log-likelihood ratio of a way to a rest, and that of levels without a change."""
+    """Return the log-likelihood ratio of a way to that as measured, which is 0 at rest.
+
+    The second one is that of levels without a change.
+    """
     pairs = [(now[name], first[name]) for name in now if name in first]
-    if not pairs or way_m <= 0:
+    if not pairs or way_m <= measured_m:
         return 0.0, 0.0
     changes = [own[0] / own[1] - other[0] / other[1] for own, other in pairs]
     per_mean = sum(1 / own[1] + 1 / other[1] for own, other in pairs) / len(pairs)
     at_rest_db2 = _FADING_DB**2 + _WHITE_DB**2 * per_mean
-    at_rest_db = sqrt(at_rest_db2)
-    on_way_db = sqrt(at_rest_db2 + _WAY_DB**2 * (1 - exp(-way_m / _WAY_M)))
+    as_measured_db = sqrt(at_rest_db2 + _on_way_db2(measured_m))
+    on_way_db = sqrt(at_rest_db2 + _on_way_db2(way_m))
     ratios = (
-        _log_density(seen, on_way_db) - _log_density(seen, at_rest_db)
+        _log_density(seen, on_way_db) - _log_density(seen, as_measured_db)
         for seen in (changes, [0.0] * len(changes))
     )
     gained, unchanged = (_BLOCK_SHARE * ratio for ratio in ratios)
     return gained, unchanged
+
+
+def _on_way_db2(way_m: float) -> float:
+    """Return the variance of how a level changes along a way."""
+    return _WAY_DB**2 * (1 - exp(-way_m / _WAY_M))
 
 
 def _added(nats: float, gained: float) -> float:

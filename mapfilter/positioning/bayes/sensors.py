@@ -13,7 +13,7 @@ decide (:mod:`mapfilter.positioning.bayes.rest`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import exp, isfinite, nan, sqrt
+from math import exp, expm1, isfinite, nan, sqrt
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
@@ -27,6 +27,10 @@ _GAP_S, _GAP_INTERVALS, _REGULAR = 5.0, 3.0, 0.02
 at fixed times differ by less than this share."""
 _KNOWN_ROWS = 10
 _REST_MPS = 0.1
+_RECENT_S, _SLOW_SHARE, _SLOWER_SHARE, _WALKERS_MPS = 2.5, 0.3, 0.5, 2.5
+"""A walker, who is no faster than this in the mean, and slower for some seconds than the first
+share of it, may have a counter that misses steps: levels decide, as at rest. Below the second one,
+the speed is not learnt."""
 _WALK_MPS = 1.4
 """Speed that is assumed before one is measured."""
 _STRAIGHT_S = 60.0
@@ -69,10 +73,12 @@ class SensorWatch:
         Reports since then, while no motion is reported; None while it moves.
     unmeasured_s : float
         Time for which an unmeasured way is in the belief already.
+    moved_m : float
+        Distance since the last report, as measured.
+    recent_mps : float
+        Mean speed of the last seconds.
     report : tuple of ReportRow
         The last report.
-    moved_m : float
-        Distance since then, as measured.
     repeated_nats : float
         How much repeated reports speak for a radio that stands still.
     repeats : MotionRepeats
@@ -91,8 +97,9 @@ class SensorWatch:
     known_s: float = nan
     rest: Rest | None = None
     unmeasured_s: float = 0.0
-    report: tuple[ReportRow, ...] = ()
     moved_m: float = 0.0
+    recent_mps: float = _WALK_MPS
+    report: tuple[ReportRow, ...] = ()
     repeated_nats: float = 0.0
     repeats: MotionRepeats = field(default_factory=MotionRepeats)
     fastest_mps: float = 0.0
@@ -145,7 +152,8 @@ def watched(
         nats = _repeated(watch, step_unit_m * moved_m, epoch.radio)
         report, moved_m = epoch.radio, 0.0
     fastest_mps = max(watch.fastest_mps, _row_mps(watch, epoch.time_s, steps))
-    watch = SensorWatch(*way[:-1], report, moved_m, nats, repeats, fastest_mps)
+    way = way._replace(moved_m=moved_m)
+    watch = SensorWatch(*way, report, nats, repeats, fastest_mps)
     if epoch.radio and nats >= _STALE_NATS:
         return watch, replace(epoch, radio=()), (why, Reason.STALE_RADIO)
     return watch, epoch, (why, Reason.USED)
@@ -165,6 +173,7 @@ class _Way(NamedTuple):
     rest: Rest | None
     unmeasured_s: float
     moved_m: float
+    recent_mps: float
 
 
 def _followed(watch: SensorWatch, epoch: Epoch, step_unit_m: float) -> tuple[_Way, Epoch, Reason]:
@@ -173,17 +182,27 @@ def _followed(watch: SensorWatch, epoch: Epoch, step_unit_m: float) -> tuple[_Wa
     steps = [abs(step.step_m) for step in epoch.motion]
     measured = [step_m for step_m in steps if isfinite(step_m)]
     gone_m, dt_s = sum(measured), time_s - watch.motion_s
-    moves = gone_m > _REST_MPS * (_usual_s(watch, dt_s) if isfinite(dt_s) else 0.0)
-    way = _timed(
-        watch, time_s, dt_s, gone_m, moves=moves, rests=bool(measured), any_rows=bool(steps)
-    )
+    row_s = _usual_s(watch, dt_s) if isfinite(dt_s) else 0.0
+    recent_mps = watch.recent_mps
+    # A step after a pause covers the usual interval at most.
+    step_s = min(row_s, watch.interval_s) if watch.rows > 1 else row_s
+    if measured and step_s > 0:
+        recent_mps += -expm1(-step_s / _RECENT_S) * (gone_m / step_s - recent_mps)
+    goes = gone_m > _REST_MPS * row_s
+    is_walker = watch.rows >= _SPEED_ROWS and step_unit_m * watch.speed_mps <= _WALKERS_MPS
+    share = recent_mps / watch.speed_mps if is_walker else 1.0
+    moves, usual = goes and share >= _SLOW_SHARE, goes and share >= _SLOWER_SHARE
+    stands = bool(measured) and not goes
+    way = _timed(watch, time_s, dt_s, gone_m, usual=usual, stands=stands, any_rows=bool(steps))
+    way = way._replace(recent_mps=recent_mps)
     if moves:
         moved_m = way.moved_m + gone_m
-        return _Way(*way[:6], time_s, time_s, None, 0.0, moved_m), epoch, why
+        way = _Way(*way[:6], time_s, time_s, None, 0.0, moved_m, recent_mps)
+        return way, epoch, why
     if not isfinite(way.moving_s):
         return way, epoch, why
     rest = way.rest or Rest(way.moving_s, pace_mps=step_unit_m * way.speed_mps)
-    rest = rest.heard(time_s, epoch.radio)
+    rest = rest.heard(time_s, epoch.radio, step_unit_m * gone_m)
     # A measured rest is none of the way, unless it was a counter that stood still.
     unmeasured_s = way.unmeasured_s + time_s - way.known_s
     if rest.is_carried:
@@ -195,13 +214,14 @@ def _followed(watch: SensorWatch, epoch: Epoch, step_unit_m: float) -> tuple[_Wa
         why = Reason.MOTION_MISSING if time_s - way.motion_s > longest_s else Reason.USED
     if why is Reason.USED and rest.is_carried:
         why = Reason.MOTION_STUCK if steps else Reason.MOTION_MISSING
+    way = way._replace(moved_m=way.moved_m + gone_m)
     if why is Reason.USED:
         return way._replace(rest=rest, known_s=time_s if measured else way.known_s), epoch, why
     step = _unmeasured(way.speed_mps, way.unmeasured_s, unmeasured_s)
     # Turns count though the length of their step is unknown.
     turned = (step for step in epoch.motion if isfinite(step.step_m) or isfinite(step.turn_rad))
     moved_m = way.moved_m + step.step_m
-    way = _Way(*way[:7], time_s, rest, unmeasured_s, moved_m)
+    way = _Way(*way[:7], time_s, rest, unmeasured_s, moved_m, recent_mps)
     return way, replace(epoch, motion=(*turned, step)), why
 
 
@@ -223,8 +243,8 @@ def _timed(
     dt_s: float,
     moved_m: float,
     *,
-    moves: bool,
-    rests: bool,
+    usual: bool,
+    stands: bool,
     any_rows: bool,
 ) -> _Way:
     """Learn from an epoch's motion rows how often they come, and how fast one moves."""
@@ -237,7 +257,7 @@ def _timed(
             dt_s = min(dt_s, 5 * interval_s) if rows > _KNOWN_ROWS else dt_s
             interval_s += new * (dt_s - interval_s)
             irregular_s += new * (abs(dt_s - interval_s) - irregular_s)
-            if moves:
+            if usual:
                 # By time: of two rows at almost the same one, the speed would be any.
                 speed_mps += 0.05 * (moved_m - speed_mps * dt_s) / interval_s
         motion_s, rows = time_s, rows + 1
@@ -248,13 +268,14 @@ def _timed(
         rows,
         interval_s,
         irregular_s,
-        watch.rests or (rests and not moves),
+        watch.rests or stands,
         speed_mps,
         moving_s,
         known_s,
         watch.rest,
         watch.unmeasured_s,
         watch.moved_m,
+        watch.recent_mps,
     )
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mapfilter._parallel import Progress
 from mapfilter._types import Bools, Floats, Ints
@@ -125,6 +124,8 @@ def folds_of(database: Reports) -> tuple[Ints, str]:
 
     Squares are twice as wide as the usual distance between neighbouring places.
     """
+    from scipy.spatial import cKDTree
+
     blocks, which = np.unique(database.block, return_inverse=True)
     if len(blocks) > 1 and blocks[0] >= 0:
         return which % MOST_FOLDS, "logs"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import warnings
+from collections import Counter
 from io import StringIO
 from pathlib import Path
 
@@ -102,7 +103,7 @@ def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     separator = max(_SEPARATORS, key=lines[0].count)
     named = [name.strip().lower() for name in _fields(lines[0], separator)]
     if len(set(named)) < len(named):
-        twice = sorted({name for name in named if named.count(name) > 1})
+        twice = sorted(name for name, times in Counter(named).items() if times > 1)
         raise fail(InputError, f"{path}, header", "each column once", listed(twice))
     # Rows that are too short end in empty fields; which field of one too long is which is unknown.
     kept = [line for line in lines[1:] if len(_fields(line, separator)) <= len(named)]

@@ -7,13 +7,16 @@ gravity keep. The compass turns it to the north later (:mod:`mapfilter.tracks.pd
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import imufusion
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mapfilter._types import Floats, Ints
 from mapfilter.tracks.pdr.signals import GRAVITY_MPS2, RATE_HZ, Signals
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _GAIN = 0.5
 _GYROSCOPE_DPS = 4000.0
@@ -56,6 +59,8 @@ def attitude(signals: Signals) -> Attitude:
 
 def _level(up: Floats) -> Rotation:
     """Return the smallest rotation that brings the device's upward direction to the z axis."""
+    from scipy.spatial.transform import Rotation
+
     up = up / np.linalg.norm(up)
     axis = np.cross(up, [0.0, 0.0, 1.0])
     sine, cosine = float(np.linalg.norm(axis)), float(up[2])
@@ -66,6 +71,8 @@ def _level(up: Floats) -> Rotation:
 
 def _fused(signals: Signals, rate_radps: Floats) -> Rotation:
     """Fuse gyroscope and accelerometer by the complementary filter of imufusion."""
+    from scipy.spatial.transform import Rotation
+
     filter_ = imufusion.Ahrs()
     filter_.set_settings(
         imufusion.AhrsSettings(
@@ -94,6 +101,7 @@ def _compass(signals: Signals) -> Rotation:
     """Return the attitude by low-passed gravity and field, its y axis to the magnetic north."""
     # Slow to import (it imports scipy.stats), and few commands need it.
     from scipy.signal import butter, sosfiltfilt
+    from scipy.spatial.transform import Rotation
 
     assert signals.field_ut is not None
     sos = butter(2, _LOWPASS_HZ, fs=RATE_HZ, output="sos")
@@ -124,6 +132,8 @@ def _with_yaw(rotation: Rotation) -> Attitude:
     The integral of the vertical rate would not: it drifts with the solid angle that a swinging
     device describes.
     """
+    from scipy.spatial.transform import Rotation
+
     count, width = len(rotation), int(_POSTURE_S * RATE_HZ)
     yaw, section = np.zeros(count), np.zeros(count, dtype=np.int64)
     references: list[Rotation] = []

@@ -1,16 +1,21 @@
-"""From a step counter and a compass to the motion of a walker: for phones that keep no raw data."""
+"""From counted steps with a compass or turns to motion: for phones that keep no raw data."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats, Ints
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
+from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.moved import MAD_TO_SD
+from mapfilter.tracks.pdr.heading import RATE_SD_RADPS
 from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.pdr.turns import turning_of
 from mapfilter.tracks.pdr.walk import DECLINATION_SD_RAD
 from mapfilter.tracks.pdr.walk_noise import SCALE, STEP_SHARE
 
@@ -22,10 +27,30 @@ _NEAR_S, _PAUSE_S = 2.0, 30.0
 _TURNED = 0.9
 _COUNTED_LATE = 0.5
 _LEAST_HEADING_DEG, _MOST_HEADING_DEG = 3.0, 45.0
-_MAD_TO_SD = 1.4826
 _CARRIED_SD_DEG = 15.0
 _CORRELATION_S = 6.0
 _OWN_COUNTS = "counted in each row"
+_NO_COURSE = (
+    "steps are counted, but no compass and no turns are beside them (compass_deg, turn_rad, "
+    "yaw_rate_radps, or a gyroscope): no motion"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """Headings or turns of the rows of a step counter.
+
+    ``chord`` is the length of the way from row to row by the steps in it, and ``walk_rad`` the
+    random walk of turns in rad/√s (0 with headings).
+    """
+
+    heading_rad: Floats
+    turn_rad: Floats
+    chord: Floats
+    walk_rad: float
+    source: str
+    unknown: str
+    notes: tuple[str, ...]
 
 
 def reckon_counted(
@@ -33,14 +58,15 @@ def reckon_counted(
     options: WalkOptions | None = None,
     convergence_rad: float = 0.0,
 ) -> tuple[pd.DataFrame | None, ImuNoise | None, tuple[str, ...]]:
-    """Make the motion of a walk from counted steps of one length, and the azimuths of a compass.
+    """Make the motion of a walk from counted steps of one length, and a compass, else turns.
 
     Parameters
     ----------
     sensors : mapping of str to pandas.DataFrame
         ``steps`` (time_s, count: since some start, or in each row where counts fall and none
         exceeds what can be walked between two rows) and ``compass`` (time_s, magnetic_deg,
-        clockwise from magnetic north).
+        clockwise from magnetic north); without a compass ``turns``, or ``gyroscope`` with
+        ``gravity`` or ``accelerometer``: see :func:`mapfilter.tracks.pdr.turns.turning_of`.
     options : WalkOptions, optional
         Of which the length of a step and the magnetic declination are used.
     convergence_rad : float
@@ -49,9 +75,9 @@ def reckon_counted(
     Returns
     -------
     motion : pandas.DataFrame or None
-        time_s, step_m, heading_rad, turn_rad (NaN); None where no step was counted. A step is
-        unknown (NaN) where the counter began anew, grew faster than anybody walks, or after more
-        than 30 s without a row.
+        time_s, step_m, and heading_rad (with a compass) or turn_rad, the other one NaN; None where
+        no step was counted. A step is unknown (NaN) where the counter began anew, grew faster than
+        anybody walks, or after more than 30 s without a row.
     imu : ImuNoise or None
         Its errors.
     notes : tuple of str
@@ -68,8 +94,6 @@ def reckon_counted(
     options = options or WalkOptions()
     if "steps" not in sensors:
         return None, None, ()
-    if "compass" not in sensors:
-        return None, None, ("steps are counted, but no compass_deg is beside them: no motion",)
     rows = sensors["steps"].sort_values("time_s", kind="stable").drop_duplicates("time_s")
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     counted, how = _counted(time_s, rows["count"].to_numpy(dtype=np.float64))
@@ -77,30 +101,74 @@ def reckon_counted(
     if not np.nansum(counted) > 0:
         reason = f"the step counter stands still in {len(rows)} rows: no motion"
         return None, None, (f"{reason} (steps of each row alone are given as step_m)",)
-    magnetic_deg, straight = _mean_direction(time_s, sensors["compass"])
-    north_deg = options.declination_deg or 0.0
+    if "compass" in sensors:
+        course, reason = _by_compass(time_s, counted, sensors, options, convergence_rad)
+    else:
+        course, reason = _by_turns(time_s, sensors)
+    if course is None:
+        return None, None, (reason,)
     motion = pd.DataFrame(
         {
             "time_s": time_s,
-            "step_m": options.step_m * counted * straight,
-            "heading_rad": heading_from_azimuth_rad(magnetic_deg + north_deg, convergence_rad),
-            "turn_rad": np.nan,
+            "step_m": options.step_m * counted * course.chord,
+            "heading_rad": course.heading_rad,
+            "turn_rad": course.turn_rad,
         }
     )
-    without = int((motion["heading_rad"].isna() & (motion["step_m"] > 0)).sum())
-    if motion["heading_rad"].isna().all():
-        reason = "compass and step counter have no time in common: no motion"
-        return None, None, (reason,)
     notes = [
-        f"motion: {np.nansum(counted):.0f} steps of {options.step_m:g} m {how}, with a compass"
+        f"motion: {np.nansum(counted):.0f} steps of {options.step_m:g} m {how}, {course.source}"
     ]
     if unknown:
         notes.append(f"motion unknown in {unknown} rows: the counter jumped, or paused for 30 s")
+    aimless = motion["heading_rad"].isna() & motion["turn_rad"].isna() & (motion["step_m"] > 0)
+    # Before the first row there is no turn.
+    without = int(aimless.iloc[0 if "compass" in sensors else 1 :].sum())
     if without:
-        notes.append(f"no compass within {_NEAR_S:g} s of {without} rows with steps")
+        notes.append(f"{course.unknown} {without} rows with steps")
+    return motion, _errors(motion, options, course.walk_rad), (*notes, *course.notes)
+
+
+def _by_compass(
+    time_s: Floats,
+    counted: Floats,
+    sensors: Mapping[str, pd.DataFrame],
+    options: WalkOptions,
+    convergence_rad: float,
+) -> tuple[_Course | None, str]:
+    """Return headings, or why there are none."""
+    magnetic_deg, chord = _mean_direction(time_s, sensors["compass"])
+    if np.isnan(magnetic_deg).all():
+        return None, "compass and step counter have no time in common: no motion"
+    notes = []
+    stepped = counted > 0
+    if fault := compass_fault(magnetic_deg[stepped], options.step_m * float(np.nansum(counted))):
+        notes.append(fault)
     if options.declination_deg is None:
         notes.append("no magnetic declination given: magnetic north taken for true north")
-    return motion, _errors(motion, options), tuple(notes)
+    if "turns" in sensors:
+        notes.append("turns are not used beside the compass")
+    azimuth_deg = magnetic_deg + (options.declination_deg or 0.0)
+    heading = heading_from_azimuth_rad(azimuth_deg, convergence_rad)
+    nothing = np.full(len(time_s), np.nan)
+    unknown = f"no compass within {_NEAR_S:g} s of"
+    return _Course(heading, nothing, chord, 0.0, "with a compass", unknown, tuple(notes)), ""
+
+
+def _by_turns(time_s: Floats, sensors: Mapping[str, pd.DataFrame]) -> tuple[_Course | None, str]:
+    """Return turns, or why there are none; the heading at the start stays unknown."""
+    turning, reason = turning_of(sensors)
+    if turning is None:
+        return None, f"no motion: {reason}" if reason else _NO_COURSE
+    turn = turning.between(time_s)
+    if np.isnan(turn).all():
+        return None, (
+            f"{turning.source} and the step counter have no time in common, or rates lie more than "
+            "2 s apart: no motion"
+        )
+    nothing, whole = np.full(len(time_s), np.nan), np.ones(len(time_s))
+    notes = ("no compass: turns only, the heading at the start is unknown",)
+    source, walk_rad = f"with {turning.source}", turning.walk_rad_per_sqrt_s
+    return _Course(nothing, turn, whole, walk_rad, source, "no turn known in", notes), ""
 
 
 def _counted(time_s: Floats, count: Floats) -> tuple[Floats, str]:
@@ -162,22 +230,32 @@ def _nearest(known_s: Floats, time_s: Floats) -> Ints:
     return np.where(is_before, before, after)
 
 
-def _errors(motion: pd.DataFrame, options: WalkOptions) -> ImuNoise:
+def _errors(motion: pd.DataFrame, options: WalkOptions, walk_rad: float) -> ImuNoise:
     """Return the errors of the motion: what scatters from row to row, and what lasts."""
     stepped = motion[motion["step_m"] > 0]
     between_s = np.diff(stepped["time_s"])
+    # A step is counted in the row in which it ends, or in the next one.
+    late_m = _COUNTED_LATE * options.step_m
+    steps = ImuNoise(
+        period_s=float(np.median(between_s)) if between_s.size else 1.0,
+        sigma_trans_m=float(np.hypot(STEP_SHARE * float(stepped["step_m"].median()), late_m)),
+        scale=SCALE,
+    )
+    if walk_rad:
+        return replace(
+            steps,
+            turns="gyro",
+            gyro_noise_deg_per_sqrt_s=float(np.degrees(walk_rad)),
+            gyro_bias_deg_per_s=float(np.degrees(RATE_SD_RADPS)),
+        )
     turned = wrap_rad(np.diff(stepped["heading_rad"]))
     known = np.abs(turned[np.isfinite(turned)])
     # Of two rows along a straight line the difference scatters by two errors.
-    white_deg = _MAD_TO_SD * float(np.degrees(np.median(known))) / 2**0.5 if known.size else 0.0
+    white_deg = MAD_TO_SD * float(np.degrees(np.median(known))) / 2**0.5 if known.size else 0.0
     north_sd_deg = 0.0 if options.declination_deg is not None else np.degrees(DECLINATION_SD_RAD)
-    # A step is counted in the row in which it ends, or in the next one.
-    late_m = _COUNTED_LATE * options.step_m
-    return ImuNoise(
-        period_s=float(np.median(between_s)) if between_s.size else 1.0,
-        sigma_trans_m=float(np.hypot(STEP_SHARE * float(stepped["step_m"].median()), late_m)),
+    return replace(
+        steps,
         sigma_orient_deg=float(np.clip(white_deg, _LEAST_HEADING_DEG, _MOST_HEADING_DEG)),
         bias_sd_deg=float(np.hypot(_CARRIED_SD_DEG, north_sd_deg)),
-        scale=SCALE,
         heading_correlation_s=_CORRELATION_S,
     )

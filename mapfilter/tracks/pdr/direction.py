@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.pdr.options import Pose
 from mapfilter.tracks.pdr.signals import RATE_HZ
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 DEVICE_SD_RAD = float(np.radians(8.0))
 ACCELERATION_SD_RAD = float(np.radians(20.0))

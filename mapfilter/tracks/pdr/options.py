@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, fields
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -12,6 +13,11 @@ from mapfilter.options import Options, Positive
 Pose = Literal["auto", "device", "any"]
 """What the direction of walking is taken from."""
 
+_OF_COMMANDS = {
+    "pose": "--pose",
+    "declination_deg": "--declination",
+    "step_m": "--step-length",
+}
 STEP_FACTOR = 0.405
 """Weinberg's factor: metres by the fourth root of m/s²; of the walks in ``docs/howto/raw-imu``."""
 
@@ -42,3 +48,29 @@ class WalkOptions(Options):
     field_ut: Annotated[float, Ge(0), Le(100)] = 0.0
     step_factor: Positive = STEP_FACTOR
     step_m: Annotated[float, Gt(0), Lt(3)] = 0.7
+
+
+def without_effect(options: WalkOptions, used: Collection[str], why: str) -> tuple[str, ...]:
+    """Return a note on each option that is not at its default, and is not used.
+
+    Parameters
+    ----------
+    used : collection of str
+        Names of the options that had an effect.
+    why : str
+        What the motion is made of instead.
+
+    Examples
+    --------
+    >>> without_effect(WalkOptions(step_m=0.8), (), "motion is that of walk.csv")
+    ('step_m = 0.8 (--step-length) has no effect: motion is that of walk.csv',)
+    """
+    found = []
+    for field in fields(WalkOptions):
+        value = getattr(options, field.name)
+        if field.name in used or value == field.default:
+            continue
+        shown = f"{value:g}" if isinstance(value, float) else str(value)
+        option = f" ({_OF_COMMANDS[field.name]})" if field.name in _OF_COMMANDS else ""
+        found.append(f"{field.name} = {shown}{option} has no effect: {why}")
+    return tuple(found)

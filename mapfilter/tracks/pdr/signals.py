@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.integrate import cumulative_trapezoid
 
 from mapfilter._types import Floats
 
@@ -133,6 +132,8 @@ def _at(time_s: Floats, known_s: Floats, values: Floats) -> Floats:
 
 def _means(edge_s: Floats, known_s: Floats, values: Floats) -> Floats:
     """Return the mean between edges, so that no rotation and no velocity is lost."""
+    from scipy.integrate import cumulative_trapezoid
+
     total = cumulative_trapezoid(values, known_s, axis=0, initial=0)
     means: Floats = np.diff(_at(edge_s, known_s, total), axis=0) * RATE_HZ
     return means

@@ -27,6 +27,7 @@ from mapfilter.tracks.readers import (
     tems,
 )
 from mapfilter.tracks.readers.columns import header_names, likely_separator
+from mapfilter.tracks.readers.csv_fields import FIELDS
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading, Recording
 from mapfilter.tracks.readers.text import Text, parts_of, read_text
@@ -165,14 +166,14 @@ def _other_separators(path: Path, text: Text) -> str:
 def _unknown(path: Path, text: Text) -> MapfilterError:
     """Return the error for a file of no known format."""
     names = set(header_names(text.first_line, likely_separator(text.first_line)))
-    fields = {name for some in plain_csv.FIELDS.values() for name in some}
+    fields = {name for some in FIELDS.values() for name in some}
     hint = _NOT_READ.get(path.suffix.lower(), "")
     if not hint and len(names) > 1 and names & fields:
         hint = (
             "a CSV with other names of columns: --column FIELD=COLUMN, such as acc_x=AX or "
             "wheel_speed_mps=SPEED"
         )
-        if not names & set(plain_csv.FIELDS["time"]):
+        if not names & set(FIELDS["time"]):
             hint = f"a CSV without a column of times; {hint}, and time=COLUMN"
     if not hint:
         hint = _other_separators(path, text)

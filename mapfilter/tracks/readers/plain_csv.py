@@ -19,6 +19,7 @@ from mapfilter.tracks.readers.columns import (
     likely_separator,
     only,
 )
+from mapfilter.tracks.readers.csv_fields import FIELDS
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import (
     add_radio,
@@ -29,67 +30,6 @@ from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 
 _UNIX_S = 1e8
-
-FIELDS: Mapping[str, tuple[str, ...]] = {
-    "time": (
-        *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
-        *("measured_at", "recorded_at"),
-    ),
-    "lat_deg": ("lat_deg", "lat", "latitude"),
-    "lon_deg": ("lon_deg", "lon", "lng", "long", "longitude"),
-    "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
-    "accuracy_m": ("accuracy_m", "accuracy"),
-    "speed_mps": ("speed_mps",),
-    "speed_kmh": ("speed_kmh",),
-    "course_deg": ("course_deg", "bearing", "course"),
-    "east_m": ("east_m", "easting"),
-    "north_m": ("north_m", "northing"),
-    "heading_rad": ("heading_rad",),
-    "step_m": ("step_m",),
-    "turn_rad": ("turn_rad",),
-    "compass_deg": ("compass_deg", "heading_deg", "azimuth_deg"),
-    "turn_deg": ("turn_deg",),
-    "yaw_rate_radps": ("yaw_rate_radps", "yaw_rate", "yaw_rate_rad_s", "yaw rate (rad/s)"),
-    "yaw_rate_degps": ("yaw_rate_degps", "yaw_rate_deg_s", "yaw_rate_dps", "yaw rate (deg/s)"),
-    "wheel_speed_mps": (
-        *("wheel_speed_mps", "wheel_speed", "vehicle_speed_mps"),
-        *("wheel speed (m/s)", "vehicle speed (m/s)"),
-    ),
-    "wheel_speed_kmh": (
-        *("wheel_speed_kmh", "vehicle_speed_kmh"),
-        *("wheel speed (km/h)", "vehicle speed (km/h)"),
-    ),
-    "role": ("role",),
-    "technology": ("technology", "radio", "rat", "network_type"),
-    "cell": ("cell",),
-    "cgi": ("cgi", "ecgi", "ncgi"),
-    "mcc": ("mcc",),
-    "mnc": ("mnc", "net"),
-    "lac": ("lac", "tac", "area"),
-    "ci": ("ci", "cid", "eci", "nci", "cellid", "cell_id"),
-    "arfcn": ("arfcn", "uarfcn", "earfcn", "nrarfcn", "nr_arfcn"),
-    "bsic": ("bsic", "psc", "pci"),
-    "level_dbm": ("level_dbm", "dbm", "rsrp", "rscp", "rssi", "signal_dbm"),
-    "bars": ("bars", "signal_bars"),
-    "level_step_db": ("level_step_db",),
-    "timing_advance": ("timing_advance", "ta"),
-    "pressure_hpa": ("pressure_hpa", "pressure"),
-    "steps": ("steps", "step_count"),
-    **{
-        f"{sensor}_{axis}": tuple(
-            name
-            for word in (sensor, *others)
-            for name in (f"{word}_{axis}", f"{word}{axis}", f"{word}_{axis}_{unit}")
-        )
-        for sensor, unit, others in (
-            ("acc", "mps2", ("accel", "accelerometer", "acceleration")),
-            ("gyr", "radps", ("gyro", "gyroscope", "angular_velocity")),
-            ("mag", "ut", ("magnetometer", "magnetic")),
-        )
-        for axis in "xyz"
-    },
-}
-"""Fields that a column map may name, and the names of columns that are known without one."""
 
 _KMH = 1 / 3.6
 _SPEEDS = ("speed_mps", "speed_kmh")
@@ -117,6 +57,12 @@ class _Mapped:
 
     def number(self, field: str) -> Floats:
         return self.rows.number(*self.names(field))
+
+    def radians(self, name: str, per: str = "") -> Floats:
+        """Return a field that may be in degrees as radians."""
+        if self.has(f"{name}_deg{per}"):
+            return np.radians(self.number(f"{name}_deg{per}"))
+        return self.number(f"{name}_rad{per}")
 
     def whole(self, field: str) -> Floats:
         return available(*self.rows.whole(*self.names(field)))
@@ -155,8 +101,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     elif mapped.has("step_m"):
         moved = ("step_m", "heading_rad", "turn_rad", "compass_deg")
         columns = {name: mapped.number(name) for name in moved}
-        if mapped.has("turn_deg"):
-            columns["turn_rad"] = np.radians(mapped.number("turn_deg"))
+        columns["turn_rad"] = mapped.radians("turn")
         there = np.isfinite(columns["step_m"])
         _add(reading, "motion", {"time_s": time_s, **columns}, rows, there)
     _add_odometry(mapped, reading, time_s)
@@ -224,17 +169,17 @@ def _add_odometry(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
             return
         # Beside positions a speed is that of their receiver.
         if mapped.has("lat_deg", "lon_deg") or mapped.has("east_m", "north_m"):
-            reading.note(
-                "speed and yaw rate not used beside positions; name the column wheel_speed_mps"
-            )
+            # Beside counted steps the yaw rate is the walker's.
+            if not mapped.has("steps"):
+                reading.note(
+                    "speed and yaw rate not used beside positions; name the column wheel_speed_mps"
+                )
             return
     name = "wheel_speed" if wheels else "speed"
     speed = mapped.number(f"{name}_mps")
     if mapped.has(f"{name}_kmh"):
         speed = _KMH * mapped.number(f"{name}_kmh")
-    yaw = mapped.number("yaw_rate_radps")
-    if mapped.has("yaw_rate_degps"):
-        yaw = np.radians(mapped.number("yaw_rate_degps"))
+    yaw = mapped.radians("yaw_rate", "ps")
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
     _add(reading, "odometry", columns, mapped.rows, np.isfinite(speed))
 
@@ -254,10 +199,22 @@ def _add_sensors(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
             value = mapped.number(field)
             columns = {"time_s": time_s, column: value}
             _add(reading, table, columns, mapped.rows, np.isfinite(value))
-    if mapped.has("steps", "compass_deg") and not mapped.has("step_m"):
-        magnetic = mapped.number("compass_deg")
-        columns = {"time_s": time_s, "magnetic_deg": magnetic}
-        _add(reading, "compass", columns, mapped.rows, np.isfinite(magnetic))
+    if mapped.has("steps") and not mapped.has("step_m"):
+        _add_courses(mapped, reading, time_s)
+
+
+def _add_courses(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
+    """Add what gives counted steps a direction: a compass, turns, or a rate of turning."""
+    magnetic = mapped.number("compass_deg")
+    columns = {"time_s": time_s, "magnetic_deg": magnetic}
+    _add(reading, "compass", columns, mapped.rows, np.isfinite(magnetic))
+    turn = mapped.radians("turn")
+    rate = mapped.radians("yaw_rate", "ps")
+    # A row with steps alone has an unknown turn; one without either is none of motion.
+    turned = np.isfinite(turn) | np.isfinite(rate)
+    there = turned | (np.isfinite(mapped.number("steps")) & turned.any())
+    columns = {"time_s": time_s, "turn_rad": turn, "yaw_rate_radps": rate}
+    _add(reading, "turns", columns, mapped.rows, there)
 
 
 def _add_cells(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:

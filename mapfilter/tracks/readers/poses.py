@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import MapfilterError
@@ -78,6 +77,8 @@ def _parts(
 
 
 def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
+    from scipy.spatial.transform import Rotation
+
     reading.program, reading.clock = "KITTI poses", Clock("monotonic")
     names = [f"r{i}{j}" for i in range(3) for j in range(4)]
     times = _frame_times(text, reading)

@@ -172,6 +172,11 @@ RECORDED: dict[str, tuple[Field, ...]] = {
     ),
     "steps": (_TIME, Field("count", 0, 1e9, "steps >= 0", required=True)),
     "compass": (_TIME, Field("magnetic_deg", -180, 360, "degrees in -180..360", required=True)),
+    "turns": (
+        _TIME,
+        Field("turn_rad", -6.3, 6.3, "radians in -2π..2π"),
+        Field("yaw_rate_radps", -20, 20, "rad/s in -20..20"),
+    ),
     "ephemerides": (
         _TIME,
         _text("satellite", required=True),
@@ -204,6 +209,6 @@ RECORDED: dict[str, tuple[Field, ...]] = {
 
 SENSORS = (
     *("accelerometer", "linear_acceleration", "gravity", "gyroscope", "magnetometer"),
-    *("orientation", "barometer", "steps", "compass", "odometry", "velocity"),
+    *("orientation", "barometer", "steps", "compass", "turns", "odometry", "velocity"),
 )
 """Tables of raw sensors, which a log keeps in its folder ``sensors``."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from mapfilter._inputs import open_input
+from mapfilter._inputs import open_input, wide_encoding
 from mapfilter.errors import InputError, fail
 
 _HINTS = {
@@ -94,7 +94,7 @@ def parts_of(text: Text) -> Iterator[Text]:
 
 
 def read_text(path: Path, most_bytes: int = -1) -> Text:
-    r"""Read a file as text: plain or gzip, UTF-8 or UTF-16, any line ends.
+    r"""Read a file as text: plain or gzip, UTF-8, UTF-16 or UTF-32, any line ends.
 
     ``most_bytes`` are read at most, all of them where it is negative.
 
@@ -160,6 +160,10 @@ def _unpacked(path: Path, data: bytes, notes: list[str]) -> bytes:
 def _as_utf8(path: Path, data: bytes, notes: list[str]) -> bytes:
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
+    elif wide_encoding(data) == "UTF-32":
+        notes.append("UTF-32 text")
+        # A file cut off may end within a character.
+        data = data[: len(data) // 4 * 4].decode("utf-32", "replace").encode()
     elif (wide := _utf16(data)) is not None:
         notes.append("UTF-16 text")
         # A file cut off may end within a character.

@@ -1,0 +1,217 @@
+"""Opening a set of RxLev rasters, without reading pixels.
+
+A set is one GeoTIFF with a band per cell, a folder with a file per cell, or a planning tool's
+export with its index; :func:`open_rasters` makes all of them look alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import projected_crs
+from mapfilter.radio.cell_rules import id_fault
+from mapfilter.rasters.ascii_grids import open_ascii_grid
+from mapfilter.rasters.atoll import INDEX_SUFFIXES, IndexRow, find_index, read_index
+from mapfilter.rasters.files import (
+    Declared,
+    Quantity,
+    RasterFile,
+    check_file,
+)
+from mapfilter.rasters.geotiff import open_geotiff
+from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.raw_grids import open_raw_grid
+from mapfilter.rasters.resampling import Resampling, common_lattice
+
+Opener = Callable[[Path, str, Declared], RasterFile]
+"""From a file, the cell's id if the file names none, and what the user or an index declares, to the
+opened file; pixels are not read."""
+
+FORMATS: Mapping[str, Opener] = {
+    ".tif": open_geotiff,
+    ".tiff": open_geotiff,
+    ".asc": open_ascii_grid,
+    ".bil": open_raw_grid,
+    ".flt": open_raw_grid,
+}
+"""Formats of raster files by suffix. A new one needs its module and a line here."""
+_MOST_FILES = 100_000
+
+
+def open_rasters(
+    path: Path | str,
+    quantity: Quantity | None = None,
+    *,
+    crs: str | None = None,
+    factor: float = 1.0,
+    nodata: float | None = None,
+    resolution_m: float | None = None,
+    resampling: Resampling = "nearest",
+) -> RxLevRasters:
+    """Open a set of rasters, and check it without reading pixels.
+
+    Parameters
+    ----------
+    path : Path or str
+        A GeoTIFF (COG) whose bands are described by cell ids; an ESRI ASCII grid (``.asc``) or raw
+        pixels with a header (``.bil``, ``.flt`` with ``.hdr``), named by the cell id; a folder of
+        such files; or an index of raw pixels (see :mod:`mapfilter.rasters.atoll`), or its folder.
+    quantity : {"level", "loss", "deviation"}, optional
+        What the files hold, where neither mapfilter's tag nor their unit states it.
+    crs : str, optional
+        Projected CRS, where the files have none.
+    factor : float
+        dB (dBm) per unit stored, such as 0.0625 for sixteenths.
+    nodata : float, optional
+        A stored number that means no data, besides the files' own.
+    resolution_m : float, optional
+        Of the lattice that all files are read on; the finest of them when left out.
+    resampling : {"nearest", "bilinear"}
+        Method for files on another lattice; bilinear in dB.
+
+    Raises
+    ------
+    InputError
+        With every fault: missing, empty or cut-off file, no CRS or degrees, rotated, oblong or
+        upside-down pixels, bands without or with the same cell id, unknown quantity, files of
+        different systems, an index that does not fit its files.
+    """
+    path = Path(path)
+    _check_options(crs, factor, nodata, resolution_m)
+    declared = Declared(projected_crs(crs) if crs is not None else None, nodata)
+    index = find_index(path) if path.is_dir() else None
+    if path.suffix.lower() in INDEX_SUFFIXES and not path.is_dir():
+        check_file(path)
+        index = path
+    sources: list[tuple[Path, IndexRow | None]] = [(path, None)]
+    if index is not None:
+        sources = [(row.path, row) for row in read_index(index)]
+    elif path.is_dir():
+        sources = [(file, None) for file in _listed(path)]
+    faults, notes, files = Faults(), list[str](), list[RasterFile]()
+    for source, row in sources:
+        try:
+            files.append(_open(source, declared, row, notes))
+        except InputError as error:
+            faults.found.extend(error.faults)
+    faults.raise_if_any(InputError)
+    files = _named_by_file(files, notes)
+    _check_ids(path, files)
+    held = _one_quantity(path, files, quantity)
+    lattice, resampled = common_lattice(files, resolution_m, resampling)
+    parts = [part for file in files for part in file.parts]
+    counted = (
+        note if count == 1 else f"{note} ({count} rasters)"
+        for note, count in Counter(notes).items()
+    )
+    return RxLevRasters(
+        path,
+        tuple(cell_id for file in files for cell_id in file.cell_ids),
+        lattice,
+        held,
+        tuple(files),
+        tuple(dict.fromkeys(parts if index is None else [*parts, index])),
+        float(factor),
+        resampling,
+        (*counted, *resampled),
+    )
+
+
+def is_raster_folder(path: Path) -> bool:
+    """Return whether a folder holds rasters."""
+    return path.is_dir() and any(_is_raster(inner) for inner in path.iterdir())
+
+
+def _check_options(
+    crs: str | None, factor: float, nodata: float | None, resolution_m: float | None
+) -> None:
+    faults = Faults()
+    if crs is not None and not crs.strip():
+        faults.add("rasters, crs", "a projected CRS in metres", "an empty text")
+    if not (math.isfinite(factor) and factor != 0):
+        faults.add("rasters, factor", "a number other than 0", factor)
+    if nodata is not None and math.isnan(nodata):
+        faults.add("rasters, nodata", "a number", nodata, "NaN means no data anyway")
+    if resolution_m is not None and not (math.isfinite(resolution_m) and resolution_m > 0):
+        faults.add("rasters, resolution_m", "metres > 0", resolution_m)
+    faults.raise_if_any(InputError)
+
+
+def _is_raster(path: Path) -> bool:
+    hidden = path.name.startswith(".")
+    return not hidden and path.suffix.lower() in FORMATS and path.is_file()
+
+
+def _listed(folder: Path) -> list[Path]:
+    found = sorted(path for path in folder.iterdir() if _is_raster(path))
+    if not found:
+        expected = f"raster files ({', '.join(FORMATS)}) or an index of them"
+        raise fail(InputError, str(folder), expected, "none in this folder")
+    if len(found) > _MOST_FILES:
+        raise fail(InputError, str(folder), f"at most {_MOST_FILES} rasters", len(found))
+    return found
+
+
+def _open(path: Path, declared: Declared, row: IndexRow | None, notes: list[str]) -> RasterFile:
+    """Open one file, and compare it with its row of an index."""
+    check_file(path)
+    opener = FORMATS.get(path.suffix.lower(), open_geotiff if row is None else open_raw_grid)
+    if row is None:
+        return opener(path, path.stem, declared)
+    file = opener(path, row.cell_id, replace(declared, header=row.header()))
+    if len(file.cell_ids) > 1:
+        got = f"{len(file.cell_ids)} bands"
+        raise fail(InputError, str(path), "one band per file of an index", got)
+    faults = Faults()
+    if note := row.check(file.lattice, file.bits, faults):
+        notes.append(note)
+    faults.raise_if_any(InputError)
+    return replace(file, cell_ids=(row.cell_id,), described=False)
+
+
+def _named_by_file(files: list[RasterFile], notes: list[str]) -> list[RasterFile]:
+    """Name cells by their files where all descriptions are the same, such as "Band 1"."""
+    single = [file for file in files if file.described and len(file.cell_ids) == 1]
+    if len(single) < 2 or len({file.cell_ids for file in single}) > 1:
+        return files
+    notes.append(f"cells are named by their files: all bands are called {single[0].cell_ids[0]!r}")
+    return [replace(file, cell_ids=(file.path.stem,)) if file in single else file for file in files]
+
+
+def _check_ids(path: Path, files: Sequence[RasterFile]) -> None:
+    faults, first = Faults(), dict[str, Path]()
+    for file in files:
+        for cell_id in file.cell_ids:
+            if wrong := id_fault(cell_id):
+                faults.add(f"{file.path}, name", *wrong)
+            if cell_id in first and first[cell_id] != file.path:
+                got = f"{cell_id!r} in {first[cell_id].name} and {file.path.name}"
+                faults.add(str(path), "each cell once", got)
+            first.setdefault(cell_id, file.path)
+    faults.raise_if_any(InputError)
+
+
+def _one_quantity(path: Path, files: Sequence[RasterFile], declared: Quantity | None) -> Quantity:
+    if declared is not None:
+        for file in files:
+            if file.tagged and file.quantity != declared:
+                expected, got = f"{declared}, as declared", file.quantity
+                hint = "quantity in [rasters] is of other rasters"
+                raise fail(InputError, str(file.path), expected, got, hint)
+        return declared
+    stated = {file.quantity for file in files}
+    known = stated - {None}
+    if len(known) > 1:
+        both = " and ".join(sorted(str(quantity) for quantity in known))
+        raise fail(InputError, str(path), "levels or losses in all files", both)
+    found = known.pop() if known and None not in stated else None
+    if found is None:
+        expected = "a quantity of the bands, levels (dBm) or losses (dB)"
+        hint = "set quantity = level or loss"
+        raise fail(InputError, str(path), expected, "neither tag nor unit", hint)
+    return found

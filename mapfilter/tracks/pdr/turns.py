@@ -1,0 +1,144 @@
+"""Turns between the rows of a step counter: of a log's turns, a yaw rate, or a gyroscope."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Floats
+from mapfilter.tracks.moved import MAD_TO_SD
+from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S
+
+_LONGEST_S = 2.0
+"""Rates that lie farther apart say nothing about what is between them."""
+_GRAVITY_S = 1.0
+_LEAST_GRAVITY = 0.5
+_NO_VERTICAL = (
+    "a gyroscope without gravity (acc_x, acc_y, acc_z) does not show which way is up; of a phone "
+    "held flat, screen up, its z axis will do: --column yaw_rate_radps=COLUMN"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """Turns through time, counter-clockwise seen from above.
+
+    Parameters
+    ----------
+    time_s : (N,) array
+        Times that grow.
+    turn_rad : (N,) array
+        Turn since the time before; NaN where unknown. The first one is not used.
+    walk_rad_per_sqrt_s : float
+        Random walk of their sum.
+    source : str
+        What they were measured by, in notes.
+    """
+
+    time_s: Floats
+    turn_rad: Floats
+    walk_rad_per_sqrt_s: float
+    source: str
+
+    def between(self, time_s: Floats) -> Floats:
+        """Return the turn from each time to the next, NaN for the first and where unknown.
+
+        Examples
+        --------
+        >>> turning = Turning(np.arange(4.0), np.array([0.0, 0.2, 0.4, np.nan]), 0.0, "")
+        >>> turning.between(np.array([0.0, 1.5, 2.0, 3.0, 9.0])).round(3).tolist()
+        [nan, 0.4, 0.2, nan, nan]
+        """
+        if len(self.time_s) < 2:
+            return np.full(len(time_s), np.nan)
+        unknown = np.isnan(self.turn_rad[1:])
+        sums = (np.where(unknown, 0.0, self.turn_rad[1:]), unknown)
+        turned, lost = (
+            np.interp(time_s, self.time_s, np.append(0.0, np.cumsum(one)), np.nan, np.nan)
+            for one in sums
+        )
+        found = np.diff(turned, prepend=np.nan)
+        known = np.diff(lost, prepend=np.nan) == 0
+        return np.where(known, found, np.nan)
+
+
+def turning_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Turning | None, str]:
+    """Return the turns that sensors show, or why they show none.
+
+    Parameters
+    ----------
+    sensors : mapping of str to pandas.DataFrame
+        ``turns``, else ``gyroscope`` with ``gravity`` or ``accelerometer``, of
+        :data:`mapfilter.tracks.sensors.SENSOR_COLUMNS`.
+
+    Returns
+    -------
+    turning : Turning or None
+    reason : str
+        "" with turns, and where no such sensor is there.
+    """
+    if (rows := _rows(sensors, "turns", ("turn_rad", "yaw_rate_radps"))) is not None:
+        turn, rate = rows[1].T
+        if np.isfinite(turn).any():
+            return Turning(rows[0], turn, WALK_RAD_PER_SQRT_S, "turns"), ""
+        return _of_rate(rows[0], rate, "a yaw rate"), ""
+    gyroscope = _rows(sensors, "gyroscope", ("x_radps", "y_radps", "z_radps"))
+    if gyroscope is None:
+        return None, ""
+    axes = ("x_mps2", "y_mps2", "z_mps2")
+    force = _rows(sensors, "gravity", axes) or _rows(sensors, "accelerometer", axes)
+    up = None if force is None else _up(gyroscope[0], *force)
+    if up is None:
+        return None, _NO_VERTICAL
+    return _of_rate(gyroscope[0], np.sum(gyroscope[1] * up, axis=1), "a gyroscope"), ""
+
+
+def _rows(
+    sensors: Mapping[str, pd.DataFrame], name: str, columns: tuple[str, ...]
+) -> tuple[Floats, Floats] | None:
+    """Return times that grow, and the columns; None where there are not two rows."""
+    if name not in sensors:
+        return None
+    rows = sensors[name].sort_values("time_s", kind="stable").drop_duplicates("time_s")
+    if len(rows) < 2:
+        return None
+    values = rows[list(columns)].to_numpy(dtype=np.float64)
+    return rows["time_s"].to_numpy(dtype=np.float64), values
+
+
+def _of_rate(time_s: Floats, rate: Floats, source: str) -> Turning:
+    """Integrate a rate by the mean of both ends of each interval.
+
+    A walker sways: rates that are sampled seldom scatter by that, from one to the next.
+    """
+    known = np.isfinite(rate)
+    time_s, rate = time_s[known], rate[known]
+    lasted_s = np.diff(time_s)
+    turn = np.where(lasted_s <= _LONGEST_S, lasted_s * (rate[1:] + rate[:-1]) / 2, np.nan)
+    bends = np.abs(np.diff(rate, 2))
+    scatter = MAD_TO_SD * float(np.median(bends)) / 6**0.5 if bends.size else 0.0
+    usual_s = float(np.median(lasted_s)) if lasted_s.size else 0.0
+    walk = float(np.hypot(WALK_RAD_PER_SQRT_S, scatter * usual_s**0.5))
+    return Turning(time_s, np.concatenate([[np.nan], turn])[: len(time_s)], walk, source)
+
+
+def _up(time_s: Floats, known_s: Floats, force: Floats) -> Floats | None:
+    """Return the upward direction in the device's axes, by the mean force of 1 s before and after.
+
+    NaN where there was none; None where the force does not include gravity.
+    """
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(np.nan_to_num(force), axis=0)])
+    first = np.searchsorted(known_s, time_s - _GRAVITY_S, side="left")
+    last = np.searchsorted(known_s, time_s + _GRAVITY_S, side="right")
+    count = last - first
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = (total[last] - total[first]) / count[:, None]
+        size = np.linalg.norm(mean, axis=1)
+        up: Floats = mean / size[:, None]
+    typical = float(np.median(np.linalg.norm(force, axis=1)))
+    # Without gravity the means of what is left nearly vanish.
+    with_gravity = np.isfinite(size).any() and np.nanmedian(size) > _LEAST_GRAVITY * typical
+    return up if with_gravity else None

@@ -1,0 +1,66 @@
+"""Fields of a plain CSV, and the names of columns by which they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+FIELDS: Mapping[str, tuple[str, ...]] = {
+    "time": (
+        *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
+        *("measured_at", "recorded_at"),
+    ),
+    "lat_deg": ("lat_deg", "lat", "latitude"),
+    "lon_deg": ("lon_deg", "lon", "lng", "long", "longitude"),
+    "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
+    "accuracy_m": ("accuracy_m", "accuracy"),
+    "speed_mps": ("speed_mps",),
+    "speed_kmh": ("speed_kmh",),
+    "course_deg": ("course_deg", "bearing", "course"),
+    "east_m": ("east_m", "easting"),
+    "north_m": ("north_m", "northing"),
+    "heading_rad": ("heading_rad",),
+    "step_m": ("step_m",),
+    "turn_rad": ("turn_rad",),
+    "compass_deg": ("compass_deg", "heading_deg", "azimuth_deg"),
+    "turn_deg": ("turn_deg",),
+    "yaw_rate_radps": ("yaw_rate_radps", "yaw_rate", "yaw_rate_rad_s", "yaw rate (rad/s)"),
+    "yaw_rate_degps": ("yaw_rate_degps", "yaw_rate_deg_s", "yaw_rate_dps", "yaw rate (deg/s)"),
+    "wheel_speed_mps": (
+        *("wheel_speed_mps", "wheel_speed", "vehicle_speed_mps"),
+        *("wheel speed (m/s)", "vehicle speed (m/s)"),
+    ),
+    "wheel_speed_kmh": (
+        *("wheel_speed_kmh", "vehicle_speed_kmh"),
+        *("wheel speed (km/h)", "vehicle speed (km/h)"),
+    ),
+    "role": ("role",),
+    "technology": ("technology", "radio", "rat", "network_type"),
+    "cell": ("cell",),
+    "cgi": ("cgi", "ecgi", "ncgi"),
+    "mcc": ("mcc",),
+    "mnc": ("mnc", "net"),
+    "lac": ("lac", "tac", "area"),
+    "ci": ("ci", "cid", "eci", "nci", "cellid", "cell_id"),
+    "arfcn": ("arfcn", "uarfcn", "earfcn", "nrarfcn", "nr_arfcn"),
+    "bsic": ("bsic", "psc", "pci"),
+    "level_dbm": ("level_dbm", "dbm", "rsrp", "rscp", "rssi", "signal_dbm"),
+    "bars": ("bars", "signal_bars"),
+    "level_step_db": ("level_step_db",),
+    "timing_advance": ("timing_advance", "ta"),
+    "pressure_hpa": ("pressure_hpa", "pressure"),
+    "steps": ("steps", "step_count"),
+    **{
+        f"{sensor}_{axis}": tuple(
+            name
+            for word in (sensor, *others)
+            for name in (f"{word}_{axis}", f"{word}{axis}", f"{word}_{axis}_{unit}")
+        )
+        for sensor, unit, others in (
+            ("acc", "mps2", ("accel", "accelerometer", "acceleration")),
+            ("gyr", "radps", ("gyro", "gyroscope", "angular_velocity")),
+            ("mag", "ut", ("magnetometer", "magnetic")),
+        )
+        for axis in "xyz"
+    },
+}
+"""Fields that a column map may name, and the names of columns that are known without one."""

@@ -1,0 +1,199 @@
+"""Pictures of a located log, drawn by another process where that saves time.
+
+What draws takes a third of a second to import, and drawing longer than locating: a process beside
+this one imports and draws meanwhile. Modules that draw are therefore imported in functions here.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mapfilter._parallel import SerialExecutor, begun, worker_processes
+from mapfilter._types import Floats
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.positioning.estimate import PositionedTrack, Snapshot, TrackEstimate
+from mapfilter.report.ground import MAX_PANELS, BaseMap
+from mapfilter.workflows.results import PICTURES
+
+if TYPE_CHECKING:
+    from mapfilter.report.canvas import Drawn
+
+_CANDIDATES, _BELIEF, _TRACK, _ERROR, _EVIDENCE = PICTURES
+_PLAIN = (_TRACK, _EVIDENCE)
+_SQUARE_M = 5.0
+_DRAWING_LIBRARY = "matplotlib"
+
+Handed = dict[str, Callable[[], bytes]]
+"""What waits for the PNG of each picture, by its name."""
+
+
+@contextmanager
+def drawn_beside() -> Iterator[Executor]:
+    """Give what draws pictures while the block runs: another process, which gets ready at once.
+
+    It is this process, and each picture is drawn when it is handed out, on a single processor, in a
+    worker, and where modules that draw are imported already, as in a notebook.
+    """
+    is_worker = multiprocessing.parent_process() is not None
+    if (os.cpu_count() or 1) == 1 or is_worker or _DRAWING_LIBRARY in sys.modules:
+        yield SerialExecutor()
+        return
+    # One: a second would import as long as it saves by drawing.
+    with worker_processes(1) as drawer:
+        begun(drawer, get_ready_to_draw)
+        yield drawer
+
+
+def get_ready_to_draw() -> None:
+    """Import what draws, and load the fonts, which is done once in each process."""
+    from mapfilter.report import errors, snapshots, track  # noqa: F401
+    from mapfilter.report.canvas import new_figure, png_of
+
+    png_of(new_figure(1.0, 1.0).subplots())
+
+
+@dataclass(frozen=True, eq=False)
+class TrackPictures:
+    """What the pictures of one located log show.
+
+    Parameters
+    ----------
+    estimate : TrackEstimate
+        Of the log.
+    truth : Truth or None
+        Its true positions, where the log has them.
+    snapshots : tuple of Snapshot
+        The belief at a few moments.
+    base : BaseMap or None
+        The map below; without any, errors alone are drawn.
+    """
+
+    estimate: TrackEstimate
+    truth: Truth | None
+    snapshots: tuple[Snapshot, ...]
+    base: BaseMap | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the pictures that there are."""
+        has_evidence = self.estimate.evidence is not None
+        there = {
+            _CANDIDATES: bool(self.snapshots) and not has_evidence,
+            _BELIEF: bool(self.snapshots) and has_evidence,
+            _TRACK: True,
+            _ERROR: self.truth is not None,
+            _EVIDENCE: has_evidence and len(self.estimate) > 0,
+        }
+        if self.base is None:
+            return (_ERROR,) if there[_ERROR] else ()
+        return tuple(name for name in PICTURES if there[name])
+
+
+def track_pictures(
+    track: PositionedTrack, truth: Truth | None, base: BaseMap | None
+) -> TrackPictures:
+    """Choose what the pictures of a located log show.
+
+    Of the candidate filter snapshots are of candidates thinning out (Fig. 1 of the paper).
+    """
+    has_evidence = track.estimate.evidence is not None
+    spread = _places if has_evidence else _candidates
+    chosen = choose_snapshots(track.snapshots, spread) if track.snapshots else []
+    return TrackPictures(track.estimate, truth, tuple(chosen), base)
+
+
+def begin_pictures(shown: TrackPictures, drawers: Executor) -> Handed:
+    """Hand out the pictures of a located log that need no single reports.
+
+    What is returned waits for the PNG of each, by its name.
+    """
+    # Only pictures of the belief need snapshots.
+    plain = replace(shown, snapshots=())
+    return {
+        name: begun(drawers, partial(draw_picture, plain if name in _PLAIN else shown, name))
+        for name in shown.names
+        if name != _ERROR
+    }
+
+
+def with_error_picture(
+    handed: Handed, shown: TrackPictures, drawers: Executor, single_reports_m: Floats | None
+) -> Handed:
+    """Hand out the picture of the errors, too, where there is a truth.
+
+    The median error of single reports is drawn beside, where it is given.
+    """
+    if _ERROR not in shown.names:
+        return handed
+    plain = replace(shown, snapshots=(), base=None)
+    errors = begun(drawers, partial(draw_picture, plain, _ERROR, single_reports_m))
+    return {name: handed.get(name, errors) for name in shown.names}
+
+
+def draw_picture(shown: TrackPictures, name: str, single_reports_m: Floats | None = None) -> bytes:
+    """Return one picture of a located log as PNG."""
+    from mapfilter.report.canvas import png_of
+
+    return png_of(_drawn(shown, name, single_reports_m))
+
+
+def _drawn(shown: TrackPictures, name: str, single_reports_m: Floats | None) -> Drawn:
+    from mapfilter.report.errors import plot_error_over_distance, plot_evidence
+    from mapfilter.report.snapshots import plot_belief, plot_candidates
+    from mapfilter.report.track import plot_track
+
+    estimate, truth, base = shown.estimate, shown.truth, shown.base
+    if name == _EVIDENCE:
+        return plot_evidence(estimate, truth)
+    if name == _ERROR:
+        assert truth is not None
+        return plot_error_over_distance(estimate, truth, single_reports_m=single_reports_m)
+    assert base is not None
+    if name == _TRACK:
+        return plot_track(estimate, truth, base)
+    plot = plot_candidates if name == _CANDIDATES else plot_belief
+    return plot(shown.snapshots, truth, base)
+
+
+def _candidates(snapshot: Snapshot) -> float:
+    return float(snapshot.weight.size)
+
+
+def choose_snapshots(
+    snapshots: Sequence[Snapshot], spread: Callable[[Snapshot], float]
+) -> list[Snapshot]:
+    """Choose at most six: the first, the last, and between them even steps of the thinning out.
+
+    Steps are even in the logarithm of ``spread``, the number of places in a belief.
+    """
+    if len(snapshots) <= MAX_PANELS:
+        return list(snapshots)
+    counts = np.array([max(spread(s), 1.0) for s in snapshots])
+    last = len(snapshots) - 1
+    depth = np.log(counts[0] / counts) + 1e-9 * np.arange(len(snapshots))
+    chosen = {0, last}
+    for goal in np.linspace(0, depth[last], MAX_PANELS)[1:-1]:
+        free = [i for i in range(1, last) if i not in chosen]
+        chosen.add(free[int(np.argmin(np.abs(depth[free] - goal)))])
+    return [snapshots[i] for i in sorted(chosen)]
+
+
+def _places(snapshot: Snapshot) -> float:
+    """Return the effective number of squares in a belief (the exponential of its entropy)."""
+    if not snapshot.weight.size:
+        return 0.0
+    at_m = np.array([snapshot.hypothesis_east_m, snapshot.hypothesis_north_m])
+    _, square = np.unique(np.round(at_m / _SQUARE_M), axis=1, return_inverse=True)
+    mass = np.bincount(square.ravel(), snapshot.weight)
+    mass = mass[mass > 0]
+    return float(np.exp(-np.sum(mass * np.log(mass))))

@@ -1,0 +1,106 @@
+"""JSON and text as editors of other systems save it: marks, wide characters, keys given twice."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import mapfilter
+from mapfilter._inputs import json_value
+from mapfilter._io import read_json, write_sealed
+from mapfilter.errors import MapfilterError, StoreError
+from mapfilter.radio.tables import read_table as read_plan_table
+from mapfilter.survey.measurement_files import DIALECTS, read_csv
+from mapfilter.tracks.readers.text import read_text
+from mapfilter.tracks.table_files import read_table
+
+UTF_32 = ["utf-32-le", "utf-32-be"]
+
+
+@pytest.mark.parametrize(
+    "text", ['{"a": 1, "b": 2, "a": 1}', '{"b": [{"a": 1, "a": 2}]}', '{"a": 1, "\\u0061": 2}']
+)
+def test_a_key_given_twice_is_refused(tmp_path, text):
+    file = tmp_path / "log.json"
+    file.write_text(text)
+    with pytest.raises(StoreError, match="the key 'a' twice in one object") as raised:
+        read_json(file)
+    assert "edited or damaged" in str(raised.value)
+    assert "cut off" not in str(raised.value)
+
+
+def test_json_with_a_byte_order_mark_is_read(tmp_path):
+    file = tmp_path / "log.json"
+    file.write_text('{"a": 1}', encoding="utf-8-sig")
+    assert read_json(file) == {"a": 1}
+
+
+@pytest.mark.parametrize("codec", ["utf-16", "utf-32"])
+def test_json_in_wide_characters_is_named(tmp_path, codec):
+    file = tmp_path / "log.json"
+    file.write_text('{"a": 1}', encoding=codec)
+    with pytest.raises(StoreError, match=codec.upper()):
+        read_json(file)
+
+
+def test_json_that_is_cut_off_is_named_as_that(tmp_path):
+    file = tmp_path / "sweep.json"
+    write_sealed(file, {"a": [1, 2]})
+    file.write_bytes(file.read_bytes()[:-5])
+    with pytest.raises(StoreError, match="cut off"):
+        read_json(file)
+
+
+def test_constants_are_taken_unless_refused():
+    assert json.dumps(json_value(b"[NaN]")) == "[NaN]"
+    assert json_value(b"[NaN, -Infinity]", str.lower) == ["nan", "-infinity"]
+
+
+def test_json_of_others_is_read_by_the_door_alone():
+    """What a process notes for itself (the list of an older folder) needs no door."""
+    package = Path(mapfilter.__file__).parent
+    found = {
+        file.relative_to(package).as_posix()
+        for file in package.rglob("*.py")
+        if re.search(r"json\.loads?\(", file.read_text(encoding="utf-8"))
+    }
+    assert found == {"_inputs.py", "_replace.py"}
+
+
+@pytest.mark.parametrize("codec", UTF_32)
+def test_utf_32_is_named_or_read(tmp_path, codec):
+    table, text = tmp_path / "motion.csv", "\ufefftime_s,step_m\n1.0,0.5\n"
+    table.write_bytes(text.encode(codec))
+    with pytest.raises(MapfilterError, match="found UTF-32"):
+        read_table("motion", table)
+    with pytest.raises(MapfilterError, match="found UTF-32"):
+        read_csv(table, DIALECTS["opencellid"])
+    assert read_plan_table(table, "a cell plan").header == ("time_s", "step_m")
+    recording = read_text(table)
+    assert recording.data == b"time_s,step_m\n1.0,0.5\n"
+    assert recording.notes == ("UTF-32 text",)
+
+
+def test_utf_32_that_is_cut_off_is_read_to_its_last_letter(tmp_path):
+    file = tmp_path / "recording.txt"
+    file.write_bytes("a,b\n1,2".encode("utf-32")[:-2])
+    assert read_text(file).data == b"a,b\n1,"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="locales by environment")
+@pytest.mark.parametrize(
+    ("name", "wanted"), [(b"caf\xc3\xa9.toml", "the encoding of the locale"), (b"caf\xe9", "UTF-8")]
+)
+def test_letters_of_a_path_that_the_locale_lacks_are_named_as_that(name, wanted):
+    code = "import sys; from pathlib import Path; from mapfilter._inputs import path_fault\n"
+    code += "print(path_fault(Path(sys.argv[1])))"
+    ascii_only = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+    run = [os.fsencode(sys.executable), b"-c", code.encode(), name]
+    done = subprocess.run(run, env=os.environ | ascii_only, capture_output=True, check=True)
+    text = done.stdout.decode()
+    assert wanted in text
+    assert ("PYTHONUTF8=1" in text) == (b"\xc3" in name)

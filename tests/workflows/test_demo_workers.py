@@ -1,0 +1,95 @@
+"""What the demo hands to other processes is done by itself where these died."""
+
+import os
+import signal
+import time
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from mapfilter._io import atomic_dir
+from mapfilter._parallel import SerialExecutor, begun, local_executor
+from mapfilter._partial import remove_left
+from mapfilter.errors import MapfilterError, fail
+from mapfilter.workflows import demo
+
+
+def _where() -> int:
+    return os.getpid()
+
+
+def _killed_elsewhere(parent: int) -> int:
+    if os.getpid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 7
+
+
+def _wrong() -> int:
+    raise fail(MapfilterError, "here", "a number", "none")
+
+
+class _Elsewhere:
+    """A task that knows the process that it was made in."""
+
+    def __init__(self) -> None:
+        self.parent = os.getpid()
+
+    def __call__(self) -> int:
+        return _killed_elsewhere(self.parent)
+
+
+def test_a_task_runs_elsewhere_and_its_faults_come_back():
+    with local_executor(2) as workers:
+        where, wrong = begun(workers, _where), begun(workers, _wrong)
+        assert where() != os.getpid()
+        with pytest.raises(MapfilterError, match="a number"):
+            wrong()
+
+
+def test_a_task_whose_worker_died_is_done_here():
+    with local_executor(2) as workers:
+        first = begun(workers, _Elsewhere())
+        assert first() == 7
+        # The pool is broken by now.
+        with pytest.raises(BrokenProcessPool):
+            workers.submit(_where)
+        assert begun(workers, _where)() == os.getpid()
+
+
+def test_on_a_single_processor_a_task_is_done_at_once():
+    done = []
+    result = begun(SerialExecutor(), lambda: done.append(1))
+    assert done == [1]
+    assert result() is None
+    assert done == [1]
+
+
+def _half_written(path: str) -> None:
+    with atomic_dir(Path(path)) as folder:
+        (folder / "half").write_text("half")
+        time.sleep(60)
+
+
+def _stopped_while_one_writes(out: Path, target: Path) -> None:
+    with demo._cleared(out), local_executor(2) as workers:
+        begun(workers, partial(_half_written, str(target)))
+        while not list(out.rglob("half")):
+            time.sleep(0.01)
+        raise KeyboardInterrupt
+
+
+def test_what_a_stopped_worker_left_is_removed(tmp_path):
+    target = tmp_path / "results" / "found"
+    with pytest.raises(KeyboardInterrupt):
+        _stopped_while_one_writes(tmp_path, target)
+    assert list(target.parent.iterdir()) == []
+
+
+def test_what_others_write_stays(tmp_path):
+    with atomic_dir(tmp_path / "own") as own:
+        remove_left(tmp_path, 0.05)
+        assert own.is_dir()
+        (own / "half").write_text("whole")
+    assert (tmp_path / "own" / "half").read_text() == "whole"

@@ -1,0 +1,66 @@
+"""Pictures that another process draws are those that this one draws, to the byte."""
+
+import multiprocessing
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.report.ground import BaseMap
+from mapfilter.workflows import track_pictures
+from mapfilter.workflows.track_pictures import begin_pictures, drawn_beside, with_error_picture
+
+
+def _shown():
+    truth = Truth(*(np.arange(3.0) for _ in range(3)))
+    estimate = TrackEstimate.of_fixes("candidate", "EPSG:32635", ())
+    base = BaseMap((0.0, 0.0, 100.0, 100.0), points_m=np.array([[10.0, 20.0], [15.0, 20.0]]))
+    return track_pictures.track_pictures(PositionedTrack(estimate, (), 0.0), truth, base)
+
+
+def _pngs():
+    shown, errors_m = _shown(), np.array([40.0, 60.0])
+    with drawn_beside() as drawers:
+        handed = with_error_picture(begin_pictures(shown, drawers), shown, drawers, errors_m)
+        started = multiprocessing.active_children()
+        return {name: png() for name, png in handed.items()}, len(started)
+
+
+def test_another_process_draws_the_same_bytes(monkeypatch):
+    monkeypatch.setattr(track_pictures, "_DRAWING_LIBRARY", "sys")
+    here, started = _pngs()
+    assert started == 0
+    assert list(here) == ["track.png", "error.png"]
+    assert all(png.startswith(b"\x89PNG") for png in here.values())
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(track_pictures, "_DRAWING_LIBRARY", "not imported")
+    beside, started = _pngs()
+    assert started == 1
+    assert beside == here
+
+
+def _stopped(children):
+    with drawn_beside():
+        children += multiprocessing.active_children()
+        raise KeyboardInterrupt
+
+
+def test_a_stopped_replay_leaves_no_process(monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(track_pictures, "_DRAWING_LIBRARY", "not imported")
+    with pytest.raises(KeyboardInterrupt):
+        _stopped(children := [])
+    (child,) = children
+    child.join(20)
+    assert not child.is_alive()
+
+
+def test_no_command_that_locates_imports_what_draws():
+    """Else the process that draws would save nothing; asked of a process of its own."""
+    code = "import sys, mapfilter.workflows.replay as _; sys.exit('matplotlib' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
