@@ -9,11 +9,13 @@ import multiprocessing.connection
 import os
 import signal
 import sys
-from concurrent.futures import ProcessPoolExecutor
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
-from threading import Thread
-from typing import Any
+from threading import Lock, Thread
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -25,6 +27,10 @@ LARGE_BLOCK_BYTES = 31 << 20
 _PR_SET_PDEATHSIG = 1
 _ENDED_BY_US = (None, 0, -signal.SIGTERM)
 _WORKER_LEFT = 77
+_SOON_S = 0.01
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class LocalWorkers(ProcessPoolExecutor):
@@ -33,25 +39,61 @@ class LocalWorkers(ProcessPoolExecutor):
     Workers see that the other end of a pipe is closed, when this process ends or
     :meth:`end_workers` is called, and end at once; under Linux the kernel ends them, too. They
     inherit neither input nor outputs, so that nobody who reads these waits for a worker.
+
+    A worker that ends in the midst of sending a result leaves half a message. The pool would wait
+    for the rest for ever, as this process could write to the same pipe; so each worker is watched,
+    and with one that ended unasked all end, and this process closes its end of that pipe.
     """
 
     def __init__(self, workers: int) -> None:
         self._context = _Context()
+        self._ending, self._seen = Lock(), 0
         watched, self._held = multiprocessing.Pipe(duplex=False)
         # Spawned workers get a copy of one end only.
         self._watched = watched
         super().__init__(
             workers, self._context, initializer=_start_worker, initargs=(os.getpid(), watched)
         )
+        # The pool forgets it when it is shut down.
+        self._results: Any = self._result_queue
 
     def __exit__(self, *error: Any) -> None:
         super().__exit__(*error)
         self.end_workers()
 
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Hand a task to a worker, and watch those that were started for it."""
+        future = super().submit(fn, *args, **kwargs)
+        with self._ending:
+            new = self._context.started[self._seen :]
+            self._seen += len(new)
+        for one in new:
+            Thread(target=self._end_after, args=(one,), daemon=True).start()
+        return future
+
     def end_workers(self) -> None:
         """End all workers now, in the midst of their tasks."""
-        self._held.close()
-        self._watched.close()
+        with self._ending:
+            self._held.close()
+            self._watched.close()
+
+    def _end_after(self, one: Any) -> None:
+        """Wait until a worker ended; where nobody asked it to, see that the pool notices."""
+        multiprocessing.connection.wait([one.sentinel])
+        while one.exitcode is None:
+            # Another thread is about to say it.
+            time.sleep(_SOON_S)
+        if one.exitcode == 0:
+            return
+        self.end_workers()
+        with self._shutdown_lock:
+            # From here on the pool starts no worker, and hands none the pipe.
+            self._broken = self._broken or True
+            others = list(self._context.started)
+        for other in others:
+            multiprocessing.connection.wait([other.sentinel])
+        with self._ending:
+            self._results._writer.close()
 
     def reason(self) -> str:
         """Return what ended a worker of a broken pool, or an empty text where it is unknown."""

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
@@ -148,3 +149,51 @@ def test_a_worker_with_other_code_does_nothing(tmp_path):
     )
     assert "worker on" in run.stdout
     assert "found other versions (likely: install the same on all hosts)" in run.stdout
+
+
+def _half_a_result(_):
+    """End as a killed worker may: in the midst of sending a result."""
+    send = Connection._send
+
+    def half(self, data, write=os.write):
+        send(self, data[: len(data) // 2], write)
+        os._exit(9)
+
+    Connection._send = half
+    return bytes(1_000)
+
+
+def _other(task):
+    return _half_a_result(task) if task == 0 else time.sleep(LONG_S)
+
+
+HALF = """
+import sys
+from mapfilter._parallel import local_executor, ordered_results
+from test_workers import _half_a_result, _other
+
+def stopped(executor):
+    executor.submit(_half_a_result, 0).add_done_callback(lambda _: None)
+    while not any(one.exitcode for one in executor._context.started):
+        pass
+    raise KeyboardInterrupt
+
+if __name__ == "__main__":
+    with local_executor(2) as executor:
+        if sys.argv[1] == "stopped":
+            stopped(executor)
+        list(ordered_results(executor, _other, range(int(sys.argv[1]))))
+"""
+
+
+@pytest.mark.parametrize("tasks", ["1", "4", "stopped"])
+def test_a_worker_that_ends_while_it_sends_a_result_hangs_nobody(tmp_path, tasks):
+    script = tmp_path / "half.py"
+    script.write_text(HALF)
+    given, where = [sys.executable, str(script), tasks], {"PYTHONPATH": str(Path(__file__).parent)}
+    done = subprocess.run(
+        given, env=os.environ | where, capture_output=True, text=True, timeout=PATIENCE_S
+    )
+    expected = "KeyboardInterrupt" if tasks == "stopped" else "worker processes: expected all"
+    assert expected in done.stderr
+    assert done.returncode not in (0, None)
