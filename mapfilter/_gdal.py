@@ -7,6 +7,7 @@ metadata, and GDAL opens the overviews and the mask beside it whatever they are.
 from __future__ import annotations
 
 import os
+import stat
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -99,11 +100,20 @@ def _no_files_in(folder: Path, _changed_ns: int) -> tuple[str, ...]:
     """Return what lies in a folder under a name that GDAL may read, and is a pipe or a device."""
     try:
         named = [one for one in os.scandir(folder) if one.name.lower().endswith(_READ_BESIDE)]
-        others = [Path(one) for one in named if not (one.is_file() or one.is_dir())]
     except OSError:
         # A folder that may not be listed; what it holds is then not looked for either.
         return ()
-    return tuple(path.name for path in others if path.exists())
+    return tuple(one.name for one in named if _is_strange(one))
+
+
+def _is_strange(entry: os.DirEntry[str]) -> bool:
+    """Tell whether there is something that is neither a file nor a folder."""
+    try:
+        mode = entry.stat().st_mode
+    except OSError:
+        # A link that leads nowhere, or to itself: GDAL cannot open it either.
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def _check_is_tiff(path: Path) -> None:

@@ -33,6 +33,15 @@ def test_a_key_given_twice_is_refused(tmp_path, text):
     assert "cut off" not in str(raised.value)
 
 
+def test_many_keys_take_no_time_for_each_other(tmp_path):
+    file = tmp_path / "log.json"
+    keys = [f'"{number}": 0' for number in range(400_000)]
+    file.write_text("{" + ", ".join([*keys, keys[-1]]) + "}")
+    # Each compared with each, these would take an hour.
+    with pytest.raises(StoreError, match="the key '399999' twice"):
+        read_json(file)
+
+
 def test_json_with_a_byte_order_mark_is_read(tmp_path):
     file = tmp_path / "log.json"
     file.write_text('{"a": 1}', encoding="utf-8-sig")

@@ -122,13 +122,27 @@ NAMES = ["use.xml", "use_rpc.txt", "use_MTL.txt", "summary.txt", "METADATA.DIM",
 NAMES += ["use.pass", "use.tfw", "USE.TFW", "use_metadata.xml", "use.tif.aux.xml", "use.pvl"]
 
 
-def test_pipes_beside_a_raster_are_refused(tmp_path):
-    path = tmp_path / "use.tif"
+def plain_raster(folder):
+    """Write a small GeoTIFF."""
+    path = folder / "use.tif"
     with rasterio.open(
         path, "w", driver="GTiff", width=8, height=8, count=1, dtype="uint8", crs=CRS,
         transform=rasterio.Affine(5, 0, 385000, 0, -5, 6672000),
     ) as target:  # fmt: skip
         target.write(np.zeros((1, 8, 8), "uint8"))
+    return path
+
+
+def opened_elsewhere(path):
+    """Open a raster in a process that may hang."""
+    return subprocess.run(
+        [sys.executable, "-c", BESIDE, str(path)], capture_output=True, text=True, timeout=60,
+        check=False,
+    )  # fmt: skip
+
+
+def test_pipes_beside_a_raster_are_refused(tmp_path):
+    path = plain_raster(tmp_path)
     for name in NAMES:
         os.mkfifo(tmp_path / name)
         with pytest.raises(InputError, match="pipe"), open_raster(path):
@@ -137,8 +151,13 @@ def test_pipes_beside_a_raster_are_refused(tmp_path):
     # What GDAL does not look for is nobody's business.
     os.mkfifo(tmp_path / "debug-pipe")
     (tmp_path / "use.xml").symlink_to(tmp_path / "gone")
-    done = subprocess.run(
-        [sys.executable, "-c", BESIDE, str(path)], capture_output=True, text=True, timeout=60,
-        check=False,
-    )  # fmt: skip
+    done = opened_elsewhere(path)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_link_to_itself_hides_no_pipe(tmp_path):
+    path = plain_raster(tmp_path)
+    (tmp_path / "a.xml").symlink_to("a.xml")
+    assert opened_elsewhere(path).returncode == 0
+    os.mkfifo(tmp_path / "use.tfw")
+    assert "refused" in opened_elsewhere(path).stderr
