@@ -55,7 +55,10 @@ def _usual_places() -> Iterator[Path]:
     """Yield where numba keeps kernels: beside the sources, and in the user's folder of caches."""
     yield Path(__file__).parent / "__pycache__"
     given = os.environ.get("XDG_CACHE_HOME")
-    yield (Path(given) if given else Path(os.path.expanduser("~")) / ".cache") / "numba"  # noqa: PTH111
+    caches = Path(given) if given else Path(os.path.expanduser("~")) / ".cache"  # noqa: PTH111
+    # Without a home the tilde stays, which would be a folder of that name here.
+    if caches.is_absolute():
+        yield caches / "numba"
 
 
 def _takes_files(folder: Path) -> bool:

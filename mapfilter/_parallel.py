@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
 from mapfilter._code import code_digest
-from mapfilter._workers import LARGE_BLOCK_BYTES, LocalWorkers
+from mapfilter._workers import LARGE_BLOCK_BYTES, LocalWorkers, NoProcessError
 from mapfilter.errors import Faults, MapfilterError, fail
 
 _CONNECT_S = 10
@@ -78,11 +78,33 @@ def worker_processes(count: int) -> Iterator[Executor]:
             raise
 
 
+@contextlib.contextmanager
+def spare_processes(count: int) -> Iterator[Executor]:
+    """Give an executor of local processes, or of this one where no process can be started."""
+    with contextlib.ExitStack() as stack:
+        pool: Executor
+        try:
+            pool = stack.enter_context(worker_processes(count))
+        except NoProcessError:
+            pool = SerialExecutor()
+        yield pool
+
+
+def warmed(workers: Executor, count: int, task: Callable[..., Any]) -> None:
+    """Have workers start, and import what a task needs, while nothing waits for them.
+
+    What goes wrong is left to those who hand in tasks.
+    """
+    with contextlib.suppress(BrokenExecutor, NoProcessError):
+        for _ in range(count):
+            workers.submit(callable, task)
+
+
 def begun(workers: Executor, task: Callable[[], T]) -> Callable[[], T]:
     """Hand out a task; what is returned waits for its result, and does it where workers died."""
     try:
         begun = workers.submit(task)
-    except BrokenExecutor:
+    except (BrokenExecutor, NoProcessError):
         return task
 
     def result() -> T:

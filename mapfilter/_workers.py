@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
@@ -20,6 +20,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from mapfilter._memory import search_cycles_rarely
+from mapfilter.errors import MapfilterError, fail
 
 # Just under the size from which on glibc adapts no more.
 LARGE_BLOCK_BYTES = 31 << 20
@@ -27,10 +28,15 @@ LARGE_BLOCK_BYTES = 31 << 20
 _PR_SET_PDEATHSIG = 1
 _ENDED_BY_US = (None, 0, -signal.SIGTERM)
 _WORKER_LEFT = 77
-_SOON_S = 0.01
+_SOON_S, _LATEST_S = 0.01, 2.0
+_BROKEN = "a worker process ended in the midst of its tasks"
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+
+class NoProcessError(MapfilterError):
+    """The system starts no process beside this one."""
 
 
 class LocalWorkers(ProcessPoolExecutor):
@@ -43,19 +49,28 @@ class LocalWorkers(ProcessPoolExecutor):
     A worker that ends in the midst of sending a result leaves half a message. The pool would wait
     for the rest for ever, as this process could write to the same pipe; so each worker is watched,
     and with one that ended unasked all end, and this process closes its end of that pipe.
+
+    Raises
+    ------
+    NoProcessError
+        The system lets this process make no pool; in ``submit`` also, start no worker.
     """
 
     def __init__(self, workers: int) -> None:
         self._context = _Context()
+        # Of all pipes that more than one thread closes here, so that none is closed twice.
         self._ending, self._seen = Lock(), 0
-        watched, self._held = multiprocessing.Pipe(duplex=False)
-        # Spawned workers get a copy of one end only.
-        self._watched = watched
-        super().__init__(
-            workers, self._context, initializer=_start_worker, initargs=(os.getpid(), watched)
-        )
-        # The pool forgets it when it is shut down.
-        self._results: Any = self._result_queue
+        with _or_no_process():
+            watched, self._held = multiprocessing.Pipe(duplex=False)
+            # Spawned workers get a copy of one end only.
+            self._watched = watched
+            super().__init__(
+                workers, self._context, initializer=_start_worker, initargs=(os.getpid(), watched)
+            )
+        # The pool forgets it when it is shut down, and closes it then.
+        results: Any = self._result_queue
+        results.close = self._close_results
+        self._results = results
 
     def __exit__(self, *error: Any) -> None:
         super().__exit__(*error)
@@ -63,10 +78,11 @@ class LocalWorkers(ProcessPoolExecutor):
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Hand a task to a worker, and watch those that were started for it."""
-        future = super().submit(fn, *args, **kwargs)
+        with _or_no_process():
+            future = super().submit(fn, *args, **kwargs)
         with self._ending:
-            new = self._context.started[self._seen :]
-            self._seen += len(new)
+            started = self._context.started
+            new, self._seen = started[self._seen :], len(started)
         for one in new:
             Thread(target=self._end_after, args=(one,), daemon=True).start()
         return future
@@ -77,19 +93,25 @@ class LocalWorkers(ProcessPoolExecutor):
             self._held.close()
             self._watched.close()
 
+    def _close_results(self) -> None:
+        with self._ending:
+            self._results._reader.close()
+            self._results._writer.close()
+
     def _end_after(self, one: Any) -> None:
         """Wait until a worker ended; where nobody asked it to, see that the pool notices."""
         multiprocessing.connection.wait([one.sentinel])
-        while one.exitcode is None:
-            # Another thread is about to say it.
+        until_s = time.monotonic() + _LATEST_S
+        # Another thread is about to say it, unless the program has the system forget its children.
+        while (code := one.exitcode) is None and time.monotonic() < until_s:
             time.sleep(_SOON_S)
-        if one.exitcode == 0:
+        if not code and not self._pending_work_items:
             return
         self.end_workers()
         with self._shutdown_lock:
             # From here on the pool starts no worker, and hands none the pipe.
-            self._broken = self._broken or True
-            others = list(self._context.started)
+            self._broken = self._broken or _BROKEN  # type: ignore[assignment]
+            others = self._context.started
         for other in others:
             multiprocessing.connection.wait([other.sentinel])
         with self._ending:
@@ -113,12 +135,28 @@ class _Context(SpawnContext):
 
     def __init__(self) -> None:
         super().__init__()
-        self.started: list[Any] = []
+        self._made: list[Any] = []
+
+    @property
+    def started(self) -> list[Any]:
+        """The workers that the system did start, in this order."""
+        return [one for one in self._made if one.pid is not None]
 
     def Process(self, *args: Any, **kwargs: Any) -> Any:  # type: ignore[override]  # noqa: N802
         process = SpawnContext.Process(*args, **kwargs)
-        self.started.append(process)
+        self._made.append(process)
         return process
+
+
+@contextlib.contextmanager
+def _or_no_process() -> Iterator[None]:
+    # Without room for another process, without semaphores, without either in a sandbox.
+    try:
+        yield
+    except (OSError, NotImplementedError, ImportError) as error:
+        hint = "the system has no room or no leave for them; use one worker"
+        expected = "processes beside this one"
+        raise fail(NoProcessError, "worker processes", expected, error, hint) from error
 
 
 def _start_worker(parent: int, watched: Connection) -> None:

@@ -394,7 +394,7 @@ def replay(
     check_custom_filter(loaded)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
-        result = run_replay(loaded, folder, html=html, progress=progress)
+        result = run_replay(loaded, folder, html=html, beside=True, progress=progress)
     print_result(replay_figures(result), as_json)
     for warning in result.warnings:
         print_message(warning)

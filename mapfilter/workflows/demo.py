@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import wait
 from contextlib import contextmanager
 from functools import partial
 from importlib import resources
@@ -13,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from mapfilter._io import ensure_writable_folder
-from mapfilter._parallel import begun, local_executor
+from mapfilter._parallel import begun, local_executor, spare_processes, warmed
 from mapfilter._partial import remove_left
 from mapfilter.config.load import load_config
 from mapfilter.workflows.build import draw_database, run_build
-from mapfilter.workflows.kernels import WORKERS, submit_kernels, to_compile
+from mapfilter.workflows.kernels import WORKERS, begin_kernels, to_compile
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import run_replay
 from mapfilter.workflows.replayed import ReplayedLog
@@ -112,12 +111,13 @@ def run_demo(
     old_filter = config.filter.model_copy(update={"name": _OLD_FILTER})
     old_config = config.model_copy(update={"filter": old_filter})
     beside = min(WORKERS, os.cpu_count() or 1)
-    with _cleared(out), local_executor(beside) as workers:
+    others = spare_processes(beside) if beside > 1 else local_executor(1)
+    with _cleared(out), others as workers:
         # Workers start here, and import what a replay and its pictures need; on a single processor
         # each task is done when it is handed out.
-        workers.submit(callable, run_replay)
-        workers.submit(get_ready_to_draw)
-        compiled = submit_kernels(workers) if to_compile() else []
+        warmed(workers, 1, run_replay)
+        begun(workers, get_ready_to_draw)
+        compiled = begin_kernels(workers) if to_compile() else []
         with stage("predict"):
             predicted = run_predict(config)
         with stage("build"):
@@ -128,8 +128,8 @@ def run_demo(
         with stage("replay"):
             by_old = partial(run_replay, old_config, out / _OLD_FILTER, html=True)
             replayed = begun(workers, by_old)
-            # A process that fails to compile costs time only.
-            wait(compiled)
+            for one in compiled:
+                one()
             walk = run_replay(config, out / "replay", html=True).logs[0]
         with stage("candidate", "replay"):
             pictures, old = drawn(), replayed().logs[0]

@@ -9,8 +9,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator
-from concurrent.futures import Executor, Future, wait
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter._kernels import draw_key
-from mapfilter._parallel import local_executor
+from mapfilter._parallel import begun, spare_processes
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import flattened, summarise
@@ -44,16 +44,17 @@ _PARTICLES, _PIXELS, _PIXEL_M = 64, 4, 5.0
 def compiled_beside() -> Iterator[None]:
     """Compile what the Bayes filter needs, in two processes, while the block runs.
 
-    At its end all is compiled. Nothing is done where it is already, or on a single processor.
+    At its end all is compiled, here where a process failed. Nothing is done where it is already, or
+    on a single processor.
     """
     if not to_compile():
         yield
         return
-    with local_executor(WORKERS) as workers:
-        tasks = submit_kernels(workers)
+    with spare_processes(WORKERS) as workers:
+        tasks = begin_kernels(workers)
         yield
-        # A process that fails costs time only.
-        wait(tasks)
+        for one in tasks:
+            one()
 
 
 def to_compile() -> bool:
@@ -61,9 +62,9 @@ def to_compile() -> bool:
     return (os.cpu_count() or 1) >= WORKERS and not all(map(_is_kept, _LAST))
 
 
-def submit_kernels(workers: Executor) -> list[Future[None]]:
-    """Hand out the compilation of what the Bayes filter needs."""
-    return [workers.submit(task) for task in _TASKS]
+def begin_kernels(workers: Executor) -> list[Callable[[], None]]:
+    """Hand out the compilation of what the Bayes filter needs; call what is returned at the end."""
+    return [begun(workers, task) for task in _TASKS]
 
 
 def compile_evidence() -> None:
@@ -171,10 +172,14 @@ def main() -> None:
     """Compile kernels as the command line says."""
     parser = argparse.ArgumentParser(description="Compile kernels ahead of their first use.")
     parser.add_argument("--replay", action="store_true", help="of the Bayes map filter alone")
-    if parser.parse_args().replay:
-        with compiled_beside():
-            return
-    compile_all()
+    if not parser.parse_args().replay:
+        compile_all()
+        return
+    with compiled_beside():
+        pass
+    if not all(map(_is_kept, _LAST)):
+        for task in _TASKS:
+            task()
 
 
 if __name__ == "__main__":

@@ -121,7 +121,12 @@ _MOST_KEPT_ROWS = 1_000_000
 
 
 def run_replay(
-    config: Config, out: Path, *, html: bool = False, progress: Progress | None = None
+    config: Config,
+    out: Path,
+    *,
+    html: bool = False,
+    beside: bool = False,
+    progress: Progress | None = None,
 ) -> ReplayResult:
     """Locate the log or logs of a configuration and write estimates, figures and pictures.
 
@@ -134,6 +139,9 @@ def run_replay(
         Folder of the results; one log writes straight into it, several into a folder each.
     html : bool
         Whether a page is written that shows each log's replay (``replay.html``).
+    beside : bool
+        Whether other processes may compile and draw meanwhile. They import the main module of the
+        program again, so a script says so below ``if __name__ == "__main__"`` only.
     progress : callable, optional
         Called with logs done and logs in all.
 
@@ -144,7 +152,8 @@ def run_replay(
         cannot be written.
     """
     options = filter_choice(config.filter)
-    with compiled_beside() if isinstance(options, BayesFilter) else nullcontext():
+    compiles = beside and isinstance(options, BayesFilter)
+    with compiled_beside() if compiles else nullcontext():
         database = _database(config, options)
         journeys = _Logs(config, database)
 
@@ -204,7 +213,7 @@ def run_replay(
 
     # Older results stay until all of these are whole.
     with (
-        nullcontext(SerialExecutor()) if wanted == "none" else drawn_beside() as drawers,
+        drawn_beside() if beside and wanted != "none" else nullcontext(SerialExecutor()) as drawers,
         replaced_files(out, partial(older_results, out)) as new,
     ):
         logs = []

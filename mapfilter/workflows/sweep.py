@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from mapfilter._io import ensure_writable_folder, replaced_files
-from mapfilter._parallel import Progress, executor_of
+from mapfilter._parallel import Progress, executor_of, warmed
 from mapfilter.config.axes import parse_axis
 from mapfilter.config.load import load_config, load_keys
 from mapfilter.config.sections import Config
@@ -202,8 +202,7 @@ def run_sweep(
     out = config.output.dir / "sweep"
     with sweep_executor(workers, cluster) as (executor, in_flight):
         # Workers start, and import what a batch needs, while the world is read.
-        for _ in range(workers):
-            executor.submit(callable, run_batch)
+        warmed(executor, workers, run_batch)
         world = sweep_world(config, plans[0].radios)
         ensure_writable_folder(out)
         table = sweep(

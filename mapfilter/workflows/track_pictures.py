@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mapfilter._parallel import SerialExecutor, begun, worker_processes
+from mapfilter._parallel import SerialExecutor, begun, spare_processes
 from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot, TrackEstimate
@@ -42,14 +42,15 @@ def drawn_beside() -> Iterator[Executor]:
     """Give what draws pictures while the block runs: another process, which gets ready at once.
 
     It is this process, and each picture is drawn when it is handed out, on a single processor, in a
-    worker, and where modules that draw are imported already, as in a notebook.
+    worker, where modules that draw are imported already, as in a notebook, and where the system
+    starts no process.
     """
     is_worker = multiprocessing.parent_process() is not None
     if (os.cpu_count() or 1) == 1 or is_worker or _DRAWING_LIBRARY in sys.modules:
         yield SerialExecutor()
         return
     # One: a second would import as long as it saves by drawing.
-    with worker_processes(1) as drawer:
+    with spare_processes(1) as drawer:
         begun(drawer, get_ready_to_draw)
         yield drawer
 

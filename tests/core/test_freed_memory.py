@@ -26,7 +26,7 @@ def faults(how):
     # A cluster on this machine leaves such settings to what its process starts later.
     plain = {name: value for name, value in os.environ.items() if not name.startswith("MALLOC_")}
     given = [sys.executable, "-c", AGAIN, how]
-    done = subprocess.run(given, env=plain, capture_output=True, text=True)
+    done = subprocess.run(given, env=plain, capture_output=True, text=True, timeout=120)
     if done.returncode == 3:
         pytest.skip("not glibc")
     assert done.returncode == 0, done.stderr

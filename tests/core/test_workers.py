@@ -151,16 +151,20 @@ def test_a_worker_with_other_code_does_nothing(tmp_path):
     assert "found other versions (likely: install the same on all hosts)" in run.stdout
 
 
-def _half_a_result(_):
-    """End as a killed worker may: in the midst of sending a result."""
+def _half_a_result(_, code=9):
+    """End as a killed worker may, or one in which a library exits: while it sends a result."""
     send = Connection._send
 
     def half(self, data, write=os.write):
         send(self, data[: len(data) // 2], write)
-        os._exit(9)
+        os._exit(code)
 
     Connection._send = half
     return bytes(1_000)
+
+
+def _half_and_no_error(task):
+    return _half_a_result(task, code=0)
 
 
 def _other(task):
@@ -168,9 +172,9 @@ def _other(task):
 
 
 HALF = """
-import sys
+import signal, sys
 from mapfilter._parallel import local_executor, ordered_results
-from test_workers import _half_a_result, _other
+from test_workers import _half_a_result, _half_and_no_error, _other
 
 def stopped(executor):
     executor.submit(_half_a_result, 0).add_done_callback(lambda _: None)
@@ -182,11 +186,16 @@ if __name__ == "__main__":
     with local_executor(2) as executor:
         if sys.argv[1] == "stopped":
             stopped(executor)
+        if sys.argv[1] == "without an error":
+            list(ordered_results(executor, _half_and_no_error, [0]))
+        if sys.argv[1] == "forgotten":
+            signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+            list(ordered_results(executor, _half_a_result, [0]))
         list(ordered_results(executor, _other, range(int(sys.argv[1]))))
 """
 
 
-@pytest.mark.parametrize("tasks", ["1", "4", "stopped"])
+@pytest.mark.parametrize("tasks", ["1", "4", "stopped", "without an error", "forgotten"])
 def test_a_worker_that_ends_while_it_sends_a_result_hangs_nobody(tmp_path, tasks):
     script = tmp_path / "half.py"
     script.write_text(HALF)
@@ -197,3 +206,41 @@ def test_a_worker_that_ends_while_it_sends_a_result_hangs_nobody(tmp_path, tasks
     expected = "KeyboardInterrupt" if tasks == "stopped" else "worker processes: expected all"
     assert expected in done.stderr
     assert done.returncode not in (0, None)
+
+
+CLOSED_AT_LEISURE = """
+import os, signal, sys, time
+from multiprocessing.connection import Connection
+from mapfilter._parallel import begun, worker_processes
+
+close = Connection._close
+
+def slowly(self, _close=os.close):
+    close(self)
+    time.sleep(0.02)
+
+Connection._close = slowly
+here = os.getpid()
+
+def task(parent):
+    if os.getpid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "done here"
+
+if __name__ == "__main__":
+    from functools import partial
+    for _ in range(4):
+        with worker_processes(1) as worker:
+            print(begun(worker, partial(task, here))())
+"""
+
+
+def test_a_pipe_is_closed_by_one_thread_only(tmp_path):
+    """Else the second one closes what has the same number by then, or nothing, which fails."""
+    script = tmp_path / "leisure.py"
+    script.write_text(CLOSED_AT_LEISURE)
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split("\n")[:4] == ["done here"] * 4

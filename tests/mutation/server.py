@@ -150,7 +150,9 @@ def _become(request: Request, note: Path) -> None:
         for number, file in ((0, nothing), (1, log), (2, log)):
             os.dup2(file, number)
         sys.dont_write_bytecode = not request.keep_bytecode
-        code = int(pytest.main(request.arguments, plugins=[Watch(request, note)]))
+        # The clock of the tests themselves would stop the one of Watch.
+        arguments = [*request.arguments, "-o", "timeout=0"]
+        code = int(pytest.main(arguments, plugins=[Watch(request, note)]))
     except BaseException:
         traceback.print_exc()
     finally:

@@ -58,7 +58,7 @@ def test_a_filter_calls_what_was_compiled():
 
 
 def test_nothing_is_started_where_all_is_kept(monkeypatch):
-    monkeypatch.setattr(kernels, "local_executor", None)
+    monkeypatch.setattr(kernels, "spare_processes", None)
     monkeypatch.setattr(kernels, "_is_kept", lambda _: True)
     with kernels.compiled_beside():
         pass

@@ -1,5 +1,7 @@
 """What the demo hands to other processes is done by itself where these died."""
 
+import multiprocessing.synchronize
+import multiprocessing.util
 import os
 import signal
 import time
@@ -10,8 +12,16 @@ from pathlib import Path
 import pytest
 
 from mapfilter._io import atomic_dir
-from mapfilter._parallel import SerialExecutor, begun, local_executor
+from mapfilter._parallel import (
+    SerialExecutor,
+    begun,
+    local_executor,
+    ordered_results,
+    spare_processes,
+    warmed,
+)
 from mapfilter._partial import remove_left
+from mapfilter._workers import NoProcessError
 from mapfilter.errors import MapfilterError, fail
 from mapfilter.workflows import demo
 
@@ -58,6 +68,30 @@ def test_a_task_whose_worker_died_is_done_here():
         assert begun(workers, _where)() == os.getpid()
 
 
+def test_warming_up_leaves_faults_to_the_tasks():
+    with local_executor(2) as workers:
+        assert begun(workers, _Elsewhere())() == 7
+        warmed(workers, 2, _where)
+
+
+@pytest.mark.parametrize("lacks", ["semaphores", "room"])
+def test_where_no_process_can_be_started_all_is_done_here(monkeypatch, lacks):
+    def refused(*_, **__):
+        raise OSError(38 if lacks == "semaphores" else 11, "not here")
+
+    place, name = {
+        "semaphores": (multiprocessing.synchronize.SemLock, "__init__"),
+        "room": (multiprocessing.util, "spawnv_passfds"),
+    }[lacks]
+    monkeypatch.setattr(place, name, refused)
+    with spare_processes(2) as workers:
+        warmed(workers, 2, _where)
+        assert begun(workers, _where)() == os.getpid()
+    expected = "processes beside this one, found .*not here.*use one worker"
+    with pytest.raises(NoProcessError, match=expected), local_executor(2) as workers:
+        list(ordered_results(workers, abs, range(4)))
+
+
 def test_on_a_single_processor_a_task_is_done_at_once():
     done = []
     result = begun(SerialExecutor(), lambda: done.append(1))
@@ -75,7 +109,9 @@ def _half_written(path: str) -> None:
 def _stopped_while_one_writes(out: Path, target: Path) -> None:
     with demo._cleared(out), local_executor(2) as workers:
         begun(workers, partial(_half_written, str(target)))
+        until_s = time.monotonic() + 60
         while not list(out.rglob("half")):
+            assert time.monotonic() < until_s
             time.sleep(0.01)
         raise KeyboardInterrupt
 

@@ -2,12 +2,15 @@
 
 import multiprocessing
 import os
+import signal
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
 
+from mapfilter._parallel import begun
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.report.ground import BaseMap
@@ -43,6 +46,23 @@ def test_another_process_draws_the_same_bytes(monkeypatch):
     assert beside == here
 
 
+def _killed(parent):
+    if os.getpid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return b""
+
+
+def test_what_a_killed_process_would_have_drawn_is_drawn_here(monkeypatch):
+    here, _ = _pngs()
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(track_pictures, "_DRAWING_LIBRARY", "not imported")
+    shown, errors_m = _shown(), np.array([40.0, 60.0])
+    with drawn_beside() as drawers:
+        begun(drawers, partial(_killed, os.getpid()))
+        handed = with_error_picture(begin_pictures(shown, drawers), shown, drawers, errors_m)
+        assert {name: png() for name, png in handed.items()} == here
+
+
 def _stopped(children):
     with drawn_beside():
         children += multiprocessing.active_children()
@@ -62,5 +82,5 @@ def test_a_stopped_replay_leaves_no_process(monkeypatch):
 def test_no_command_that_locates_imports_what_draws():
     """Else the process that draws would save nothing; asked of a process of its own."""
     code = "import sys, mapfilter.workflows.replay as _; sys.exit('matplotlib' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
