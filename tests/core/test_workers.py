@@ -217,7 +217,7 @@ close = Connection._close
 
 def slowly(self, _close=os.close):
     close(self)
-    time.sleep(0.02)
+    time.sleep(0.2)
 
 Connection._close = slowly
 here = os.getpid()
