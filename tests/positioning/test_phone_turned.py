@@ -376,6 +376,13 @@ def test_odds_that_come_and_go_leave_a_position():
     assert is_ahead(RULES, again, MAIN, 37.0)
 
 
+def test_a_position_is_lost_before_another_one_is_the_likelier():
+    rules = HoldRules()
+    for log_odds, lost in ((-0.9, True), (-1.1, False)):
+        held = still_open(rules, (one_of(log_odds),), MAIN, 20.0)
+        assert is_ahead(rules, held, MAIN, 27.0) is lost
+
+
 def test_the_other_beliefs_keep_their_odds_after_a_takeover():
     best, other = one_of(9.0, prior=-1.0), replace(one_of(4.0, prior=-5.0), ahead_m=20.0)
     (left,) = after_takeover((best, other), best)

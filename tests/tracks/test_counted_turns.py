@@ -179,3 +179,33 @@ def test_turns_between_some_rows_add_up_to_all(turn, chosen):
 
 def test_nothing_turns_without_sensors():
     assert turning_of({"steps": STEPS}) == (None, "")
+
+
+def constant_turn():
+    """A phone upright that turns by 0.1 rad/s for 10 s."""
+    time_s = np.arange(0.0, 10.0, 0.5)
+    zero = np.zeros(time_s.size)
+    force = pd.DataFrame({"time_s": time_s, "x_mps2": zero, "y_mps2": zero, "z_mps2": zero + 9.8})
+    rate = pd.DataFrame({"time_s": time_s, "x_radps": 0.0, "y_radps": 0.0, "z_radps": 0.1})
+    return force, rate
+
+
+def test_a_hole_in_the_force_leaves_the_vertical():
+    force, rate = constant_turn()
+    force.loc[3, "z_mps2"] = np.nan
+    turning, reason = turning_of({"accelerometer": force, "gyroscope": rate})
+    assert reason == ""
+    assert turning.between(np.array([0.0, 2.0, 8.0]))[1:] == pytest.approx([0.2, 0.6])
+    force["z_mps2"] = np.nan
+    assert turning_of({"accelerometer": force, "gyroscope": rate})[0] is None
+
+
+def test_a_single_turn_hides_no_yaw_rate():
+    _, rate = constant_turn()
+    turns = pd.DataFrame({"time_s": rate["time_s"], "turn_rad": np.nan, "yaw_rate_radps": 0.1})
+    turns.loc[1, "turn_rad"] = 0.0
+    turning, _ = turning_of({"turns": turns})
+    assert turning.source == "a yaw rate"
+    assert turning.between(np.array([0.0, 2.0, 8.0]))[1:] == pytest.approx([0.2, 0.6])
+    turns["turn_rad"] = 0.3
+    assert turning_of({"turns": turns})[0].source == "turns"

@@ -107,7 +107,7 @@ class HeldOtherwise:
     null : NullHypothesis
         Beside this belief.
     ahead_m : float
-        Distance travelled since which it is ahead of the main belief, and elsewhere; NaN if not.
+        Distance travelled since which it is likely enough, and elsewhere; NaN if not.
     """
 
     belief: ParticleBelief
@@ -254,7 +254,7 @@ def still_open(
 def _compared(
     rules: HoldRules, one: HeldOtherwise, main: ParticleBelief, travelled_m: float
 ) -> HeldOtherwise:
-    """Return a belief with the distance since which it is ahead."""
+    """Return a belief with the distance since which it is likely enough."""
     if not _leads(rules, one, main):
         return replace(one, ahead_m=nan)
     return one if isfinite(one.ahead_m) else replace(one, ahead_m=travelled_m)
@@ -263,14 +263,14 @@ def _compared(
 def is_ahead(
     rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
 ) -> bool:
-    """Return whether one of the beliefs is ahead of the main one, and elsewhere, for some way."""
+    """Return whether one of the beliefs is likely enough, and elsewhere, for some way."""
     return any(
         travelled_m - one.ahead_m >= rules.lost_after_m and _leads(rules, one, main) for one in held
     )
 
 
 def _leads(rules: HoldRules, one: HeldOtherwise, main: ParticleBelief) -> bool:
-    """Return whether a belief is ahead of the main one by its odds, and elsewhere."""
+    """Return whether a belief is likely enough against the main one, and elsewhere."""
     return one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main)
 
 

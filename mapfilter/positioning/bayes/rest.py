@@ -6,7 +6,8 @@ compared with its first one, by the likelihoods of "still there", or as far away
 
 A walker whose steps are no longer counted is 50 m away before that ratio can be large. So the
 rest itself has to be shown, too: where levels could have shown it, and did not, the position is in
-doubt from 45 m on, at the pace before. How levels change then depends on the distance.
+doubt from 45 m on, at the pace before, beyond what is measured. How levels change then depends on
+the distance.
 """
 
 from __future__ import annotations
@@ -48,12 +49,12 @@ levels could not show a rest; the sum at or below which they do, and do again af
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """Reports since motion stands still.
+    """Reports since motion stands still, or is slow.
 
     Parameters
     ----------
     since_s : float
-        Time of the last step.
+        Time of the last step at a walker's pace.
     block_s : float
         When the present block began.
     first, present : mapping of str to tuple of float

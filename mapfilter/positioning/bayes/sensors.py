@@ -66,17 +66,17 @@ class SensorWatch:
     speed_mps : float
         Mean speed while it moves.
     moving_s : float
-        Time of the last measured step.
+        Time of the last measured step at a walker's pace.
     known_s : float
         Time until which the way is measured, or in the belief as an unmeasured one.
     rest : Rest or None
-        Reports since then, while no motion is reported; None while it moves.
+        Reports since then, while no motion is reported, or little; None while it moves.
     unmeasured_s : float
         Time for which an unmeasured way is in the belief already.
     moved_m : float
         Distance since the last report, as measured.
     recent_mps : float
-        Mean speed of the last seconds.
+        Mean speed of the last seconds, in the unit of the steps per second.
     report : tuple of ReportRow
         The last report.
     repeated_nats : float
@@ -84,7 +84,7 @@ class SensorWatch:
     repeats : MotionRepeats
         How motion rows repeat each other.
     fastest_mps : float
-        Largest speed of a row.
+        Largest speed of a row, in the unit of the steps per second.
     """
 
     motion_s: float = nan

@@ -82,7 +82,8 @@ def turning_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Turning | None, str
     """
     if (rows := _rows(sensors, "turns", ("turn_rad", "yaw_rate_radps"))) is not None:
         turn, rate = rows[1].T
-        if np.isfinite(turn).any():
+        # A single turn says less than a rate in every row.
+        if np.isfinite(turn).sum() >= np.isfinite(rate).sum():
             return Turning(rows[0], turn, WALK_RAD_PER_SQRT_S, "turns"), ""
         return _of_rate(rows[0], rate, "a yaw rate"), ""
     gyroscope = _rows(sensors, "gyroscope", ("x_radps", "y_radps", "z_radps"))
@@ -130,7 +131,11 @@ def _up(time_s: Floats, known_s: Floats, force: Floats) -> Floats | None:
 
     NaN where there was none; None where the force does not include gravity.
     """
-    total = np.concatenate([np.zeros((1, 3)), np.cumsum(np.nan_to_num(force), axis=0)])
+    measured = np.isfinite(force).all(axis=1)
+    if not measured.any():
+        return None
+    known_s, force = known_s[measured], force[measured]
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(force, axis=0)])
     first = np.searchsorted(known_s, time_s - _GRAVITY_S, side="left")
     last = np.searchsorted(known_s, time_s + _GRAVITY_S, side="right")
     count = last - first
