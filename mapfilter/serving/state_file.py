@@ -29,6 +29,7 @@ from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.pace import Pace
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.repeats import MotionRepeats
 from mapfilter.positioning.bayes.rest import Rest
@@ -42,7 +43,7 @@ from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.integrity import SampleTail
 
-FORMAT, VERSION = "mapfilter session", 4
+FORMAT, VERSION = "mapfilter session", 5
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -71,6 +72,7 @@ _CLASSES: dict[str, type] = {
         RecentPath,
         ReportRow,
         Reported,
+        Pace,
         Rest,
         SampleTail,
         SensorWatch,

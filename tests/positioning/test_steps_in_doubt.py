@@ -11,6 +11,7 @@ from made_town import Town, slowed, walk_log
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.held import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.pace import Pace
 from mapfilter.positioning.bayes.rest import Rest
 from mapfilter.positioning.bayes.sensors import SensorWatch, watched
 from mapfilter.positioning.bayes.step_units import (
@@ -214,8 +215,8 @@ def test_the_pace_before_a_rest_is_in_metres():
     for second in range(62):
         step = MotionStep(4.4 if second < 60 else 0.0, 0.0)
         state, _ = AREA.step(state, Epoch(float(second), (step,)), rng)
-    assert state.watch.speed_mps == pytest.approx(4.4, rel=0.05)
-    assert state.watch.rest.pace_mps == pytest.approx(FOOT_M * state.watch.speed_mps)
+    assert state.watch.pace.speed_mps == pytest.approx(4.4, rel=0.05)
+    assert state.watch.rest.pace_mps == pytest.approx(FOOT_M * state.watch.pace.speed_mps)
 
 
 def test_a_measured_position_leaves_no_doubt():
@@ -235,16 +236,16 @@ def test_a_measured_position_leaves_no_doubt():
     [(1.3, 1.0), (0.7, 1.0), (2.5, 1.0), (4.4, FOOT_M), (0.41, 1 / FOOT_M), (9.0, 1.0)],
 )
 def test_the_unit_with_which_a_speed_is_a_walkers(speed_mps, unit_m):
-    assert SensorWatch(rows=30, speed_mps=speed_mps).other_unit_m == pytest.approx(unit_m)
-    assert SensorWatch(rows=29, speed_mps=speed_mps).other_unit_m == 1.0
-    fast = SensorWatch(rows=30, speed_mps=speed_mps, fastest_mps=9.1)
+    assert Pace(rows=30, interval_s=1.0, speed_mps=speed_mps).other_unit_m == pytest.approx(unit_m)
+    assert Pace(rows=29, interval_s=1.0, speed_mps=speed_mps).other_unit_m == 1.0
+    fast = Pace(rows=30, interval_s=1.0, speed_mps=speed_mps, fastest_mps=9.1)
     assert fast.other_unit_m == 1.0
 
 
 @pytest.mark.parametrize("speed_mps", [0.15, 0.41, 0.7, 2.5, 2.7, 4.4, 7.9, 8.2, 9.0])
 def test_notes_on_a_log_name_the_unit_that_the_filter_tries(speed_mps):
     rows = pd.DataFrame({"time_s": np.arange(60.0), "step_m": speed_mps, "heading_rad": 0.0})
-    unit_m = SensorWatch(rows=60, speed_mps=speed_mps).other_unit_m
+    unit_m = Pace(rows=60, interval_s=1.0, speed_mps=speed_mps).other_unit_m
     fault = speed_fault(rows)
     assert ("lengths in feet" in fault) == (unit_m < 1)
     assert ("metres taken for feet" in fault) == (unit_m > 1)
@@ -255,9 +256,9 @@ def test_a_row_of_a_vehicle_ends_the_question_of_the_unit():
     watch, times = SensorWatch(), [k + apart for k in range(40) for apart in (0.0, 0.001)]
     for time_s in times:
         watch, _, _ = watched(watch, Epoch(time_s, (MotionStep(2.2, 0.1 * time_s),)))
-    assert watch.other_unit_m == pytest.approx(FOOT_M)
+    assert watch.pace.other_unit_m == pytest.approx(FOOT_M)
     watch, _, _ = watched(watch, Epoch(40.0, (MotionStep(12.0, 0.0),)))
-    assert watch.other_unit_m == 1.0
+    assert watch.pace.other_unit_m == 1.0
 
 
 def test_lengths_are_read_in_the_unit():

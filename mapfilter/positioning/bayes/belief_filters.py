@@ -174,7 +174,7 @@ class BeliefFilters:
         gnss: GnssState = state.sources[GnssSource.name]
         if not self.holds.watched or not state.compass or gnss.met:
             return 1.0
-        return state.watch.other_unit_m
+        return state.watch.pace.other_unit_m
 
     def may_have_left(self, state: BayesState) -> bool:
         """Return whether a walker may have left its position though no step is counted."""
@@ -187,17 +187,18 @@ class BeliefFilters:
     def carried_on(
         self, state: BayesState, belief: MapBelief, gone_s: float, rng: np.random.Generator
     ) -> MapBelief:
-        """Move some hypotheses to where they may be by now, once steps are counted again.
+        """Move some hypotheses to where they may be by now, once steps are counted as before.
 
-        ``state`` is that before, ``gone_s`` the time without steps. A rest whose levels were in
-        doubt may have been a way.
+        ``state`` is that before, ``gone_s`` the time without steps, or with few. A rest whose
+        levels were in doubt may have been a way, a stroll a longer one.
         """
         rest = state.watch.rest
         if rest is None or not isinstance(belief, ParticleBelief):
             return belief
         count = belief.log_weight.size
         gone = rng.random(count) < rest.left_probability
-        far_m = sqrt(spread_m2(rest.pace_mps, gone_s) / 2)
+        missed_mps = max(rest.pace_mps - rest.measured_m / gone_s, 0.0) if gone_s > 0 else 0.0
+        far_m = sqrt(spread_m2(missed_mps, gone_s) / 2)
         moved = belief.state.copy()
         moved[: NORTH + 1, gone] += far_m * rng.standard_normal((NORTH + 1, int(gone.sum())))
         return replace(belief, state=moved)

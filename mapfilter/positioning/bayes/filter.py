@@ -199,6 +199,8 @@ class BayesPositioner(Filter[BayesState]):
         gnss: GnssState = state.sources[GnssSource.name]
         if epoch.fix is not None and gnss.was_used(epoch.time_s):
             state = replace(state, last_fix=epoch.fix)
+        if gnss.was_used(epoch.time_s) and state.watch.rest is not None:
+            state = replace(state, watch=state.watch.positioned(epoch.time_s))
         if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))

@@ -82,7 +82,7 @@ def moved(
         # Positions leave no doubt of a jump, and tell whether headings are still read rightly.
         plain = (one for one in held if one.hold.is_as_measured)
         held = () if hold.is_as_measured else tuple(plain)
-    if not epoch.time_s - state.watch.moving_s <= rules.longest_pause_s:
+    if not epoch.time_s - state.watch.pace.stepped_s <= rules.longest_pause_s:
         # Who stood may have turned there.
         walking_rad = nan
     own = _OwnDraws(epoch.time_s)

@@ -54,7 +54,7 @@ class Rest:
     Parameters
     ----------
     since_s : float
-        Time of the last step at a walker's pace.
+        Time of the last step at the usual pace, or of the last position that was measured.
     block_s : float
         When the present block began.
     first, present : mapping of str to tuple of float
@@ -76,7 +76,7 @@ class Rest:
     is_doubtful : bool
         Whether levels could have shown the rest by now, and did not.
     measured_m : float
-        Way that was measured since the last step at a walker's pace: 0 at rest.
+        Way in m that was measured since then: 0 at rest.
     """
 
     since_s: float
