@@ -34,17 +34,20 @@ from mapfilter.positioning.locators import as_filter
 from mapfilter.tracks.log import TrackLog
 
 _PLACE = ("east_m", "north_m", "covariance_m2")
+_TRACKED = {Status.TRACKING, Status.UNCERTAIN}
 _ORDER = {
-    Status.SEARCHING: set(Status) - {Status.TRACKING},
-    Status.CONVERGED: {Status.TRACKING, Status.LOST, Status.OUTSIDE},
-    Status.TRACKING: {Status.TRACKING, Status.LOST, Status.OUTSIDE},
+    Status.SEARCHING: set(Status) - _TRACKED,
+    Status.CONVERGED: _TRACKED | {Status.LOST, Status.OUTSIDE},
+    Status.TRACKING: _TRACKED | {Status.LOST, Status.OUTSIDE},
+    Status.UNCERTAIN: _TRACKED | {Status.LOST, Status.OUTSIDE},
     Status.LOST: set(Status),
     Status.OUTSIDE: set(Status),
 }
 _BELIEF_ORDER = {
-    Status.SEARCHING: set(Status) - {Status.TRACKING},
+    Status.SEARCHING: set(Status) - _TRACKED,
     Status.CONVERGED: set(Status) - {Status.CONVERGED},
     Status.TRACKING: set(Status) - {Status.CONVERGED},
+    Status.UNCERTAIN: set(Status) - {Status.CONVERGED},
     Status.LOST: set(Status),
     Status.OUTSIDE: set(Status),
 }

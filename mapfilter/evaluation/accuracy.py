@@ -28,6 +28,7 @@ RADII = (50, 67, 95, 99)
 """Per cent of the belief that the radii of an estimate hold."""
 
 _CLAIMS = (Status.CONVERGED, Status.TRACKING)
+_FOLLOWED = (*_CLAIMS, Status.UNCERTAIN)
 _WINDOW_M = 100.0
 
 
@@ -227,7 +228,8 @@ class Claims:
     lost : int
         How often LOST began.
     false_lost : int
-        How often it began right after a claimed position that was at most 50 m off.
+        How often it began right after a position that was at most 50 m off, claimed or
+        UNCERTAIN.
     worst_100m_m : float
         The largest mean error over 100 m travelled, from the first claim on; over what was
         travelled, where that is less; NaN without a claim.
@@ -258,6 +260,7 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
     inside = (estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1])
     counted = inside & (estimate.time_s <= until_s)
     claimed = counted & claims_of(estimate)
+    known = counted & np.array([status in _FOLLOWED for status in estimate.status], dtype=bool)
     converged = counted & np.array([s is Status.CONVERGED for s in estimate.status], dtype=bool)
     lost = counted & np.array([status is Status.LOST for status in estimate.status], dtype=bool)
     near = errors_m <= SUCCESS_RADIUS_M
@@ -275,7 +278,7 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
         wrong_converged=int((converged & ~near).sum()),
         false_starts=int((began_claim & ~near).sum()),
         lost=int(began_lost.sum()),
-        false_lost=int((began_lost & _before(claimed & near)).sum()),
+        false_lost=int((began_lost & _before(known & near)).sum()),
         worst_100m_m=_worst_100m(errors_m[followed], truth.distance_at(estimate.time_s[followed])),
     )
 

@@ -24,13 +24,15 @@ class Status(StrEnum):
     """State of a filter at an epoch.
 
     ``SEARCHING`` → ``CONVERGED`` (the first epoch at which the switch rule holds) → ``TRACKING``;
-    ``LOST`` when the evidence contradicts the belief; ``OUTSIDE`` when nothing on the map explains
+    ``UNCERTAIN`` when a position is tracked, but may well be another one than the leading; ``LOST``
+    when the evidence contradicts the belief; ``OUTSIDE`` when nothing on the map explains
     it: off the area, or in another network than the map's. No position is given then.
     """
 
     SEARCHING = "SEARCHING"
     CONVERGED = "CONVERGED"
     TRACKING = "TRACKING"
+    UNCERTAIN = "UNCERTAIN"
     LOST = "LOST"
     OUTSIDE = "OUTSIDE"
 

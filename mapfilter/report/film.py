@@ -18,13 +18,18 @@ from mapfilter._io import atomic_file
 from mapfilter._types import Floats
 from mapfilter.errors import OutputError, fail
 from mapfilter.report.basemap import BaseMap, LocalFrame, draw_base, map_height_in
-from mapfilter.report.canvas import BLACK, BLUE, VERMILLION, figure_of, new_figure, styled
+from mapfilter.report.canvas import BLACK, BLUE, SKY, VERMILLION, figure_of, new_figure, styled
 
 FILM_FORMATS = {".gif": "pillow", ".mp4": "ffmpeg"}
 """Endings of films, and the writers of matplotlib that make them."""
 
 _WIDTH_IN, _DPI = 6.4, 100
-_COLORS = {"SEARCHING": "#8c8c8c", "LOST": VERMILLION, "OUTSIDE": VERMILLION}
+_COLORS = {
+    "SEARCHING": "#8c8c8c",
+    "UNCERTAIN": SKY,
+    "LOST": VERMILLION,
+    "OUTSIDE": VERMILLION,
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,9 +50,9 @@ def plot_track(
     """Draw truth and estimate over the streets, and where the filter switched to tracking.
 
     Tracked estimates more than 50 m off are drawn in another colour and shape; those while the
-    filter searched or was lost are no claims, and small and pale whatever their error. Epochs
-    without a position are not drawn. Without a title it is the filter's name and the outcome of the
-    track; ``zoom`` shows only the surroundings of truth and estimate, not the whole area.
+    filter searched, was uncertain or lost are no claims, and small and pale whatever their error.
+    Epochs without a position are not drawn. Without a title it is the filter's name and the outcome
+    of the track; ``zoom`` shows only the surroundings of truth and estimate, not the whole area.
     """
     if truth is not None and not truth.time_s.size:
         truth = None
@@ -105,7 +105,9 @@ def plot_track(
 
 def _unclaimed(estimate: TrackEstimate) -> str:
     """Return what estimates that are not tracked are called in the legend."""
-    return "while searching" + (" or lost" if Status.LOST in estimate.status else "")
+    words = ("searching", "uncertain", "lost")
+    seen = [word for word in words if Status(word.upper()) in estimate.status] or ["searching"]
+    return f"while {', '.join(seen[:-1])} or {seen[-1]}" if seen[1:] else f"while {seen[0]}"
 
 
 def _outcome(estimate: TrackEstimate, truth: Truth | None) -> str:

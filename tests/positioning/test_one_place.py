@@ -29,15 +29,15 @@ class Belief:
 class State:
     belief: object = None
     status: Status = Status.TRACKING
-    unclear: bool = False
     contested: bool = False
     alternative: object = None
+    held: tuple = ()
     sources: dict = field(default_factory=dict)
     reckoning: object = field(default_factory=lambda: SimpleNamespace(travelled_m=40.0))
 
 
 def weighing(contested=False, left=False):
-    rules = SimpleNamespace(unclear_below_mass=0.8, clear_from_mass=0.95)
+    rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0)
     beliefs = SimpleNamespace(
         options=SimpleNamespace(split_mass=0.4),
         rules_of=lambda _: rules,
@@ -47,55 +47,39 @@ def weighing(contested=False, left=False):
     return Weighing(beliefs, None, ())
 
 
-@pytest.mark.parametrize(
-    ("mass", "measured", "was_unclear", "unclear"),
-    [
-        # Measured motion may spread it as far as it searches again; else it has to gather.
-        (0.4, True, False, False),
-        (0.79, False, False, True),
-        (0.8, False, False, False),
-        # What was unclear is clear from a larger mass on, however it moves.
-        (0.94, True, True, True),
-        (0.94, False, True, True),
-        (0.95, True, True, False),
-        (0.95, False, True, False),
-    ],
-)
-@pytest.mark.parametrize("status", [Status.TRACKING, Status.CONVERGED])
-def test_a_belief_that_is_spread_is_lost_until_it_has_gathered(
-    mass, measured, was_unclear, unclear, status
-):
-    given = State(Belief(mass), status)
-    found = weighing().in_one_place(given, measured=measured, was_unclear=was_unclear)
-    assert found.unclear is unclear
+@pytest.mark.parametrize(("mass", "claimed"), [(0.4, False), (0.94, False), (0.95, True)])
+def test_a_position_is_claimed_if_it_is_certain_enough(mass, claimed):
+    found = weighing().in_one_place(State(Belief(mass)))
+    assert found.status is (Status.TRACKING if claimed else Status.UNCERTAIN)
     assert not found.contested
-    assert found.status is (Status.LOST if unclear else status)
-    assert found.belief is given.belief
+    assert found.belief == Belief(mass)
 
 
-@pytest.mark.parametrize("measured", [True, False])
-def test_below_the_mass_of_a_split_it_has_to_converge_anew(measured):
-    given = State(Belief(0.39))
-    found = weighing(True).in_one_place(given, measured=measured, was_unclear=True)
+def test_what_converges_is_judged_by_the_rule_of_convergence():
+    given = State(Belief(0.6, Status.CONVERGED), Status.CONVERGED)
+    assert weighing().in_one_place(given) is given
+
+
+def test_below_the_mass_of_a_split_it_has_to_converge_anew():
+    found = weighing(True).in_one_place(State(Belief(0.39)))
     assert found.status is Status.LOST
     assert found.belief.status is Status.SEARCHING
     assert isnan(found.belief.agreement_start_m)
-    assert (found.unclear, found.contested) == (False, False)
+    assert not found.contested
 
 
-def test_another_reading_of_headings_makes_it_contested():
-    found = weighing(True).in_one_place(State(Belief(1.0)), measured=True, was_unclear=False)
-    assert (found.status, found.unclear, found.contested) == (Status.LOST, False, True)
-    both = weighing(True).in_one_place(State(Belief(0.5)), measured=False, was_unclear=False)
-    assert (both.status, both.unclear, both.contested) == (Status.LOST, True, True)
+@pytest.mark.parametrize("mass", [1.0, 0.5])
+def test_another_reading_of_headings_makes_it_contested(mass):
+    found = weighing(True).in_one_place(State(Belief(mass)))
+    assert (found.status, found.contested) == (Status.LOST, True)
 
 
 @pytest.mark.parametrize("status", [Status.SEARCHING, Status.LOST, Status.OUTSIDE])
 def test_only_what_claims_a_position_can_be_lost(status):
     given = State(Belief(0.1), status)
-    assert weighing(True).in_one_place(given, measured=False, was_unclear=True) is given
+    assert weighing(True).in_one_place(given) is given
     nothing = State(None)
-    assert weighing(True).in_one_place(nothing, measured=False, was_unclear=True) is nothing
+    assert weighing(True).in_one_place(nothing) is nothing
 
 
 @dataclass
@@ -178,5 +162,5 @@ def test_terms_of_timing_are_clipped_normal_densities(weight):
 
 
 def test_a_rest_in_doubt_makes_it_contested():
-    found = weighing(left=True).in_one_place(State(Belief(0.99)), measured=True, was_unclear=False)
-    assert (found.status, found.unclear, found.contested) == (Status.LOST, False, True)
+    found = weighing(left=True).in_one_place(State(Belief(0.99)))
+    assert (found.status, found.contested) == (Status.LOST, True)

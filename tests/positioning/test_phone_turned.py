@@ -10,6 +10,7 @@ from made_town import Town, walk_log
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import UpdateInfo
+from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes import moving
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -263,24 +264,20 @@ def test_who_stands_may_turn_there():
         assert len(walked(*begun(), *rows)[0].held) == count
 
 
-def test_the_two_reasons_to_be_lost_are_told_apart():
+def test_a_contested_position_is_lost_and_a_spread_one_uncertain():
     state, rng = begun()
     held = HeldOtherwise(beside(state.belief, 200.0), Hold(1.0, 3.0), 3.0, 0.0, ahead_m=-7.0)
     rest = (1.0, 0.0, 0.0)
     state, output = walked(replace(state, held=(held,)), rng, rest)
-    assert (output.fix.status, state.unclear, state.contested) == (Status.LOST, False, True)
+    assert (output.fix.status, state.contested) == (Status.LOST, True)
     assert Reason.PHONE_TURNED in {one.reason for one in output.unused}
-    # 90 % in one place are enough after that, and too few after a way that was not measured.
+    # Of 90 % in one place nothing is claimed, but they are not contested.
     wide = state.belief.state.copy()
     wide[0, ::10] += 200.0
     state = replace(state, held=(), belief=replace(state.belief, state=wide))
     cleared, output = walked(state, rng, (2.0, 0.0, 0.0))
-    assert (output.fix.status, cleared.contested) == (Status.TRACKING, False)
+    assert (output.fix.status, cleared.contested) == (Status.UNCERTAIN, False)
     assert Reason.PHONE_TURNED not in {one.reason for one in output.unused}
-    both = replace(state, unclear=True, held=(held,))
-    for time_s, now in ((2.0, both), (3.0, None)):
-        both, output = walked(now or replace(both, held=()), rng, (time_s, 0.0, 0.0))
-        assert (output.fix.status, both.unclear) == (Status.LOST, True)
 
 
 def test_motion_that_is_read_otherwise_is_used():
@@ -345,7 +342,11 @@ def test_which_beliefs_stay_open():
         return [one.belief for one in still_open(RULES, (low, high, mid), MAIN, travelled_m)]
 
     assert left(399.0) == [high.belief, mid.belief]
-    assert left(400.0) == [mid.belief]
+    # What is ahead stays.
+    assert left(400.0) == [high.belief, mid.belief]
+    behind = one_of(0.9)
+    assert len(still_open(RULES, (behind,), MAIN, 399.0)) == 1
+    assert still_open(RULES, (behind,), MAIN, 400.0) == ()
     # The Bayes factor refutes, whatever the odds before.
     assert still_open(RULES, (one_of(-3.0, prior=1.5),), MAIN, 0.0) == ()
 
@@ -418,6 +419,25 @@ def test_how_headings_are_read_after_a_jump():
     assert again.direction_rad(1.0) == pytest.approx(mirror.direction_rad(1.0))
     step = MotionStep(1.0, 0.3)
     assert Hold().read(step) is step
+
+
+def test_a_phone_that_was_mirrored_before_shows_it_at_a_corner():
+    """Along the axis nothing changes; then left is right, for a mirrored phone as for others."""
+    for hold in (Hold(), Hold(-1.0, 0.7), Hold(1.0, 2.0, 0.3048)):
+        other = hold.mirrored_at(0.4)
+        assert other.direction_rad(0.4) == pytest.approx(hold.direction_rad(0.4))
+        turn = wrap_rad(hold.direction_rad(0.4 + 1.5) - hold.direction_rad(0.4))
+        assert wrap_rad(other.direction_rad(0.4 + 1.5) - other.direction_rad(0.4)) == pytest.approx(
+            -turn
+        )
+        assert other.step_unit_m == hold.step_unit_m
+    state, rng = begun()
+    state, _ = walked(state, rng, (1.0, 1.4, 0.0), (2.0, 1.4, 1.5))
+    directions = sorted(one.hold.direction_rad(1.5) for one in state.held)
+    # Straight on, by a turned and by a mirrored phone, and to the other side.
+    assert directions == pytest.approx([-1.5, 0.0, 0.0], abs=1e-9)
+    priors = {round(one.hold.direction_rad(1.5), 1): one.log_prior for one in state.held}
+    assert priors[-1.5] == pytest.approx(np.log(0.006 / 0.994) + np.log(0.25))
 
 
 def test_vehicles_and_maps_without_cells_are_not_watched():

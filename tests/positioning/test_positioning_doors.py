@@ -58,8 +58,7 @@ def test_the_usual_options():
         "converge_log_odds": -12.0,
         "converge_threshold": 2.0,
         "map_nats_per_m": 0.04,
-        "unclear_below_mass": 0.8,
-        "clear_from_mass": 0.95,
+        "claimed_from": 0.95,
         "takes_over_searching": False,
     }
     evidence = EvidenceOptions()

@@ -48,7 +48,7 @@ def track(*statuses, error_m=0.0):
     return TrackEstimate.of_fixes(CRS, "candidate", fixes)
 
 
-SEARCHING, CONVERGED, TRACKING, LOST, OUTSIDE = Status
+SEARCHING, CONVERGED, TRACKING, UNCERTAIN, LOST, OUTSIDE = Status
 
 
 @pytest.mark.parametrize(

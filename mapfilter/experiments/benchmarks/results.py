@@ -56,7 +56,7 @@ class CaseResult:
     false_converged_per_journey, false_converged_per_km : float
         How often a claim began more than 50 m off, also after LOST.
     false_lost_per_journey, false_lost_per_km : float
-        How often LOST was reported right after a claimed position that was at most 50 m off.
+        How often LOST was reported right after a position at most 50 m off, claimed or UNCERTAIN.
     lost_per_km : float
         How often LOST was reported at all, before any displacement.
     seconds_per_track : float

@@ -30,8 +30,8 @@ won              found      other, TRACKING   TRACKING   other's  took over
 
 Then, by the status reported before: ``LOST`` stays while the belief searches and becomes
 ``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief that had converged and
-has less than half of it in one place is ``LOST`` and searches again; while motion is not measured,
-one that has less than 80 % there is ``LOST``, until it has gathered. While the null hypothesis
+has less than half of it in one place is ``LOST`` and searches again; one that has less than 95 %
+there, rivals included, is ``UNCERTAIN``. While the null hypothesis
 is more probable than the belief, one that had converged is ``LOST``, too, and ``OUTSIDE`` where it
 lies at the edge of the area; one that searches is ``OUTSIDE``, and so is one that has left the
 area. A belief does not converge while the null hypothesis is not improbable or the alternative
@@ -94,9 +94,9 @@ class AlternativeRules(Options):
         Lead over its alternative, as a log Bayes factor, that a belief needs to converge.
     map_nats_per_m : float
         Negative log-likelihood of the map for each metre under the null hypothesis.
-    unclear_below_mass, clear_from_mass : float
-        Share of a belief within 50 m of its leading position below which one that had converged is
-        reported as LOST while motion is not measured, and from which it is not any more.
+    claimed_from : float
+        Probability that a tracked position is right to 50 m from which on it is claimed; below it
+        is reported as UNCERTAIN.
     takes_over_searching : bool
         An alternative that is ahead of a belief that had converged replaces it at once, and has to
         converge anew.
@@ -111,8 +111,7 @@ class AlternativeRules(Options):
     converge_log_odds: float = -12.0
     converge_threshold: float = 2.0
     map_nats_per_m: NotNegative = MAP_NATS_PER_M
-    unclear_below_mass: Share = 0.8
-    clear_from_mass: Share = 0.95
+    claimed_from: Share = 0.95
     takes_over_searching: bool = False
 
     def least_log_odds(self, *, searching: bool) -> float:

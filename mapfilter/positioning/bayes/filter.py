@@ -50,6 +50,8 @@ from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 
+_LEAST_AT_START = 0.8
+"""Share of a known start within 50 m from which on it is one place, and tracked."""
 _TOLD_ELSEWHERE = (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING, Reason.STALE_RADIO)
 
 
@@ -139,7 +141,7 @@ class BayesPositioner(Filter[BayesState]):
         """
         belief = self.beliefs.by_compass[True].init(Start(None, True, east_m, north_m, sd_m), rng)
         near = -expm1(-0.5 * (NEAR_M / sd_m) ** 2) if sd_m > 0 else 1.0
-        least = max(self.options.split_mass, self.rules.unclear_below_mass)
+        least = max(self.options.split_mass, _LEAST_AT_START)
         status = Status.TRACKING if near > least else Status.SEARCHING
         return replace(self.begin(), belief=replace(belief, status=status), status=status)
 
@@ -148,16 +150,12 @@ class BayesPositioner(Filter[BayesState]):
     ) -> tuple[BayesState, StepOutput]:
         """Process one epoch."""
         epoch, repeated = _with_a_new_fix(state, epoch)
-        unclear, spacing_m, hold = state.unclear, state.particle_spacing_m, state.hold
-        if unclear or state.contested:
-            state = replace(state, status=Status.TRACKING, unclear=False, contested=False)
+        spacing_m, hold = state.particle_spacing_m, state.hold
+        state = _tracked(state)
         before, weighing = state.status, self._weighing
         heard = epoch.radio
         watch, epoch, (motion, radio) = watched(state.watch, epoch, hold.step_unit_m)
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
-        if state.unclear:
-            # Hypotheses that were carried on have to gather first; what searches goes on so.
-            unclear, state = True, replace(state, unclear=False)
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         if radio is not Reason.USED:
@@ -186,7 +184,7 @@ class BayesPositioner(Filter[BayesState]):
                 belief, status = report(before, state.belief, state.status)
                 if belief is not state.belief or status is not state.status:
                     state = replace(state, belief=belief, status=status)
-                state = weighing.in_one_place(state, measured=measured, was_unclear=unclear)
+                state = weighing.in_one_place(state)
         other_unit = state.hold.step_unit_m != hold.step_unit_m
         read_anew = state.hold != hold and not other_unit
         taken_over = read_anew and not state.hold.is_as_measured
@@ -217,7 +215,7 @@ class BayesPositioner(Filter[BayesState]):
         generator as before the step these are its own.
         """
         epoch, _ = _with_a_new_fix(state, epoch)
-        spacing_m = state.particle_spacing_m
+        spacing_m, state = state.particle_spacing_m, _tracked(state)
         watch, epoch, (motion, _) = watched(state.watch, epoch, state.hold.step_unit_m)
         state, _ = moved(self.beliefs, state, watch, epoch, rng)
         return *self._weighing.collected(state, epoch, spacing_m), motion not in UNMEASURED
@@ -258,6 +256,13 @@ class BayesPositioner(Filter[BayesState]):
             belief.state[1].astype(np.float64) + south,
             belief.weight.astype(np.float64),
         )
+
+
+def _tracked(state: BayesState) -> BayesState:
+    """Return a state as TRACKING where only its last report was in doubt, and not its belief."""
+    if not (state.contested or state.status is Status.UNCERTAIN):
+        return state
+    return replace(state, status=Status.TRACKING, contested=False)
 
 
 def _with_a_new_fix(state: BayesState, epoch: Epoch) -> tuple[Epoch, bool]:

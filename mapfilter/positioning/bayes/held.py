@@ -3,11 +3,12 @@
 A compass heading that jumps between two rows of a walk has two explanations: the walker turned
 there, or walks straight on and the phone was turned. The belief follows the first. Beside it,
 smaller beliefs follow the second, weighed by the same readings: one for a phone that was *turned*,
-so that all further headings are off by the jump, and one for a phone whose headings are *mirrored*
-from there on. The difference of their log evidence, with the odds of such an event, decides: while
-one of them is ahead elsewhere, the position is LOST; when it is far ahead, it takes over, and
-headings are read as it reads them. Walks without a jump have no such beliefs. While the belief
-searches, some of its own hypotheses have a turned phone instead
+so that all further headings are off by the jump, one for a phone whose headings are *mirrored*
+from there on, and one for a phone that was mirrored before, along an axis of the mirror, where the
+walker has turned to the other side. The difference of their log evidence, with the odds of such an
+event, decides: while one of them is ahead elsewhere, the position is LOST; when it is far ahead, it
+takes over, and headings are read as it reads them. Walks without a jump have no such beliefs. While
+the belief searches, some of its own hypotheses have a turned phone instead
 (:meth:`mapfilter.positioning.bayes.belief_filters.BeliefFilters.turned`).
 """
 
@@ -88,6 +89,20 @@ class Hold:
         unit_m = self.step_unit_m
         turned = Hold(sign, float(wrap_rad(ahead_rad - sign * after_rad)), unit_m)
         return turned, Hold(-sign, float(wrap_rad(ahead_rad + sign * after_rad)), unit_m)
+
+    def mirrored_at(self, heading_rad: float) -> Hold:
+        """Return how headings are read of a phone that has been mirrored since some heading.
+
+        As that is along an axis of the mirror, nothing has changed so far: turns will.
+
+        Examples
+        --------
+        >>> f"{Hold().mirrored_at(0.5).direction_rad(0.9):.1f}"
+        '0.1'
+        """
+        ahead_rad, sign = self.direction_rad(heading_rad), self.sign
+        offset_rad = float(wrap_rad(ahead_rad + sign * heading_rad))
+        return Hold(-sign, offset_rad, self.step_unit_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +199,11 @@ def forked(
     before_rad, after_rad = headings_rad
     around = abs(float(wrap_rad(after_rad - before_rad))) > radians(rules.around_deg)
     found = []
-    for one in hold.straight_on(before_rad, after_rad):
+    ways: tuple[Hold, ...] = hold.straight_on(before_rad, after_rad)
+    if not around:
+        # It may have been mirrored before, and this is the corner that shows it.
+        ways = (*ways, hold.mirrored_at(before_rad))
+    for one in ways:
         # Who has turned a phone is likely to turn it back.
         likely = around or (one.is_usual and not hold.is_usual)
         probability = rules.around_probability if likely else rules.probability
@@ -232,6 +251,8 @@ def still_open(
 ) -> tuple[HeldOtherwise, ...]:
     """Return the beliefs that are neither refuted nor undecided for too long, most likely first.
 
+    One that is likely enough for a LOST position is kept for as long as it is.
+
     Parameters
     ----------
     rules : HoldRules
@@ -245,7 +266,10 @@ def still_open(
         one
         for one in held
         if one.log_bayes_factor(main) > rules.abandon_threshold
-        and travelled_m - one.start_m < rules.abandon_after_m
+        and (
+            travelled_m - one.start_m < rules.abandon_after_m
+            or one.log_odds(main) > rules.lost_log_odds
+        )
     ]
     kept.sort(key=lambda one: -one.log_odds(main))
     return tuple(_compared(rules, one, main, travelled_m) for one in kept[: rules.max_beliefs])

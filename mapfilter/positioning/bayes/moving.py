@@ -91,11 +91,9 @@ def moved(
         gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
         if state.status is belief.status is Status.TRACKING:
             held = (as_measured(rules, belief, state.null, hold, gone_m, white_rad, own.forking),)
-    unclear = state.unclear
     if belief is not None and watch.rest is None and beliefs.may_have_left(state):
         gone_s = epoch.time_s - state.watch.moving_s
-        away = beliefs.carried_on(state, belief, gone_s, own_rng(epoch.time_s, _AWAY))
-        belief, unclear = away, unclear or away is not belief
+        belief = beliefs.carried_on(state, belief, gone_s, own_rng(epoch.time_s, _AWAY))
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         measured = step
@@ -158,7 +156,6 @@ def moved(
     return BayesState(
         belief=belief,
         status=state.status,
-        unclear=unclear,
         contested=state.contested,
         sources=state.sources,
         reckoning=reckoning,

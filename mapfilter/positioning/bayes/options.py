@@ -265,11 +265,7 @@ class BayesFilter(Options):
             switch_hold_m=self.switch_hold_m,
         )
         rules = AlternativeRules()
-        rules = replace(
-            rules,
-            unclear_below_mass=min(rules.unclear_below_mass, self.switch_mass),
-            clear_from_mass=min(rules.clear_from_mass, self.switch_mass),
-        )
+        rules = replace(rules, claimed_from=min(rules.claimed_from, self.switch_mass))
         positioned, carriageways = None, None
         threads = Threads(self.threads)
         model = BayesModel(area, motion, weights, evidence, threads=threads)
@@ -279,8 +275,6 @@ class BayesFilter(Options):
                 rules,
                 converge_log_odds=_CONVERGE_BY_MAP,
                 map_nats_per_m=_NATS_PER_M_BY_MAP,
-                unclear_below_mass=0.0,
-                clear_from_mass=0.0,
             )
             particles = replace(
                 particles,

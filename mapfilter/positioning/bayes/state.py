@@ -38,8 +38,6 @@ class BayesState:
         None before the first report with a known cell, fix or satellite.
     status : Status
         As reported; that of the belief may differ while it is LOST.
-    unclear : bool
-        LOST only because the belief is spread over more than one place.
     contested : bool
         LOST only because a belief in which the phone was turned is ahead, or because the phone may
         have been carried on though no step is counted.
@@ -79,7 +77,6 @@ class BayesState:
 
     belief: MapBelief | None = None
     status: Status = Status.SEARCHING
-    unclear: bool = False
     contested: bool = False
     sources: Mapping[str, Any] = field(default_factory=dict)
     reckoning: DeadReckoning = field(default_factory=DeadReckoning)
@@ -103,7 +100,6 @@ class BayesState:
         return BayesState(
             belief=self.belief,
             status=self.status,
-            unclear=self.unclear,
             contested=self.contested,
             sources=self.sources,
             reckoning=self.reckoning,

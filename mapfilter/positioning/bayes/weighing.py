@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.alternative import (
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
+from mapfilter.positioning.bayes.certainty import certainty
 from mapfilter.positioning.bayes.evidence import (
     Context,
     EvidenceSource,
@@ -181,7 +182,6 @@ class Weighing:
         after = BayesState(
             belief=now.belief,
             status=now.status,
-            unclear=state.unclear,
             contested=state.contested,
             sources=sources,
             reckoning=state.reckoning,
@@ -268,29 +268,27 @@ class Weighing:
         )
         return replace(twin, belief=belief) if info.reason is Reason.USED else None
 
-    def in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
+    def in_one_place(self, state: BayesState) -> BayesState:
         """Return a state that is LOST while its belief is spread over more than one place.
 
-        Below the mass at which it searches again, it has to converge anew. Motion that is not
-        measured spreads it to all sides, so it is LOST earlier, but kept as found: it is clear
-        again when it has gathered.
+        Below the mass at which it searches again, it has to converge anew. A belief in one place
+        that is not certain enough for a claim is UNCERTAIN.
         """
         belief = state.belief
         if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
             return state
-        mass = belief.summary.mass_50m
-        if mass < self.beliefs.options.split_mass:
+        if belief.summary.mass_50m < self.beliefs.options.split_mass:
             belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
             return replace(state, belief=belief, status=Status.LOST)
-        rules = self.beliefs.rules_of(state)
-        least = 0.0 if measured else rules.unclear_below_mass
-        if was_unclear:
-            least = rules.clear_from_mass
-        contested = self.beliefs.is_contested(state) or self.beliefs.may_have_left(state)
-        unclear = mass < least
-        if not (unclear or contested):
+        if self.beliefs.is_contested(state) or self.beliefs.may_have_left(state):
+            return replace(state, status=Status.LOST, contested=True)
+        if state.status is Status.CONVERGED:
             return state
-        return replace(state, status=Status.LOST, unclear=unclear, contested=contested)
+        rules = self.beliefs.rules_of(state)
+        probability = certainty(rules, belief, state.alternative, state.held)
+        if probability >= rules.claimed_from:
+            return state
+        return replace(state, status=Status.UNCERTAIN)
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator

@@ -2,7 +2,7 @@
 // Dark and light: the system's choice until a button says otherwise. Canvases read the same colors as the styles.
 (() => {
   const NAMES = ["paper", "card", "ink", "soft", "line", "ground", "street", "building", "house", "halo", "here", "there",
-    "alternative", "truth", "belief", "searching", "converged", "tracking", "lost", "outside", "accent"];
+    "alternative", "truth", "belief", "searching", "converged", "tracking", "uncertain", "lost", "outside", "accent"];
   const system = window.matchMedia("(prefers-color-scheme: dark)");
   const listeners = [];
 

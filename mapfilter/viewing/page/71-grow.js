@@ -23,7 +23,7 @@
     if (follow && last >= 0) {
       page.store.set({ time: page.end });
       const known = Number.isFinite(here.east);
-      const found = ["CONVERGED", "TRACKING"].includes(run.status(last));
+      const found = ["CONVERGED", "TRACKING", "UNCERTAIN"].includes(run.status(last));
       if (known && found && !page.camera.moved) {
         const wide = Math.max(AROUND_M, 4 * (run.epochs.r95[last] || 0));
         page.camera.fit({ east0: here.east - wide, east1: here.east + wide, north0: here.north - wide, north1: here.north + wide }, page.maps[0].view);

@@ -1,0 +1,74 @@
+"""How certain a tracked position is, with all that competes with its belief.
+
+A belief says how much of it lies near its leading hypothesis, given that it describes what is
+measured at all. Beside it stand beliefs in which the phone was turned, and an alternative from
+scratch, each with its odds against the belief. What of all of them lies within 50 m is the
+probability that the position is right: below a least one it is given, but not claimed. The null
+hypothesis has no position, and statuses of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import exp, hypot
+
+import numpy as np
+
+from mapfilter.filters.grid import GridBelief
+from mapfilter.filters.hypotheses import NEAR_M
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.positioning.bayes.alternative import (
+    AlternativeHypothesis,
+    AlternativeRules,
+    MapBelief,
+)
+from mapfilter.positioning.bayes.held import HeldOtherwise
+
+_NEGLIGIBLE, _CERTAIN = -9.0, 30.0
+"""Log odds below which a rival is not looked at; bound above which they make no difference."""
+
+
+def certainty(
+    rules: AlternativeRules,
+    main: MapBelief,
+    alternative: AlternativeHypothesis | None = None,
+    held: Iterable[HeldOtherwise] = (),
+) -> float:
+    """Return the probability that the position lies within 50 m of a belief's leading hypothesis.
+
+    Parameters
+    ----------
+    rules : AlternativeRules
+        An alternative has prior odds that its threshold for taking over makes even.
+    main : MapBelief
+    alternative : AlternativeHypothesis or None
+    held : iterable of HeldOtherwise
+        Beliefs in which the phone was turned.
+    """
+    near, total = main.summary.mass_50m, 1.0
+    if alternative is not None:
+        log_odds = alternative.log_bayes_factor(main) - rules.lost_threshold
+        if log_odds > _NEGLIGIBLE and _apart_m(alternative.belief, main) > NEAR_M:
+            total += exp(min(log_odds, _CERTAIN))
+    if isinstance(main, ParticleBelief):
+        for one in held:
+            log_odds = one.log_odds(main)
+            if log_odds > _NEGLIGIBLE:
+                odds = exp(min(log_odds, _CERTAIN))
+                total += odds
+                near += odds * _share_near(one.belief, main)
+    return near / total
+
+
+def _apart_m(one: MapBelief, other: MapBelief) -> float:
+    """Return the distance of the leading hypotheses."""
+    own, mean = one.summary.mean, other.summary.mean
+    return hypot(own[0] - mean[0], own[1] - mean[1])
+
+
+def _share_near(one: ParticleBelief, main: ParticleBelief | GridBelief) -> float:
+    """Return the share of a belief within 50 m of the leading hypothesis of another."""
+    east_m, north_m = main.summary.mean[:2]
+    gone_east_m, gone_north_m = one.state[0] - east_m, one.state[1] - north_m
+    near = gone_east_m * gone_east_m + gone_north_m * gone_north_m <= NEAR_M**2
+    return float(np.dot(one.weight, near))

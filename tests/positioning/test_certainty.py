@@ -1,0 +1,74 @@
+"""How certain a position is, with all that competes with it, against sums by hand."""
+
+from math import exp
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.hypotheses import Bins
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, AlternativeRules
+from mapfilter.positioning.bayes.certainty import certainty
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+
+RULES = AlternativeRules()
+BINS = Bins.over((0.0, 0.0, 2000.0, 2000.0))
+
+
+def belief(*places, log_evidence=-50.0):
+    """A hundred hypotheses, shared evenly by places (east, m), all at 1000 m north."""
+    east_m = np.resize(np.array(places, dtype=np.float32), 100)
+    state = np.stack([east_m, np.full(100, 1000.0, dtype=np.float32)])
+    empty = np.empty((0, 100), dtype=np.float32)
+    log_weight = np.full(100, -np.log(100.0))
+    return ParticleBelief(state, log_weight, BINS, empty, log_evidence=log_evidence)
+
+
+def turned(log_odds, *places, prior=-2.0):
+    own = belief(*places, log_evidence=-50.0 + log_odds - prior)
+    return HeldOtherwise(own, Hold(1.0, 3.0), prior, 0.0)
+
+
+def test_without_rivals_it_is_the_mass_near_the_leading_hypothesis():
+    assert certainty(RULES, belief(500.0)) == pytest.approx(1.0)
+    assert certainty(RULES, belief(500.0, 500.0, 500.0, 900.0)) == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize("log_odds", [-3.0, 0.0, 2.0])
+def test_a_turned_phone_counts_by_its_odds_where_it_is_elsewhere(log_odds):
+    main, odds = belief(500.0), exp(log_odds)
+    assert certainty(RULES, main, held=[turned(log_odds, 700.0)]) == pytest.approx(1 / (1 + odds))
+    assert certainty(RULES, main, held=[turned(log_odds, 540.0)]) == pytest.approx(1.0)
+    half = turned(log_odds, 520.0, 600.0)
+    assert certainty(RULES, main, held=[half]) == pytest.approx((1 + odds / 2) / (1 + odds))
+    # Two of them add up, and so does what the belief has elsewhere.
+    spread = belief(500.0, 500.0, 500.0, 900.0)
+    both = [turned(log_odds, 700.0), turned(log_odds, 510.0)]
+    expected = (0.75 + odds) / (1 + 2 * odds)
+    assert certainty(RULES, spread, held=both) == pytest.approx(expected)
+
+
+def test_improbable_rivals_make_no_difference():
+    improbable = [turned(-12.0, 700.0)]
+    assert certainty(RULES, belief(500.0), held=improbable) == pytest.approx(1.0, abs=1e-5)
+    assert certainty(RULES, belief(500.0), held=[turned(900.0, 700.0)]) < 1e-9
+
+
+def alternative(log_bayes_factor, *places):
+    other = belief(*places, log_evidence=log_bayes_factor)
+    return AlternativeHypothesis(other, 0.0, -50.0)
+
+
+def test_an_alternative_counts_by_the_threshold_at_which_it_takes_over():
+    main = belief(500.0)
+    assert RULES.lost_threshold == 8.0
+    assert certainty(RULES, main, alternative(8.0, 900.0)) == pytest.approx(0.5)
+    assert certainty(RULES, main, alternative(6.0, 900.0)) == pytest.approx(1 / (1 + exp(-2)))
+    assert certainty(RULES, main, alternative(8.0, 530.0)) == pytest.approx(1.0)
+    assert certainty(RULES, main, alternative(-5.0, 900.0)) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_masses_on_a_grid_have_no_turned_phones():
+    grid = SimpleNamespace(summary=SimpleNamespace(mass_50m=0.9))
+    assert certainty(RULES, grid, held=()) == 0.9
