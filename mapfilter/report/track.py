@@ -105,9 +105,9 @@ def plot_track(
 
 def _unclaimed(estimate: TrackEstimate) -> str:
     """Return what estimates that are not tracked are called in the legend."""
-    words = ("searching", "uncertain", "lost")
-    seen = [word for word in words if Status(word.upper()) in estimate.status] or ["searching"]
-    return f"while {', '.join(seen[:-1])} or {seen[-1]}" if seen[1:] else f"while {seen[0]}"
+    others = [one for one in (Status.UNCERTAIN, Status.LOST) if one in estimate.status]
+    *words, last = "searching", *(one.lower() for one in others)
+    return f"while {', '.join(words)} or {last}" if words else f"while {last}"
 
 
 def _outcome(estimate: TrackEstimate, truth: Truth | None) -> str:

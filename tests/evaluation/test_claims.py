@@ -7,7 +7,13 @@ from mapfilter.evaluation.accuracy import Truth, score_claims
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 
-STATUS = {"S": Status.SEARCHING, "C": Status.CONVERGED, "T": Status.TRACKING, "L": Status.LOST}
+STATUS = {
+    "S": Status.SEARCHING,
+    "C": Status.CONVERGED,
+    "T": Status.TRACKING,
+    "U": Status.UNCERTAIN,
+    "L": Status.LOST,
+}
 
 
 def truth(seconds):
@@ -87,6 +93,15 @@ def test_lost_begins_once_and_is_false_right_after_a_good_position():
     # The position counts that was claimed last, not the one reported with LOST.
     found = claims("CTLCTL", [0, 40, 200, 0, 200, 10])
     assert (found.lost, found.false_lost) == (2, 1)
+
+
+def test_uncertain_positions_are_no_claims_but_may_be_lost_falsely():
+    found = claims("SCTUUTU", [0, 0, 10, 60, 10, 60, 60])
+    assert (found.claimed, found.within_50m, found.lost) == (3, 2, 0)
+    # A claim begins anew after it.
+    assert (found.false_starts, found.covered) == (1, (2, 2, 2, 2))
+    found = claims("CTUULULUL", [0, 0, 0, 40, 40, 60, 60, 10, 10])
+    assert (found.lost, found.false_lost) == (3, 2)
 
 
 def test_nothing_counts_after_a_given_time():

@@ -18,7 +18,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import epochs
 
-CLAIMED = (Status.CONVERGED, Status.TRACKING)
+FOLLOWED = (Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN)
 NO_CELL_IS_AT_FAULT = {"fault_probability": 1e-6}
 LEVELS_ARE_AS_PREDICTED = {"level_error_db": 2.0}
 NOBODY_LEAVES_THE_WAYS = {"off_cost_per_m": 2.0}
@@ -30,7 +30,7 @@ HALF_TURN, THIRD = np.pi, 2.1
 def followed(area, log, seed, since=0.0, **options):
     """Follow a log from its true start; return the share of epochs at which it is right.
 
-    Right is a claimed position that is at most 50 m off, and within its 95 % radius; epochs count
+    Right is a position that is followed, at most 50 m off, and within its 95 % radius; epochs count
     from a share of the walk on.
     """
     rng = np.random.default_rng(seed)
@@ -45,7 +45,7 @@ def followed(area, log, seed, since=0.0, **options):
             np.interp(epoch.time_s, truth["time_s"], truth[name]) for name in ("east_m", "north_m")
         )
         off_m = np.hypot(fix.east_m - east_m, fix.north_m - north_m)
-        right.append(fix.status in CLAIMED and off_m <= min(50.0, fix.radii_m[2]))
+        right.append(fix.status in FOLLOWED and off_m <= min(50.0, fix.radii_m[2]))
         unused += [reading.reason for reading in output.unused]
     return float(np.mean(right[round(since * len(right)) :])), unused
 

@@ -219,7 +219,11 @@ def test_track_tells_near_from_far(area, tmp_path):
 
 @pytest.mark.parametrize(
     ("status", "name"),
-    [(Status.SEARCHING, "while searching"), (Status.LOST, "while searching or lost")],
+    [
+        (Status.SEARCHING, "while searching"),
+        (Status.UNCERTAIN, "while searching or uncertain"),
+        (Status.LOST, "while searching or lost"),
+    ],
 )
 def test_estimates_that_are_not_claimed_are_pale_and_small(area, status, name):
     # 70 m off: marked as such where it is tracked, and only there.
