@@ -12,8 +12,6 @@ from numba import njit
 from mapfilter._kernels import exp32, hashed, normals
 from mapfilter._types import Floats, Floats32, Ints32
 
-_BLOCK = 1024
-
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
@@ -120,30 +118,6 @@ def taken(
         i = np.uint32(at[j])
         log_of[j] = log_weight[i]
         weight_of[j] = weight[i]
-
-
-@njit(error_model="numpy", cache=True, nogil=True)
-def copied(begin: int, stop: int, kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
-    """Copy the chosen columns of ``kept`` (W, N) to ``copies`` (W, M)."""
-    rows = kept.shape[0]
-    fours = rows // 4 * 4
-    # A block of indices stays in the cache; each is loaded once for four rows.
-    for first in range(begin, stop, _BLOCK):
-        at = chosen[first : min(first + _BLOCK, stop)]
-        for r in range(0, fours, 4):
-            a, b, c, d = kept[r], kept[r + 1], kept[r + 2], kept[r + 3]
-            to_a, to_b = copies[r, first:], copies[r + 1, first:]
-            to_c, to_d = copies[r + 2, first:], copies[r + 3, first:]
-            for j in range(at.size):
-                i = np.uint32(at[j])
-                to_a[j] = a[i]
-                to_b[j] = b[i]
-                to_c[j] = c[i]
-                to_d[j] = d[i]
-        for r in range(fours, rows):
-            row, to = kept[r], copies[r, first:]
-            for j in range(at.size):
-                to[j] = row[np.uint32(at[j])]
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)

@@ -15,12 +15,16 @@ from numba import njit
 
 from mapfilter._kernels import exp32, log32
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
+from mapfilter.models.ageing import Ageing, age
 from mapfilter.models.cell_faults import mixed
 from mapfilter.models.fingerprint import REACH_SD, STEPS_PER_SD
 
 _F = np.float32
 _BLOCK = 128
 """Hypotheses of a block: what they keep, and the steps of a report, fit into the first cache."""
+_AGED = 1024
+"""Hypotheses that are aged at a time: longer pieces of rows are read faster, and what they keep
+still fits into the second cache."""
 _HALF, _ONE, _ZERO = _F(0.5), _F(1.0), _F(0.0)
 LOG_ROOT_TWO_PI = _F(0.9189385)
 
@@ -53,45 +57,27 @@ class Prediction(NamedTuple):
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
-def age(
-    first: int,
-    stop: int,
-    kept: Floats32,
-    decay: Floats32,
-    fault_keep: float,
-    fault_log_odds: float,
-    now: Floats32,
-) -> None:
-    """Fill what hypotheses keep, (W, N), after a distance."""
-    means = decay.size
-    keep, usual = _F(fault_keep), _F(fault_log_odds)
-    for d in range(means):
-        factor, row, to = decay[d], kept[d, first:stop], now[d, first:stop]
-        for i in range(row.size):
-            to[i] = factor * row[i]
-    for d in range(means, kept.shape[0]):
-        row, to = kept[d, first:stop], now[d, first:stop]
-        for i in range(row.size):
-            to[i] = usual + (row[i] - usual) * keep
-
-
-@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def weigh_by_levels(
     begin: int,
     stop: int,
-    kept: Floats32,
+    ageing: Ageing,
     pixel: Ints32,
     predicted: Prediction,
     terms: LevelTerms,
     weight: float,
     log_weight: Floats,
 ) -> None:
-    """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
-    means = terms.gain.shape[1]
+    """Age what hypotheses keep, add the log-likelihood of levels to weights, and update both.
+
+    All of that is done for some hypotheses before the next, while what they keep is in the cache.
+    """
+    kept, means = ageing.now, terms.gain.shape[1]
     w = _F(weight)
     steps, more = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
     total, upon = np.empty(_BLOCK, np.float32), _gain_of_sums(terms)
     for first in range(begin, stop, _BLOCK):
+        if (first - begin) % _AGED == 0:
+            age(first, min(first + _AGED, stop), ageing)
         count, into = min(_BLOCK, stop - first), log_weight[first:]
         total[:] = _ZERO
         for k in range(terms.cell.size):

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter._kernels import draw_key
-from mapfilter.filters.resampling import copied, copy_with_jitter, log_sum, normalise, systematic
+from mapfilter.filters.copies import array_of, copies_of
+from mapfilter.filters.resampling import copy_with_jitter, log_sum, normalise, systematic
 
 
 def test_log_weights_are_brought_to_sum_to_one():
@@ -71,9 +72,14 @@ def test_copies_of_what_is_kept_are_the_chosen_columns(rows, count):
     rng = np.random.default_rng(rows)
     kept = rng.standard_normal((rows, 900)).astype(np.float32)
     chosen = np.sort(rng.integers(900, size=count)).astype(np.int32)
-    copies = np.full((rows, count), np.nan, dtype=np.float32)
-    copied(0, chosen.size, kept, chosen, copies)
-    np.testing.assert_array_equal(copies, kept[:, chosen])
+    copies = copies_of(kept, chosen)
+    assert copies.shape == (rows, count)
+    np.testing.assert_array_equal(copies.made(), kept[:, chosen])
+    again = np.sort(rng.integers(count, size=count + 3)).astype(np.int32)
+    twice = copies_of(copies, again)
+    assert twice.of is kept
+    np.testing.assert_array_equal(array_of(twice), kept[:, chosen][:, again])
+    assert array_of(kept) is kept
 
 
 def test_resampling_is_unbiased():
