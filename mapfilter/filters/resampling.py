@@ -12,6 +12,9 @@ from numba import njit
 from mapfilter._kernels import exp32, hashed, normals
 from mapfilter._types import Floats, Floats32, Ints32
 
+_BLOCK = 1024
+"""Copies that are made at a time, which stay in the cache."""
+
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
@@ -23,16 +26,20 @@ def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
         Logarithm of the sum before, and the effective sample size, one over the sum of squares;
         minus infinity and 0 where no weight is left.
     """
-    highest = -np.inf
-    for i in range(log_weight.size):
-        highest = log_weight[i] if log_weight[i] > highest else highest
+    # Eight side by side, as below.
+    most, whole = np.full(8, -np.inf), log_weight.size // 8 * 8
+    for i in range(0, whole, 8):
+        for j in range(8):
+            most[j] = log_weight[i + j] if log_weight[i + j] > most[j] else most[j]
+    for i in range(whole, log_weight.size):
+        most[0] = log_weight[i] if log_weight[i] > most[0] else most[0]
+    highest = most.max()
     if not np.isfinite(highest):
         return -np.inf, 0.0
     for i in range(log_weight.size):
         weight[i] = exp32(np.float32(log_weight[i] - highest))
     # Eight sums side by side: one alone would wait for itself, and lose digits.
     sums, squares = np.zeros(8), np.zeros(8)
-    whole = log_weight.size // 8 * 8
     for i in range(0, whole, 8):
         for j in range(8):
             w = np.float64(weight[i + j])
@@ -135,19 +142,22 @@ def copy_with_jitter(
     ``jitter`` has the standard deviation for each row; rows of 0, and rows beyond, are copied as
     they are. The noise is drawn from ``key``.
     """
-    rows, at = state.shape[0], chosen[first:stop]
-    for r in range(0, rows, 2):
-        # Normal numbers come in pairs: one for each of two rows.
-        one, other = state[r], state[min(r + 1, rows - 1)]
-        to_one, to_other = copies[r, first:stop], copies[min(r + 1, rows - 1), first:stop]
-        sd = jitter[r] if r < jitter.size else np.float32(0.0)
-        other_sd = jitter[r + 1] if r + 1 < min(rows, jitter.size) else np.float32(0.0)
-        for j in range(at.size):
-            to_one[j] = one[np.uint32(at[j])]
-            to_other[j] = other[np.uint32(at[j])]
-        drawn = (np.uint64(r) << np.uint64(40)) + np.uint64(first)
-        if sd > 0 or other_sd > 0:
+    rows = state.shape[0]
+    for begin in range(first, stop, _BLOCK):
+        end = min(begin + _BLOCK, stop)
+        at = chosen[begin:end]
+        for r in range(0, rows, 2):
+            # Normal numbers come in pairs: one for each of two rows.
+            one, other = state[r], state[min(r + 1, rows - 1)]
+            to_one, to_other = copies[r, begin:end], copies[min(r + 1, rows - 1), begin:end]
+            sd = jitter[r] if r < jitter.size else np.float32(0.0)
+            other_sd = jitter[r + 1] if r + 1 < min(rows, jitter.size) else np.float32(0.0)
             for j in range(at.size):
-                a, b = normals(hashed(key, drawn + np.uint64(j)))
-                to_one[j] += sd * a
-                to_other[j] += other_sd * b
+                to_one[j] = one[np.uint32(at[j])]
+                to_other[j] = other[np.uint32(at[j])]
+            drawn = (np.uint64(r) << np.uint64(40)) + np.uint64(begin)
+            if sd > 0 or other_sd > 0:
+                for j in range(at.size):
+                    a, b = normals(hashed(key, drawn + np.uint64(j)))
+                    to_one[j] += sd * a
+                    to_other[j] += other_sd * b

@@ -68,18 +68,20 @@ def age(first: int, stop: int, ageing: Ageing) -> None:
         if not ageing.due[d]:
             continue
         to = ageing.now[d, first:stop]
+        factor = ageing.decay[d] if d < means else keep
         if chosen:
             row, at = ageing.before[d], ageing.chosen[first:stop]
-            for i in range(to.size):
-                to[i] = row[np.uint32(at[i])]
+            if d < means:
+                for i in range(to.size):
+                    to[i] = factor * row[np.uint32(at[i])]
+            else:
+                for i in range(to.size):
+                    to[i] = usual + (row[np.uint32(at[i])] - usual) * factor
         else:
             row = ageing.before[d, first:stop]
-            for i in range(to.size):
-                to[i] = row[i]
-        if d < means:
-            factor = ageing.decay[d]
-            for i in range(to.size):
-                to[i] *= factor
-        else:
-            for i in range(to.size):
-                to[i] = usual + (to[i] - usual) * keep
+            if d < means:
+                for i in range(to.size):
+                    to[i] = factor * row[i]
+            else:
+                for i in range(to.size):
+                    to[i] = usual + (row[i] - usual) * factor
