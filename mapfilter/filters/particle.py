@@ -23,7 +23,13 @@ from mapfilter.errors import Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.copies import MADE_WHEN_READ, Copies, Kept, copies_of
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
-from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic, taken
+from mapfilter.filters.resampling import (
+    copy_with_jitter,
+    normalise,
+    normalise_by,
+    systematic_by,
+    taken,
+)
 from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 _LEAST_WEIGHT = np.finfo(np.float32).tiny
@@ -282,7 +288,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         )
         weight = np.empty(log_weight.size, dtype=np.float32)
         if reason is Reason.USED:
-            log_total, effective = normalise(log_weight, weight)
+            log_total, effective = normalise_by(self.threads, log_weight, weight)
             if not isfinite(log_total):
                 reason = Reason.NO_CANDIDATES_LEFT
         if reason is not Reason.USED:
@@ -309,7 +315,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         wanted = int(min(max(by_bins, least), options.max_particles))
         if effective < options.resample_below * weight.size or 2 * wanted < weight.size:
             chosen = np.empty(wanted, dtype=np.int32)
-            systematic(weight, rng.random(), chosen)
+            systematic_by(self.threads, weight, rng.random(), chosen)
             sd = np.array(options.searching_jitter if searching else options.jitter, np.float32)
             copies = np.empty((state.shape[0], wanted), dtype=np.float32)
             key = draw_key(rng)
@@ -324,7 +330,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             state, kept = copies, copies_of(kept, chosen)
             np.maximum(chosen_by, _LEAST_WEIGHT, out=chosen_by)
             log_weight = np.subtract(log_of, np.log(chosen_by, out=chosen_by), out=log_of)
-            normalise(log_weight, np.empty(wanted, dtype=np.float32))
+            normalise_by(self.threads, log_weight, np.empty(wanted, dtype=np.float32))
         now = ParticleBelief(
             state,
             log_weight,

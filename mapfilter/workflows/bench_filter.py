@@ -22,7 +22,13 @@ from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.copies import Copies, copies_of
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
-from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+from mapfilter.filters.resampling import (
+    copy_with_jitter,
+    normalise,
+    normalise_by,
+    systematic,
+    systematic_by,
+)
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
@@ -230,9 +236,9 @@ def whole_step(
     state, log_weight = model.move(belief.state, belief.log_weight, given.motion, draw_key(rng))
     cloud, _ = model.weigh(belief.cloud._replace(state=state), log_weight, given.reading)
     weight = np.empty(count, dtype=np.float32)
-    normalise(log_weight, weight)
+    normalise_by(model.threads, log_weight, weight)
     chosen = np.empty(count, dtype=np.int32)
-    systematic(weight, rng.random(), chosen)
+    systematic_by(model.threads, weight, rng.random(), chosen)
     copies = np.empty_like(state)
     model.threads.over(count, (copy_with_jitter, state, chosen, jitter, draw_key(rng), copies))
     return copies, copies_of(cloud.kept, chosen)

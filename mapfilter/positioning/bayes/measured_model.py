@@ -13,6 +13,7 @@ from math import isfinite, log
 import numpy as np
 from scipy.special import logsumexp
 
+from mapfilter._threads import Call
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
 from mapfilter.models.ageing import Ageing
 from mapfilter.models.level_memory import LevelMemory
@@ -81,18 +82,18 @@ class MeasuredMapModel(BayesModel):
         tenths: Bytes = np.minimum(np.rint(10 * more_db), 255).astype(np.uint8).reshape(-1)
         return tenths
 
-    def _weigh_serving(
+    def _serving(
         self,
         memory: LevelMemory,
         kept: Ageing,
         pixel: Ints32,
         log_weight: Floats,
         reading: RadioReading,
-    ) -> Ageing:
+    ) -> tuple[Ageing, list[Call]]:
         if self.serving_is_measured:
             log_weight += self.log_serving_at(pixel, reading)
-            return kept
-        return super()._weigh_serving(memory, kept, pixel, log_weight, reading)
+            return kept, []
+        return super()._serving(memory, kept, pixel, log_weight, reading)
 
     @property
     def serving_is_measured(self) -> bool:

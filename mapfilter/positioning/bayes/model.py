@@ -189,18 +189,21 @@ class BayesModel:
             beyond, used = np.flatnonzero(self.area.beyond(cloud.state)), True
             before = log_weight[beyond]
             memory, kept, pixel = self._found(cloud, reading)
-            other = 0.0
+            other, calls = 0.0, list[Call]()
             if reading.serving >= 0 and reading.serving_weight > 0:
-                kept = self._weigh_serving(memory, kept, pixel, log_weight, reading)
+                kept, calls = self._serving(memory, kept, pixel, log_weight, reading)
             if reading.levels is not None:
-                start = log_weight.copy() if withholds else log_weight
-                memory = self._weigh_levels(memory, kept, pixel, log_weight, reading)
+                start = log_weight
+                if withholds:
+                    self.threads.over(log_weight.size, *calls)
+                    start, calls = log_weight.copy(), []
+                memory = self._weigh_levels(memory, kept, calls, pixel, log_weight, reading)
                 other = memory.other_log_likelihood
                 if withholds:
                     withheld_share = 1 - self.evidence.levels.tracking_share
                     kept_back = gained(start, log_weight, withheld_share)
             else:
-                self.threads.over(log_weight.size, (age, kept))
+                self.threads.over(log_weight.size, *calls, (age, kept))
             cloud = Cloud(cloud.state, kept.now, memory)
             for bound in reading.bounds:
                 predicted, own, cells = self._looked_up(pixel, bound.cells, rough=False)
@@ -267,9 +270,8 @@ class BayesModel:
         Of what they keep all rows are to be aged yet, but for a serving cell that is new.
         """
         errors, memory, length_m = self.evidence.levels, cloud.shared, reading.length_m
-        frame, count = self.area.frame, cloud.state.shape[1]
-        pixel, last = np.empty(count, dtype=np.int32), (frame.rows - 1, frame.cols - 1)
-        self.threads.over(count, (fingerprint.fill_pixels, cloud.state, frame, *last, pixel))
+        # That takes less time than to divide it.
+        pixel, count = fingerprint.pixels(cloud.state, self.area.frame), cloud.state.shape[1]
         if memory is None or not self.remember:
             memory = LevelMemory.empty(errors, self.area.site_of)
             kept = as_it_is(memory.start(count))
@@ -280,27 +282,34 @@ class BayesModel:
             now = np.empty((memory.width, count), dtype=np.float32)
             kept = Ageing(*columns_of(cloud.kept), decay, keep, errors.fault_log_odds, due, now)
         served = [reading.serving] if reading.serving >= 0 else []
-        return *self._with_cells(memory, kept, np.array(served, dtype=np.int32)), pixel
+        memory, kept, _ = self._with_cells(memory, kept, [], np.array(served, dtype=np.int32))
+        return memory, kept, pixel
 
     def _with_cells(
-        self, memory: LevelMemory, kept: Ageing, bands: Ints32
-    ) -> tuple[LevelMemory, Ageing]:
-        """Give cells slots; what hypotheses keep is aged before, where cells are new."""
-        if memory.has_slots(bands):
-            return memory, kept
-        self.threads.over(kept.now.shape[1], (age, kept))
-        memory, now = memory.with_cells(bands, kept.now, in_place=True)
-        return memory, as_it_is(now)
+        self, memory: LevelMemory, kept: Ageing, calls: list[Call], bands: Ints32
+    ) -> tuple[LevelMemory, Ageing, list[Call]]:
+        """Give cells slots; where some are new, what hypotheses keep is aged before.
 
-    def _weigh_serving(
+        ``calls`` are due before that, and are returned if they still are.
+        """
+        if memory.has_slots(bands):
+            return memory, kept, calls
+        self.threads.over(kept.now.shape[1], *calls, (age, kept))
+        memory, now = memory.with_cells(bands, kept.now, in_place=True)
+        return memory, as_it_is(now), []
+
+    def _serving(
         self,
         memory: LevelMemory,
         kept: Ageing,
         pixel: Ints32,
         log_weight: Floats,
         reading: RadioReading,
-    ) -> Ageing:
-        """Add the log-likelihood of the serving cell, in place; return what is to be aged yet."""
+    ) -> tuple[Ageing, list[Call]]:
+        """Return the calls that add the log-likelihood of the serving cell, in place.
+
+        Also return what is to be aged besides.
+        """
         table, weight = self._serving_table, reading.serving_weight
         row = memory.fault_row(reading.serving)
         other = -self.evidence.serving.fault_nats
@@ -309,10 +318,8 @@ class BayesModel:
         predicted, pixel, cells = self._looked_up(pixel, cells, rough=False)
         flat, bands, cell = predicted.level_dbm, predicted.bands, int(cells[0])
         given = pixel, flat, bands, cell, table, weight, kept.now[row], other, log_weight
-        self.threads.over(
-            pixel.size, (age, kept.of_row(row)), (fingerprint.weigh_by_serving, *given)
-        )
-        return kept.without_row(row)
+        calls = [(age, kept.of_row(row)), (fingerprint.weigh_by_serving, *given)]
+        return kept.without_row(row), calls
 
     @property
     def serving_is_measured(self) -> bool:
@@ -334,18 +341,22 @@ class BayesModel:
         self,
         memory: LevelMemory,
         kept: Ageing,
+        calls: list[Call],
         pixel: Ints32,
         log_weight: Floats,
         reading: RadioReading,
     ) -> LevelMemory:
-        """Add the log-likelihood of levels and absent cells, in place; return the memory now."""
+        """Add the log-likelihood of levels and absent cells, in place; return the memory now.
+
+        ``calls`` are due before.
+        """
         report = reading.levels
         assert report is not None
         weight = self.level_weight(reading)
         # Cells that nobody expects say nothing, neither for the belief nor against it.
         report = report._replace(absent=self._expected_absent(pixel, report))
         cells = np.concatenate([report.cell, report.absent])
-        memory, kept = self._with_cells(memory, kept, cells[: memory.slots])
+        memory, kept, calls = self._with_cells(memory, kept, calls, cells[: memory.slots])
         if report.cell.size > memory.slots:
             slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
@@ -354,7 +365,7 @@ class BayesModel:
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
         by_levels = predicted, terms._replace(cell=cells), weight, log_weight
-        calls: list[Call] = [(weigh_by_levels, kept, own, *by_levels)]
+        calls = [*calls, (weigh_by_levels, kept, own, *by_levels)]
         if absent.cell.size:
             predicted, own, cells = self._looked_up(pixel, absent.cell)
             terms_of = absent._replace(cell=cells), self._bound_table
