@@ -21,8 +21,15 @@ from mapfilter._threads import ONE, Threads
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.filters.copies import MADE_WHEN_READ, Copies, Kept, copies_of
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
-from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic, taken
+from mapfilter.filters.resampling import (
+    copy_with_jitter,
+    normalise,
+    normalise_by,
+    systematic_by,
+    taken,
+)
 from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 _LEAST_WEIGHT = np.finfo(np.float32).tiny
@@ -114,7 +121,7 @@ class Cloud(NamedTuple):
     ----------
     state : ndarray of float32, shape (R, N)
         The first two rows are east and north in the model's frame.
-    kept : ndarray of float32, shape (W, N)
+    kept : ndarray of float32, shape (W, N), or Copies of that shape
         What each hypothesis keeps besides, such as errors that are summed out; W may be 0.
     shared : object
         What all of them share.
@@ -123,7 +130,7 @@ class Cloud(NamedTuple):
     """
 
     state: Floats32
-    kept: Floats32
+    kept: Floats32 | Copies
     shared: Any = None
     withheld: float = 0.0
 
@@ -169,7 +176,9 @@ class ParticleBelief:
         Logarithms of weights, which sum to one after an update.
     bins : Bins
         The area.
-    kept, shared : ndarray of float32, shape (W, N), and object
+    kept : ndarray of float32, shape (W, N)
+        As in :class:`Cloud`; copies are made when it is first read.
+    shared : object
         As in :class:`Cloud`.
     travelled_m : float
         By dead reckoning since the start.
@@ -182,7 +191,7 @@ class ParticleBelief:
     state: Floats32
     log_weight: Floats
     bins: Bins
-    kept: Floats32
+    kept: Kept = MADE_WHEN_READ
     shared: Any = None
     travelled_m: float = 0.0
     log_evidence: float = 0.0
@@ -197,7 +206,13 @@ class ParticleBelief:
     @property
     def cloud(self) -> Cloud:
         """The hypotheses as models weigh them."""
-        return Cloud(self.state, self.kept, self.shared)
+        return Cloud(self.state, self.kept_unread, self.shared)
+
+    @property
+    def kept_unread(self) -> Floats32 | Copies:
+        """What particles keep, without making copies of it."""
+        kept: Floats32 | Copies = self.__dict__["kept"]
+        return kept
 
     @cached_property
     def weight(self) -> Floats32:
@@ -214,7 +229,7 @@ class ParticleBelief:
         return summarise(self.state, self.weight, self.bins)
 
     def __getstate__(self) -> dict[str, object]:
-        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,7 +270,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             state,
             log_weight,
             belief.bins,
-            belief.kept,
+            belief.kept_unread,
             belief.shared,
             travelled_m,
             belief.log_evidence,
@@ -273,7 +288,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         )
         weight = np.empty(log_weight.size, dtype=np.float32)
         if reason is Reason.USED:
-            log_total, effective = normalise(log_weight, weight)
+            log_total, effective = normalise_by(self.threads, log_weight, weight)
             if not isfinite(log_total):
                 reason = Reason.NO_CANDIDATES_LEFT
         if reason is not Reason.USED:
@@ -300,24 +315,22 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         wanted = int(min(max(by_bins, least), options.max_particles))
         if effective < options.resample_below * weight.size or 2 * wanted < weight.size:
             chosen = np.empty(wanted, dtype=np.int32)
-            systematic(weight, rng.random(), chosen)
+            systematic_by(self.threads, weight, rng.random(), chosen)
             sd = np.array(options.searching_jitter if searching else options.jitter, np.float32)
             copies = np.empty((state.shape[0], wanted), dtype=np.float32)
             key = draw_key(rng)
             # Copies keep the part of their weight that they were not chosen by. Rounding may choose
             # the last one though its weight is none.
             log_of, chosen_by = np.empty(wanted), np.empty(wanted, dtype=np.float32)
-            before, kept = kept, np.empty((kept.shape[0], wanted), dtype=np.float32)
             self.threads.over(
                 wanted,
                 (copy_with_jitter, state, chosen, sd, key, copies),
                 (taken, log_weight, weight, chosen, log_of, chosen_by),
-                (copied, before, chosen, kept),
             )
-            state = copies
+            state, kept = copies, copies_of(kept, chosen)
             np.maximum(chosen_by, _LEAST_WEIGHT, out=chosen_by)
             log_weight = np.subtract(log_of, np.log(chosen_by, out=chosen_by), out=log_of)
-            normalise(log_weight, np.empty(wanted, dtype=np.float32))
+            normalise_by(self.threads, log_weight, np.empty(wanted, dtype=np.float32))
         now = ParticleBelief(
             state,
             log_weight,

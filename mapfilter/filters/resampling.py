@@ -10,9 +10,12 @@ import numpy as np
 from numba import njit
 
 from mapfilter._kernels import exp32, hashed, normals
-from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter._threads import Threads
+from mapfilter._types import Floats, Floats32, Ints, Ints32
 
 _BLOCK = 1024
+"""Particles that stay in the cache. Sums over particles are taken by blocks, as these are the same
+however many threads share the work: parts of a thread begin at multiples of it."""
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -25,32 +28,90 @@ def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
         Logarithm of the sum before, and the effective sample size, one over the sum of squares;
         minus infinity and 0 where no weight is left.
     """
-    highest = -np.inf
-    for i in range(log_weight.size):
-        highest = log_weight[i] if log_weight[i] > highest else highest
+    sums = np.empty((3, -(-log_weight.size // _BLOCK)))
+    _fill_blocks(0, log_weight.size, log_weight, weight, sums)
+    log_total, effective = _joined(sums)
+    if effective > 0:
+        _scale_blocks(0, log_weight.size, log_weight, weight, sums, log_total)
+    return log_total, effective
+
+
+def normalise_by(threads: Threads, log_weight: Floats, weight: Floats32) -> tuple[float, float]:
+    """Do what :func:`normalise` does, divided among threads."""
+    count = log_weight.size
+    if not threads.divide(count):
+        found: tuple[float, float] = normalise(log_weight, weight)
+        return found
+    sums = np.empty((3, -(-count // _BLOCK)))
+    threads.over(count, (_fill_blocks, log_weight, weight, sums))
+    log_total, effective = _joined(sums)
+    if effective > 0:
+        threads.over(count, (_scale_blocks, log_weight, weight, sums, log_total))
+    return log_total, effective
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
+def _fill_blocks(first: int, stop: int, log_weight: Floats, weight: Floats32, sums: Floats) -> None:
+    """Fill weights relative to the largest of their block.
+
+    Also fill for each block, (3, B), the logarithm of the largest, the sum of weights and that of
+    their squares.
+    """
+    # Eight side by side: one alone would wait for itself, and lose digits.
+    most, total, squares = np.empty(8), np.empty(8), np.empty(8)
+    for begin in range(first, stop, _BLOCK):
+        end = min(begin + _BLOCK, stop)
+        given, found, whole = log_weight[begin:end], weight[begin:end], (end - begin) // 8 * 8
+        most[:], total[:], squares[:] = -np.inf, 0.0, 0.0
+        for i in range(0, whole, 8):
+            for j in range(8):
+                most[j] = given[i + j] if given[i + j] > most[j] else most[j]
+        for i in range(whole, given.size):
+            most[0] = given[i] if given[i] > most[0] else most[0]
+        highest = most.max()
+        # Without any weight, differences would be no numbers.
+        less = highest if np.isfinite(highest) else 0.0
+        for i in range(given.size):
+            found[i] = exp32(np.float32(given[i] - less))
+        for i in range(0, whole, 8):
+            for j in range(8):
+                w = np.float64(found[i + j])
+                total[j] += w
+                squares[j] += w * w
+        for i in range(whole, given.size):
+            w = np.float64(found[i])
+            total[0] += w
+            squares[0] += w * w
+        block = begin // _BLOCK
+        sums[0, block], sums[1, block], sums[2, block] = highest, total.sum(), squares.sum()
+
+
+@njit(error_model="numpy", cache=True)
+def _joined(sums: Floats) -> tuple[float, float]:
+    """Return what :func:`normalise` does, by the sums of blocks; these become their factors."""
+    highest, total, squares = sums[0].max(), 0.0, 0.0
     if not np.isfinite(highest):
         return -np.inf, 0.0
-    for i in range(log_weight.size):
-        weight[i] = exp32(np.float32(log_weight[i] - highest))
-    # Eight sums side by side: one alone would wait for itself, and lose digits.
-    sums, squares = np.zeros(8), np.zeros(8)
-    whole = log_weight.size // 8 * 8
-    for i in range(0, whole, 8):
-        for j in range(8):
-            w = np.float64(weight[i + j])
-            sums[j] += w
-            squares[j] += w * w
-    for i in range(whole, log_weight.size):
-        w = np.float64(weight[i])
-        sums[0] += w
-        squares[0] += w * w
-    total = sums.sum()
-    log_total = highest + np.log(total)
-    share = np.float32(1.0 / total)
-    for i in range(log_weight.size):
-        weight[i] *= share
-        log_weight[i] -= log_total
-    return log_total, total * total / squares.sum()
+    for b in range(sums.shape[1]):
+        share = np.exp(sums[0, b] - highest)
+        total += share * sums[1, b]
+        squares += share * share * sums[2, b]
+        sums[0, b] = share
+    for b in range(sums.shape[1]):
+        sums[0, b] /= total
+    return highest + np.log(total), total * total / squares
+
+
+@njit(error_model="numpy", cache=True, nogil=True)
+def _scale_blocks(
+    first: int, stop: int, log_weight: Floats, weight: Floats32, sums: Floats, log_total: float
+) -> None:
+    """Normalise weights by the factors of their blocks, and log weights, in place."""
+    for begin in range(first, stop, _BLOCK):
+        end, share = min(begin + _BLOCK, stop), np.float32(sums[0, begin // _BLOCK])
+        for i in range(begin, end):
+            weight[i] *= share
+            log_weight[i] -= log_total
 
 
 def log_sum(log_weight: Floats) -> float:
@@ -80,25 +141,95 @@ def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
     >>> chosen.tolist()
     [0, 0, 2, 2]
     """
-    count, last = chosen.size, weight.size - 1
-    if not count:
+    passed = np.empty(-(-weight.size // _BLOCK) + 1)
+    _sum_blocks(0, weight.size, weight, passed)
+    begins = _begins(passed, offset, chosen.size)
+    _choose(0, weight.size, weight, passed, begins, offset, chosen)
+
+
+def systematic_by(threads: Threads, weight: Floats32, offset: float, chosen: Ints32) -> None:
+    """Do what :func:`systematic` does, divided among threads."""
+    if not threads.divide(weight.size):
+        systematic(weight, offset, chosen)
         return
-    chosen[:] = 0
-    # Each particle is written where its copies begin, over those before it that have none: nothing
-    # depends on a comparison that is hard to foresee.
-    passed, begin, most = 0.0, 0, np.float64(count)
-    for i in range(last):
-        chosen[begin] = i
-        passed += weight[i]
-        end = passed * most - offset
-        end = end if end < most else most
-        begin = max(int(np.ceil(end)), begin)
-        if begin == count:
-            break
-    if begin < count:
-        chosen[begin] = last
-    for j in range(1, count):
-        chosen[j] = max(chosen[j], chosen[j - 1])
+    passed = np.empty(-(-weight.size // _BLOCK) + 1)
+    threads.over(weight.size, (_sum_blocks, weight, passed))
+    begins = _begins(passed, offset, chosen.size)
+    threads.over(weight.size, (_choose, weight, passed, begins, offset, chosen))
+
+
+@njit(error_model="numpy", cache=True, nogil=True)
+def _sum_blocks(first: int, stop: int, weight: Floats32, passed: Floats) -> None:
+    """Fill the sum of each block of weights, behind it."""
+    eight = np.empty(8)
+    for begin in range(first, stop, _BLOCK):
+        end = min(begin + _BLOCK, stop)
+        whole = begin + (end - begin) // 8 * 8
+        eight[:] = 0.0
+        for i in range(begin, whole, 8):
+            for j in range(8):
+                eight[j] += weight[i + j]
+        for i in range(whole, end):
+            eight[0] += weight[i]
+        passed[begin // _BLOCK + 1] = eight.sum()
+
+
+@njit(error_model="numpy", cache=True)
+def _begins(passed: Floats, offset: float, count: int) -> Ints:
+    """Return where the copies of each block begin, and their end; sums become those before it."""
+    begins, most = np.zeros(passed.size, dtype=np.int64), np.float64(count)
+    passed[0] = 0.0
+    for b in range(1, passed.size):
+        passed[b] += passed[b - 1]
+        end = min(passed[b] * most - offset, most)
+        begins[b] = max(int(np.ceil(end)), begins[b - 1])
+    # The last particle takes what rounding has left.
+    begins[-1] = count
+    return begins
+
+
+@njit(error_model="numpy", cache=True, nogil=True)
+def _choose(
+    first: int,
+    stop: int,
+    weight: Floats32,
+    passed: Floats,
+    begins: Ints,
+    offset: float,
+    chosen: Ints32,
+) -> None:
+    """Fill the copies of particles ``first`` to ``stop``, by blocks."""
+    count, sums = np.float64(chosen.size), np.empty(_BLOCK)
+    ends = np.zeros(_BLOCK + 1, dtype=np.int32)
+    for at in range(first, stop, _BLOCK):
+        block, size = at // _BLOCK, min(_BLOCK, stop - at)
+        begin, copies = begins[block], begins[block + 1] - begins[block]
+        if copies == 0:
+            continue
+        total, least, most = passed[block], np.float64(begin), np.float64(begins[block + 1])
+        for j in range(size):
+            total += weight[at + j]
+            sums[j] = total
+        for j in range(size):
+            end = sums[j] * count - offset
+            end = end if end < most else most
+            end = end if end > least else least
+            ends[j + 1] = np.int32(np.ceil(end)) - np.int32(begin)
+        # What rounding has left is of the last particle.
+        ends[size] = copies
+        # Four copies are written at once, of which those of the next particle replace what is too
+        # many: nothing depends on a comparison that is hard to foresee.
+        found = np.empty(copies + 4, dtype=np.int32)
+        for j in range(size):
+            of, to = at + j, np.uint32(ends[j])
+            found[to] = of
+            found[to + np.uint32(1)] = of
+            found[to + np.uint32(2)] = of
+            found[to + np.uint32(3)] = of
+            for k in range(ends[j] + 4, ends[j + 1]):
+                found[k] = of
+        for k in range(copies):
+            chosen[begin + k] = found[k]
 
 
 @njit(error_model="numpy", cache=True, nogil=True)
@@ -122,30 +253,6 @@ def taken(
         weight_of[j] = weight[i]
 
 
-@njit(error_model="numpy", cache=True, nogil=True)
-def copied(begin: int, stop: int, kept: Floats32, chosen: Ints32, copies: Floats32) -> None:
-    """Copy the chosen columns of ``kept`` (W, N) to ``copies`` (W, M)."""
-    rows = kept.shape[0]
-    fours = rows // 4 * 4
-    # A block of indices stays in the cache; each is loaded once for four rows.
-    for first in range(begin, stop, _BLOCK):
-        at = chosen[first : min(first + _BLOCK, stop)]
-        for r in range(0, fours, 4):
-            a, b, c, d = kept[r], kept[r + 1], kept[r + 2], kept[r + 3]
-            to_a, to_b = copies[r, first:], copies[r + 1, first:]
-            to_c, to_d = copies[r + 2, first:], copies[r + 3, first:]
-            for j in range(at.size):
-                i = np.uint32(at[j])
-                to_a[j] = a[i]
-                to_b[j] = b[i]
-                to_c[j] = c[i]
-                to_d[j] = d[i]
-        for r in range(fours, rows):
-            row, to = kept[r], copies[r, first:]
-            for j in range(at.size):
-                to[j] = row[np.uint32(at[j])]
-
-
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def copy_with_jitter(
     first: int,
@@ -161,19 +268,22 @@ def copy_with_jitter(
     ``jitter`` has the standard deviation for each row; rows of 0, and rows beyond, are copied as
     they are. The noise is drawn from ``key``.
     """
-    rows, at = state.shape[0], chosen[first:stop]
-    for r in range(0, rows, 2):
-        # Normal numbers come in pairs: one for each of two rows.
-        one, other = state[r], state[min(r + 1, rows - 1)]
-        to_one, to_other = copies[r, first:stop], copies[min(r + 1, rows - 1), first:stop]
-        sd = jitter[r] if r < jitter.size else np.float32(0.0)
-        other_sd = jitter[r + 1] if r + 1 < min(rows, jitter.size) else np.float32(0.0)
-        for j in range(at.size):
-            to_one[j] = one[np.uint32(at[j])]
-            to_other[j] = other[np.uint32(at[j])]
-        drawn = (np.uint64(r) << np.uint64(40)) + np.uint64(first)
-        if sd > 0 or other_sd > 0:
+    rows = state.shape[0]
+    for begin in range(first, stop, _BLOCK):
+        end = min(begin + _BLOCK, stop)
+        at = chosen[begin:end]
+        for r in range(0, rows, 2):
+            # Normal numbers come in pairs: one for each of two rows.
+            one, other = state[r], state[min(r + 1, rows - 1)]
+            to_one, to_other = copies[r, begin:end], copies[min(r + 1, rows - 1), begin:end]
+            sd = jitter[r] if r < jitter.size else np.float32(0.0)
+            other_sd = jitter[r + 1] if r + 1 < min(rows, jitter.size) else np.float32(0.0)
             for j in range(at.size):
-                a, b = normals(hashed(key, drawn + np.uint64(j)))
-                to_one[j] += sd * a
-                to_other[j] += other_sd * b
+                to_one[j] = one[np.uint32(at[j])]
+                to_other[j] = other[np.uint32(at[j])]
+            drawn = (np.uint64(r) << np.uint64(40)) + np.uint64(begin)
+            if sd > 0 or other_sd > 0:
+                for j in range(at.size):
+                    a, b = normals(hashed(key, drawn + np.uint64(j)))
+                    to_one[j] += sd * a
+                    to_other[j] += other_sd * b

@@ -40,6 +40,26 @@ def mixed(
     after : float
         Log odds of the fault, given the reading.
     """
+    fine, gained, factor, after = mixed_but_for_logarithm(before, other, right)
+    return fine, gained - log32(factor), after
+
+
+@njit(inline="always")
+def mixed_but_for_logarithm(
+    before: np.float32, other: np.float32, right: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """Mix likelihoods as :func:`mixed` does, without a logarithm.
+
+    Returns
+    -------
+    fine : float
+        Probability that there is no fault, given the reading.
+    gained, factor : float
+        The log-likelihood of the reading is the first less the logarithm of the second. The product
+        of four factors is a normal number in single precision.
+    after : float
+        Log odds of the fault, given the reading.
+    """
     most, cap = _F(MOST_READING), _F(MOST_KEPT)
     whole = before + other - right
     odds = whole if whole < most else most
@@ -47,9 +67,10 @@ def mixed(
     fine = _ONE / (_ONE + exp32(odds))
     # Beyond the bound the logarithm of one plus the odds is that of the odds.
     beyond = whole - odds if whole > odds else _ZERO
-    gained = right + beyond - log32(fine * (_ONE + exp32(before)))
+    known = before if before < most else most
+    factor = fine * (_ONE + exp32(known))
     after = whole if whole < cap else cap
     # Faults that are next to impossible from the start stay so.
     least = before if before < -cap else -cap
     after = after if after > least else least
-    return fine, gained, after
+    return fine, right + beyond - (before - known), factor, after

@@ -15,12 +15,16 @@ from numba import njit
 
 from mapfilter._kernels import exp32, log32
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
-from mapfilter.models.cell_faults import mixed
+from mapfilter.models.ageing import Ageing, age
+from mapfilter.models.cell_faults import mixed, mixed_but_for_logarithm
 from mapfilter.models.fingerprint import REACH_SD, STEPS_PER_SD
 
 _F = np.float32
 _BLOCK = 128
 """Hypotheses of a block: what they keep, and the steps of a report, fit into the first cache."""
+_AGED = 1024
+"""Hypotheses that are aged at a time: longer pieces of rows are read faster, and what they keep
+still fits into the second cache."""
 _HALF, _ONE, _ZERO = _F(0.5), _F(1.0), _F(0.0)
 LOG_ROOT_TWO_PI = _F(0.9189385)
 
@@ -53,47 +57,30 @@ class Prediction(NamedTuple):
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
-def age(
-    first: int,
-    stop: int,
-    kept: Floats32,
-    decay: Floats32,
-    fault_keep: float,
-    fault_log_odds: float,
-    now: Floats32,
-) -> None:
-    """Fill what hypotheses keep, (W, N), after a distance."""
-    means = decay.size
-    keep, usual = _F(fault_keep), _F(fault_log_odds)
-    for d in range(means):
-        factor, row, to = decay[d], kept[d, first:stop], now[d, first:stop]
-        for i in range(row.size):
-            to[i] = factor * row[i]
-    for d in range(means, kept.shape[0]):
-        row, to = kept[d, first:stop], now[d, first:stop]
-        for i in range(row.size):
-            to[i] = usual + (row[i] - usual) * keep
-
-
-@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def weigh_by_levels(
     begin: int,
     stop: int,
-    kept: Floats32,
+    ageing: Ageing,
     pixel: Ints32,
     predicted: Prediction,
     terms: LevelTerms,
     weight: float,
     log_weight: Floats,
 ) -> None:
-    """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
-    means = terms.gain.shape[1]
+    """Age what hypotheses keep, add the log-likelihood of levels to weights, and update both.
+
+    All of that is done for some hypotheses before the next, while what they keep is in the cache.
+    """
+    kept, means = ageing.now, terms.gain.shape[1]
     w = _F(weight)
-    steps, more = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
-    total, upon = np.empty(_BLOCK, np.float32), _gain_of_sums(terms)
+    gain, upon = _in_fours(terms.gain), _gain_of_sums(terms)
+    steps, more = np.zeros((gain.shape[0], _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
+    total, factors = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
     for first in range(begin, stop, _BLOCK):
+        if (first - begin) % _AGED == 0:
+            age(first, min(first + _AGED, stop), ageing)
         count, into = min(_BLOCK, stop - first), log_weight[first:]
-        total[:] = _ZERO
+        total[:], factors[:] = _ZERO, _ONE
         for k in range(terms.cell.size):
             s, cell, innovation = terms.slot[k], terms.cell[k], steps[k]
             _look_up(predicted, pixel[first:], count, cell, innovation, more)
@@ -108,10 +95,16 @@ def weigh_by_levels(
                 more[j] = -_HALF * (v * v * per + log32(variance))
                 innovation[j] = v * own * per
             for j in range(count):
-                fine, gained, odds[j] = mixed(odds[j], other, more[j])
+                fine, gained, factor, odds[j] = mixed_but_for_logarithm(odds[j], other, more[j])
                 total[j] += gained
+                factors[j] *= factor
                 innovation[j] = fine * innovation[j]
-        _corrected(kept, first, count, terms.gain, steps)
+            # One logarithm for four levels.
+            if k % 4 == 3 or k == terms.cell.size - 1:
+                for j in range(count):
+                    total[j] -= log32(factors[j])
+                    factors[j] = _ONE
+        _corrected(kept, first, count, gain, steps)
         for j in range(count):
             into[j] += w * total[j]
 
@@ -136,7 +129,8 @@ def weigh_by_absence(
     means = terms.gain.shape[1]
     w = _F(weight)
     middle, last = _F(REACH_SD * STEPS_PER_SD) + _HALF, _F(2 * REACH_SD * STEPS_PER_SD)
-    steps, per_sd = np.empty((terms.cell.size, _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
+    gain = _in_fours(terms.gain)
+    steps, per_sd = np.zeros((gain.shape[0], _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
     right, total = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
     place, upon = np.empty(_BLOCK, np.int32), _gain_of_sums(terms)
     for first in range(begin, stop, _BLOCK):
@@ -166,7 +160,7 @@ def weigh_by_absence(
                 hazard = exp32(-_HALF * z * z - LOG_ROOT_TWO_PI - right[j])
                 hazard = hazard if z < _F(6.0) else _ZERO
                 below[j] = -fine * hazard * own * per_sd[j]
-        _corrected(kept, first, count, terms.gain, steps)
+        _corrected(kept, first, count, gain, steps)
         for j in range(count):
             into[j] += w * total[j]
 
@@ -220,9 +214,11 @@ def _look_up(
     share, width, band = _F(0.01 * predicted.share), np.uint32(predicted.bands), np.uint32(cell)
     for j in range(count):
         at = np.uint32(np.uint32(pixel[j]) * width) + band
-        rough = _F(predicted.rough_db[at])
         level_dbm[j] = predicted.level_dbm[at]
-        more_db2[j] = share * rough * rough
+        more_db2[j] = _F(predicted.rough_db[at])
+    # Apart from what is looked up, as that is not vectorised.
+    for j in range(count):
+        more_db2[j] = share * more_db2[j] * more_db2[j]
 
 
 @njit(inline="always")
@@ -262,34 +258,34 @@ def _less_steps(
 
 
 @njit(inline="always")
+def _in_fours(gain: Floats32) -> Floats32:
+    """Return gains (K, D) with rows of zeros behind them: as many as four go into."""
+    whole = np.zeros(((gain.shape[0] + 3) // 4 * 4, gain.shape[1]), dtype=np.float32)
+    for k in range(gain.shape[0]):
+        for d in range(gain.shape[1]):
+            whole[k, d] = gain[k, d]
+    return whole
+
+
+@njit(inline="always")
 def _corrected(kept: Floats32, first: int, count: int, gain: Floats32, steps: Floats32) -> None:
-    """Add the gains (K, D) times the steps (K, block) to the means of a block, in place."""
-    terms = gain.shape[0]
-    fours = terms // 4 * 4
+    """Add gains (K, D) times steps (K, block), K by fours, to the means of a block, in place."""
     half = (gain.shape[1] - 1) // 2
-    # Slow and fast errors take the same steps, four of which are added at a time.
-    for d in range(half):
-        row, other = kept[d, first:], kept[half + d, first:]
-        for k in range(0, fours, 4):
+    for k in range(0, gain.shape[0], 4):
+        one, two, three, four = steps[k], steps[k + 1], steps[k + 2], steps[k + 3]
+        # Slow and fast errors take the same steps.
+        for d in range(half):
+            row, other = kept[d, first:], kept[half + d, first:]
             a, b, c, e = gain[k, d], gain[k + 1, d], gain[k + 2, d], gain[k + 3, d]
             m = half + d
             f, g, h, i = gain[k, m], gain[k + 1, m], gain[k + 2, m], gain[k + 3, m]
-            one, two, three, four = steps[k], steps[k + 1], steps[k + 2], steps[k + 3]
             none = (a == _ZERO) & (b == _ZERO) & (c == _ZERO) & (e == _ZERO)
             if not (none & (f == _ZERO) & (g == _ZERO) & (h == _ZERO) & (i == _ZERO)):
                 for j in range(count):
                     p, q, r, s = one[j], two[j], three[j], four[j]
-                    row[j] += (a * p + b * q) + (c * r + e * s)
-                    other[j] += (f * p + g * q) + (h * r + i * s)
-        for k in range(fours, terms):
-            a, b, step = gain[k, d], gain[k, half + d], steps[k]
-            if (a != _ZERO) | (b != _ZERO):
-                for j in range(count):
-                    row[j] += a * step[j]
-                    other[j] += b * step[j]
-    row = kept[2 * half, first:]
-    for k in range(terms):
-        by, step = gain[k, 2 * half], steps[k]
-        if by != _ZERO:
-            for j in range(count):
-                row[j] += by * step[j]
+                    row[j] = row[j] + a * p + b * q + c * r + e * s
+                    other[j] = other[j] + f * p + g * q + h * r + i * s
+        row, d = kept[2 * half, first:], 2 * half
+        a, b, c, e = gain[k, d], gain[k + 1, d], gain[k + 2, d], gain[k + 3, d]
+        for j in range(count):
+            row[j] = row[j] + a * one[j] + b * two[j] + c * three[j] + e * four[j]

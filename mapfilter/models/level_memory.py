@@ -113,10 +113,18 @@ class LevelMemory:
         kept[2 * self.slots + 1 :] = self.errors.fault_log_odds
         return kept
 
+    def fault_row(self, band: int) -> int:
+        """Return the row of what hypotheses keep with the log odds of a cell's fault."""
+        return 2 * self.slots + 1 + self.slot_of[band]
+
     def fault_odds(self, band: int, kept: Floats32) -> Floats32:
-        """Return the row of what hypotheses keep with the log odds of a cell's fault, (N,)."""
-        row: Floats32 = kept[2 * self.slots + 1 + self.slot_of[band]]
+        """Return the log odds of a cell's fault among what hypotheses keep, (N,)."""
+        row: Floats32 = kept[self.fault_row(band)]
         return row
+
+    def has_slots(self, bands: Ints32) -> bool:
+        """Return whether all of these cells have slots."""
+        return self.slot_of.keys() >= set(bands.tolist())
 
     def correlation(self, one: Ints32, other: Ints32) -> Floats:
         """Return the correlation of the errors of two lists of bands before any level."""

@@ -11,6 +11,7 @@ from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.models.street_motion import OFF, MapFactors, interpolate, weigh_by_map
 
 _F = np.float32
+_BLOCK = 4096
 
 
 class WayMap(NamedTuple):
@@ -82,6 +83,23 @@ def weigh_by_ways(
     That is done for hypotheses ``first`` to ``stop``. ``beyond`` is the map's log-likelihood beyond
     the area; NaN for that of the area's edge.
     """
+    for begin in range(first, stop, _BLOCK):
+        end = min(begin + _BLOCK, stop)
+        _weigh_block(begin, end, moved, ways, factors, beyond, log_weight, weighed)
+
+
+@njit(error_model="numpy", cache=True, nogil=True)
+def _weigh_block(
+    first: int,
+    stop: int,
+    moved: Floats32,
+    ways: WayMap,
+    factors: MapFactors,
+    beyond: float,
+    log_weight: Floats,
+    weighed: Floats,
+) -> None:
+    """Do what :func:`weigh_by_ways` does for hypotheses that stay in the cache."""
     east, north = moved[0, first:stop], moved[1, first:stop]
     rows, pixel_m = ways.log_likelihood.shape[0], ways.pixel_m
     first_m, north_m = pixel_m / 2, (rows - 0.5) * pixel_m

@@ -132,7 +132,7 @@ def _apart_m(step: DeviceStep, given: StepInputs, belief: ParticleBelief) -> flo
     """Return how far mean positions after a step lie apart, with the same random numbers."""
     model, placed, key = given.model, step.device.placed, np.uint64(7)
     state, here = model.move(belief.state, belief.log_weight, given.motion, key)
-    model.weigh(Cloud(state, belief.kept, belief.shared), here, given.reading)
+    model.weigh(belief.cloud._replace(state=state), here, given.reading)
     moved, there = _weighed(step, given, step.placed(belief.cloud), placed(belief.log_weight), key)
     one, other = _mean(state, here), _mean(on_host(moved.state), on_host(there))
     return hypot(*(one - other).tolist())

@@ -20,8 +20,15 @@ from mapfilter.config.load import load_config
 from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
-from mapfilter.filters.particle import Cloud, ParticleBelief, ParticleFilter, ParticleOptions
-from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
+from mapfilter.filters.copies import Copies, copies_of
+from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
+from mapfilter.filters.resampling import (
+    copy_with_jitter,
+    normalise,
+    normalise_by,
+    systematic,
+    systematic_by,
+)
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
@@ -180,9 +187,14 @@ def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInput
     absent = np.setdiff1d(np.arange(len(area.cell_ids), dtype=np.int32), cell)
     levels = LevelReport(cell, level[cell] + np.float32(3.0), absent, float(level[cell].min()), 3.0)
     reading = RadioReading(int(cell[0]), 5 / 40, levels, length_m=5.0)
-    # As in a filter under way, particles know of the errors of levels by an earlier report.
-    cloud, _ = model.weigh(belief.cloud, belief.log_weight.copy(), reading)
-    belief = replace(belief, kept=cloud.kept, shared=cloud.shared)
+    # As in a filter under way, particles know of the errors of levels by an earlier report, and
+    # what they keep of these is still to be copied from those that were chosen then.
+    log_weight, weight = belief.log_weight.copy(), np.empty(count, dtype=np.float32)
+    cloud, _ = model.weigh(belief.cloud, log_weight, reading)
+    normalise(log_weight, weight)
+    chosen = np.empty(count, dtype=np.int32)
+    systematic(weight, 0.5, chosen)
+    belief = replace(belief, kept=copies_of(cloud.kept, chosen), shared=cloud.shared)
     return StepInputs(model, MotionStep(1.4, radians(37.0)), reading, levels), belief
 
 
@@ -215,22 +227,21 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
 
 def whole_step(
     given: StepInputs, belief: ParticleBelief, jitter: Floats32, rng: np.random.Generator
-) -> tuple[Floats32, Floats32]:
-    """Return the particles after a step that always resamples: state and what they keep."""
+) -> tuple[Floats32, Copies]:
+    """Return the particles after a step that always resamples: state and what they keep.
+
+    The latter is copied by the next step, as this one copies that of the step before.
+    """
     model, count = given.model, belief.log_weight.size
     state, log_weight = model.move(belief.state, belief.log_weight, given.motion, draw_key(rng))
-    cloud, _ = model.weigh(Cloud(state, belief.kept, belief.shared), log_weight, given.reading)
+    cloud, _ = model.weigh(belief.cloud._replace(state=state), log_weight, given.reading)
     weight = np.empty(count, dtype=np.float32)
-    normalise(log_weight, weight)
+    normalise_by(model.threads, log_weight, weight)
     chosen = np.empty(count, dtype=np.int32)
-    systematic(weight, rng.random(), chosen)
-    copies, kept = np.empty_like(state), np.empty_like(cloud.kept)
-    model.threads.over(
-        count,
-        (copy_with_jitter, state, chosen, jitter, draw_key(rng), copies),
-        (copied, cloud.kept, chosen, kept),
-    )
-    return copies, kept
+    systematic_by(model.threads, weight, rng.random(), chosen)
+    copies = np.empty_like(state)
+    model.threads.over(count, (copy_with_jitter, state, chosen, jitter, draw_key(rng), copies))
+    return copies, copies_of(cloud.kept, chosen)
 
 
 def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:

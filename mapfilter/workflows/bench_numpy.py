@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.filters.copies import array_of
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import log_serving
 from mapfilter.models.level_kernels import LevelTerms
@@ -56,7 +57,7 @@ class NumpyModel:
     def __init__(self, inputs: StepInputs, belief: ParticleBelief) -> None:
         self.model, self.motion = inputs.model, inputs.motion
         self.reading, self.levels = inputs.reading, inputs.levels
-        self.kept: Floats = belief.kept.astype(np.float64)
+        self.kept: Floats = array_of(belief.kept_unread).astype(np.float64)
         self.shared: LevelMemory = belief.shared
 
     @cached_property

@@ -23,7 +23,7 @@ from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import flattened, summarise
 from mapfilter.filters.particle import Cloud
-from mapfilter.filters.resampling import copied, copy_with_jitter, normalise, systematic
+from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
 from mapfilter.models.level_errors import LevelReport
@@ -107,7 +107,6 @@ def compile_resampling() -> None:
     chosen[:] = np.arange(_PARTICLES)
     jitter, copies = np.ones(STATES, dtype=np.float32), np.empty_like(cloud.state)
     key = draw_key(np.random.default_rng(0))
-    copied(0, _PARTICLES, cloud.state, chosen, copies)
     copy_with_jitter(0, _PARTICLES, cloud.state, chosen, jitter, key, copies)
     systematic(weight, 0.5, chosen)
 

@@ -7,7 +7,7 @@ import pytest
 
 from mapfilter.filters import kalman
 from mapfilter.filters.gaussian import IEKF, Gaussian, Method
-from mapfilter.filters.resampling import copied, copy_with_jitter, taken
+from mapfilter.filters.resampling import copy_with_jitter, taken
 from mapfilter.models.ranging import timing_advances
 from mapfilter.models.state import POSITION
 from mapfilter.positioning.kalman.models import compiled
@@ -25,16 +25,13 @@ def test_parts_of_the_copies_are_those_of_the_whole(cuts, rows):
     whole = np.empty((rows, count), "f4")
     copy_with_jitter(0, count, state, chosen, jitter, key, whole)
     noise = np.full((rows, count), np.nan, "f4")
-    plain, log_of = np.full((rows, count), np.nan, "f4"), np.full(count, np.nan)
-    weight_of = np.full(count, np.nan, "f4")
+    log_of, weight_of = np.full(count, np.nan), np.full(count, np.nan, "f4")
     for first, stop in pairwise(cuts):
         copy_with_jitter(first, stop, state, chosen, jitter, key, noise)
-        copied(first, stop, state, chosen, plain)
         taken(first, stop, log_weight, weight, chosen, log_of, weight_of)
-        for written in (noise[0], plain[0], log_of, weight_of):
+        for written in (noise[0], log_of, weight_of):
             assert np.flatnonzero(np.isnan(written)).tolist() == list(range(stop, count))
     np.testing.assert_array_equal(noise, whole)
-    np.testing.assert_array_equal(plain, state[:, chosen])
     np.testing.assert_array_equal(log_of, log_weight[chosen])
     np.testing.assert_array_equal(weight_of, weight[chosen])
     still = [r for r in range(rows) if jitter[r] == 0]

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.copies import Copies
 from mapfilter.filters.hypotheses import Bins
-from mapfilter.filters.particle import Cloud, ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import Cloud, ParticleBelief, ParticleFilter, ParticleOptions
 
 
 @dataclass(frozen=True)
@@ -240,3 +241,24 @@ def test_particles_without_any_weight():
     moved, reason = filter_.predict(start, MotionStep(-2.0, nan), rng)
     assert (moved.travelled_m, reason) == (2.0, Reason.NO_HEADING)
     assert set(vars(pickle.loads(pickle.dumps(moved)))) == set(type(moved).__dataclass_fields__)
+
+
+def test_copies_of_what_particles_keep_are_made_when_they_are_read():
+    options = ParticleOptions(
+        **STILL, max_particles=64, min_search_particles=40, min_particles=4, resample_below=0.99,
+        particles_per_bin=1e-3,
+    )  # fmt: skip
+    filter_, rng = ParticleFilter(Remembering(), options), np.random.default_rng(0)
+    after, _ = filter_.update(filter_.init(0.0, rng), 2.0, rng)
+    copies = after.kept_unread
+    assert isinstance(copies, Copies)
+    moved, _ = filter_.predict(after, MotionStep(1.0, 0.0), rng)
+    assert moved.kept_unread is after.cloud.kept is copies
+    # Whoever stores a belief stores an array.
+    stored = pickle.loads(pickle.dumps(after))
+    assert isinstance(stored.kept_unread, np.ndarray)
+    for belief in (after, moved, stored, replace(moved, travelled_m=9.0)):
+        np.testing.assert_array_equal(belief.kept, copies.made())
+        assert belief.kept is belief.kept_unread
+    with pytest.raises(TypeError, match="kept"):
+        ParticleBelief(after.state, after.log_weight, after.bins)

@@ -6,7 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter._kernels import draw_key
-from mapfilter.filters.resampling import copied, copy_with_jitter, log_sum, normalise, systematic
+from mapfilter._threads import ONE, Threads
+from mapfilter.filters.copies import array_of, copies_of
+from mapfilter.filters.resampling import (
+    copy_with_jitter,
+    log_sum,
+    normalise,
+    normalise_by,
+    systematic,
+    systematic_by,
+)
 
 
 def test_log_weights_are_brought_to_sum_to_one():
@@ -19,8 +28,46 @@ def test_log_weights_are_brought_to_sum_to_one():
     assert effective == pytest.approx(1 / (0.125**2 + 0.25**2 + 0.625**2), rel=1e-5)
 
 
+@pytest.mark.parametrize("count", [1, 1024, 1025, 5000])
+def test_weights_and_choice_are_the_same_to_the_byte_for_any_number_of_threads(count):
+    given_, found = np.random.default_rng(count).normal(-800.0, 30.0, count), []
+    given_[:: max(count // 3, 2)] = -np.inf
+    for threads in (ONE, *(Threads(n, least=0) for n in (2, 3, 7))):
+        log_weight, weight = given_.copy(), np.empty(count, dtype=np.float32)
+        sums = normalise_by(threads, log_weight, weight)
+        chosen = np.full(2 * count // 3 + 1, -1, dtype=np.int32)
+        systematic_by(threads, weight, 0.4, chosen)
+        found.append((sums, *(one.tobytes() for one in (log_weight, weight, chosen))))
+    assert found == [found[0]] * 4
+    # A block without any weight, and one whose largest is negligible, take part.
+    exact = np.exp(given_ - given_.max()) if count > 1 else np.ones(1)
+    if count > 1:
+        np.testing.assert_allclose(weight, exact / exact.sum(), rtol=1e-5, atol=1e-30)
+
+
 def test_no_weight_is_told():
     assert normalise(np.full(3, -np.inf), np.empty(3, dtype=np.float32)) == (-np.inf, 0.0)
+    for threads in (ONE, Threads(2, least=0)):
+        nothing = np.full(3000, -np.inf), np.empty(3000, dtype=np.float32)
+        assert normalise_by(threads, *nothing) == (-np.inf, 0.0)
+
+
+def test_a_block_without_weight_has_none():
+    log_weight, weight = np.full(2048, -np.inf), np.empty(2048, dtype=np.float32)
+    log_weight[1024:] = 5.0
+    assert normalise(log_weight, weight) == pytest.approx((5.0 + np.log(1024), 1024.0))
+    np.testing.assert_allclose(weight, np.repeat([0.0, 1 / 1024], 1024), rtol=1e-6)
+    chosen = np.empty(300, dtype=np.int32)
+    systematic(weight, 0.0, chosen)
+    assert chosen.min() >= 1024
+
+
+@pytest.mark.parametrize("heavy", [0, 700, 1023, 1024, 2999])
+def test_one_particle_may_have_all_copies(heavy):
+    weight, chosen = np.zeros(3000, dtype=np.float32), np.empty(2500, dtype=np.int32)
+    weight[heavy] = 1.0
+    systematic(weight, 0.7, chosen)
+    assert chosen.tolist() == [heavy] * 2500
 
 
 @given(
@@ -71,9 +118,14 @@ def test_copies_of_what_is_kept_are_the_chosen_columns(rows, count):
     rng = np.random.default_rng(rows)
     kept = rng.standard_normal((rows, 900)).astype(np.float32)
     chosen = np.sort(rng.integers(900, size=count)).astype(np.int32)
-    copies = np.full((rows, count), np.nan, dtype=np.float32)
-    copied(0, chosen.size, kept, chosen, copies)
-    np.testing.assert_array_equal(copies, kept[:, chosen])
+    copies = copies_of(kept, chosen)
+    assert copies.shape == (rows, count)
+    np.testing.assert_array_equal(copies.made(), kept[:, chosen])
+    again = np.sort(rng.integers(count, size=count + 3)).astype(np.int32)
+    twice = copies_of(copies, again)
+    assert twice.of is kept
+    np.testing.assert_array_equal(array_of(twice), kept[:, chosen][:, again])
+    assert array_of(kept) is kept
 
 
 def test_resampling_is_unbiased():

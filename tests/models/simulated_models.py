@@ -86,8 +86,9 @@ def test_pixels():
 
 
 def test_ageing():
-    _, (kept, decay, keep, usual, _), (expected,) = done(ageing)
-    cuda_reports.age(kept, decay, keep, usual)
+    _, (given,), (expected,) = done(ageing)
+    kept, usual = given.before, given.fault_log_odds
+    cuda_reports.age(kept, given.decay, given.fault_keep, usual)
     np.testing.assert_allclose(kept, expected, rtol=1e-6, atol=1e-6)
 
 

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from scipy.stats import norm, truncnorm
 
 from mapfilter.errors import ConfigError
+from mapfilter.models.ageing import Ageing, age, as_it_is
 from mapfilter.models.fingerprint import bound_table
 from mapfilter.models.level_errors import LevelErrors, LevelReport, roughness
-from mapfilter.models.level_kernels import Prediction, age, weigh_by_absence, weigh_by_levels
+from mapfilter.models.level_kernels import Prediction, weigh_by_absence, weigh_by_levels
 from mapfilter.models.level_memory import SLOTS, LevelMemory
 
 SITE = np.array([0, 0, 1, 1, 1, 2])
@@ -48,7 +49,8 @@ def weighed(memory, kept, pixel, table, given, rough_db=None):
     rough = np.zeros(table.size, np.uint8) if rough_db is None else rough_db.ravel()
     pixel, flat, bands = pixel.astype(np.int32), table.ravel(), table.shape[1]
     predicted = Prediction(flat, rough, bands, errors.roughness)
-    weigh_by_levels(0, pixel.size, kept, pixel, predicted, terms, errors.weight, log_weight)
+    as_now = as_it_is(kept)
+    weigh_by_levels(0, pixel.size, as_now, pixel, predicted, terms, errors.weight, log_weight)
     if given.absent.size:
         absent = memory.absence(given)
         table, weight = bound_table(), errors.weight
@@ -60,8 +62,10 @@ def moved(memory, kept, length_m):
     errors = memory.errors
     memory, decay = memory.after(length_m)
     keep = exp(-length_m / errors.fault_m)
-    now = np.empty_like(kept)
-    age(0, kept.shape[1], kept, decay, keep, errors.fault_log_odds, now)
+    now, due = np.empty_like(kept), np.ones(kept.shape[0], dtype=bool)
+    each_its_own = np.empty(0, dtype=np.int32)
+    ageing = Ageing(kept, each_its_own, decay, keep, errors.fault_log_odds, due, now)
+    age(0, kept.shape[1], ageing)
     return memory, now
 
 

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapfilter.filters.resampling import copied, copy_with_jitter, taken
+from mapfilter.filters.resampling import copy_with_jitter, taken
 from mapfilter.models import fingerprint
+from mapfilter.models.ageing import Ageing, age, as_it_is
 from mapfilter.models.fingerprint import RasterFrame, ServingWeights, bound_table, serving_table
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_kernels import (
     LevelTerms,
     Prediction,
-    age,
     weigh_by_absence,
     weigh_by_levels,
 )
@@ -76,9 +76,19 @@ def pixels(p):
 
 
 def ageing(p):
-    now = np.full_like(p.kept, np.nan)
+    found = aged(p, np.empty(0, dtype=np.int32))
+    return age, [found], [found.now]
+
+
+def ageing_of_copies(p):
+    found = aged(p, p.chosen)
+    return age, [found], [found.now]
+
+
+def aged(p, chosen):
+    now, due = np.full_like(p.kept, np.nan), np.ones(WIDTH, dtype=bool)
     decay = np.linspace(0.1, 0.99, 2 * SLOTS + 1).astype(np.float32)
-    return age, [p.kept, decay, 0.97, LevelErrors().fault_log_odds, now], [now]
+    return Ageing(p.kept, chosen, decay, 0.97, LevelErrors().fault_log_odds, due, now)
 
 
 def serving(p):
@@ -89,8 +99,18 @@ def serving(p):
 
 def levels(p):
     predicted = Prediction(p.level_dbm, p.rough, BANDS, 0.3)
-    arguments = [p.kept, p.pixel, predicted, p.terms, 0.35, p.log_weight]
+    arguments = [as_it_is(p.kept), p.pixel, predicted, p.terms, 0.35, p.log_weight]
     return weigh_by_levels, arguments, [p.kept, p.log_weight]
+
+
+def levels_of_aged_copies(p):
+    predicted, found = Prediction(p.level_dbm, p.rough, BANDS, 0.3), aged(p, p.chosen)
+    # One row has been aged and changed before.
+    age(0, p.count, found.of_row(2 * SLOTS + 2))
+    found = found.without_row(2 * SLOTS + 2)
+    found.now[2 * SLOTS + 2] += 1.0
+    arguments = [found, p.pixel, predicted, p.terms, 0.35, p.log_weight]
+    return weigh_by_levels, arguments, [found.now, p.log_weight]
 
 
 def absence(p):
@@ -105,18 +125,14 @@ def jittered(p):
     return copy_with_jitter, [p.state, p.chosen, jitter, np.uint64(5), copies], [copies]
 
 
-def copies_of_kept(p):
-    copies = np.full_like(p.kept, np.nan)
-    return copied, [p.kept, p.chosen, copies], [copies]
-
-
 def weights_taken(p):
     log_of, weight_of = np.full(p.count, np.nan), np.full(p.count, np.nan, dtype=np.float32)
     return taken, [p.log_weight, p.weight, p.chosen, log_of, weight_of], [log_of, weight_of]
 
 
 PASSES = [
-    motion, ways, pixels, ageing, serving, levels, absence, jittered, copies_of_kept, weights_taken,
+    motion, ways, pixels, ageing, ageing_of_copies, serving, levels, levels_of_aged_copies, absence,
+    jittered, weights_taken,
 ]  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from mapfilter._types import Ints32
 from mapfilter.filters import cuda_copies
 from mapfilter.filters.array_resampling import normalise_arrays, systematic_arrays
 from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.filters.copies import array_of
 from mapfilter.filters.particle import Cloud
 from mapfilter.models import cuda_motion, cuda_reports, fingerprint
 from mapfilter.models.level_errors import LevelReport
@@ -71,7 +72,7 @@ class DeviceStep:
     def placed(self, cloud: Cloud) -> Cloud:
         """Return hypotheses on the device."""
         placed = self.device.placed
-        return cloud._replace(state=placed(cloud.state), kept=placed(cloud.kept))
+        return cloud._replace(state=placed(cloud.state), kept=placed(array_of(cloud.kept)))
 
     def move(
         self, state: Any, log_weight: Any, motion: MotionStep, key: np.uint64
@@ -156,7 +157,7 @@ class DeviceStep:
             kept = memory.start(cloud.state.shape[1], self.device.arrays)
         else:
             memory, decay = memory.after(length_m)
-            keep, kept = exp(-length_m / errors.fault_m), cloud.kept.copy()
+            keep, kept = exp(-length_m / errors.fault_m), array_of(cloud.kept).copy()
             cuda_reports.age(kept, self.device.placed(decay), keep, errors.fault_log_odds)
         served = [reading.serving] if reading.serving >= 0 else []
         memory, kept = memory.with_cells(np.array(served, dtype=np.int32), kept, in_place=True)

@@ -21,6 +21,7 @@ from math import hypot, isfinite, log, nan, radians
 import numpy as np
 
 from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.filters.copies import copies_of
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import wrap_one_rad, wrap_rad
@@ -241,8 +242,7 @@ def _smaller(
     state = belief.state[:STATES, chosen].copy()
     state[BIAS] = wrap_rad(state[BIAS] + 2**0.5 * white_rad * rng.standard_normal(count))
     log_weight = np.full(count, -log(count))
-    # An index of columns gives rows that are not contiguous: kernels are compiled anew for them.
-    kept = np.take(belief.kept, chosen, axis=1)
+    kept = copies_of(belief.kept_unread, chosen.astype(np.int32))
     return replace(belief, state=state, log_weight=log_weight, kept=kept)
 
 

@@ -13,8 +13,10 @@ from math import isfinite, log
 import numpy as np
 from scipy.special import logsumexp
 
+from mapfilter._threads import Call
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
-from mapfilter.filters.particle import Cloud
+from mapfilter.models.ageing import Ageing
+from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
@@ -80,13 +82,18 @@ class MeasuredMapModel(BayesModel):
         tenths: Bytes = np.minimum(np.rint(10 * more_db), 255).astype(np.uint8).reshape(-1)
         return tenths
 
-    def _weigh_serving(
-        self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
-    ) -> None:
+    def _serving(
+        self,
+        memory: LevelMemory,
+        kept: Ageing,
+        pixel: Ints32,
+        log_weight: Floats,
+        reading: RadioReading,
+    ) -> tuple[Ageing, list[Call]]:
         if self.serving_is_measured:
             log_weight += self.log_serving_at(pixel, reading)
-        else:
-            super()._weigh_serving(cloud, pixel, log_weight, reading)
+            return kept, []
+        return super()._serving(memory, kept, pixel, log_weight, reading)
 
     @property
     def serving_is_measured(self) -> bool:

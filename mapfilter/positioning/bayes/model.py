@@ -16,14 +16,15 @@ import numpy as np
 from mapfilter._threads import ONE, Call, Threads
 from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.filters.copies import columns_of
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import log_sum
 from mapfilter.models import fingerprint
+from mapfilter.models.ageing import Ageing, age, as_it_is
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import (
     Prediction,
-    age,
     gained,
     rough_squares,
     shares_above,
@@ -187,17 +188,23 @@ class BayesModel:
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
             beyond, used = np.flatnonzero(self.area.beyond(cloud.state)), True
             before = log_weight[beyond]
-            cloud, pixel = self._aged(cloud, reading)
-            other = 0.0
+            memory, kept, pixel = self._found(cloud, reading)
+            other, calls = 0.0, list[Call]()
             if reading.serving >= 0 and reading.serving_weight > 0:
-                self._weigh_serving(cloud, pixel, log_weight, reading)
+                kept, calls = self._serving(memory, kept, pixel, log_weight, reading)
             if reading.levels is not None:
-                start = log_weight.copy() if withholds else log_weight
-                cloud = self._weigh_levels(cloud, pixel, log_weight, reading)
-                other = cloud.shared.other_log_likelihood
+                start = log_weight
+                if withholds:
+                    self.threads.over(log_weight.size, *calls)
+                    start, calls = log_weight.copy(), []
+                memory = self._weigh_levels(memory, kept, calls, pixel, log_weight, reading)
+                other = memory.other_log_likelihood
                 if withholds:
                     withheld_share = 1 - self.evidence.levels.tracking_share
                     kept_back = gained(start, log_weight, withheld_share)
+            else:
+                self.threads.over(log_weight.size, *calls, (age, kept))
+            cloud = Cloud(cloud.state, kept.now, memory)
             for bound in reading.bounds:
                 predicted, own, cells = self._looked_up(pixel, bound.cells, rough=False)
                 fingerprint.weigh_by_bound(
@@ -257,38 +264,62 @@ class BayesModel:
     def _bands(self) -> int:
         return len(self.area.cell_ids) + 2
 
-    def _aged(self, cloud: Cloud, reading: RadioReading) -> tuple[Cloud, Ints32]:
-        """Return hypotheses with what they keep as a reading finds it, and their pixels."""
+    def _found(self, cloud: Cloud, reading: RadioReading) -> tuple[LevelMemory, Ageing, Ints32]:
+        """Return what a reading finds: the memory, what hypotheses keep, and their pixels.
+
+        Of what they keep all rows are to be aged yet, but for a serving cell that is new.
+        """
         errors, memory, length_m = self.evidence.levels, cloud.shared, reading.length_m
-        frame, count = self.area.frame, cloud.state.shape[1]
-        pixel, last = np.empty(count, dtype=np.int32), (frame.rows - 1, frame.cols - 1)
-        calls: list[Call] = [(fingerprint.fill_pixels, cloud.state, frame, *last, pixel)]
+        # That takes less time than to divide it.
+        pixel, count = fingerprint.pixels(cloud.state, self.area.frame), cloud.state.shape[1]
         if memory is None or not self.remember:
             memory = LevelMemory.empty(errors, self.area.site_of)
-            kept = memory.start(count)
+            kept = as_it_is(memory.start(count))
         else:
             memory, decay = memory.after(length_m)
-            keep = exp(-length_m / errors.fault_m)
+            keep, due = exp(-length_m / errors.fault_m), np.ones(memory.width, dtype=np.bool_)
             # NumPy asks for large pages, numba for many small ones.
-            kept = np.empty_like(cloud.kept)
-            calls.append((age, cloud.kept, decay, keep, errors.fault_log_odds, kept))
-        self.threads.over(count, *calls)
+            now = np.empty((memory.width, count), dtype=np.float32)
+            kept = Ageing(*columns_of(cloud.kept), decay, keep, errors.fault_log_odds, due, now)
         served = [reading.serving] if reading.serving >= 0 else []
-        memory, kept = memory.with_cells(np.array(served, dtype=np.int32), kept, in_place=True)
-        return Cloud(cloud.state, kept, memory), pixel
+        memory, kept, _ = self._with_cells(memory, kept, [], np.array(served, dtype=np.int32))
+        return memory, kept, pixel
 
-    def _weigh_serving(
-        self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
-    ) -> None:
+    def _with_cells(
+        self, memory: LevelMemory, kept: Ageing, calls: list[Call], bands: Ints32
+    ) -> tuple[LevelMemory, Ageing, list[Call]]:
+        """Give cells slots; where some are new, what hypotheses keep is aged before.
+
+        ``calls`` are due before that, and are returned if they still are.
+        """
+        if memory.has_slots(bands):
+            return memory, kept, calls
+        self.threads.over(kept.now.shape[1], *calls, (age, kept))
+        memory, now = memory.with_cells(bands, kept.now, in_place=True)
+        return memory, as_it_is(now), []
+
+    def _serving(
+        self,
+        memory: LevelMemory,
+        kept: Ageing,
+        pixel: Ints32,
+        log_weight: Floats,
+        reading: RadioReading,
+    ) -> tuple[Ageing, list[Call]]:
+        """Return the calls that add the log-likelihood of the serving cell, in place.
+
+        Also return what is to be aged besides.
+        """
         table, weight = self._serving_table, reading.serving_weight
-        odds = cloud.shared.fault_odds(reading.serving, cloud.kept)
+        row = memory.fault_row(reading.serving)
         other = -self.evidence.serving.fault_nats
         # Its own level, the strongest and the second strongest.
         cells = np.array([reading.serving, self._bands - 2, self._bands - 1], dtype=np.int32)
         predicted, pixel, cells = self._looked_up(pixel, cells, rough=False)
         flat, bands, cell = predicted.level_dbm, predicted.bands, int(cells[0])
-        given = pixel, flat, bands, cell, table, weight, odds, other, log_weight
-        self.threads.over(pixel.size, (fingerprint.weigh_by_serving, *given))
+        given = pixel, flat, bands, cell, table, weight, kept.now[row], other, log_weight
+        calls = [(age, kept.of_row(row)), (fingerprint.weigh_by_serving, *given)]
+        return kept.without_row(row), calls
 
     @property
     def serving_is_measured(self) -> bool:
@@ -307,17 +338,25 @@ class BayesModel:
         return weight
 
     def _weigh_levels(
-        self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
-    ) -> Cloud:
-        """Add the log-likelihood of levels and absent cells; return what hypotheses keep now."""
+        self,
+        memory: LevelMemory,
+        kept: Ageing,
+        calls: list[Call],
+        pixel: Ints32,
+        log_weight: Floats,
+        reading: RadioReading,
+    ) -> LevelMemory:
+        """Add the log-likelihood of levels and absent cells, in place; return the memory now.
+
+        ``calls`` are due before.
+        """
         report = reading.levels
         assert report is not None
-        memory, kept, weight = cloud.shared, cloud.kept, self.level_weight(reading)
+        weight = self.level_weight(reading)
         # Cells that nobody expects say nothing, neither for the belief nor against it.
         report = report._replace(absent=self._expected_absent(pixel, report))
         cells = np.concatenate([report.cell, report.absent])
-        # What they keep has been copied as it was aged.
-        memory, kept = memory.with_cells(cells[: memory.slots], kept, in_place=True)
+        memory, kept, calls = self._with_cells(memory, kept, calls, cells[: memory.slots])
         if report.cell.size > memory.slots:
             slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
@@ -326,14 +365,14 @@ class BayesModel:
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
         by_levels = predicted, terms._replace(cell=cells), weight, log_weight
-        calls: list[Call] = [(weigh_by_levels, kept, own, *by_levels)]
+        calls = [*calls, (weigh_by_levels, kept, own, *by_levels)]
         if absent.cell.size:
             predicted, own, cells = self._looked_up(pixel, absent.cell)
             terms_of = absent._replace(cell=cells), self._bound_table
-            calls.append((weigh_by_absence, kept, own, predicted, *terms_of, weight, log_weight))
+            given = own, predicted, *terms_of, weight, log_weight
+            calls.append((weigh_by_absence, kept.now, *given))
         self.threads.over(log_weight.size, *calls)
-        other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
-        return Cloud(cloud.state, kept, memory.with_other(other))
+        return memory.with_other(weight * (float(terms.other.sum()) + float(absent.other.sum())))
 
     def _expected_absent(self, pixel: Ints32, report: LevelReport) -> Ints32:
         if not isinstance(self.area, TiledArea):
