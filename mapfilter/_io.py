@@ -61,7 +61,7 @@ def atomic_file(path: Path) -> Iterator[Path]:
     try:
         with _writing(temporary, path):
             yield temporary
-            sync(temporary)
+            _sync(temporary)
         with _into_place(path, target):
             temporary.replace(target)
     finally:
@@ -87,9 +87,9 @@ def atomic_dir(path: Path) -> Iterator[Path]:
             yield new
             # Most of the time of each is waiting for the disk, which takes many at once.
             with ThreadPoolExecutor(_SYNCED_AT_ONCE) as pool:
-                for _ in pool.map(sync, sorted(new.rglob("*"))):
+                for _ in pool.map(_sync, sorted(new.rglob("*"))):
                     pass
-            sync(new)
+            _sync(new)
         with _into_place(path, target):
             if target.exists():
                 exchange(new, target)
@@ -118,14 +118,14 @@ def replaced_files(folder: Path, older: Callable[[], Iterable[Path]]) -> Iterato
             stale = set(older())
             files = sorted(path for path in new.rglob("*") if not path.is_dir())
             for file in files:
-                sync(file)
+                _sync(file)
             for file in files:
                 target = folder / file.relative_to(new)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 file.replace(target)
                 stale.discard(target)
             for within in {(folder / file.relative_to(new)).parent for file in files}:
-                sync(within)
+                _sync(within)
             for path in sorted(stale):
                 path.unlink(missing_ok=True)
                 if path.parent != folder and not any(path.parent.iterdir()):
@@ -283,7 +283,7 @@ def _writing(temporary: Path, path: Path) -> Iterator[None]:
 def _into_place(path: Path, target: Path) -> Iterator[None]:
     try:
         yield
-        sync(target.parent)
+        _sync(target.parent)
     except OSError as error:
         raise _not_writable(path, error) from error
 
@@ -304,8 +304,8 @@ def _partial_folder(path: Path) -> tuple[Path, Path]:
         raise _not_writable(path, error) from error
 
 
-def sync(path: Path) -> None:
-    """Flush a file, or a folder's list of names, to the disk; raises OSError."""
+def _sync(path: Path) -> None:
+    """Flush a file, or a folder's list of names, to the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -368,7 +368,7 @@ def replay(
     from mapfilter.workflows.drawer import drawer_process
 
     # What draws starts before the imports below, which take as long as its own.
-    undrawn = any(setting.startswith("output.pictures") for setting in settings or ())
+    undrawn = any("pictures" in setting and "none" in setting for setting in settings or ())
     with nullcontext() if undrawn else drawer_process() as drawers:
         from mapfilter.config.load import load_config
         from mapfilter.workflows.replay import run_replay

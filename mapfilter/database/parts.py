@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from mapfilter._io import sync, write_sealed
+from mapfilter._io import write_sealed
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.database.manifest import (
@@ -89,16 +89,14 @@ class PartWriter:
     """Collects rows, and writes them into a folder whenever enough of them are in memory.
 
     With several ``writers`` as many threads write these parts while rows of the next ones are
-    collected, and no longer than that: twice as many rows are in memory. They flush files to the
-    disk, too, for which nobody then waits at the end. The parts do not depend on it. ``points``
-    counts those added and ``received`` those of them with a level; ``parts`` are the manifest's
-    entries at the end.
+    collected, and no longer than that: twice as many rows are in memory. The parts do not depend on
+    it. ``points`` counts those added and ``received`` those of them with a level; ``parts`` are the
+    manifest's entries at the end.
     """
 
     def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int = 1) -> None:
         self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
         self._pool = ThreadPoolExecutor(writers) if writers > 1 else None
-        self._syncs = writers > 1
         self._writing: list[Future[None]] = []
         self._folders = levels_folders(cell_ids)
         self._points: list[pa.Table] = []
@@ -136,8 +134,6 @@ class PartWriter:
 
     def finish(self) -> None:
         """Write what is left, and list the parts: points first, then cell by cell."""
-        # Who waits for these flushes them to the disk, many at a time.
-        self._syncs = False
         self._flush()
         self._wait()
         if self._points_file is None:
@@ -173,8 +169,6 @@ class PartWriter:
         if self._points_file is None:
             self._points_file = open_writer(table.schema, self._folder / POINTS)
         self._points_file.write_table(table, row_group_size=_ROWS_IN_A_GROUP)
-        if self._syncs:
-            sync(self._folder / POINTS)
         for chunk in table["geometry"].chunks:
             places = point_coordinates(chunk)
             low, high = self._bounds
@@ -187,8 +181,6 @@ class PartWriter:
         file = self._folder / self._folders[cell_id] / f"part-{len(written)}.parquet"
         file.parent.mkdir(parents=True, exist_ok=True)
         write_columns(table, file, _ROWS_IN_A_GROUP)
-        if self._syncs:
-            sync(file)
         written.append(describe_part(self._folder, file, table.num_rows, cell_id))
 
 

@@ -184,7 +184,9 @@ def _draw_points(axes: Axes, frame: LocalFrame, points_m: Floats, base: BaseMap)
 def _draw_scale_bar(axes: Axes, width_m: float) -> None:
     # The longest of 1, 2, 5 times a power of ten that is no more than a quarter of the width.
     power = 10.0 ** floor(log10(width_m / 4))
-    length_m = next(factor * power for factor in (5.0, 2.0, 1.0) if factor * power <= width_m / 4)
+    # A little less than a power of ten may be rounded to it: then half of it is the longest.
+    lengths_m = (factor * power for factor in (5.0, 2.0, 1.0, 0.5))
+    length_m = next(length_m for length_m in lengths_m if length_m <= width_m / 4)
     text = f"{length_m / 1000:g} km" if length_m >= 1000 else f"{length_m:g} m"
     x = np.array([0.04, 0.04 + length_m / width_m])
     (bar,) = axes.plot(x, [0.045, 0.045], color=BLACK, linewidth=2.5, solid_capstyle="butt")
