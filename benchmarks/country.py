@@ -34,13 +34,12 @@ from statistics import median
 import numpy as np
 from metropolis import CRS, FLOOR_DBM, NORTH_M, PIXEL_M, WEST_M, Radio, made_plan, made_ways
 
-from mapfilter._code import code_digest
 from mapfilter._parallel import executor_of, local_executor
 from mapfilter.database.build import build
 from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import open_database
-from mapfilter.database.tiles import read_tiles
+from mapfilter.database.tiles import get_ready_to_read
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
@@ -107,9 +106,8 @@ def processor_s() -> float:
 
 
 def process_of(task: int, wait_s: float = 0.3) -> int:  # noqa: ARG001
-    """Return the process that this runs in, once it has imported what a build needs."""
-    code_digest()
-    read_tiles([])
+    """Return the process that this runs in, once it is ready, as before a build's first tile."""
+    get_ready_to_read()
     time.sleep(wait_s)
     return os.getpid()
 

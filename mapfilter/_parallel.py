@@ -95,9 +95,20 @@ def warmed(workers: Executor, count: int, task: Callable[..., Any]) -> None:
 
     What goes wrong is left to those who hand in tasks.
     """
+    made_ready(workers, count, partial(callable, task))
+
+
+def made_ready(workers: Executor, count: int, ready: Callable[[], Any]) -> None:
+    """Have workers start, and do what each does once, while nothing waits for them.
+
+    This process, if it is the only one, does it when it comes to it. What goes wrong is left to
+    those who hand in tasks.
+    """
+    if isinstance(workers, SerialExecutor):
+        return
     with contextlib.suppress(BrokenExecutor, NoProcessError):
         for _ in range(count):
-            workers.submit(callable, task)
+            workers.submit(ready)
 
 
 def begun(workers: Executor, task: Callable[[], T]) -> Callable[[], T]:

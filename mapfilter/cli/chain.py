@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, get_args
 
@@ -364,39 +365,48 @@ def replay(
     as_json: JsonOption = False,
 ) -> None:
     """Locate one log, or every log of a folder; exit code 3 if done in part."""
-    from mapfilter.config.load import load_config
-    from mapfilter.workflows.replay import run_replay
-    from mapfilter.workflows.replayed import replay_figures
+    from mapfilter.workflows.drawer import drawer_process
 
-    given = seeded(settings, seed, "journeys.seed")
-    paths = {"database.path": database, "track.path": log[0] if log else None}
-    for key, value in (paths | {"track.zone": zone}).items():
-        if value is not None:
-            given.append(f"{key}={toml(str(value))}")
-    for key, files in (("track.recordings", (log or [])[1:]), ("track.truth", truth or [])):
-        if files:
-            given.append(f"{key}={toml([str(file) for file in files])}")
-    if course_motion:
-        given.append("track.course_motion=true")
-    walk = walk_changes(declination, step_length)
-    given += [f"track.walk.{name}={value!r}" for name, value in walk.items()]
-    if filter_name is not None:
-        given.append(f"filter.name={toml(filter_name)}")
-    if without is not None:
-        given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
-    if smooth:
-        given.append("filter.smooth=true")
-    if protection is not None:
-        given.append(f"integrity.risk={protection!r}")
-    loaded = load_config(config, given)
-    if walk and not loaded.track.steps:
-        refuse({"--declination": declination, "--step-length": step_length}, "track.steps = false")
-    check_custom_filter(loaded)
-    folder = (out or loaded.output.dir / "replay").absolute()
-    with progress_bar("replay") as progress:
-        result = run_replay(loaded, folder, html=html, beside=True, progress=progress)
-    print_result(replay_figures(result), as_json)
-    for warning in result.warnings:
-        print_message(warning)
-    if result.partial:
-        raise typer.Exit(PARTIAL)
+    # What draws starts before the imports below, which take as long as its own.
+    undrawn = any("pictures" in setting and "none" in setting for setting in settings or ())
+    with nullcontext() if undrawn else drawer_process() as drawers:
+        from mapfilter.config.load import load_config
+        from mapfilter.workflows.replay import run_replay
+        from mapfilter.workflows.replayed import replay_figures
+
+        given = seeded(settings, seed, "journeys.seed")
+        paths = {"database.path": database, "track.path": log[0] if log else None}
+        for key, value in (paths | {"track.zone": zone}).items():
+            if value is not None:
+                given.append(f"{key}={toml(str(value))}")
+        for key, files in (("track.recordings", (log or [])[1:]), ("track.truth", truth or [])):
+            if files:
+                given.append(f"{key}={toml([str(file) for file in files])}")
+        if course_motion:
+            given.append("track.course_motion=true")
+        walk = walk_changes(declination, step_length)
+        given += [f"track.walk.{name}={value!r}" for name, value in walk.items()]
+        if filter_name is not None:
+            given.append(f"filter.name={toml(filter_name)}")
+        if without is not None:
+            given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
+        if smooth:
+            given.append("filter.smooth=true")
+        if protection is not None:
+            given.append(f"integrity.risk={protection!r}")
+        loaded = load_config(config, given)
+        if walk and not loaded.track.steps:
+            refuse(
+                {"--declination": declination, "--step-length": step_length}, "track.steps = false"
+            )
+        check_custom_filter(loaded)
+        folder = (out or loaded.output.dir / "replay").absolute()
+        with progress_bar("replay") as progress:
+            result = run_replay(
+                loaded, folder, html=html, beside=True, drawers=drawers, progress=progress
+            )
+        print_result(replay_figures(result), as_json)
+        for warning in result.warnings:
+            print_message(warning)
+        if result.partial:
+            raise typer.Exit(PARTIAL)

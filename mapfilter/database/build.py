@@ -24,7 +24,7 @@ from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
-from mapfilter.database.store import open_database
+from mapfilter.database.store import open_written
 from mapfilter.database.tiles import (
     TileRows,
     TileTask,
@@ -42,6 +42,8 @@ from mapfilter.roads.lattice import RouteLattice
 
 MARGIN_DB = 6.0
 TILE_PX = 256
+TASKS_A_WORKER = 4
+"""Tasks in flight for each worker, which keep all of them busy."""
 PIXELS_A_TASK = 16_000_000
 """Pixels of a task: some eight tiles of 30 cells, which share most of their files."""
 
@@ -116,7 +118,7 @@ def build(
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     in_flight : int
-        Tasks submitted at a time; four per worker keep all of them busy.
+        Tasks submitted at a time, :data:`TASKS_A_WORKER` for each worker.
     pixels_a_task : int
         Most pixels that a task reads, of all cells that reach its tiles; with 0 it has one tile.
         Tiles of a task read a file that reaches several of them once. The last tasks are smaller.
@@ -175,7 +177,7 @@ def build(
             parts = MeasuredParts(readings, deviations_at_points(folder, deviation, ids))
         head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts, parts)
         head.write(folder, written.parts)
-    return open_database(out)
+    return open_written(out)
 
 
 def build_roads(
@@ -209,7 +211,7 @@ def build_roads(
         plan = CellPlan(lattice.crs, ())
         head = Head(lattice, plan, parameters, attribution, tuple(inputs), counts)
         head.write(folder, written.parts)
-    return open_database(out)
+    return open_written(out)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -274,7 +276,7 @@ class BuildJob:
         """Yield the tiles in order, finished ones from disk."""
         every = range(len(self.windows))
         missing = [n for n in every if not finished.keep or finished.load(n) is None]
-        shares = 1 if isinstance(executor, SerialExecutor) else max(in_flight // 2, 1)
+        shares = 1 if isinstance(executor, SerialExecutor) else max(in_flight // TASKS_A_WORKER, 1)
         todo = tuple(missing)
         tasks = grouped(map(self.task, todo), pixels_a_task, len(todo), shares)
         results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
+import shapely
 from numpy.typing import NDArray
 
+from mapfilter._code import code_digest
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
@@ -16,7 +18,9 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.sampling import Places, levels_at
+from mapfilter.roads.index import RouteSource
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.ways import Ways
 
 _MAX_TILES = 64
 """Tiles of a group, however few cells reach them."""
@@ -129,6 +133,20 @@ def grouped(
         pixels += task.pixels
     if group:
         yield group
+
+
+def get_ready_to_read() -> None:
+    """Load what the first tile takes, the kernel that lays points above all, while nothing waits.
+
+    A worker does it when it starts; each process does it once.
+    """
+    code_digest()
+    lattice = Lattice("EPSG:32632", 0.0, 0.0, 1.0, 1, 1)
+    line = np.array([shapely.LineString([(0, -0.5), (1, -0.5)])])
+    one, code = np.ones(1, np.int64), np.zeros(1, np.int16)
+    ways = Ways(lattice.crs, one, code, ("way",), line, np.zeros(1, bool), np.zeros(1, np.int8))
+    read_tiles([])
+    places_table(RouteSource.of(ways, half_width_m=1.0).tile(lattice), lattice)
 
 
 def read_tiles(tasks: Sequence[TileTask]) -> list[bytes]:

@@ -40,6 +40,7 @@ MAP_IN = 7.0
 
 _KILOMETRE_FROM_M = 1500.0
 _MOST_PX = 2400
+_BEYOND_PX = 8
 _ROW_IN, _HEADING_IN = 0.205, 0.55
 
 
@@ -105,7 +106,7 @@ def draw_base(
     """
     frame = local_frame(base)
     if base.points_m is not None and len(base.points_m):
-        _draw_points(axes, frame, base.points_m, base.resolution_m)
+        _draw_points(axes, frame, base.points_m, base)
     lines = [np.column_stack(frame(line[:, 0], line[:, 1])) for line in base.streets]
     if lines:
         axes.add_collection(LineCollection(lines, colors=streets, linewidths=0.6, zorder=1.5))
@@ -156,23 +157,36 @@ def _show_extent(axes: Axes, frame: LocalFrame, base: BaseMap) -> None:
     axes.set_ylim(0.0, top)
 
 
-def _draw_points(axes: Axes, frame: LocalFrame, points_m: Floats, resolution_m: float) -> None:
-    """Draw points as the pixels that they are the centres of; of large areas, as larger pixels."""
-    low = points_m.min(axis=0) - resolution_m / 2
-    side_m = max(resolution_m, float(np.ptp(points_m, axis=0).max()) / _MOST_PX)
-    col, row = ((points_m - low) / side_m).astype(np.int64).T
+def _draw_points(axes: Axes, frame: LocalFrame, points_m: Floats, base: BaseMap) -> None:
+    """Draw points as the pixels that they are the centres of; of large areas, as larger pixels.
+
+    Those beyond the extent are left out, which takes less than not to show them.
+    """
+    low = points_m.min(axis=0) - base.resolution_m / 2
+    side_m = max(base.resolution_m, float(np.ptp(points_m, axis=0).max()) / _MOST_PX)
+    at = ((points_m - low) / side_m).astype(np.int64)
+    corners = (np.array(base.bounds_m).reshape(2, 2) - low) / side_m
+    first, end = np.floor(corners[0]) - _BEYOND_PX, np.ceil(corners[1]) + _BEYOND_PX
+    at = at[((at >= first) & (at < end)).all(axis=1)]
+    if not len(at):
+        return
+    corner = at.min(axis=0)
+    col, row = (at - corner).T
     # Bytes, not fractions: matplotlib resamples them in a quarter of the time.
     pixels = np.zeros((int(row.max()) + 1, int(col.max()) + 1, 4), dtype=np.uint8)
     pixels[..., :3] = np.round(255 * np.array(to_rgb(STREET)))
     pixels[row, col, 3] = round(255 * 0.75)
-    high = low + side_m * np.array(pixels.shape[1::-1])
-    axes.imshow(pixels, extent=frame.extent((*low, *high)), origin="lower", zorder=1)
+    west_south = low + side_m * corner
+    high = west_south + side_m * np.array(pixels.shape[1::-1])
+    axes.imshow(pixels, extent=frame.extent((*west_south, *high)), origin="lower", zorder=1)
 
 
 def _draw_scale_bar(axes: Axes, width_m: float) -> None:
     # The longest of 1, 2, 5 times a power of ten that is no more than a quarter of the width.
     power = 10.0 ** floor(log10(width_m / 4))
-    length_m = next(factor * power for factor in (5.0, 2.0, 1.0) if factor * power <= width_m / 4)
+    # A little less than a power of ten may be rounded to it: then half of it is the longest.
+    lengths_m = (factor * power for factor in (5.0, 2.0, 1.0, 0.5))
+    length_m = next(length_m for length_m in lengths_m if length_m <= width_m / 4)
     text = f"{length_m / 1000:g} km" if length_m >= 1000 else f"{length_m:g} m"
     x = np.array([0.04, 0.04 + length_m / width_m])
     (bar,) = axes.plot(x, [0.045, 0.045], color=BLACK, linewidth=2.5, solid_capstyle="butt")

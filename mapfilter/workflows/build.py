@@ -8,15 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from mapfilter._io import ensure_writable_folder
-from mapfilter._parallel import Progress, executor_of
+from mapfilter._parallel import Progress, executor_of, made_ready
 from mapfilter.config.sections import Config
-from mapfilter.database.build import build, build_roads
+from mapfilter.database.build import TASKS_A_WORKER, build, build_roads
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.floor import floor_notes
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.measured import Readings, read_checked_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
+from mapfilter.database.tiles import get_ready_to_read
 from mapfilter.errors import ConfigError, StoreError, fail
 from mapfilter.rasters.geotiff import READINGS_TAG, tag_of
 from mapfilter.rasters.opening import open_rasters
@@ -29,8 +30,6 @@ from mapfilter.workflows.world import (
     raster_cover,
     raster_world,
 )
-
-_TASKS_A_WORKER = 4
 
 
 @dataclass(frozen=True)
@@ -74,9 +73,11 @@ def run_build(
     target, section = config.database_path, config.database
     if not section.cells:
         return _build_roads(config, progress)
-    rasters, plan, world = raster_world(config, planned_rasters(config))
-    ensure_writable_folder(target.parent)
     with executor_of(workers, cluster) as (executor, at_once):
+        # Workers start while the inputs are read.
+        made_ready(executor, at_once, get_ready_to_read)
+        rasters, plan, world = raster_world(config, planned_rasters(config))
+        ensure_writable_folder(target.parent)
         database = build(
             rasters,
             plan,
@@ -89,7 +90,7 @@ def run_build(
             attribution=world.streets.attribution,
             measured=_measured(config),
             executor=executor,
-            in_flight=_TASKS_A_WORKER * at_once,
+            in_flight=TASKS_A_WORKER * at_once,
             writers=at_once,
             resume=resume,
             progress=progress,

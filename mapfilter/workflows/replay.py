@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -55,6 +56,7 @@ from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.track_pictures import (
     Handed,
     TrackPictures,
+    begin_mapless,
     begin_pictures,
     drawn_beside,
     track_pictures,
@@ -126,6 +128,7 @@ def run_replay(
     *,
     html: bool = False,
     beside: bool = False,
+    drawers: Executor | None = None,
     progress: Progress | None = None,
 ) -> ReplayResult:
     """Locate the log or logs of a configuration and write estimates, figures and pictures.
@@ -142,6 +145,8 @@ def run_replay(
     beside : bool
         Whether other processes may compile and draw meanwhile. They import the main module of the
         program again, so a script says so below ``if __name__ == "__main__"`` only.
+    drawers : Executor, optional
+        What draws, where it was started before (``workflows.drawer``).
     progress : callable, optional
         Called with logs done and logs in all.
 
@@ -196,12 +201,14 @@ def run_replay(
         recorder = TraceRecorder(filter_) if html else None
         track = locate(log, filter_, rng, snapshots=drawn, risk=risk, recorder=recorder)
         into = new if count == 1 else new / name
-        shown = _shown(database, log, track) if drawn else None
-        pictures = begin_pictures(shown, drawers) if shown is not None else {}
+        truth = Truth.of_table(log.truth)
+        mapless = begin_mapless(track, truth, drawing) if drawn and database is not None else {}
+        shown = _shown(database, truth, track) if drawn else None
+        pictures = begin_pictures(shown, drawing, mapless) if shown is not None else {}
         baseline = baselines.of(log)
         if shown is not None:
             beside_m = baseline.error_m if baseline is not None else None
-            pictures = with_error_picture(pictures, shown, drawers, beside_m)
+            pictures = with_error_picture(pictures, shown, drawing, beside_m)
         if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
         lack = lack_of(opened, log, options, track.estimate, database)
@@ -211,9 +218,12 @@ def run_replay(
         files = tuple(out / file.relative_to(new) for file in written.outputs)
         return replace(written, outputs=files)
 
+    place: AbstractContextManager[Executor] = nullcontext(drawers or SerialExecutor())
+    if drawers is None and beside and wanted != "none":
+        place = drawn_beside()
     # Older results stay until all of these are whole.
     with (
-        drawn_beside() if beside and wanted != "none" else nullcontext(SerialExecutor()) as drawers,
+        place as drawing,
         replaced_files(out, partial(older_results, out)) as new,
     ):
         logs = []
@@ -267,10 +277,10 @@ def _database(config: Config, options: FilterOptions) -> RadioRouteDatabase | No
 
 
 def _shown(
-    database: RadioRouteDatabase | None, log: TrackLog, track: PositionedTrack
+    database: RadioRouteDatabase | None, truth: Truth | None, track: PositionedTrack
 ) -> TrackPictures:
     base = street_map(database, served_points(database)) if database is not None else None
-    return track_pictures(track, Truth.of_table(log.truth), base)
+    return track_pictures(track, truth, base)
 
 
 def _write(

@@ -6,23 +6,22 @@ this one imports and draws meanwhile. Modules that draw are therefore imported i
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mapfilter._parallel import SerialExecutor, begun, spare_processes
+from mapfilter._parallel import begun
 from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot, TrackEstimate
 from mapfilter.report.ground import MAX_PANELS, BaseMap
+from mapfilter.workflows.drawer import DRAWING_LIBRARY, drawer_process
 from mapfilter.workflows.results import PICTURES
 
 if TYPE_CHECKING:
@@ -31,28 +30,18 @@ if TYPE_CHECKING:
 _CANDIDATES, _BELIEF, _TRACK, _ERROR, _EVIDENCE = PICTURES
 _PLAIN = (_TRACK, _EVIDENCE)
 _SQUARE_M = 5.0
-_DRAWING_LIBRARY = "matplotlib"
+_DRAWING_LIBRARY = DRAWING_LIBRARY
 
 Handed = dict[str, Callable[[], bytes]]
 """What waits for the PNG of each picture, by its name."""
+_NONE: Mapping[str, Callable[[], bytes]] = MappingProxyType({})
 
 
 @contextmanager
 def drawn_beside() -> Iterator[Executor]:
-    """Give what draws pictures while the block runs: another process, which gets ready at once.
-
-    It is this process, and each picture is drawn when it is handed out, on a single processor, in a
-    worker, where modules that draw are imported already, as in a notebook, and where the system
-    starts no process.
-    """
-    is_worker = multiprocessing.parent_process() is not None
-    if (os.cpu_count() or 1) == 1 or is_worker or _DRAWING_LIBRARY in sys.modules:
-        yield SerialExecutor()
-        return
-    # One: a second would import as long as it saves by drawing.
-    with spare_processes(1) as drawer:
-        begun(drawer, get_ready_to_draw)
-        yield drawer
+    """Give what draws pictures, as :func:`mapfilter.workflows.drawer.drawer_process` does."""
+    with drawer_process(_DRAWING_LIBRARY) as drawers:
+        yield drawers
 
 
 def get_ready_to_draw() -> None:
@@ -113,15 +102,27 @@ def track_pictures(
     return TrackPictures(track.estimate, truth, tuple(chosen), base)
 
 
-def begin_pictures(shown: TrackPictures, drawers: Executor) -> Handed:
+def begin_mapless(track: PositionedTrack, truth: Truth | None, drawers: Executor) -> Handed:
+    """Hand out the picture that needs no map, of the evidence, while the map is being read."""
+    if track.estimate.evidence is None or not len(track.estimate):
+        return {}
+    shown = TrackPictures(track.estimate, truth, (), None)
+    return {_EVIDENCE: begun(drawers, partial(draw_picture, shown, _EVIDENCE))}
+
+
+def begin_pictures(
+    shown: TrackPictures, drawers: Executor, handed: Mapping[str, Callable[[], bytes]] = _NONE
+) -> Handed:
     """Hand out the pictures of a located log that need no single reports.
 
-    What is returned waits for the PNG of each, by its name.
+    What is returned waits for the PNG of each, by its name. Those that were ``handed`` out already
+    are not drawn again.
     """
     # Only pictures of the belief need snapshots.
     plain = replace(shown, snapshots=())
     return {
-        name: begun(drawers, partial(draw_picture, plain if name in _PLAIN else shown, name))
+        name: handed.get(name)
+        or begun(drawers, partial(draw_picture, plain if name in _PLAIN else shown, name))
         for name in shown.names
         if name != _ERROR
     }

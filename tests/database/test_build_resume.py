@@ -2,7 +2,10 @@
 
 import multiprocessing
 import pickle
+import subprocess
+import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Event
 
@@ -13,6 +16,7 @@ from killed_worker import KillsOneWorker
 from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
 
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
+from mapfilter.database import store
 from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run
 from mapfilter.database.sources import LayerRoutes
@@ -163,6 +167,48 @@ def test_many_tiles_a_task_give_the_same_bytes(world, whole, tmp_path):
     with local_executor(2) as executor:
         built = again(world, tmp_path / "db", executor=executor, writers=2, **many)
     assert contents(built.path) == whole
+
+
+class Threads(ThreadPoolExecutor):
+    """Counts tasks."""
+
+    tasks = 0
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.tasks += 1
+        return super().submit(fn, *args, **kwargs)
+
+
+def test_tasks_become_small_at_the_end_and_no_smaller_than_workers_need(world, whole, tmp_path):
+    every = Counting()
+    again(world, tmp_path / "one", executor=every)
+    left, groups = every.tasks, 0
+    while left:
+        left, groups = left - -(-left // 2), groups + 1
+    with Threads(2) as executor:
+        again(world, tmp_path / "db", executor=executor, in_flight=8, pixels_a_task=10**9)
+    assert contents(tmp_path / "db") == whole
+    assert executor.tasks == groups < every.tasks
+
+
+def test_a_database_that_was_just_written_is_not_read_again(world, tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "_check_parts", lambda *_: pytest.fail("parts were read"))
+    built = again(world, tmp_path / "db")
+    monkeypatch.undo()
+    found = open_database(tmp_path / "db", verify="full")
+    assert found.generation == built.generation
+    assert found.manifest == built.manifest
+
+
+def test_who_is_ready_lays_the_first_tile_at_once():
+    """The kernel takes a quarter of a second to load; asked of a process of its own."""
+    code = (
+        "from mapfilter.database.tiles import get_ready_to_read as ready\n"
+        "from mapfilter.roads.index import _burn\n"
+        "assert not _burn.signatures\nready()\nassert len(_burn.signatures) == 1"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert run.returncode == 0, run.stderr
 
 
 def test_a_build_that_goes_on_makes_tasks_of_what_is_missing(world, whole, tmp_path):

@@ -13,8 +13,9 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
+from mapfilter.report import basemap
 from mapfilter.report.basemap import BaseMap, draw_base, largest
-from mapfilter.report.canvas import BLUE, ORANGE, save
+from mapfilter.report.canvas import BLUE, ORANGE, new_figure, png_of, save
 from mapfilter.report.network import plot_landuse, plot_margin
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routes import route_lattice_from_landuse
@@ -296,3 +297,23 @@ def test_a_network_gets_its_pictures(network, tmp_path):
     assert all(path.is_file() for path in drawn)
     assert len(draw_network(rasters, database, tmp_path)) == 5
     assert not (tmp_path / "land-use.png").exists()
+
+
+def test_a_map_draws_the_points_of_its_extent_and_the_same_picture(monkeypatch):
+    """Of a large area a picture shows a small part; the rest is not prepared for drawing."""
+    row, col = np.divmod(np.arange(400 * 400), 400)
+    points_m = np.column_stack([col * 5.0 + 2.5, row * 5.0 + 2.5])[(row % 9 == 0) | (col % 7 == 0)]
+    base = BaseMap((503.3, 701.7, 903.3, 1001.7), points_m=points_m)
+
+    def drawn():
+        axes = new_figure(5.0, 4.0).subplots()
+        draw_base(axes, base)
+        return axes.images[0].get_array().shape, png_of(axes)
+
+    size, png = drawn()
+    assert size == (77, 97, 4)
+    monkeypatch.setattr(basemap, "_BEYOND_PX", 10_000)
+    assert drawn() == ((400, 400, 4), png)
+    axes = new_figure(5.0, 4.0).subplots()
+    draw_base(axes, base.zoomed((9_000.0, 9_000.0, 9_100.0, 9_100.0)))
+    assert not axes.images

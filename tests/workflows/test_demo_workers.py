@@ -16,6 +16,7 @@ from mapfilter._parallel import (
     SerialExecutor,
     begun,
     local_executor,
+    made_ready,
     ordered_results,
     spare_processes,
     warmed,
@@ -72,6 +73,19 @@ def test_warming_up_leaves_faults_to_the_tasks():
     with local_executor(2) as workers:
         assert begun(workers, _Elsewhere())() == 7
         warmed(workers, 2, _where)
+
+
+def _noted(folder):
+    (folder / str(os.getpid())).touch()
+
+
+def test_workers_get_ready_by_themselves(tmp_path):
+    with local_executor(2) as workers:
+        made_ready(workers, 2, partial(_noted, tmp_path))
+    done = {int(file.name) for file in tmp_path.iterdir()}
+    assert 1 <= len(done) <= 2
+    assert os.getpid() not in done
+    made_ready(SerialExecutor(), 2, partial(pytest.fail, "done before it is its turn"))
 
 
 @pytest.mark.parametrize("lacks", ["semaphores", "room"])

@@ -10,12 +10,17 @@ from functools import partial
 import numpy as np
 import pytest
 
-from mapfilter._parallel import begun
+from mapfilter._parallel import SerialExecutor, begun
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.report.ground import BaseMap
 from mapfilter.workflows import track_pictures
-from mapfilter.workflows.track_pictures import begin_pictures, drawn_beside, with_error_picture
+from mapfilter.workflows.track_pictures import (
+    begin_mapless,
+    begin_pictures,
+    drawn_beside,
+    with_error_picture,
+)
 
 
 def _shown():
@@ -84,3 +89,36 @@ def test_no_command_that_locates_imports_what_draws():
     code = "import sys, mapfilter.workflows.replay as _; sys.exit('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
+
+
+def test_what_was_handed_out_while_the_map_was_read_is_not_drawn_again():
+    shown, drawn = _shown(), []
+
+    class Noting(SerialExecutor):
+        def submit(self, fn, /, *args, **kwargs):
+            drawn.append(fn)
+            return super().submit(fn, *args, **kwargs)
+
+    assert list(begin_pictures(shown, Noting())) == ["track.png"]
+    assert len(drawn) == 1
+    before = {"track.png": lambda: b"already"}
+    assert begin_pictures(shown, Noting(), before) == before
+    assert len(drawn) == 1
+    track = PositionedTrack(shown.estimate, (), 0.0)
+    assert begin_mapless(track, shown.truth, Noting()) == {}
+
+
+@pytest.mark.parametrize("pictures", ["all", "none"])
+def test_a_replay_starts_what_draws_before_its_imports(pictures):
+    """Both take about as long; asked of a process of its own."""
+    code = (
+        "import sys\nfrom mapfilter.workflows import drawer\n"
+        "def begin():\n    sys.exit(40 + ('pandas' in sys.modules or 'numba' in sys.modules))\n"
+        "drawer.drawer_process = begin\n"
+        "from mapfilter.cli import main\n"
+        f"sys.argv = ['mapfilter', 'replay', '--db', 'none', '--set', 'output.pictures={pictures}']"
+        "\nmain()"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    expected = {"all": 40, "none": 2}[pictures]
+    assert run.returncode == expected, run.stderr
