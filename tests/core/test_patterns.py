@@ -28,13 +28,15 @@ def compiled_patterns():
             if isinstance(value, re.Pattern):
                 found[f"{info.name}.{name}"] = value
     for file in ROOT.rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        text = file.read_text(encoding="utf-8")
+        # Most modules do not name it, and to parse all of them takes two seconds.
+        for node in ast.walk(ast.parse(text)) if re.search(r"\bre\b", text) else ():
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
                 continue
             of_re = isinstance(node.func.value, ast.Name) and node.func.value.id == "re"
-            text = node.args[0] if node.args else None
-            if of_re and node.func.attr in METHODS and isinstance(text, ast.Constant):
-                found[f"{file.relative_to(ROOT)}:{node.lineno}"] = re.compile(text.value)
+            given = node.args[0] if node.args else None
+            if of_re and node.func.attr in METHODS and isinstance(given, ast.Constant):
+                found[f"{file.relative_to(ROOT)}:{node.lineno}"] = re.compile(given.value)
     named = {value.pattern for place, value in found.items() if ":" not in place}
     return {
         place: value

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mapfilter._types import Floats, Floats32
+from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.filters.resampling import systematic
 from mapfilter.models.street_motion import MapWeights
 from mapfilter.models.street_path import weigh_path
@@ -79,7 +79,7 @@ def ends_of_path(
     turned_rad, log_prior, width_rad = turns
     found = np.empty(points.shape[1], dtype=np.float32)
     off = np.empty_like(found)
-    best, kept = -inf, []
+    best, kept = -inf, list[tuple[Ints32, Floats32, Floats32]]()
     for turn in range(turned_rad.size):
         off[:] = OFF_AT_START
         weigh_path(
@@ -94,20 +94,45 @@ def ends_of_path(
         )
         found += _F(log_prior[turn])
         best = max(best, float(found.max()))
-        place = np.flatnonzero(found > best - _LEAST_NATS).astype(np.int32)
-        turn_of = np.full(place.size, turn, dtype=np.int32)
-        kept.append((place, turn_of, found[place], off[place]))
-    place, turn_of, log_likelihood, off = (np.concatenate(part) for part in zip(*kept, strict=True))
-    log_drawn = _EVENNESS * (log_likelihood.astype(np.float64) - best)
-    drawn_by = np.exp(log_drawn)
+        place = np.flatnonzero(found > best - _LEAST_NATS)
+        kept.append((place.astype(np.int32), found[place], off[place]))
+    log_likelihood = np.concatenate([likely for _, likely, _ in kept])
+    # There are millions: nothing is kept of them but what they are drawn by.
+    drawn_by = _log_drawn(log_likelihood, best)
+    np.exp(drawn_by, out=drawn_by)
+    drawn_by /= drawn_by.sum()
     chosen = np.empty(count, dtype=np.int32)
-    systematic((drawn_by / drawn_by.sum()).astype(np.float32), rng.random(), chosen)
+    systematic(drawn_by.astype(np.float32), rng.random(), chosen)
     beside_m = area.lattice.resolution_m * (rng.random((2, count)) - 0.5)
     aside_rad = width_rad * (rng.random(count) - 0.5)
-    log_weight = log_likelihood[chosen] - best - log_drawn[chosen]
+    likely = log_likelihood[chosen]
+    log_weight = likely - best - _log_drawn(likely, best)
+    turn_of, place, off = _picked([(place, off) for place, _, off in kept], chosen)
     return PathEnds(
-        points[:, place[chosen]] + beside_m.astype(np.float32),
-        turned_rad[turn_of[chosen]] + aside_rad,
-        off[chosen],
+        points[:, place] + beside_m.astype(np.float32),
+        turned_rad[turn_of] + aside_rad,
+        off,
         log_weight - np.log(np.sum(np.exp(log_weight))),
     )
+
+
+def _log_drawn(log_likelihood: Floats32, best: float) -> Floats:
+    """Return the logarithm of what ends are drawn in proportion to."""
+    log_drawn = log_likelihood.astype(np.float64)
+    log_drawn -= best
+    log_drawn *= _EVENNESS
+    return log_drawn
+
+
+def _picked(kept: list[tuple[Ints32, Floats32]], chosen: Ints32) -> tuple[Ints, Ints32, Floats32]:
+    """Return part, place and ``off`` of each chosen one, by increasing numbers over all parts."""
+    edges = np.cumsum([0, *(place.size for place, _ in kept)])
+    ends = np.searchsorted(chosen, edges)
+    local = [
+        chosen[first:last] - edge
+        for edge, first, last in zip(edges[:-1], ends[:-1], ends[1:], strict=True)
+    ]
+    part = np.repeat(np.arange(len(kept)), np.diff(ends))
+    place = np.concatenate([own[at] for (own, _), at in zip(kept, local, strict=True)])
+    off = np.concatenate([own[at] for (_, own), at in zip(kept, local, strict=True)])
+    return part, place, off
