@@ -314,6 +314,7 @@ def test_a_map_draws_the_points_of_its_extent_and_the_same_picture(monkeypatch):
     assert size == (77, 97, 4)
     monkeypatch.setattr(basemap, "_BEYOND_PX", 10_000)
     assert drawn() == ((400, 400, 4), png)
+    monkeypatch.undo()
     axes = new_figure(5.0, 4.0).subplots()
     draw_base(axes, base.zoomed((9_000.0, 9_000.0, 9_100.0, 9_100.0)))
     assert not axes.images
