@@ -42,15 +42,15 @@ class Ageing(NamedTuple):
 
     def of_row(self, row: int) -> Ageing:
         """Return that of a single row, if it is due."""
-        only = np.zeros_like(self.due)
+        only = np.zeros(self.due.size, dtype=np.bool_)
         only[row] = self.due[row]
-        return self._replace(due=only)
+        return Ageing(*self[:5], only, self.now)
 
     def without_row(self, row: int) -> Ageing:
         """Return that of the other rows."""
         others = self.due.copy()
         others[row] = False
-        return self._replace(due=others)
+        return Ageing(*self[:5], others, self.now)
 
 
 def as_it_is(kept: Floats32) -> Ageing:
