@@ -80,14 +80,13 @@ def _texts(given: Any) -> pd.Categorical:
     """Return texts as categories; an empty text is a missing one."""
     if isinstance(given, pd.Categorical):
         return given
-    texts = np.asarray(given, dtype=object)
-    code, words = pd.factorize(texts)
-    order = sorted(
-        (at for at, word in enumerate(words.tolist()) if word != ""), key=words.__getitem__
-    )
-    rank = np.full(len(words) + 1, -1, dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return _categories(rank[code], [words[at] for at in order])
+    found = pd.Categorical(np.asarray(given, dtype=object))
+    words, codes = found.categories.tolist(), found.codes
+    if "" in words:
+        empty = words.index("")
+        del words[empty]
+        codes = np.where(codes == empty, -1, codes - (codes > empty))
+    return _categories(codes, words)
 
 
 def _categories(codes: Any, words: list[str]) -> pd.Categorical:
