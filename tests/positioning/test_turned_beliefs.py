@@ -64,6 +64,7 @@ def forks(hold, before_rad, after_rad, rules=RULES, white_rad=0.0, main=None):
 def test_the_odds_of_a_phone_that_was_turned(hold, jump_rad, odds):
     before_rad = 0.7
     found = forks(hold, before_rad, float(wrap_rad(before_rad + jump_rad)))
+    found, earlier = found[:2], found[2:]
     assert [one.log_prior for one in found] == pytest.approx(odds)
     assert [one.hold.sign for one in found] == [hold.sign, -hold.sign]
     for one in found:
@@ -72,14 +73,24 @@ def test_the_odds_of_a_phone_that_was_turned(hold, jump_rad, odds):
         assert one.hold.direction_rad(before_rad + jump_rad) == pytest.approx(ahead_rad)
         assert one.belief.log_evidence == -70.0
         assert one.log_bayes_factor(belief()) == 0.0
+    # Mirrored before, with the turn to the other side: not where it is one right round.
+    assert bool(earlier) == (abs(wrap_rad(jump_rad)) < np.radians(150.0))
+    for one in earlier:
+        assert one.log_prior == pytest.approx(RARE + MIRRORED)
+        turn_rad = one.hold.direction_rad(before_rad + jump_rad) - hold.direction_rad(before_rad)
+        assert wrap_rad(turn_rad + hold.sign * jump_rad) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_mirrored_back_to_the_usual_reading_is_likely():
     """From a mirrored reading the other sign is the mirrored one of the two."""
     hold = Hold(-1.0, 2.0)
-    _, other = forks(hold, 0.5, hold.direction_rad(0.5))
+    _, other, *_ = forks(hold, 0.5, hold.direction_rad(0.5))
     assert other.hold.is_usual
     assert other.log_prior == pytest.approx(USUAL + MIRRORED)
+    # Along an axis of the mirror nothing jumps, and the next corner shows that it is over.
+    *_, earlier = forks(hold, 1.0, 1.0 + 1.6)
+    assert earlier.hold == Hold()
+    assert earlier.log_prior == pytest.approx(USUAL + MIRRORED)
 
 
 def test_the_belief_in_which_headings_are_as_measured():
@@ -118,8 +129,7 @@ def test_the_white_noise_of_two_headings_is_in_their_bias():
     """Wrapped; the main belief keeps its own."""
     main = belief()
     rules = replace(RULES, particles=1000)
-    (one, other) = forks(Hold(), 0.0, 1.6, rules, white_rad=0.2, main=main)
-    for own in (one.belief, other.belief):
+    for own in (one.belief for one in forks(Hold(), 0.0, 1.6, rules, white_rad=0.2, main=main)):
         added = wrap_rad(own.state[BIAS].astype(float) - 3.0)
         assert abs(added.mean()) < 5 * 0.2 * (2 / 1000) ** 0.5
         assert added.std() == pytest.approx(0.2 * 2**0.5, rel=5 / 2000**0.5)
