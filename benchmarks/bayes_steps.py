@@ -38,7 +38,7 @@ def tracked_from(filter_: BayesPositioner, merged: list[Epoch]) -> tuple[BayesSt
     rng, state, tracked = np.random.default_rng(7), filter_.begin(), 0
     for number, epoch in enumerate(merged, start=1):
         state, _ = filter_.step(state, epoch, rng)
-        tracked += state.status is Status.TRACKING
+        tracked += state.status in (Status.TRACKING, Status.UNCERTAIN)
         if tracked >= 30:
             return state, number
     raise SystemExit("the walk is never tracked")
@@ -103,9 +103,9 @@ def main() -> None:
         before_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         found = locate(day, filter_, np.random.default_rng(7))
         most_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        share = np.mean([one is Status.TRACKING for one in found.estimate.status])
+        share = np.mean([one.is_followed for one in found.estimate.status])
         print(
-            f"{len(found.estimate)} epochs, {share:.1%} tracked: {found.filter_s:.1f} s", end=", "
+            f"{len(found.estimate)} epochs, {share:.1%} followed: {found.filter_s:.1f} s", end=", "
         )
         print(f"{most_mb:.0f} MB, {before_mb:.0f} MB before it")
         return

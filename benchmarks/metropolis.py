@@ -31,7 +31,6 @@ from mapfilter.database.tiles import TileRows, places_table, received_levels, ti
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.success import wilson_interval
-from mapfilter.filters.contract import Status
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -310,7 +309,7 @@ def walked(folder: Path, count: int, length_m: float, seed: int, extract: Path |
             before = time.process_time()
             state, out = positioner.step(state, epoch, rng)
             own.append(time.process_time() - before)
-            if state.status in (Status.CONVERGED, Status.TRACKING):
+            if state.status.is_followed:
                 tracked.append(own[-1])
                 if np.isnan(at_m):
                     at_m = float(np.hypot(out.fix.east_m - east(epoch.time_s),

@@ -28,7 +28,6 @@ RADII = (50, 67, 95, 99)
 """Per cent of the belief that the radii of an estimate hold."""
 
 _CLAIMS = (Status.CONVERGED, Status.TRACKING)
-_FOLLOWED = (*_CLAIMS, Status.UNCERTAIN)
 _WINDOW_M = 100.0
 
 
@@ -224,7 +223,8 @@ class Claims:
         How often CONVERGED was reported, the first time and after LOST, and how often of these more
         than 50 m off.
     false_starts : int
-        How often a claim began more than 50 m off.
+        How often a claim began more than 50 m off, after an epoch at which no position was
+        followed.
     lost : int
         How often LOST began.
     false_lost : int
@@ -260,14 +260,14 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
     inside = (estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1])
     counted = inside & (estimate.time_s <= until_s)
     claimed = counted & claims_of(estimate)
-    known = counted & np.array([status in _FOLLOWED for status in estimate.status], dtype=bool)
+    known = counted & np.array([status.is_followed for status in estimate.status], dtype=bool)
     converged = counted & np.array([s is Status.CONVERGED for s in estimate.status], dtype=bool)
     lost = counted & np.array([status is Status.LOST for status in estimate.status], dtype=bool)
     near = errors_m <= SUCCESS_RADIUS_M
     radii_m = np.column_stack([estimate.radii_m, estimate.radius_99_m])
     held = errors_m[:, np.newaxis] <= radii_m
     followed = counted & np.logical_or.accumulate(claimed) & np.isfinite(errors_m)
-    began_claim, began_lost = claimed & ~_before(claimed), lost & ~_before(lost)
+    began_claim, began_lost = claimed & ~_before(known), lost & ~_before(lost)
     return Claims(
         epochs=int(counted.sum()),
         km=float(truth.distance_at(min(until_s, float(truth.time_s[-1]))) / 1000),

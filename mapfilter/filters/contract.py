@@ -24,9 +24,9 @@ class Status(StrEnum):
     """State of a filter at an epoch.
 
     ``SEARCHING`` → ``CONVERGED`` (the first epoch at which the switch rule holds) → ``TRACKING``;
-    ``UNCERTAIN`` when a position is tracked, but may well be another one than the leading; ``LOST``
-    when the evidence contradicts the belief; ``OUTSIDE`` when nothing on the map explains
-    it: off the area, or in another network than the map's. No position is given then.
+    ``UNCERTAIN`` when a position is tracked, but not certain enough to be claimed; ``LOST`` when
+    the evidence contradicts the belief; ``OUTSIDE`` when nothing on the map explains it: off the
+    area, or in another network than the map's. No position is given then.
     """
 
     SEARCHING = "SEARCHING"
@@ -35,6 +35,11 @@ class Status(StrEnum):
     UNCERTAIN = "UNCERTAIN"
     LOST = "LOST"
     OUTSIDE = "OUTSIDE"
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether one position is followed, claimed or not."""
+        return self in (Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN)
 
 
 class Reason(StrEnum):

@@ -328,6 +328,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
                 (taken, log_weight, weight, chosen, log_of, chosen_by),
             )
             state, kept = copies, copies_of(kept, chosen)
+            if 2 * wanted < weight.size:
+                # What most of them kept would be held until the next report.
+                kept = kept.made()
             np.maximum(chosen_by, _LEAST_WEIGHT, out=chosen_by)
             log_weight = np.subtract(log_of, np.log(chosen_by, out=chosen_by), out=log_of)
             normalise_by(self.threads, log_weight, np.empty(wanted, dtype=np.float32))

@@ -34,7 +34,7 @@ class Fix:
     radii_m : (3,) array
         Radii that hold 50, 67 and 95 % of the belief.
     status : Status
-        SEARCHING, CONVERGED, TRACKING or LOST.
+        As in :class:`~mapfilter.filters.contract.Status`.
     hypotheses : int
         Number of hypotheses (candidates, particles or Gaussians).
     mass_50m : float
@@ -190,7 +190,7 @@ class TrackEstimate:
     radii_m : (N, 3) array
         Radii about the position that contain 50, 67 and 95 % of the belief.
     status : tuple of Status
-        SEARCHING, CONVERGED, TRACKING or LOST, for each epoch.
+        As in :class:`~mapfilter.filters.contract.Status`, for each epoch.
     hypotheses : (N,) array of int64
         Number of hypotheses (candidates, particles or Gaussians).
     mass_50m : (N,) array

@@ -295,7 +295,7 @@ class _Album:
             if fix.status is last.status and near:
                 return
         self.open = fix.status in (Status.SEARCHING, Status.CONVERGED)
-        if fix.status is not Status.TRACKING:
+        if fix.status not in (Status.TRACKING, Status.UNCERTAIN):
             hypotheses = found.east_m, found.north_m, found.weight
             at = fix.east_m, fix.north_m, fix.status
             self.taken.append(Snapshot(fix.time_s, self.travelled_m, *hypotheses, *at))

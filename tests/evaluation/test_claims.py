@@ -98,8 +98,10 @@ def test_lost_begins_once_and_is_false_right_after_a_good_position():
 def test_uncertain_positions_are_no_claims_but_may_be_lost_falsely():
     found = claims("SCTUUTU", [0, 0, 10, 60, 10, 60, 60])
     assert (found.claimed, found.within_50m, found.lost) == (3, 2, 0)
-    # A claim begins anew after it.
-    assert (found.false_starts, found.covered) == (1, (2, 2, 2, 2))
+    # What goes on after it begins no claim.
+    assert (found.false_starts, found.covered) == (0, (2, 2, 2, 2))
+    assert claims("SUTLUT", [60, 60, 60, 0, 60, 60]).false_starts == 0
+    assert claims("SUTLT", [60, 60, 60, 0, 60]).false_starts == 1
     found = claims("CTUULULUL", [0, 0, 0, 40, 40, 60, 60, 10, 10])
     assert (found.lost, found.false_lost) == (3, 2)
 

@@ -31,23 +31,44 @@ class Linear:
         self.compiled = compiled(self.model)
 
 
+def apart(ours, exact):
+    """Differences of mean and covariance, in units of the exact deviations."""
+    scale = np.sqrt(np.diagonal(exact.covariance))
+    covariance = (ours.covariance - exact.covariance) / np.outer(scale, scale)
+    return (ours.mean - exact.mean) / scale, covariance
+
+
 def agree(ours, exact, tolerance):
     """In units of the exact deviations."""
-    scale = np.sqrt(np.diagonal(exact.covariance))
-    assert np.abs((ours.mean - exact.mean) / scale).max() < tolerance
-    ratio = ours.covariance / np.outer(scale, scale) - exact.covariance / np.outer(scale, scale)
-    assert np.abs(ratio).max() < 2 * tolerance
+    mean, covariance = apart(ours, exact)
+    assert np.abs(mean).max() < tolerance
+    assert np.abs(covariance).max() < 2 * tolerance
 
 
 @pytest.mark.parametrize("options", [SIR, REGULARISED, SirOptions(0.5)], ids=str)
 def test_as_a_kalman_filter_where_all_is_linear(options):
-    """Positions within a few hundred metres: satellites' ranges are linear there to 2 mm."""
-    layout, rng = POSITION_CLOCK_3D, np.random.default_rng(1)
+    """Positions within a few hundred metres: satellites' ranges are linear there to 2 mm.
+
+    A single run is off by 0.05 deviations in each coordinate (root mean square of twelve seeds), by
+    chance alone; the mean of eight by 0.02, of which 0.06 are three.
+    """
+    runs = [linear_run(options, seed) for seed in range(1, 9)]
+    found = [apart(ours, exact) for ours, exact, _ in runs]
+    means, covariances = (np.array(values) for values in zip(*found, strict=True))
+    assert np.abs(np.mean([gained for *_, gained in runs], axis=0)).max() < 0.1
+    assert np.abs(means.mean(axis=0)).max() < 0.06
+    assert np.abs(covariances.mean(axis=0)).max() < 0.12
+    assert np.sqrt((means**2).mean()) < 0.08
+
+
+def linear_run(options, seed):
+    """The filter's moments after eight readings, the exact ones, and differences of evidence."""
+    layout, rng = POSITION_CLOCK_3D, np.random.default_rng(seed)
     motion = together([random_walk(1.0, 6.0, dimensions=3), random_walk(1.0, 2.0, dimensions=1)])
     case = Linear(layout)
     mean, covariance = np.array([10.0, -20.0, 5.0, 80.0]), np.diag([400.0, 400.0, 400.0, 1e4])
     truth = mean + rng.standard_normal(4) * [20, 20, 20, 100]
-    exact = Gaussian(mean, covariance)
+    exact, gained = Gaussian(mean, covariance), []
     ours = rb.init(mean, covariance, [0, 1, 2], 100_000, rng)
     for _ in range(8):
         truth = motion.sample(truth, rng)
@@ -56,8 +77,8 @@ def test_as_a_kalman_filter_where_all_is_linear(options):
         exact, told = kalman.update(exact, case.compiled, reading, EKF)
         ours = rb.predict(ours, motion.transition, motion.noise, rng)
         ours, news = rb.update(ours, case.compiled, reading, rng, options)
-        assert news.evidence == pytest.approx(told.evidence, abs=0.1)
-    agree(ours.moments(), exact, 0.06)
+        gained.append(news.evidence - told.evidence)
+    return ours.moments(), exact, gained
 
 
 @pytest.mark.parametrize("noise", ["piecewise", "continuous"])

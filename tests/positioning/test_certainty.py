@@ -5,12 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_town import Town
 
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, AlternativeRules
 from mapfilter.positioning.bayes.certainty import certainty
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.options import BayesFilter
 
 RULES = AlternativeRules()
 BINS = Bins.over((0.0, 0.0, 2000.0, 2000.0))
@@ -69,6 +71,13 @@ def test_an_alternative_counts_by_the_threshold_at_which_it_takes_over():
     assert certainty(RULES, main, alternative(-5.0, 900.0)) == pytest.approx(1.0, abs=1e-5)
 
 
-def test_masses_on_a_grid_have_no_turned_phones():
+def test_masses_on_a_grid_are_not_compared_with_turned_phones():
+    """Their beliefs are of hypotheses, and a grid has none beside it."""
     grid = SimpleNamespace(summary=SimpleNamespace(mass_50m=0.9))
-    assert certainty(RULES, grid, held=()) == 0.9
+    assert certainty(RULES, grid, held=[turned(2.0, 700.0)]) == 0.9
+
+
+@pytest.mark.parametrize(("switch_mass", "claimed_from"), [(0.995, 0.95), (0.9, 0.9)])
+def test_a_claim_never_asks_for_more_than_convergence(switch_mass, claimed_from):
+    positioner = BayesFilter(switch_mass=switch_mass).over_area(Town.of(1).area())
+    assert positioner.rules.claimed_from == claimed_from

@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 from faulty_town import TOWN, OffWays, moved, other, turned, walk, without_streets
 
-from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.contract import Reason
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import epochs
 
-FOLLOWED = (Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN)
 NO_CELL_IS_AT_FAULT = {"fault_probability": 1e-6}
 LEVELS_ARE_AS_PREDICTED = {"level_error_db": 2.0}
 NOBODY_LEAVES_THE_WAYS = {"off_cost_per_m": 2.0}
@@ -45,7 +44,7 @@ def followed(area, log, seed, since=0.0, **options):
             np.interp(epoch.time_s, truth["time_s"], truth[name]) for name in ("east_m", "north_m")
         )
         off_m = np.hypot(fix.east_m - east_m, fix.north_m - north_m)
-        right.append(fix.status in FOLLOWED and off_m <= min(50.0, fix.radii_m[2]))
+        right.append(fix.status.is_followed and off_m <= min(50.0, fix.radii_m[2]))
         unused += [reading.reason for reading in output.unused]
     return float(np.mean(right[round(since * len(right)) :])), unused
 

@@ -342,8 +342,11 @@ def test_which_beliefs_stay_open():
         return [one.belief for one in still_open(RULES, (low, high, mid), MAIN, travelled_m)]
 
     assert left(399.0) == [high.belief, mid.belief]
-    # What is ahead stays.
+    # What is likely enough, elsewhere, stays for longer.
     assert left(400.0) == [high.belief, mid.belief]
+    assert left(1199.0) == [high.belief]
+    assert left(1200.0) == []
+    assert still_open(RULES, (one_of(2.0, east_m=40.0),), MAIN, 400.0) == ()
     behind = one_of(0.9)
     assert len(still_open(RULES, (behind,), MAIN, 399.0)) == 1
     assert still_open(RULES, (behind,), MAIN, 400.0) == ()
@@ -362,6 +365,9 @@ def test_when_a_belief_is_ahead_and_when_it_takes_over():
     assert winner(RULES, (one_of(7.9),), MAIN, -3.0) is None
     assert winner(RULES, (one_of(9.0, null=-2.0),), MAIN, -3.0) is None
     assert winner(RULES, (one_of(9.0, status=Status.SEARCHING),), MAIN, -3.0) is None
+    # Of those that are able to take over the likeliest one does.
+    doubtful = one_of(12.0, null=-2.0)
+    assert winner(RULES, (doubtful, best), MAIN, -3.0) is best
     assert winner(RULES, (), MAIN, -3.0) is None
 
 

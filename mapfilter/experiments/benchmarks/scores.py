@@ -118,8 +118,9 @@ def _since_fault(estimate: TrackEstimate, errors_m: Floats, fault_at_s: float) -
     """Score what is claimed more than 50 m off since a fault of the sensors began.
 
     ``fault_wrong_s`` is the time from the fault's begin to the first such claim, and
-    ``fault_noticed_s`` that to the first epoch after it at which nothing wrong is claimed: LOST,
-    OUTSIDE, or within 50 m again. Where there is none, it is the time to the last epoch, and
+    ``fault_noticed_s`` that to the first epoch after it at which nothing wrong is claimed:
+    UNCERTAIN, LOST, OUTSIDE, or within 50 m again. Where there is none, it is the time to the last
+    epoch, and
     ``fault_unnoticed`` is true. Both are None where nothing wrong is claimed.
     """
     since = (estimate.time_s >= fault_at_s) & np.isfinite(errors_m)

@@ -95,8 +95,8 @@ class AlternativeRules(Options):
     map_nats_per_m : float
         Negative log-likelihood of the map for each metre under the null hypothesis.
     claimed_from : float
-        Probability that a tracked position is right to 50 m from which on it is claimed; below it
-        is reported as UNCERTAIN.
+        Least probability of being within 50 m with which a tracked position is claimed; with less
+        it is UNCERTAIN.
     takes_over_searching : bool
         An alternative that is ahead of a belief that had converged replaces it at once, and has to
         converge anew.

@@ -251,7 +251,7 @@ def still_open(
 ) -> tuple[HeldOtherwise, ...]:
     """Return the beliefs that are neither refuted nor undecided for too long, most likely first.
 
-    One that is likely enough for a LOST position is kept for as long as it is.
+    One that is likely enough for a LOST position, elsewhere, is undecided for longer.
 
     Parameters
     ----------
@@ -266,13 +266,16 @@ def still_open(
         one
         for one in held
         if one.log_bayes_factor(main) > rules.abandon_threshold
-        and (
-            travelled_m - one.start_m < rules.abandon_after_m
-            or one.log_odds(main) > rules.lost_log_odds
-        )
+        and travelled_m - one.start_m < _undecided_m(rules, one, main)
     ]
     kept.sort(key=lambda one: -one.log_odds(main))
     return tuple(_compared(rules, one, main, travelled_m) for one in kept[: rules.max_beliefs])
+
+
+def _undecided_m(rules: HoldRules, one: HeldOtherwise, main: ParticleBelief) -> float:
+    """Return the distance for which a belief may stay undecided."""
+    leads = _leads(rules, one, main)
+    return max(rules.abandon_after_m, rules.abandon_ahead_after_m if leads else 0.0)
 
 
 def _compared(
@@ -315,11 +318,14 @@ def winner(
     max_null_log_odds : float
         Largest log odds of the null hypothesis beside it.
     """
-    best = max(held, key=lambda one: one.log_odds(main), default=None)
-    if best is None or best.log_odds(main) < rules.win_log_odds:
-        return None
-    agrees = best.belief.status is Status.TRACKING and best.null.log_odds <= max_null_log_odds
-    return best if agrees else None
+    able = (
+        one
+        for one in held
+        if one.log_odds(main) >= rules.win_log_odds
+        and one.belief.status is Status.TRACKING
+        and one.null.log_odds <= max_null_log_odds
+    )
+    return max(able, key=lambda one: one.log_odds(main), default=None)
 
 
 def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[HeldOtherwise, ...]:

@@ -41,7 +41,9 @@ class HoldRules(Options):
     abandon_threshold : float
         Log Bayes factor at which the phone was not turned.
     abandon_after_m : float
-        Distance after which that stays undecided.
+        Distance after which that stays undecided,
+    abandon_ahead_after_m : float
+        and the same where it is likely enough for a LOST position.
     max_beliefs : int
         Largest number of beliefs at a time.
     particles : int
@@ -61,5 +63,6 @@ class HoldRules(Options):
     win_log_odds: float = 8.0
     abandon_threshold: float = -4.0
     abandon_after_m: NotNegative = 400.0
-    max_beliefs: Annotated[int, Ge(1)] = 4
+    abandon_ahead_after_m: NotNegative = 1200.0
+    max_beliefs: Annotated[int, Ge(1)] = 6
     particles: Annotated[int, Ge(10)] = 1000

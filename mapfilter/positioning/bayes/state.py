@@ -37,7 +37,7 @@ class BayesState:
     belief : MapBelief or None
         None before the first report with a known cell, fix or satellite.
     status : Status
-        As reported; that of the belief may differ while it is LOST.
+        As reported; that of the belief may differ while it is LOST or UNCERTAIN.
     contested : bool
         LOST only because a belief in which the phone was turned is ahead, or because the phone may
         have been carried on though no step is counted.

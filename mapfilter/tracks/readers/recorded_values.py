@@ -34,7 +34,7 @@ def joined_parts(parts: list[pd.DataFrame]) -> pd.DataFrame:
 
 
 def reordered(rows: pd.DataFrame, order: Ints) -> pd.DataFrame:
-    """Return rows in another order, column by column; many ``rows`` are emptied."""
+    """Return rows in another order; of many ``rows`` no column is left."""
     # Taking a column out of a table takes longer than reordering a short one.
     take = rows.pop if len(rows) > _MANY_ROWS else rows.__getitem__
     columns = {name: take(name).array[order] for name in list(rows.columns)}

@@ -44,7 +44,7 @@
   };
 
   // A track as pieces of one status, each with a dash of its own: status is not told by color alone.
-  const DASHES = { SEARCHING: [1.5, 4], UNCERTAIN: [8, 3], LOST: [6, 4], OUTSIDE: [2, 2, 6, 2] };
+  const DASHES = { SEARCHING: [1.5, 4], UNCERTAIN: [12, 3], LOST: [6, 4], OUTSIDE: [2, 2, 6, 2] };
   MF.dashOf = (status) => DASHES[status] ?? null;
   MF.drawTrack = (pen, run, from, to, style) => {
     const { camera, view } = pen;

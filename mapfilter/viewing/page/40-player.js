@@ -23,9 +23,9 @@
     for (let x = 0; x < width; x += 1) {
       const status = run.status(run.at(page.start + ((page.end - page.start) * x) / width));
       context.fillStyle = MF.statusColor(status);
-      // Lost is told by its height too.
-      const low = status === "LOST" || status === "OUTSIDE";
-      context.fillRect(x, low ? 4 : 0, 1, low ? 4 : 8);
+      // Uncertain and lost are told by their height too.
+      const top = status === "LOST" || status === "OUTSIDE" ? 4 : status === "UNCERTAIN" ? 2 : 0;
+      context.fillRect(x, top, 1, 8 - top);
     }
   };
 

@@ -1,0 +1,65 @@
+"""Ageing of what hypotheses keep, read through the numbers of chosen ones, against NumPy."""
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.copies import Copies, columns_of, copies_of
+from mapfilter.models.ageing import Ageing, age, as_it_is
+
+WIDTH, MEANS, COUNT = 5, 3, 1500
+DECAY = np.array([0.9, 0.5, 1.0], dtype=np.float32)
+KEEP, USUAL = 0.7, -2.75
+
+
+@pytest.fixture
+def before():
+    return np.random.default_rng(3).normal(0, 5, (WIDTH, 40)).astype(np.float32)
+
+
+def aged(kept):
+    """The same by NumPy, of columns that were copied before."""
+    means = DECAY[:, None] * kept[:MEANS]
+    faults = np.float32(USUAL) + (kept[MEANS:] - np.float32(USUAL)) * np.float32(KEEP)
+    return np.vstack([means, faults])
+
+
+def ageing(kept, due=(True,) * WIDTH):
+    now = np.full((WIDTH, kept.shape[1]), np.nan, dtype=np.float32)
+    return Ageing(*columns_of(kept), DECAY, KEEP, USUAL, np.array(due), now)
+
+
+def test_copies_are_aged_as_the_columns_that_they_are_of(before):
+    chosen = np.random.default_rng(4).integers(0, 40, COUNT).astype(np.int32)
+    found = ageing(copies_of(before, chosen))
+    untouched = before.copy()
+    for first, stop in ((0, 700), (700, 701), (701, COUNT)):
+        age(first, stop, found)
+    np.testing.assert_allclose(found.now, aged(before[:, chosen]), rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(before, untouched)
+    # Copies of copies are those of the first ones.
+    again = np.array([5, 5, 1499], dtype=np.int32)
+    twice = copies_of(Copies(before, chosen), again)
+    np.testing.assert_array_equal(twice.made(), before[:, chosen][:, again])
+
+
+def test_what_has_columns_of_its_own_is_aged_in_their_order(before):
+    found = ageing(before)
+    age(0, 40, found)
+    np.testing.assert_allclose(found.now, aged(before), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("row", [1, 4])
+def test_rows_may_be_aged_apart(before, row):
+    chosen = np.arange(39, -1, -1, dtype=np.int32)
+    found, expected = ageing(copies_of(before, chosen)), aged(before[:, ::-1])
+    age(0, 40, found.of_row(row))
+    np.testing.assert_allclose(found.now[row], expected[row], rtol=1e-6, atol=1e-6)
+    assert np.isnan(np.delete(found.now, row, axis=0)).all()
+    age(0, 40, found.without_row(row))
+    np.testing.assert_allclose(found.now, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_what_is_as_it_should_be_stays(before):
+    found = as_it_is(before)
+    age(0, 40, found)
+    assert found.now is before
