@@ -102,14 +102,17 @@ def by_code(log):
 
 @pytest.mark.parametrize("each", [0, 7])
 def test_walks_are_tracked_where_codes_are_used_again_far_away(each):
-    town = Town.of(3)
+    """Most of eight walks, and none wrongly; without a counterpart of the namesakes it was none."""
+    town, found = Town.of(3), []
     positioner = BayesFilter().over_area(with_namesakes(town, each))
-    for seed in (21, 22):
+    for seed in range(21, 29):
         log = by_code(slowed(walk_log(town, seed, error_db=3.0)))
         rng, state = np.random.default_rng(5), positioner.begin()
         for epoch in epochs(log):
             state, output = positioner.step(state, epoch, rng)
         end = log.truth.iloc[-1]
         away_m = np.hypot(output.fix.east_m - end["east_m"], output.fix.north_m - end["north_m"])
-        assert output.fix.status is Status.TRACKING
-        assert away_m < 30.0
+        if output.fix.status is Status.TRACKING:
+            found.append(away_m)
+    assert len(found) >= 5
+    assert max(found) < 30.0
