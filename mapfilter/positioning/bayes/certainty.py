@@ -1,10 +1,10 @@
 """How certain a tracked position is, with all that competes with its belief.
 
-A belief says how much of it lies near its leading hypothesis, given that it describes what is
-measured at all. Beside it stand beliefs in which the phone was turned, and an alternative from
-scratch, each with its odds against the belief. What of all of them lies within 50 m is the
-probability that the position is right: below a least one it is given, but not claimed. The null
-hypothesis has no position, and statuses of its own.
+The share of a belief near its leading hypothesis is a probability given that the belief describes
+what is measured at all. Beside it stand beliefs in which the phone was turned, and an alternative
+from scratch, each with its odds against the belief. The share of all of them together within 50 m
+is the probability that the position is right. With too low a probability a position is reported but
+not claimed. The null hypothesis has no position, and statuses of its own.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from math import exp, hypot
 
 import numpy as np
 
-from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import (
@@ -66,7 +65,7 @@ def _apart_m(one: MapBelief, other: MapBelief) -> float:
     return hypot(own[0] - mean[0], own[1] - mean[1])
 
 
-def _share_near(one: ParticleBelief, main: ParticleBelief | GridBelief) -> float:
+def _share_near(one: ParticleBelief, main: ParticleBelief) -> float:
     """Return the share of a belief within 50 m of the leading hypothesis of another."""
     east_m, north_m = main.summary.mean[:2]
     gone_east_m, gone_north_m = one.state[0] - east_m, one.state[1] - north_m
