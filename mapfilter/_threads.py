@@ -21,6 +21,10 @@ from typing import Any
 LEAST_PARTICLES = 32_768
 """Fewer particles than this are not divided: beginning and awaiting the parts of a step would take
 a tenth of its time."""
+_DEPTH = 6
+"""What a signal raises comes after calls, at the beginning of functions and where loops jump back.
+A loop that waits again cannot catch what comes at its own jump; a loop around it does. So many
+loops withstand as many signals at once, each of which comes at the very jump of the next loop."""
 _BLOCK = 1024
 """Parts begin at multiples of it, at which the vectorised loops of kernels come out even."""
 
@@ -85,20 +89,10 @@ class Threads:
             _make_what_has_not_begun(parts)
         except BaseException as error:
             failure = error
-        # What a signal raises comes after calls, at the beginning of functions and where loops jump
-        # back. All of these are inside a `try` here. The inner loop jumps back inside the outer
-        # one, so that a second interrupt, while the first is remembered, is remembered, too.
-        is_awaited = False
-        while not is_awaited:
-            try:
-                while not is_awaited:
-                    try:
-                        _await(parts)
-                        is_awaited = True
-                    except BaseException as error:
-                        failure = error
-            except BaseException as error:
-                failure = error
+        try:
+            failure = _await(parts) or failure
+        except BaseException as error:
+            failure = error
         errors: list[BaseException | None] = []
         try:
             errors = [failure, *(part.taken_error() for part in parts)]
@@ -190,9 +184,18 @@ def _make_what_has_not_begun(parts: Sequence[_Part]) -> None:
             _make(part.first, part.stop, part.calls)
 
 
-def _await(parts: Sequence[_Part]) -> None:
-    for part in parts:
-        part.wait()
+def _await(parts: Sequence[_Part], depth: int = _DEPTH) -> BaseException | None:
+    """Wait for parts whatever is raised meanwhile, and return what was raised last."""
+    failure: BaseException | None = None
+    while True:
+        try:
+            if depth:
+                return _await(parts, depth - 1) or failure
+            for part in parts:
+                part.wait()
+            return failure
+        except BaseException as error:
+            failure = error
 
 
 def _help(pool: _Pool, number: int) -> None:
