@@ -21,10 +21,10 @@ from typing import Any
 LEAST_PARTICLES = 32_768
 """Fewer particles than this are not divided: beginning and awaiting the parts of a step would take
 a tenth of its time."""
-_DEPTH = 6
+_DEPTH = 4
 """What a signal raises comes after calls, at the beginning of functions and where loops jump back.
 A loop that waits again cannot catch what comes at its own jump; a loop around it does. So many
-loops withstand as many signals at once, each of which comes at the very jump of the next loop."""
+loops, and two more, withstand as many signals that come at the very jumps of one after another."""
 _BLOCK = 1024
 """Parts begin at multiples of it, at which the vectorised loops of kernels come out even."""
 
@@ -89,10 +89,18 @@ class Threads:
             _make_what_has_not_begun(parts)
         except BaseException as error:
             failure = error
-        try:
-            failure = _await(parts) or failure
-        except BaseException as error:
-            failure = error
+        # The inner loop jumps back inside the outer one.
+        is_awaited = False
+        while not is_awaited:
+            try:
+                while not is_awaited:
+                    try:
+                        failure = _await(parts) or failure
+                        is_awaited = True
+                    except BaseException as error:
+                        failure = error
+            except BaseException as error:
+                failure = error
         errors: list[BaseException | None] = []
         try:
             errors = [failure, *(part.taken_error() for part in parts)]
