@@ -27,6 +27,7 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.pace import Pace
@@ -43,7 +44,7 @@ from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.integrity import SampleTail
 
-FORMAT, VERSION = "mapfilter session", 6
+FORMAT, VERSION = "mapfilter session", 7
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -70,6 +71,7 @@ _CLASSES: dict[str, type] = {
         ParticleBelief,
         Receiver,
         RecentPath,
+        Recovery,
         ReportRow,
         Reported,
         Pace,

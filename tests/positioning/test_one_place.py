@@ -1,13 +1,14 @@
 """When a belief in more than one place is LOST, and how evidence is collected, by hand."""
 
 from dataclasses import dataclass, field, replace
-from math import inf, isnan
+from math import inf, isnan, nan
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mapfilter.filters.contract import Status
+from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
 from mapfilter.positioning.bayes.timing import TimingState, TimingTerm
 from mapfilter.positioning.bayes.weighing import Weighing, weighed_by
@@ -32,14 +33,18 @@ class State:
     contested: bool = False
     alternative: object = None
     held: tuple = ()
+    null: object = field(default_factory=lambda: SimpleNamespace(log_odds=-12.0))
+    recovery: object = None
     sources: dict = field(default_factory=dict)
     reckoning: object = field(default_factory=lambda: SimpleNamespace(travelled_m=40.0))
 
 
 def weighing(contested=False, left=False):
-    rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0)
+    rules = SimpleNamespace(
+        claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0, converge_threshold=2.0
+    )
     beliefs = SimpleNamespace(
-        options=SimpleNamespace(split_mass=0.4),
+        options=SimpleNamespace(split_mass=0.4, switch_mass=0.99, switch_hold_m=14.0),
         rules_of=lambda _: rules,
         is_contested=lambda _: contested,
         may_have_left=lambda _: left,
@@ -47,9 +52,13 @@ def weighing(contested=False, left=False):
     return Weighing(beliefs, None, ())
 
 
+def judged(state, *, positioned=False, **others):
+    return weighing(**others).judged(state, positioned=positioned)
+
+
 @pytest.mark.parametrize(("mass", "claimed"), [(0.4, False), (0.94, False), (0.95, True)])
 def test_a_position_is_claimed_if_it_is_certain_enough(mass, claimed):
-    found = weighing().in_one_place(State(Belief(mass)))
+    found = judged(State(Belief(mass)))
     assert found.status is (Status.TRACKING if claimed else Status.UNCERTAIN)
     assert not found.contested
     assert found.belief == Belief(mass)
@@ -57,11 +66,11 @@ def test_a_position_is_claimed_if_it_is_certain_enough(mass, claimed):
 
 def test_what_converges_is_judged_by_the_rule_of_convergence():
     given = State(Belief(0.6, Status.CONVERGED), Status.CONVERGED)
-    assert weighing().in_one_place(given) is given
+    assert judged(given) is given
 
 
 def test_below_the_mass_of_a_split_it_has_to_converge_anew():
-    found = weighing(True).in_one_place(State(Belief(0.39)))
+    found = judged(State(Belief(0.39)), contested=True)
     assert found.status is Status.LOST
     assert found.belief.status is Status.SEARCHING
     assert isnan(found.belief.agreement_start_m)
@@ -70,16 +79,52 @@ def test_below_the_mass_of_a_split_it_has_to_converge_anew():
 
 @pytest.mark.parametrize("mass", [1.0, 0.5])
 def test_another_reading_of_headings_makes_it_contested(mass):
-    found = weighing(True).in_one_place(State(Belief(mass)))
+    found = judged(State(Belief(mass)), contested=True)
     assert (found.status, found.contested) == (Status.LOST, True)
 
 
 @pytest.mark.parametrize("status", [Status.SEARCHING, Status.LOST, Status.OUTSIDE])
 def test_only_what_claims_a_position_can_be_lost(status):
     given = State(Belief(0.1), status)
-    assert weighing(True).in_one_place(given) is given
+    assert replace(judged(given, contested=True), recovery=None) == given
     nothing = State(None)
-    assert weighing(True).in_one_place(nothing) is nothing
+    assert judged(nothing, contested=True) is nothing
+
+
+def after_a_loss(gone_m, agrees_from_m=nan, *, mass=0.99, null=-12.0):
+    """A position that was lost, tracked again, so far on."""
+    null, reckoning = SimpleNamespace(log_odds=null), SimpleNamespace(travelled_m=gone_m)
+    recovery = Recovery(agrees_from_m)
+    return State(Belief(mass), null=null, reckoning=reckoning, recovery=recovery)
+
+
+def test_what_was_lost_is_claimed_when_it_has_agreed_for_some_way():
+    lost = judged(State(Belief(), Status.LOST))
+    assert lost.recovery == Recovery()
+    begins = judged(after_a_loss(100.0))
+    assert (begins.status, begins.recovery) == (Status.UNCERTAIN, Recovery(100.0))
+    ends = judged(after_a_loss(113.9, 100.0))
+    assert (ends.status, ends.recovery) == (Status.UNCERTAIN, Recovery(100.0))
+    over = judged(after_a_loss(114.0, 100.0))
+    assert (over.status, over.recovery) == (Status.TRACKING, None)
+
+
+@pytest.mark.parametrize("doubt", [{"mass": 0.98}, {"null": -11.9}])
+def test_what_does_not_agree_as_it_would_to_converge_begins_anew(doubt):
+    found = judged(after_a_loss(300.0, 100.0, **doubt))
+    assert found.status is Status.UNCERTAIN
+    assert isnan(found.recovery.agrees_from_m)
+    usual = replace(after_a_loss(300.0, 100.0, **doubt), recovery=None)
+    assert judged(usual).status is Status.TRACKING
+
+
+def test_a_measured_position_ends_what_was_lost():
+    given = after_a_loss(100.0)
+    found = judged(given, positioned=True)
+    assert (found.status, found.recovery) == (Status.TRACKING, None)
+    searching = replace(given, belief=Belief(0.3, Status.SEARCHING), status=Status.LOST)
+    # It has to converge anew, which is enough.
+    assert judged(searching).recovery is None
 
 
 @dataclass
@@ -162,5 +207,5 @@ def test_terms_of_timing_are_clipped_normal_densities(weight):
 
 
 def test_a_rest_in_doubt_makes_it_contested():
-    found = weighing(left=True).in_one_place(State(Belief(0.99)))
+    found = judged(State(Belief(0.99)), left=True)
     assert (found.status, found.contested) == (Status.LOST, True)

@@ -4,13 +4,15 @@ The share of a belief near its leading hypothesis is a probability given that th
 what is measured at all. Beside it stand beliefs in which the phone was turned, and an alternative
 from scratch, each with its odds against the belief. The share of all of them together within 50 m
 is the probability that the position is right. With too low a probability a position is reported but
-not claimed. The null hypothesis has no position, and statuses of its own.
+not claimed. The null hypothesis has no position, and statuses of its own. A position that was lost
+is claimed again when it has agreed for some way, as a belief that searches has to.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import exp, hypot
+from dataclasses import dataclass
+from math import exp, hypot, isfinite, nan
 
 import numpy as np
 
@@ -25,6 +27,34 @@ from mapfilter.positioning.bayes.held import HeldOtherwise
 
 _NEGLIGIBLE, _CERTAIN = -9.0, 30.0
 """Log odds below which a rival is not looked at; bound above which they make no difference."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """Of a position that was lost, though its belief did not search again.
+
+    Parameters
+    ----------
+    agrees_from_m : float
+        Distance travelled since which the belief agrees; NaN if it does not.
+    """
+
+    agrees_from_m: float = nan
+
+    def after(self, travelled_m: float, hold_m: float, *, agrees: bool) -> Recovery | None:
+        """Return it at a distance travelled, or None where the belief has agreed for ``hold_m``.
+
+        Examples
+        --------
+        >>> Recovery().after(100.0, 20.0, agrees=True)
+        Recovery(agrees_from_m=100.0)
+        >>> Recovery(100.0).after(120.0, 20.0, agrees=True) is None
+        True
+        """
+        if not agrees:
+            return Recovery()
+        from_m = self.agrees_from_m if isfinite(self.agrees_from_m) else travelled_m
+        return None if travelled_m - from_m >= hold_m else Recovery(from_m)
 
 
 def certainty(

@@ -184,7 +184,8 @@ class BayesPositioner(Filter[BayesState]):
                 belief, status = report(before, state.belief, state.status)
                 if belief is not state.belief or status is not state.status:
                     state = replace(state, belief=belief, status=status)
-                state = weighing.in_one_place(state)
+                satellites: GnssState = state.sources[GnssSource.name]
+                state = weighing.judged(state, positioned=satellites.was_used(epoch.time_s))
         other_unit = state.hold.step_unit_m != hold.step_unit_m
         read_anew = state.hold != hold and not other_unit
         taken_over = read_anew and not state.hold.is_as_measured

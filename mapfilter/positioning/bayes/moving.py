@@ -168,6 +168,7 @@ def moved(
         reported=state.reported,
         watch=watch,
         last_fix=state.last_fix,
+        recovery=state.recovery,
         twin=twin,
         hold=hold,
         walking_rad=walking_rad,

@@ -12,6 +12,7 @@ from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
 from mapfilter.positioning.bayes.area_frame import AreaFrame
+from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
@@ -63,6 +64,8 @@ class BayesState:
         Whether sensors still measure.
     last_fix : GnssFix or None
         The last one that was used.
+    recovery : Recovery or None
+        Of a position that was lost though its belief did not search again, until it is claimed.
     twin : MirroredTwin or None
         The mirrored motion, while a belief by the map alone has to prove itself.
     hold : Hold
@@ -89,6 +92,7 @@ class BayesState:
     reported: Reported | None = None
     watch: SensorWatch = field(default_factory=SensorWatch)
     last_fix: GnssFix | None = None
+    recovery: Recovery | None = None
     twin: MirroredTwin | None = None
     hold: Hold = field(default_factory=Hold)
     walking_rad: float = nan
@@ -112,6 +116,7 @@ class BayesState:
             reported=reported,
             watch=self.watch,
             last_fix=self.last_fix,
+            recovery=self.recovery,
             twin=self.twin,
             hold=self.hold,
             walking_rad=self.walking_rad,

@@ -23,7 +23,7 @@ from mapfilter.positioning.bayes.alternative import (
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
-from mapfilter.positioning.bayes.certainty import certainty
+from mapfilter.positioning.bayes.certainty import Recovery, certainty
 from mapfilter.positioning.bayes.evidence import (
     Context,
     EvidenceSource,
@@ -194,6 +194,7 @@ class Weighing:
             reported=state.reported,
             watch=state.watch,
             last_fix=state.last_fix,
+            recovery=None if now.taken_over else state.recovery,
             twin=state.twin,
             # An alternative reads headings as they are.
             hold=hold_after_takeover(state) if now.taken_over else state.hold,
@@ -241,6 +242,7 @@ class Weighing:
             null=best.null,
             alternative=None,
             takeovers=state.takeovers + 1,
+            recovery=Recovery(),
             hold=best.hold,
             held=after_takeover(held, best),
         )
@@ -268,12 +270,34 @@ class Weighing:
         )
         return replace(twin, belief=belief) if info.reason is Reason.USED else None
 
-    def in_one_place(self, state: BayesState) -> BayesState:
-        """Return a state that is LOST while its belief is spread over more than one place.
+    def judged(self, state: BayesState, *, positioned: bool) -> BayesState:
+        """Return a state that is LOST or UNCERTAIN where its position is not to be claimed.
 
-        Below the mass at which it searches again, it has to converge anew. A belief in one place
-        that is not certain enough for a claim is UNCERTAIN.
+        It is LOST while its belief is spread over more than one place: below the mass at which it
+        searches again, it has to converge anew. A belief in one place that is not certain enough
+        is UNCERTAIN; so is one that was lost, until it agrees as one that converges does, or
+        positions are used: ``positioned`` is whether one was.
         """
+        state = self._in_one_place(state)
+        belief, rules, recovery = state.belief, self.beliefs.rules_of(state), state.recovery
+        if belief is None or belief.status is Status.SEARCHING or positioned:
+            recovery = None
+        elif state.status in (Status.LOST, Status.OUTSIDE):
+            recovery = Recovery()
+        if belief is not None and state.status is Status.TRACKING:
+            probability = certainty(rules, belief, state.alternative, state.held)
+            uncertain = probability < rules.claimed_from
+            if recovery is not None:
+                options, travelled_m = self.beliefs.options, state.reckoning.travelled_m
+                agrees = probability >= options.switch_mass
+                agrees = agrees and not doubted(rules, belief, state.null, state.alternative)
+                recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
+                uncertain = uncertain or recovery is not None
+            if uncertain:
+                return replace(state, status=Status.UNCERTAIN, recovery=recovery)
+        return state if recovery is state.recovery else replace(state, recovery=recovery)
+
+    def _in_one_place(self, state: BayesState) -> BayesState:
         belief = state.belief
         if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
             return state
@@ -282,13 +306,7 @@ class Weighing:
             return replace(state, belief=belief, status=Status.LOST)
         if self.beliefs.is_contested(state) or self.beliefs.may_have_left(state):
             return replace(state, status=Status.LOST, contested=True)
-        if state.status is Status.CONVERGED:
-            return state
-        rules = self.beliefs.rules_of(state)
-        probability = certainty(rules, belief, state.alternative, state.held)
-        if probability >= rules.claimed_from:
-            return state
-        return replace(state, status=Status.UNCERTAIN)
+        return state
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
