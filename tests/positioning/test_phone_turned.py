@@ -280,6 +280,23 @@ def test_a_contested_position_is_lost_and_a_spread_one_uncertain():
     assert Reason.PHONE_TURNED not in {one.reason for one in output.unused}
 
 
+def test_while_it_is_contested_it_is_searched_for_anew_and_taken_over_it_has_to_agree():
+    """What is ahead of a belief in a wrong place may be in a wrong place, too."""
+    state, rng = begun()
+    state, _ = walked(state, rng, (1.0, 5.0, 0.0))
+    other, sure = beside(state.belief, 200.0), NullHypothesis(-40.0)
+    for log_prior, searched, wins in ((-3.0, False, 0), (3.0, True, 0), (200.0, True, 1)):
+        held = HeldOtherwise(other, Hold(1.0, 3.0), log_prior, 0.0, sure, ahead_m=-7.0)
+        # The alternative has no part in what a reading says of places chosen for the test.
+        before = replace(state, held=(held,), null=sure)
+        after, output = WATCHED.step(before, Epoch(1.5, (), RADIO), np.random.default_rng(6))
+        assert (after.alternative is not None) == searched
+        assert after.takeovers == wins
+        if wins:
+            assert output.fix.status is Status.UNCERTAIN
+            assert after.recovery is not None
+
+
 def test_motion_that_is_read_otherwise_is_used():
     state, rng = begun()
     _, output = walked(replace(state, hold=Hold(1.0, np.pi)), rng, (1.0, 1.4, 0.0))

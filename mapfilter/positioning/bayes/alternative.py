@@ -5,11 +5,11 @@ measured: the position is outside the map, or database and network do not belong
 likelihoods of its own, which fit every reading moderately well. Its log odds against the belief are
 bounded from below, as it may become true at any time: so they are a CUSUM (Page, 1954).
 
-When they are large, or most of the belief has left the area, where nothing can refute it, an
-*alternative* starts from scratch beside the belief. Both then predict the same readings; the
-difference of their log evidence is the logarithm of the Bayes factor between "the position is
-anywhere" and "the position is where the belief has it". The alternative has a null hypothesis, too:
-one that is improbable beside it is *suspect*.
+When they are large, most of the belief has left the area, where nothing can refute it, or a turned
+phone is more probable, an *alternative* starts from scratch beside the belief. Both then predict
+the same readings; the difference of their log evidence is the logarithm of the Bayes factor between
+"the position is anywhere" and "the position is where the belief has it". The alternative has a null
+hypothesis, too: one that is improbable beside it is *suspect*.
 
 After each reading, the alternative has one outcome, and a table gives what follows. Searching or
 found is the status of the belief that was there first:

@@ -173,6 +173,8 @@ class Weighing:
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
         disputed = disputed or asks_for_unit(state, now.belief, other_m)
+        # Who is ahead of a belief in a wrong place may be in a wrong place, too.
+        disputed = disputed or beliefs.is_contested(state)
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
@@ -240,7 +242,6 @@ class Weighing:
             status=Status.TRACKING,
             sources={**state.sources, **own},
             null=best.null,
-            alternative=None,
             takeovers=state.takeovers + 1,
             recovery=Recovery(),
             hold=best.hold,
