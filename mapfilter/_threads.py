@@ -22,9 +22,9 @@ LEAST_PARTICLES = 32_768
 """Fewer particles than this are not divided: beginning and awaiting the parts of a step would take
 a tenth of its time."""
 _DEPTH = 4
-"""What a signal raises comes after calls, at the beginning of functions and where loops jump back.
-A loop that waits again cannot catch what comes at its own jump; a loop around it does. So many
-loops, and two more, withstand as many signals that come at the very jumps of one after another."""
+"""Number of loops around the one that waits for parts. What a signal raises comes after calls, at
+the beginning of functions and where loops jump back. What comes at a loop's own jump back is caught
+by the loop around it alone, so that several in a row need several loops."""
 _BLOCK = 1024
 """Parts begin at multiples of it, at which the vectorised loops of kernels come out even."""
 
@@ -82,33 +82,36 @@ class Threads:
             return
         (first, stop), *others = self.parts(size)
         parts = [_Part(begin, end, calls) for begin, end in others]
-        failure: BaseException | None = None
+        caught: list[BaseException | None] = [None]
         try:
             _hand_over(parts)
             _make(first, stop, calls)
             _make_what_has_not_begun(parts)
         except BaseException as error:
-            failure = error
-        # The inner loop jumps back inside the outer one.
+            caught[0] = error
+        # The loops of `_await` begin with a call, after which an interrupt may come: it is caught
+        # here, and a further one at the jump back of the inner loop by the outer one.
         is_awaited = False
         while not is_awaited:
             try:
                 while not is_awaited:
                     try:
-                        failure = _await(parts) or failure
+                        _await(parts, caught)
                         is_awaited = True
                     except BaseException as error:
-                        failure = error
+                        caught[0] = error
             except BaseException as error:
-                failure = error
+                caught[0] = error
         errors: list[BaseException | None] = []
+        failure: BaseException | None = None
         try:
-            errors = [failure, *(part.taken_error() for part in parts)]
+            errors = [caught[0], *(part.taken_error() for part in parts)]
             failure = next((error for error in errors if error is not None), None)
             if failure is not None:
                 raise failure
         finally:
-            # Its traceback has this frame: arrays would be kept by the circle.
+            # Its traceback has this frame and those of `_await`: circles would keep arrays.
+            caught[0] = None
             del failure, errors
 
 
@@ -192,18 +195,17 @@ def _make_what_has_not_begun(parts: Sequence[_Part]) -> None:
             _make(part.first, part.stop, part.calls)
 
 
-def _await(parts: Sequence[_Part], depth: int = _DEPTH) -> BaseException | None:
-    """Wait for parts whatever is raised meanwhile, and return what was raised last."""
-    failure: BaseException | None = None
+def _await(parts: Sequence[_Part], caught: list[BaseException | None], depth: int = _DEPTH) -> None:
+    """Wait for parts whatever is raised meanwhile; the last of it is kept in ``caught``."""
     while True:
         try:
             if depth:
-                return _await(parts, depth - 1) or failure
+                return _await(parts, caught, depth - 1)
             for part in parts:
                 part.wait()
-            return failure
+            return None
         except BaseException as error:
-            failure = error
+            caught[0] = error
 
 
 def _help(pool: _Pool, number: int) -> None:

@@ -193,6 +193,37 @@ def test_no_array_is_kept_after_an_error(failing):
         gc.enable()
 
 
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers that send signals here")
+def test_no_array_is_kept_after_an_interrupt_while_parts_are_awaited():
+    main, begun = threading.get_ident(), threading.Barrier(2)
+
+    interrupts = []
+
+    def interrupt(*_):
+        interrupts.append(1)
+        raise KeyboardInterrupt
+
+    def call(first, _, array):  # noqa: ARG001
+        begun.wait(60)
+        if threading.get_ident() == main:
+            signal.setitimer(signal.ITIMER_REAL, 0.02)
+        else:
+            sleep(0.3)
+
+    array = np.zeros(SIZE)
+    kept, before = weakref.ref(array), signal.signal(signal.SIGALRM, interrupt)
+    gc.disable()
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            Threads(2, least=0).over(SIZE, (call, array))
+        del array
+        assert interrupts
+        assert kept() is None
+    finally:
+        gc.enable()
+        signal.signal(signal.SIGALRM, before)
+
+
 def test_threads_can_be_pickled():
     several = Threads(3, least=5)
     several.over(SIZE, (lambda *_: None,))

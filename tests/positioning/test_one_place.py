@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import Status
+from mapfilter.positioning.bayes import claims
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
 from mapfilter.positioning.bayes.timing import TimingState, TimingTerm
@@ -26,6 +27,12 @@ class Belief:
         return SimpleNamespace(mass_50m=self.mass)
 
 
+class At(Belief):
+    @property
+    def summary(self):
+        return SimpleNamespace(mass_50m=self.mass, mean=(0.0, 0.0))
+
+
 @dataclass(frozen=True)
 class State:
     belief: object = None
@@ -39,21 +46,18 @@ class State:
     reckoning: object = field(default_factory=lambda: SimpleNamespace(travelled_m=40.0))
 
 
-def weighing(contested=False, left=False):
+def judged(state, *, weighed=True, positioned=False, contested=False, left=False):
     rules = SimpleNamespace(
         claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0, converge_threshold=2.0
     )
     beliefs = SimpleNamespace(
-        options=SimpleNamespace(split_mass=0.4, switch_mass=0.99, switch_hold_m=14.0),
+        options=SimpleNamespace(split_mass=0.4),
+        options_of=lambda _: SimpleNamespace(switch_mass=0.99, switch_hold_m=14.0),
         rules_of=lambda _: rules,
         is_contested=lambda _: contested,
         may_have_left=lambda _: left,
     )
-    return Weighing(beliefs, None, ())
-
-
-def judged(state, *, positioned=False, **others):
-    return weighing(**others).judged(state, positioned=positioned)
+    return claims.judged(beliefs, state, weighed=weighed, positioned=positioned)
 
 
 @pytest.mark.parametrize(("mass", "claimed"), [(0.4, False), (0.94, False), (0.95, True)])
@@ -107,6 +111,29 @@ def test_what_was_lost_is_claimed_when_it_has_agreed_for_some_way():
     assert (ends.status, ends.recovery) == (Status.UNCERTAIN, Recovery(100.0))
     over = judged(after_a_loss(114.0, 100.0))
     assert (over.status, over.recovery) == (Status.TRACKING, None)
+    # Without a reading nothing agrees, and nothing disagrees.
+    for given in (after_a_loss(114.0, 100.0), after_a_loss(114.0)):
+        same = judged(given, weighed=False)
+        assert same.status is Status.UNCERTAIN
+        assert same.recovery is given.recovery
+
+
+@pytest.mark.parametrize("status", [Status.LOST, Status.OUTSIDE])
+def test_a_loss_begins_a_recovery_unless_a_rest_alone_is_in_doubt(status):
+    given = State(Belief(), status, recovery=Recovery(30.0))
+    assert judged(given).recovery == Recovery()
+    assert judged(State(Belief()), contested=True).recovery == Recovery()
+    assert judged(State(Belief()), left=True).recovery is None
+    assert judged(State(Belief()), left=True, contested=True).recovery == Recovery()
+
+
+@pytest.mark.parametrize(("lead", "agrees"), [(-2.1, True), (-1.9, False)])
+def test_an_alternative_close_behind_leaves_a_doubt(lead, agrees):
+    place = SimpleNamespace(summary=SimpleNamespace(mean=(0.0, 0.0)))
+    other = SimpleNamespace(log_bayes_factor=lambda _: lead, belief=place)
+    found = judged(replace(after_a_loss(100.0), alternative=other, belief=At()))
+    assert found.status is Status.UNCERTAIN
+    assert isnan(found.recovery.agrees_from_m) != agrees
 
 
 @pytest.mark.parametrize("doubt", [{"mass": 0.98}, {"null": -11.9}])

@@ -13,6 +13,7 @@ from mapfilter.filters.particle import UpdateInfo
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes import moving
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
@@ -280,21 +281,66 @@ def test_a_contested_position_is_lost_and_a_spread_one_uncertain():
     assert Reason.PHONE_TURNED not in {one.reason for one in output.unused}
 
 
-def test_while_it_is_contested_it_is_searched_for_anew_and_taken_over_it_has_to_agree():
+SURE = NullHypothesis(-40.0)
+
+
+def rivalled(state, log_prior, **changed):
+    """The state beside a turned phone 200 m away, with such odds."""
+    other = beside(state.belief, 200.0)
+    held = HeldOtherwise(other, Hold(1.0, 3.0), log_prior, 0.0, SURE, ahead_m=-7.0)
+    return replace(state, held=(held,), null=SURE, **changed)
+
+
+@pytest.mark.parametrize(("log_prior", "contested"), [(-3.0, False), (3.0, True)])
+def test_while_it_is_contested_a_position_is_searched_for_anew(log_prior, contested):
     """What is ahead of a belief in a wrong place may be in a wrong place, too."""
-    state, rng = begun()
-    state, _ = walked(state, rng, (1.0, 5.0, 0.0))
-    other, sure = beside(state.belief, 200.0), NullHypothesis(-40.0)
-    for log_prior, searched, wins in ((-3.0, False, 0), (3.0, True, 0), (200.0, True, 1)):
-        held = HeldOtherwise(other, Hold(1.0, 3.0), log_prior, 0.0, sure, ahead_m=-7.0)
-        # The alternative has no part in what a reading says of places chosen for the test.
-        before = replace(state, held=(held,), null=sure)
-        after, output = WATCHED.step(before, Epoch(1.5, (), RADIO), np.random.default_rng(6))
-        assert (after.alternative is not None) == searched
-        assert after.takeovers == wins
-        if wins:
-            assert output.fix.status is Status.UNCERTAIN
-            assert after.recovery is not None
+    state, _ = walked(*begun(), (1.0, 5.0, 0.0))
+    before, rng = rivalled(state, log_prior), np.random.default_rng(6)
+    after, output = WATCHED.step(before, Epoch(1.5, (), RADIO), rng)
+    assert (after.alternative is not None) == contested
+    assert (output.fix.status is Status.LOST) == contested
+    # Whether steps are in another unit is another question.
+    assert after.alternatives == 0
+
+
+def test_an_alternative_stays_beside_a_turned_phone_that_takes_over():
+    """Its odds against the position stay what they were."""
+    state, _ = walked(*begun(), (1.0, 5.0, 0.0))
+    main = state.belief
+    place = beside(main, -250.0, status=Status.SEARCHING)
+    alternative = AlternativeHypothesis(place, 0.0, main.log_evidence, null=SURE)
+    before, rng = rivalled(state, -5.0, alternative=alternative), np.random.default_rng(6)
+    (held,) = before.held
+    ahead = replace(held, belief=replace(held.belief, log_evidence=main.log_evidence + 50.0))
+    after, output = WATCHED.step(replace(before, held=(ahead,)), Epoch(1.5, (), RADIO), rng)
+    assert (after.takeovers, output.fix.status) == (1, Status.UNCERTAIN)
+    other = after.alternative
+    assert (other.start_m, other.main_log_evidence) == (0.0, main.log_evidence + 5.0)
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_what_was_lost_is_claimed_after_readings_over_some_way_or_a_fix(fixed):
+    log = log_of(1)
+    rng = np.random.default_rng(5)
+    state = WATCHED.begin_at(log.truth["east_m"][0], log.truth["north_m"][0], 5.0, rng)
+    rows = list(epochs(log))
+    for epoch in rows[:30]:
+        state, _ = WATCHED.step(state, epoch, rng)
+    assert (state.status, state.recovery) == (Status.TRACKING, None)
+    state, found = replace(state, recovery=Recovery()), []
+    for epoch in rows[30:90]:
+        measured = with_a_fix(epoch, log) if fixed else epoch
+        then_m = state.reckoning.travelled_m
+        state, output = WATCHED.step(state, measured, rng)
+        found.append((output.fix.status, state.recovery, then_m, bool(epoch.radio)))
+    if fixed:
+        assert found[0][:2] == (Status.TRACKING, None)
+        return
+    uncertain = [row for row in found if row[1] is not None]
+    assert {row[0] for row in uncertain} == {Status.UNCERTAIN}
+    assert sum(row[3] for row in uncertain) >= 2
+    assert uncertain[-1][2] - uncertain[0][2] > WATCHED.options.switch_hold_m - 3
+    assert found[-1][:2] == (Status.TRACKING, None)
 
 
 def test_motion_that_is_read_otherwise_is_used():

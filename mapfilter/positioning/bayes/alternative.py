@@ -31,11 +31,12 @@ won              found      other, TRACKING   TRACKING   other's  took over
 Then, by the status reported before: ``LOST`` stays while the belief searches and becomes
 ``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief that had converged and
 has less than half of it in one place is ``LOST`` and searches again; one that has less than 95 %
-there, rivals included, is ``UNCERTAIN``, and so is one that was lost, until it has agreed for some
-way. While the null hypothesis is more probable than the belief, one that had converged is ``LOST``,
-too, and ``OUTSIDE`` where it lies at the edge of the area; one that searches is ``OUTSIDE``, and so
-is one that has left the area. A belief does not converge while the null hypothesis is not
-improbable or the alternative close behind, as the true position may have died out of it.
+there, rivals included, is ``UNCERTAIN``, and so is one that was LOST without a new search, until it
+has agreed for some way. While the null hypothesis is more probable than the belief, one that had
+converged is ``LOST``, too, and ``OUTSIDE`` where it lies at the edge of the area; one that searches
+is ``OUTSIDE``, and so is one that has left the area. A belief does not converge while the null
+hypothesis is not improbable or the alternative close behind, as the true position may have died out
+of it.
 """
 
 from __future__ import annotations
@@ -177,7 +178,8 @@ class AlternativeHypothesis:
     start_m, start_s : float
         Distance travelled and time at its start.
     main_log_evidence : float
-        Log evidence of the main belief at its start.
+        Log evidence of the main belief at its start; less the log odds of a turned phone whose
+        belief has taken over since.
     sources : mapping of str to object
         State of the sources of evidence that depends on the belief.
     gnss_log_bayes_factor : float
@@ -201,6 +203,10 @@ class AlternativeHypothesis:
         """Return the logarithm of the Bayes factor in favour of the alternative."""
         by_readings = self.belief.log_evidence - (main.log_evidence - self.main_log_evidence)
         return by_readings + self.gnss_log_bayes_factor
+
+    def beside(self, log_prior: float) -> AlternativeHypothesis:
+        """Return it beside a belief that has taken over, which had such log odds beforehand."""
+        return replace(self, main_log_evidence=self.main_log_evidence - log_prior)
 
 
 class Outcome(Enum):

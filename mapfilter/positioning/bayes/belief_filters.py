@@ -108,6 +108,15 @@ class BeliefFilters:
             return self.rules
         return self.positioned[1]
 
+    def options_of(self, state: BayesState) -> ParticleOptions:
+        """Return the numbers of particles and the switch rule for the evidence that there is."""
+        lanes = self.by_carriageways(state)
+        if lanes is not None:
+            return lanes.options
+        if self.positioned is None or self.by_map_alone(state):
+            return self.options
+        return self.positioned[0]
+
     def filter_of(self, state: BayesState) -> MapFilter:
         """Return the filter of a single belief for the evidence that there is."""
         if self.by_carriageways(state) is not None:

@@ -5,7 +5,7 @@ what is measured at all. Beside it stand beliefs in which the phone was turned, 
 from scratch, each with its odds against the belief. The share of all of them together within 50 m
 is the probability that the position is right. With too low a probability a position is reported but
 not claimed. The null hypothesis has no position, and statuses of its own. A position that was lost
-is claimed again when it has agreed for some way, as a belief that searches has to.
+without a new search is claimed again when it has agreed for some way.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _NEGLIGIBLE, _CERTAIN = -9.0, 30.0
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """Of a position that was lost, though its belief did not search again.
+    """Way over which a position has agreed since it was lost without a new search.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Recovery:
     agrees_from_m: float = nan
 
     def after(self, travelled_m: float, hold_m: float, *, agrees: bool) -> Recovery | None:
-        """Return it at a distance travelled, or None where the belief has agreed for ``hold_m``.
+        """Return it after a reading; None where the belief has agreed for ``hold_m``.
 
         Examples
         --------

@@ -27,6 +27,7 @@ from mapfilter.positioning.bayes.alternative import (
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
+from mapfilter.positioning.bayes.claims import judged
 from mapfilter.positioning.bayes.evidence import (
     EvidenceSource,
     EvidenceUpdate,
@@ -176,16 +177,16 @@ class BayesPositioner(Filter[BayesState]):
                 state = replace(state, belief=belief, sources={**state.sources, **sources})
         else:
             measured = motion not in UNMEASURED
-            state, why = weighing.weighed(
-                state, state.belief, updates, epoch, rng, measured=measured
-            )
+            moved_only = state.belief
+            state, why = weighing.weighed(state, moved_only, updates, epoch, rng, measured=measured)
             reason = reason if why is Reason.USED else why
+            used = state.belief is not moved_only
             if state.belief is not None:
                 belief, status = report(before, state.belief, state.status)
                 if belief is not state.belief or status is not state.status:
                     state = replace(state, belief=belief, status=status)
-                satellites: GnssState = state.sources[GnssSource.name]
-                state = weighing.judged(state, positioned=satellites.was_used(epoch.time_s))
+                positioned = _gnss_of(state).was_used(epoch.time_s)
+                state = judged(self.beliefs, state, weighed=used, positioned=positioned)
         other_unit = state.hold.step_unit_m != hold.step_unit_m
         read_anew = state.hold != hold and not other_unit
         taken_over = read_anew and not state.hold.is_as_measured
@@ -195,7 +196,7 @@ class BayesPositioner(Filter[BayesState]):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         elif other_unit:
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.OTHER_UNIT))
-        gnss: GnssState = state.sources[GnssSource.name]
+        gnss = _gnss_of(state)
         if epoch.fix is not None and gnss.was_used(epoch.time_s):
             state = replace(state, last_fix=epoch.fix)
         if gnss.was_used(epoch.time_s) and state.watch.rest is not None:
@@ -264,6 +265,11 @@ def _tracked(state: BayesState) -> BayesState:
     if not (state.contested or state.status is Status.UNCERTAIN):
         return state
     return replace(state, status=Status.TRACKING, contested=False)
+
+
+def _gnss_of(state: BayesState) -> GnssState:
+    gnss: GnssState = state.sources[GnssSource.name]
+    return gnss
 
 
 def _with_a_new_fix(state: BayesState, epoch: Epoch) -> tuple[Epoch, bool]:

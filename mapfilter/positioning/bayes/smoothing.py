@@ -65,6 +65,8 @@ class BayesSmoother:
         Distance between two beliefs that are kept; doubles when they take too much memory.
     kept, alternative : list of Kept
         Of the main belief and, since its start, of the present alternative.
+    alternative_is_whole : bool
+        Whether there is one of each part since its start: none was dropped at a takeover.
     moved : list of (float, float, float, float)
         East, north and distance by dead reckoning at each epoch, and the variance of its sampling.
     last : BayesState or None
@@ -76,6 +78,7 @@ class BayesSmoother:
     every_m: float = 5.0
     kept: list[Kept] = field(default_factory=list)
     alternative: list[Kept] = field(default_factory=list)
+    alternative_is_whole: bool = True
     moved: list[tuple[float, float, float, float]] = field(default_factory=list)
     last: BayesState | None = None
     _kept_bytes: int = 0
@@ -95,13 +98,13 @@ class BayesSmoother:
                 starts_m = [before.alternative.start_m]
             since_m = min(starts_m, default=now.travelled_m)
             self._keep_only([k for k in self.kept if k.travelled_m < since_m])
-            self.alternative = []
+            self.alternative, self.alternative_is_whole = [], after.alternative is None
         elif before.alternative is not None and after.alternative is None:
             if taken_over:
                 start_m = before.alternative.start_m
                 ours = [k for k in self.kept if k.travelled_m < start_m]
-                self._keep_only(ours + self.alternative)
-            self.alternative = []
+                self._keep_only(ours + (self.alternative if self.alternative_is_whole else []))
+            self.alternative, self.alternative_is_whole = [], True
         due = not self.kept or now.travelled_m - self.kept[-1].travelled_m >= self.every_m
         if after.belief is None or not due:
             return

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import nan
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from mapfilter.positioning.bayes.alternative import (
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
-from mapfilter.positioning.bayes.certainty import Recovery, certainty
+from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import (
     Context,
     EvidenceSource,
@@ -173,12 +172,12 @@ class Weighing:
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
         disputed = disputed or asks_for_unit(state, now.belief, other_m)
-        # Who is ahead of a belief in a wrong place may be in a wrong place, too.
-        disputed = disputed or beliefs.is_contested(state)
+        disputed = disputed or now.null.log_odds >= rules.start_log_odds or gone
+        # A turned phone may be ahead only because the belief is in a wrong place.
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
-            and (now.null.log_odds >= rules.start_log_odds or disputed or gone)
+            and (disputed or beliefs.is_contested(state))
         ):
             alternative = self._alternative(state, now.belief, epoch, rng)
         after = BayesState(
@@ -202,7 +201,7 @@ class Weighing:
             hold=hold_after_takeover(state) if now.taken_over else state.hold,
             walking_rad=state.walking_rad,
             held=() if now.taken_over else state.held,
-            alternatives=state.alternatives + (alternative is not now.alternative),
+            alternatives=state.alternatives + (disputed and alternative is not now.alternative),
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
@@ -242,6 +241,7 @@ class Weighing:
             status=Status.TRACKING,
             sources={**state.sources, **own},
             null=best.null,
+            alternative=state.alternative and state.alternative.beside(best.log_prior),
             takeovers=state.takeovers + 1,
             recovery=Recovery(),
             hold=best.hold,
@@ -270,44 +270,6 @@ class Weighing:
             twin.belief, replace(reading, doubted=True), rng
         )
         return replace(twin, belief=belief) if info.reason is Reason.USED else None
-
-    def judged(self, state: BayesState, *, positioned: bool) -> BayesState:
-        """Return a state that is LOST or UNCERTAIN where its position is not to be claimed.
-
-        It is LOST while its belief is spread over more than one place: below the mass at which it
-        searches again, it has to converge anew. A belief in one place that is not certain enough
-        is UNCERTAIN; so is one that was lost, until it agrees as one that converges does, or
-        positions are used: ``positioned`` is whether one was.
-        """
-        state = self._in_one_place(state)
-        belief, rules, recovery = state.belief, self.beliefs.rules_of(state), state.recovery
-        if belief is None or belief.status is Status.SEARCHING or positioned:
-            recovery = None
-        elif state.status in (Status.LOST, Status.OUTSIDE):
-            recovery = Recovery()
-        if belief is not None and state.status is Status.TRACKING:
-            probability = certainty(rules, belief, state.alternative, state.held)
-            uncertain = probability < rules.claimed_from
-            if recovery is not None:
-                options, travelled_m = self.beliefs.options, state.reckoning.travelled_m
-                agrees = probability >= options.switch_mass
-                agrees = agrees and not doubted(rules, belief, state.null, state.alternative)
-                recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
-                uncertain = uncertain or recovery is not None
-            if uncertain:
-                return replace(state, status=Status.UNCERTAIN, recovery=recovery)
-        return state if recovery is state.recovery else replace(state, recovery=recovery)
-
-    def _in_one_place(self, state: BayesState) -> BayesState:
-        belief = state.belief
-        if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
-            return state
-        if belief.summary.mass_50m < self.beliefs.options.split_mass:
-            belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
-            return replace(state, belief=belief, status=Status.LOST)
-        if self.beliefs.is_contested(state) or self.beliefs.may_have_left(state):
-            return replace(state, status=Status.LOST, contested=True)
-        return state
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
