@@ -281,6 +281,24 @@ def test_headings_that_are_read_as_usual_again(takeovers):
     assert history.alternative == []
 
 
+@pytest.mark.parametrize("between", [False, True])
+def test_an_alternative_that_outlasts_a_takeover_by_a_turned_phone(between):
+    """What was kept of it before that is gone, so no part of it is joined to what it takes over."""
+    history, turned = BayesSmoother(AREA, ERRORS, every_m=1.0), Hold(1.0, 3.0)
+    main, other, last = (cloud((x, 1.0, 0, 0)) for x in (1.0, 5.0, 9.0))
+    rival = SimpleNamespace(belief=at(0, last).belief, start_m=MOVED[1][2] - 0.5)
+    held = (SimpleNamespace(hold=Hold(), start_m=MOVED[2][2] - 0.5),)
+    first = turned if between else Hold()
+    tracks = [at(0, main, hold=first), at(1, main, rival, hold=first, held=held)]
+    tracks += [at(2, other if between else main, rival, takeovers=int(between))]
+    tracks += [at(3, last, takeovers=1 + between), at(4, last, takeovers=1 + between)]
+    for before, after in zip([tracks[0], *tracks], tracks, strict=False):
+        history.add(before, after)
+    assert [k.epoch for k in history.kept] == ([0, 3, 4] if between else [0, 1, 2, 3, 4])
+    assert [float(k.state[0, 0]) for k in history.kept][1:] == [9.0] * (2 if between else 4)
+    assert history.alternative_is_whole
+
+
 def test_evidence_is_kept_by_epoch():
     tracking, converged = Status.TRACKING, Status.CONVERGED
     cases = [(10.0, tracking), (10.1, tracking), (5.0, converged), (nan, tracking), (9.0, tracking)]
