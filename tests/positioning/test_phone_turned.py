@@ -195,10 +195,12 @@ def test_an_alternative_reads_headings_as_they_are_also_once_it_takes_over():
         assert then.summary.mean[0] - before.summary.mean[0] == pytest.approx(moved_m, abs=1.0)
     # Whatever the reading says of a place that was chosen for the test.
     certain = replace(after.alternative, null=NullHypothesis(-40.0))
-    after = replace(after, alternative=certain)
+    after = replace(after, alternative=certain, recovery=Recovery())
     after, output = WATCHED.step(after, Epoch(2.0, (MotionStep(5.0, 0.0),), RADIO), rng)
     assert after.takeovers == 1
     assert after.hold == Hold()
+    # It has converged by itself, or will have to.
+    assert after.recovery is None
     assert Reason.PHONE_TURNED not in {one.reason for one in output.unused}
 
 
