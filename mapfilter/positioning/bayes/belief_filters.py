@@ -101,21 +101,19 @@ class BeliefFilters:
 
     def rules_of(self, state: BayesState) -> AlternativeRules:
         """Return the rules for the evidence that there is."""
-        lanes = self.by_carriageways(state)
-        if lanes is not None:
-            return lanes.rules
-        if self.positioned is None or self.by_map_alone(state):
-            return self.rules
-        return self.positioned[1]
+        return self._settings_of(state)[1]
 
     def options_of(self, state: BayesState) -> ParticleOptions:
         """Return the numbers of particles and the switch rule for the evidence that there is."""
+        return self._settings_of(state)[0]
+
+    def _settings_of(self, state: BayesState) -> tuple[ParticleOptions, AlternativeRules]:
         lanes = self.by_carriageways(state)
         if lanes is not None:
-            return lanes.options
+            return lanes.options, lanes.rules
         if self.positioned is None or self.by_map_alone(state):
-            return self.options
-        return self.positioned[0]
+            return self.options, self.rules
+        return self.positioned
 
     def filter_of(self, state: BayesState) -> MapFilter:
         """Return the filter of a single belief for the evidence that there is."""
