@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from functools import cache
 from typing import Annotated
 
 import typer
@@ -103,5 +104,10 @@ def main() -> None:
 
 def _run() -> int | None:
     keep_kernels()
-    code: int | None = get_command(app)()
-    return code
+    return _command_line()()
+
+
+@cache
+def _command_line() -> Callable[[], int | None]:
+    """Return all commands; to look at the types of their options takes as long as many commands."""
+    return get_command(app)
