@@ -186,7 +186,7 @@ def test_a_search_stays_one_after_a_rest_in_doubt(status):
     state, _ = AREA.step(state, Epoch(1.0, (MotionStep(5.0, 0.0),)), rng)
     rest = replace(Rest(1.0, pace_mps=1.4), is_doubtful=True)
     belief = replace(state.belief, status=Status.SEARCHING)
-    state = replace(state, belief=belief, status=status, watch=replace(state.watch, rest=rest))
+    state = replace(state, belief=belief, status=status, watch=state.watch._replace(rest=rest))
     before_m = state.belief.state[:2].std()
     for time_s in (30.0, 31.0):
         state, output = AREA.step(state, Epoch(time_s, (MotionStep(5.0, 0.0),)), rng)
@@ -202,7 +202,7 @@ def test_the_doubt_of_a_rest_ends_where_its_levels_have_shown_it():
     doubtful = replace(Rest(1.0, pace_mps=1.4), is_doubtful=True)
     for left_nats, status in ((9.0, Status.UNCERTAIN), (-9.0, Status.TRACKING)):
         rest = replace(doubtful, left_nats=left_nats)
-        rested = replace(state, watch=replace(state.watch, rest=rest))
+        rested = replace(state, watch=state.watch._replace(rest=rest))
         _, output = AREA.step(rested, Epoch(30.0, (MotionStep(5.0, 0.0),)), rng)
         assert output.fix.status is status
 

@@ -134,7 +134,7 @@ def test_a_stroll_of_60_m_that_levels_do_not_contradict_is_learnt():
     assert (watch.moving_s, watch.known_s, watch.rest) == (102.0, 102.0, None)
     assert watch.pace.speed_mps == pytest.approx((1.5 + 60.2 / 102.0) / 2)
     # In feet the same speeds are larger.
-    feet = replace(strolling(), pace=replace(strolling().pace, speed_mps=4.5, recent_mps=0.9))
+    feet = strolling()._replace(pace=replace(strolling().pace, speed_mps=4.5, recent_mps=0.9))
     watch = after(epoch(101.0, 2.0), watch=feet, unit_m=0.25)
     assert watch.pace.speed_mps == pytest.approx((4.5 + 60.0 / 0.25 / 101.0) / 2)
 
@@ -151,8 +151,8 @@ def test_a_stroll_in_doubt_is_not_learnt():
 def test_what_the_counter_did_not_miss_is_no_unmeasured_way():
     """Of 1.5 m/s for 101 s a third is measured: the rest of the way is put in once."""
     watch = strolling(50.5, carried_nats=6.0)
-    before = replace(watch, rest=replace(watch.rest, carried_nats=5.9, served={"A": 50.0}))
-    before = replace(before, rest=replace(before.rest, served=dict.fromkeys("ABCDE", 100.0)))
+    before = watch._replace(rest=replace(watch.rest, carried_nats=5.9, served={"A": 50.0}))
+    before = before._replace(rest=replace(before.rest, served=dict.fromkeys("ABCDE", 100.0)))
     radio = (ReportRow("serving", "F", None, None, nan, 0),)
     watch, seen, (why, _) = watched(before, epoch(101.0, 0.0, radio=radio))
     assert why is Reason.MOTION_STUCK
@@ -303,5 +303,5 @@ def test_eight_nats_make_a_radio_stale(before, stale):
     assert (why is Reason.STALE_RADIO) == stale
     assert seen.radio == (() if stale else rows)
     # Without a report nothing is stale.
-    _, seen, (_, why) = watched(replace(watch, repeated_nats=99.0), epoch(2.0))
+    _, seen, (_, why) = watched(watch._replace(repeated_nats=99.0), epoch(2.0))
     assert why is Reason.USED

@@ -45,11 +45,12 @@ class Hold:
         """Return a step with the length and the direction that it stands for."""
         if self.step_unit_m != 1.0:
             unit_m = self.step_unit_m
-            step = replace(
-                step,
-                step_m=unit_m * step.step_m,
-                spread_m=unit_m * step.spread_m,
-                sampling_sd_m=unit_m * step.sampling_sd_m,
+            step = MotionStep(
+                unit_m * step.step_m,
+                step.heading_rad,
+                step.turn_rad,
+                unit_m * step.spread_m,
+                unit_m * step.sampling_sd_m,
             )
         if self.is_as_measured or not isfinite(step.heading_rad):
             return step

@@ -12,8 +12,9 @@ those of a stroll, so levels decide (:mod:`mapfilter.positioning.bayes.rest`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import exp, isfinite, nan, sqrt
+from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.pace import GAP_INTERVALS, Pace
@@ -30,8 +31,7 @@ _STRETCH_M = 60.0
 """Way as measured after which levels that agree with it have shown a stroll."""
 
 
-@dataclass(frozen=True, slots=True)
-class SensorWatch:
+class SensorWatch(NamedTuple):
     """What is known of the sensors after an epoch.
 
     Parameters
@@ -58,7 +58,7 @@ class SensorWatch:
         How motion rows repeat each other.
     """
 
-    pace: Pace = field(default_factory=Pace)
+    pace: Pace = Pace()
     moving_s: float = nan
     known_s: float = nan
     rest: Rest | None = None
@@ -66,7 +66,7 @@ class SensorWatch:
     moved_m: float = 0.0
     report: tuple[ReportRow, ...] = ()
     repeated_nats: float = 0.0
-    repeats: MotionRepeats = field(default_factory=MotionRepeats)
+    repeats: MotionRepeats = MotionRepeats()
 
     def positioned(self, time_s: float) -> SensorWatch:
         """Return the watch after a position was measured and used.
@@ -80,7 +80,7 @@ class SensorWatch:
 
     def _moving(self, time_s: float) -> SensorWatch:
         """Return the watch after a measured way to a time."""
-        return replace(self, moving_s=time_s, known_s=time_s, rest=None, unmeasured_s=0.0)
+        return self._replace(moving_s=time_s, known_s=time_s, rest=None, unmeasured_s=0.0)
 
 
 UNMEASURED = frozenset(
@@ -115,7 +115,7 @@ def watched(
     if epoch.radio:
         nats = repeated_nats(nats, report, epoch.radio, step_unit_m * moved_m)
         report, moved_m = epoch.radio, 0.0
-    watch = replace(watch, moved_m=moved_m, report=report, repeated_nats=nats, repeats=repeats)
+    watch = watch._replace(moved_m=moved_m, report=report, repeated_nats=nats, repeats=repeats)
     if epoch.radio and nats >= STALE_NATS:
         return watch, replace(epoch, radio=()), (why, Reason.STALE_RADIO)
     return watch, epoch, (why, Reason.USED)
@@ -128,7 +128,7 @@ def _followed(
     time_s, steps = epoch.time_s, epoch.motion
     pace, going = watch.pace.read(time_s, steps, step_unit_m)
     before_m = watch.moved_m
-    watch = replace(watch, pace=pace, moved_m=before_m + going.gone_m)
+    watch = watch._replace(pace=pace, moved_m=before_m + going.gone_m)
     if going.moves:
         return watch._moving(time_s), epoch, Reason.USED
     if not isfinite(watch.moving_s):
@@ -149,10 +149,10 @@ def _followed(
     if why is Reason.USED:
         if rest.measured_m >= _STRETCH_M and not rest.is_doubtful:
             strolled_mps = rest.measured_m / step_unit_m / (time_s - watch.moving_s)
-            slower = replace(watch, pace=pace.slowed(strolled_mps))
+            slower = watch._replace(pace=pace.slowed(strolled_mps))
             return slower._moving(time_s), epoch, why
         known_s = time_s if going.measured else watch.known_s
-        return replace(watch, rest=rest, known_s=known_s), epoch, why
+        return watch._replace(rest=rest, known_s=known_s), epoch, why
     # A measured rest is none of the way, unless it was a counter that stood still.
     to_s = watch.unmeasured_s + time_s - watch.known_s
     missed = 1.0
@@ -162,8 +162,8 @@ def _followed(
             # What the counter did not miss is in the belief already.
             missed = max(1 - rest.measured_m / (rest.pace_mps * to_s), 0.0)
     step = _unmeasured(missed * pace.speed_mps, watch.unmeasured_s, to_s)
-    watch = replace(
-        watch, known_s=time_s, rest=rest, unmeasured_s=to_s, moved_m=before_m + step.step_m
+    watch = watch._replace(
+        known_s=time_s, rest=rest, unmeasured_s=to_s, moved_m=before_m + step.step_m
     )
     return watch, replace(epoch, motion=(*_turns_of(steps), step)), why
 
