@@ -8,6 +8,7 @@ from shutil import rmtree
 from typing import Any
 
 from sphinx.application import Sphinx
+from sphinx.domains.python import PythonDomain
 
 project = "mapfilter"
 author = "The mapfilter developers"
@@ -70,6 +71,24 @@ def _sidebar_of_modules(
         context["toctree"] = lambda **given: whole(**{**given, "collapse": True})
 
 
+class _Names(PythonDomain):
+    """The names of Python, where what was looked up is kept.
+
+    Short names of types in docstrings are compared with all names that there are.
+    """
+
+    _found: dict[tuple[object, ...], list[Any]] | None = None
+
+    def find_obj(self, env: Any, *sought: Any) -> list[Any]:
+        """Return the objects of a name; pages are resolved when all of them have been read."""
+        if self._found is None:
+            self._found = {}
+        if sought not in self._found:
+            self._found[sought] = super().find_obj(env, *sought)
+        return list(self._found[sought])
+
+
 def setup(app: Sphinx) -> None:
     """Connect what is done to pages before the theme (at 500) is."""
+    app.add_domain(_Names, override=True)
     app.connect("html-page-context", _sidebar_of_modules, priority=400)
