@@ -207,6 +207,19 @@ def test_the_doubt_of_a_rest_ends_where_its_levels_have_shown_it():
         assert output.fix.status is status
 
 
+@pytest.mark.parametrize("left_nats", [-2.0, 2.0])
+def test_as_many_hypotheses_are_carried_on_as_the_levels_of_the_rest_say(left_nats):
+    rng = np.random.default_rng(1)
+    state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
+    rest = replace(Rest(1.0, pace_mps=1.4), left_nats=left_nats)
+    state = replace(state, watch=state.watch._replace(rest=rest))
+    after = AREA.beliefs.carried_on(state, state.belief, 100.0, rng)
+    share = np.mean(np.any(after.state != state.belief.state, axis=0))
+    # Four standard errors of 1000 hypotheses or more.
+    assert state.belief.count >= 1000
+    assert share == pytest.approx(1 / (1 + np.exp(-left_nats)), abs=0.04)
+
+
 def test_the_pace_before_a_rest_is_in_metres():
     rng = np.random.default_rng(1)
     state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
