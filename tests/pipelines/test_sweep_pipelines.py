@@ -38,6 +38,11 @@ def test_build_and_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert all(Path(picture).is_file() for picture in found["pictures"])
 
 
+@pytest.mark.parametrize("file", sorted(PIPELINES.glob("*.toml")), ids=lambda file: file.stem)
+def test_paths_that_a_pipeline_prints_have_no_dots(file: Path) -> None:
+    assert load_config(file).output.dir.parent == PIPELINES.parent / "out"
+
+
 def test_settings_of_the_reproduction() -> None:
     config = load_config(PIPELINES / "reproduce_papers.toml")
     assert config.area.map == "synthetic"
