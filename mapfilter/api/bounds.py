@@ -55,7 +55,11 @@ class Bound:
         from mapfilter.report.network import plot_point_values
 
         radio, database = self.found.radio, self.database
-        base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
+        base = BaseMap(
+            radio.lattice.bounds_m,
+            attribution=database.attribution,
+            whole_m=database.lattice.bounds_m,
+        )
         values = on_lattice(radio, self.found.at_points()["along_bound_m"])
         title = "Least position error along the street from one report of levels"
         return plot_point_values(
