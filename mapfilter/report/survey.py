@@ -104,8 +104,10 @@ def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap) -> Figu
             look = Look(shrink=0.8, pad=0.02, aspect=28)
             figure.colorbar(image, ax=axes, label=label, **look)
         at = local_frame(shown)(cell.east_m, cell.north_m)
-        look = Look(cmap="viridis", clim=levels_dbm, edgecolors=BLACK, linewidths=0.5)
-        left.scatter(*at, s=22, c=cell.measured_dbm, zorder=5, **look)
+        # A rim about all of them: rims of dense points would hide their colours.
+        left.scatter(*at, s=32, color=BLACK, linewidths=0, zorder=5)
+        look = Look(cmap="viridis", clim=levels_dbm, linewidths=0)
+        left.scatter(*at, s=15, c=cell.measured_dbm, zorder=5.5, **look)
         right.scatter(*at, s=3, color=BLACK, linewidths=0, zorder=5)
         points = grouped(len(cell.measured_dbm))
         left.set_title(f"{cell.cell_id}: level, {points} measurements", fontsize=10)
