@@ -100,6 +100,8 @@ class Track:
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the track and the ground truth over the streets of the database.
 
+        A script saves the picture with ``axes.figure.savefig("track.png")``.
+
         Parameters
         ----------
         ax : matplotlib Axes, optional
