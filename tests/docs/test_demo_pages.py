@@ -1,4 +1,4 @@
-"""What the first pages tell of the demo is what it prints; the ten lines of the README run on it."""
+"""What the first pages tell of the demo is what it prints; the README's ten lines run on it."""
 
 import re
 from pathlib import Path
