@@ -14,21 +14,22 @@ The names below are loaded when they are first used, so that importing mapfilter
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from mapfilter._kernel_cache import keep_kernels
 
 if TYPE_CHECKING:
+    from mapfilter.api.bounds import Bound as Bound
+    from mapfilter.api.bounds import bound as bound
     from mapfilter.api.located import Score as Score
     from mapfilter.api.located import Track as Track
     from mapfilter.api.located import locate as locate
     from mapfilter.api.located import score as score
     from mapfilter.api.logs import read_log as read_log
     from mapfilter.api.reports import locate_reports as locate_reports
-    from mapfilter.api.studies import Bound as Bound
     from mapfilter.api.studies import Sweep as Sweep
-    from mapfilter.api.studies import bound as bound
     from mapfilter.api.studies import simulate as simulate
     from mapfilter.api.studies import sweep as sweep
     from mapfilter.database.build import build as build
@@ -67,10 +68,11 @@ if TYPE_CHECKING:
     from mapfilter.tracks.store import write_log as write_log
 
 _NAMES = {
+    "api.bounds": "Bound bound",
     "api.located": "Score Track locate score",
     "api.logs": "read_log",
     "api.reports": "locate_reports",
-    "api.studies": "Bound Sweep bound simulate sweep",
+    "api.studies": "Sweep simulate sweep",
     "database.build": "build",
     "database.radioroutes": "RadioRouteDatabase",
     "database.store": "open_database",
@@ -111,7 +113,8 @@ def __getattr__(name: str) -> Any:
         return import_module(f"{__name__}._io").VERSION
     home = _HOMES.get(name)
     if home is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        message = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(message, name=name, obj=sys.modules[__name__])
     keep_kernels()
     return getattr(import_module(f"{__name__}.{home}"), name)
 

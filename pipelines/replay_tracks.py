@@ -1,5 +1,8 @@
 """Journeys along the streets of a database's area, located from an unknown start, and scored.
 
+The filter is that of 2007, and the phone is served exactly as predicted, as in the paper: the
+success rate is no estimate of accuracy. ``mapfilter evaluate global-positioning`` makes one.
+
 Run ``build_database.py`` first, with the same area; the settings are in ``replay_tracks.toml``::
 
     python pipelines/replay_tracks.py --set area.map=CITY.osm.pbf --set area.bbox=W,S,E,N

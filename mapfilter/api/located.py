@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from mapfilter._arguments import Argument, check_arguments, generator
+from mapfilter.api.given import database_argument, log_argument, opened, read
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
@@ -97,6 +100,8 @@ class Track:
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the track and the ground truth over the streets of the database.
 
+        A script saves the picture with ``axes.figure.savefig("track.png")``.
+
         Parameters
         ----------
         ax : matplotlib Axes, optional
@@ -110,8 +115,8 @@ class Track:
 
 
 def locate(
-    log: TrackLog,
-    database: RadioRouteDatabase,
+    log: TrackLog | Path | str,
+    database: RadioRouteDatabase | Path | str,
     filter: Any = DEFAULT,  # noqa: A002
     *,
     seed: int | np.random.Generator = 0,
@@ -124,9 +129,11 @@ def locate(
 
     Parameters
     ----------
-    log : TrackLog
-        In the CRS of the database. Cells that it names by identity (mcc, mnc, lac, ci) get the ids
-        of the database.
+    log : TrackLog or path
+        In the CRS of the database; a path is read as by :func:`mapfilter.read_log` in that CRS.
+        Cells that it names by identity (mcc, mnc, lac, ci) get the ids of the database.
+    database : RadioRouteDatabase or path
+        A path is opened by each call; open it once for many logs.
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out. What the log states
@@ -148,10 +155,16 @@ def locate(
     ------
     InputError
         The log is in another CRS than the database.
+    StoreError
+        A path holds no database, or one that is damaged.
     ConfigError
-        The filter is none, a custom filter fails, or the risk does not lie between 0 and 1.
+        Log or database is neither, the seed is none, the filter is none, a custom filter fails, or
+        the risk does not lie between 0 and 1.
     """
-    rng = np.random.default_rng(seed)
+    check_arguments("locate", log_argument(log), database_argument(database))
+    rng = generator("locate", seed)
+    database = opened(database)
+    log = read(log, database.lattice.crs)
     log = name_by_plan(in_frame(log, database.lattice.crs), database.plan)
     options, notes = fitted_to_log(
         filter_options(filter) if isinstance(filter, str) else filter, log
@@ -207,7 +220,14 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
     ------
     InputError
         The ground truth has fewer than two positions, or lacks a column.
+    ConfigError
+        There is no track, or no table of ground truth.
     """
+    check_arguments(
+        "score",
+        Argument("track", track, Track | TrackEstimate, "a track of locate"),
+        Argument("truth", truth, pd.DataFrame | Truth, "a table such as log.truth"),
+    )
     estimate = track.estimate if isinstance(track, Track) else track
     if not isinstance(truth, Truth):
         lacking = {"time_s", "east_m", "north_m"} - set(truth.columns)

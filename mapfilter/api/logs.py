@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from mapfilter._arguments import PATH, Argument, check_arguments
+from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenOptions, open_log
@@ -14,10 +16,10 @@ _WALK = WalkOptions()
 
 
 def read_log(
-    paths: str | Path | Sequence[str | Path],
+    paths: str | Path | Iterable[str | Path],
     *,
     crs: str = "",
-    truth: Sequence[str | Path] = (),
+    truth: str | Path | Iterable[str | Path] = (),
     zone: str = "",
     columns: Mapping[str, str] | None = None,
     course_motion: bool = False,
@@ -27,13 +29,13 @@ def read_log(
 
     Parameters
     ----------
-    paths : path, or sequence of paths
+    paths : path, or several
         A log's folder; or recordings (the page "Recordings of other programs" lists the formats),
         or a folder of them.
     crs : str
         Projected CRS for recordings, such as ``database.lattice.crs``; else the UTM zone of their
         positions.
-    truth : sequence of paths
+    truth : path, or several
         Recordings whose positions are the truth, and no measurements.
     zone : str
         Zone of local times that state none, such as ``Europe/Brussels``.
@@ -52,8 +54,23 @@ def read_log(
         There is neither a log nor a recording, or what there is makes no sense; with every fault.
     StoreError
         A file of a log is missing, cut off or changed since it was written.
+    ConfigError
+        There is no path, or the CRS is no text.
     """
-    true = [Path(path) for path in truth]
+    files = "a path, or several"
+    check_arguments(
+        "read_log",
+        Argument("paths", paths, PATH | Iterable, files),
+        Argument("crs", crs, str, "a CRS such as database.lattice.crs"),
+        Argument("truth", truth, PATH | Iterable, files),
+    )
+    given, true = _several(paths), _several(truth)
+    if not given:
+        raise fail(ConfigError, "read_log, paths", files, "none", "a pattern that no file matches")
     combine = CombineOptions(truth=true, course_motion=course_motion, walk=walk)
     options = OpenOptions(zone=zone, columns=columns or {}, combine=combine)
-    return open_log(paths, crs=crs, options=options).log
+    return open_log(given, crs=crs, options=options).log
+
+
+def _several(paths: str | Path | Iterable[str | Path]) -> list[Path]:
+    return [Path(paths)] if isinstance(paths, PATH) else [Path(path) for path in paths]

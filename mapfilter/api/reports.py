@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 
+from mapfilter._arguments import PATH, Argument, check_arguments, generator
+from mapfilter.api.given import opened, read
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.fingerprints.censoring import bounds_of
 from mapfilter.positioning.fingerprints.located import LocatedReports
@@ -22,8 +25,8 @@ from mapfilter.tracks.log import TrackLog
 
 
 def locate_reports(
-    log: TrackLog | Reports,
-    database: RadioRouteDatabase | Reports | TrackLog | Sequence[TrackLog],
+    log: TrackLog | Reports | Path | str,
+    database: RadioRouteDatabase | Path | str | Reports | TrackLog | Iterable[TrackLog],
     method: Method | str = AUTO,
     *,
     level_error_db: float = 6.0,
@@ -33,9 +36,10 @@ def locate_reports(
 
     Parameters
     ----------
-    log : TrackLog or Reports
-        What was received; in the CRS of the database.
-    database : RadioRouteDatabase, Reports, TrackLog or sequence of TrackLog
+    log : TrackLog, Reports or path
+        What was received; in the CRS of the database. A path is read as by
+        :func:`mapfilter.read_log`.
+    database : RadioRouteDatabase or its path, Reports, TrackLog or several
         Predicted or surveyed levels; or fingerprints: logs with ground truth, or a table of
         :func:`mapfilter.read_fingerprint_table`.
     method : options, or str
@@ -51,24 +55,39 @@ def locate_reports(
     InputError
         The log is in another CRS than the database, or the database has no report with a position.
     ConfigError
-        There is no such method.
+        There is no such method, an argument is none of these, or the seed is none.
     """
+    check_arguments(
+        "locate_reports",
+        Argument("log", log, TrackLog | Reports | PATH, "a log, reports or the path of a log"),
+        Argument(
+            "database",
+            database,
+            RadioRouteDatabase | PATH | Reports | TrackLog | Iterable,
+            "a database or its path, reports, or logs",
+        ),
+    )
+    rng = generator("locate_reports", seed)
     plan = None
-    if isinstance(database, RadioRouteDatabase):
+    if isinstance(database, RadioRouteDatabase | PATH):
+        database = opened(database)
         known, plan = reports_of_database(database, level_error_db), database.plan
     elif isinstance(database, Reports):
         known = database
     else:
-        known = reports_of_logs([database] if isinstance(database, TrackLog) else database)
-    reports = reports_of_logs([log], plan) if isinstance(log, TrackLog) else log
-    rng = np.random.default_rng(seed)
-    strongest = usual_readings(reports)
+        logs = [database] if isinstance(database, TrackLog) else list(database)
+        each = [Argument(f"database[{k}]", one, TrackLog, "a log") for k, one in enumerate(logs)]
+        check_arguments("locate_reports", *each)
+        known = reports_of_logs(logs)
+    if not isinstance(log, Reports):
+        log = reports_of_logs([read(log, known.crs)], plan)
+    strongest = usual_readings(log)
     fitted = fit_locator(
         known,
         method,
         rng,
         strongest=strongest,
-        bounds=bounds_of(reports),
-        timed=timed_share(reports),
+        bounds=bounds_of(log),
+        timed=timed_share(log),
     )
-    return locate_by(fitted, reports)
+    return locate_by(fitted, log)

@@ -1,4 +1,4 @@
-"""Simulate journeys, sweep filters over noise, and bound what a database allows."""
+"""Simulate journeys, and sweep filters over noise."""
 
 from __future__ import annotations
 
@@ -10,15 +10,12 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 import pandas as pd
 
+from mapfilter._arguments import Argument, check_arguments, check_seed
+from mapfilter.api.given import database_argument, opened
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.evaluation.first_fix import FirstFixOptions
-from mapfilter.evaluation.map_bound import MapBound, on_lattice
-from mapfilter.evaluation.map_bound import bound as bound_of
-from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.evaluation.success import success_cells
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
@@ -35,6 +32,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork, street_network
 from mapfilter.roads.routes import read_roads
+from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Ways
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
@@ -50,7 +48,7 @@ if TYPE_CHECKING:
 def simulate(
     rasters: RxLevRasters,
     cells: CellPlan,
-    roads: Path | str | Ways,
+    roads: Layer | Ways,
     *,
     journeys: int = 1,
     draws: int = 1,
@@ -68,7 +66,7 @@ def simulate(
     rasters : RxLevRasters
         The levels that the phone receives. Other rasters than those of the database, or
         the database has no errors.
-    roads : path, or Ways
+    roads : path, GeoDataFrame or Ways
         OpenStreetMap file or vector layer, as for :func:`mapfilter.read_routes`.
     journeys : int
         Number of different routes.
@@ -91,7 +89,27 @@ def simulate(
     -------
     dict of str to TrackLog
         By name, in the order of the journeys.
+
+    Raises
+    ------
+    InputError
+        Plan and roads differ in their CRS, or no route is as long as wanted.
+    ConfigError
+        An argument is none of these, or the seed is none.
     """
+    check_arguments(
+        "simulate",
+        _rasters(rasters),
+        Argument("cells", cells, CellPlan, "a cell plan of read_cell_plan"),
+        _roads(roads),
+    )
+    check_arguments(
+        "simulate",
+        Argument("imu", imu, ImuNoise | None, "ImuNoise"),
+        Argument("reports", reports, ReportModel | None, "ReportModel"),
+        Argument("walker", walker, WalkerModel | None, "WalkerModel"),
+    )
+    check_seed("simulate", seed)
     journey = JourneyPlan(length_m=length_m, profile=profile, walker=walker or WalkerModel())
     settings = SimulationSettings(
         journeys=journeys,
@@ -144,9 +162,9 @@ class Sweep:
 
 
 def sweep(
-    database: RadioRouteDatabase,
+    database: RadioRouteDatabase | Path | str,
     rasters: RxLevRasters,
-    roads: Path | str | Ways,
+    roads: Layer | Ways,
     filters: Mapping[str, FilterOptions | str],
     *,
     noises: Sequence[ImuNoise] | ImuNoise | None = None,
@@ -161,9 +179,10 @@ def sweep(
 
     Parameters
     ----------
+    database : RadioRouteDatabase or path
     rasters : RxLevRasters
         The levels that the phone receives, with the handovers and fading of ``reports``.
-    roads : path, or Ways
+    roads : path, GeoDataFrame or Ways
         As for :func:`simulate`.
     filters : mapping of str to options
         Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``.
@@ -179,7 +198,28 @@ def sweep(
         Of routes and noise.
     executor : Executor, optional
         Does the runs, such as a ``ProcessPoolExecutor``; this process when left out.
+
+    Raises
+    ------
+    InputError
+        No route is as long as wanted.
+    ConfigError
+        An argument is none of these, or the seed is none.
     """
+    check_arguments(
+        "sweep",
+        database_argument(database),
+        _rasters(rasters),
+        _roads(roads),
+        Argument("filters", filters, Mapping, 'names and options, such as {"mine": BayesFilter()}'),
+    )
+    check_arguments(
+        "sweep",
+        Argument("noises", noises, ImuNoise | Sequence | None, "ImuNoise, or several"),
+        Argument("reports", reports, ReportModel | None, "ReportModel"),
+    )
+    check_seed("sweep", seed)
+    database = opened(database)
     reports = reports or ReportModel()
     radio = Radio() if reports.radio == AS_PREDICTED else Radio("ground truth", nan)
     plans = [
@@ -243,71 +283,16 @@ def _distinguished(
     ]
 
 
-@dataclass(frozen=True, repr=False, eq=False)
-class Bound:
-    """Where positioning will work, before any drive.
-
-    Parameters
-    ----------
-    found : MapBound
-        All figures.
-    """
-
-    found: MapBound
-    database: RadioRouteDatabase
-
-    def __repr__(self) -> str:
-        along_m = self.found.at_points()["along_bound_m"]
-        median_m = float(np.nanmedian(along_m))
-        return f"Bound: {along_m.size} points, {median_m:.1f} m along the street (median)"
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the figures of each point; see also ``found.by_way()`` and ``found.twins()``."""
-        return self.found.to_dataframe()
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the least position error along the street at each point.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure when left out.
-        """
-        from mapfilter.report.basemap import BaseMap
-        from mapfilter.report.network import plot_point_values
-
-        radio, database = self.found.radio, self.database
-        base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
-        values = on_lattice(radio, self.found.at_points()["along_bound_m"])
-        title = "Least position error along the street from one report of levels"
-        return plot_point_values(
-            values, radio.lattice, database.plan, base, ax, title=title, label="bound / m"
-        )
+def _rasters(value: object) -> Argument:
+    return Argument("rasters", value, RxLevRasters, "rasters of open_rasters")
 
 
-def bound(
-    database: RadioRouteDatabase,
-    *,
-    errors: ErrorModel | None = None,
-    options: FirstFixOptions | None = None,
-    seed: int = 0,
-) -> Bound:
-    """Bound the accuracy of positions by a database (Cramér-Rao), and the metres to a first fix.
-
-    Parameters
-    ----------
-    errors : ErrorModel, optional
-        Assumed errors of the predicted levels.
-    options : FirstFixOptions, optional
-        Of the simulated journeys.
-    seed : int
-        Of these journeys.
-    """
-    return Bound(bound_of(database, errors=errors, options=options, seed=seed), database)
+def _roads(value: object) -> Argument:
+    return Argument("roads", value, Layer | Ways, "a map's path or name, or ways")
 
 
 def _network(
-    roads: Path | str | Ways, rasters: RxLevRasters, profile: Literal["walking", "driving"]
+    roads: Layer | Ways, rasters: RxLevRasters, profile: Literal["walking", "driving"]
 ) -> StreetNetwork:
     if not isinstance(roads, Ways):
         roads = read_roads(roads, rasters.lattice, profile=profile).ways

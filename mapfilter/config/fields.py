@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -51,7 +52,8 @@ def resolve_path(value: Any, info: ValidationInfo) -> Any:
             raise ValueError("a path whose ~ is the folder of a user") from error
         if fault := path_fault(path):
             raise ValueError(fault)
-        return path
+        # What is printed names no folder that is left again.
+        return Path(os.path.realpath(path)) if ".." in path.parts else path
     return value
 
 

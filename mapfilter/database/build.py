@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._arguments import PATH, Argument, check_arguments
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
@@ -137,7 +138,16 @@ def build(
         parameter is out of range, or no point has a level above the floor.
     OutputError
         The folder cannot be written, or holds other files than a database.
+    ConfigError
+        An argument is of another type.
     """
+    check_arguments(
+        "build",
+        Argument("rasters", rasters, RxLevRasters, "rasters of open_rasters"),
+        Argument("plan", plan, CellPlan, "a cell plan of read_cell_plan"),
+        Argument("routes", routes, RouteLattice | Routes, "routes of read_routes"),
+        Argument("out", out, PATH, "the path of a folder"),
+    )
     floor_dbm = floor_of(plan, floor_dbm)
     check_parameters(margin_db, floor_dbm, tile_px)
     job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)

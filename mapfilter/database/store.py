@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import pyarrow as pa
 
+from mapfilter._arguments import check_path
 from mapfilter._io import check_part, left_aside
 from mapfilter.database.checked import Part, generation_of
 from mapfilter.database.manifest import CELLS, MANIFEST, POINTS, read_manifest
@@ -94,7 +95,10 @@ def open_database(
     StoreError
         No database, one of another version, its manifest is damaged, a part is missing, cut off,
         of another length or has another checksum; or it is not the one of ``generation``.
+    ConfigError
+        The path is none.
     """
+    check_path("open_database", "path", path)
     return _settled(Path(path), verify, generation)
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from mapfilter._arguments import Argument, check_arguments
 from mapfilter.filters.contract import MotionStep
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SCHEMA, SERVING, TABLES
@@ -140,7 +141,14 @@ def _is_reading(value: Any) -> bool:
 
 
 def epochs(log: TrackLog) -> list[Epoch]:
-    """Merge a log's tables by time."""
+    """Merge a log's tables by time.
+
+    Raises
+    ------
+    ConfigError
+        It is no log.
+    """
+    check_arguments("epochs", Argument("log", log, TrackLog, "a log of read_log or make_log"))
     tables = {_FIELDS[name]: _by_time(log, name) for name, table in TABLES.items() if table.kinds}
     ahead = dict.fromkeys(tables, 0)
     merged = []

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
 
+from mapfilter._arguments import check_path
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, short_crs, unproject
@@ -270,7 +271,10 @@ def read_cell_plan(
     InputError
         The file is missing, empty or no such table; or with file, row (line of the file) and field
         of every fault, and the likely mistake.
+    ConfigError
+        The path is none.
     """
+    check_path("read_cell_plan", "path", path)
     path = Path(path)
     faults = Faults()
     rows, notes = read_plan(path, projected_crs(crs), faults, layout, columns, defaults)

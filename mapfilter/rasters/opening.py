@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from mapfilter._arguments import check_path
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cell_rules import id_fault
@@ -80,7 +81,10 @@ def open_rasters(
         With every fault: missing, empty or cut-off file, no CRS or degrees, rotated, oblong or
         upside-down pixels, bands without or with the same cell id, unknown quantity, files of
         different systems, an index that does not fit its files.
+    ConfigError
+        The path is none.
     """
+    check_path("open_rasters", "path", path)
     path = Path(path)
     _check_options(crs, factor, nodata, resolution_m)
     declared = Declared(projected_crs(crs) if crs is not None else None, nodata)

@@ -1,6 +1,6 @@
 """The map under a picture: extent, streets, scale bar and north; rasters, names and legends on it.
 
-Maps are drawn in metres or kilometres east and north of their south-western corner.
+Maps are drawn in metres or kilometres east and north of the south-western corner of their area.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ class LocalFrame:
 
 
 def local_frame(base: BaseMap) -> LocalFrame:
-    """Return the frame of a map: metres, of large areas kilometres."""
-    west, south, east, north = base.bounds_m
+    """Return the frame of a map and of all parts of it: metres, of large areas kilometres."""
+    west, south, east, north = base.whole_m or base.bounds_m
     large = max(east - west, north - south) > _KILOMETRE_FROM_M
     return LocalFrame(west, south, 1000.0 if large else 1.0)
 
@@ -152,9 +152,9 @@ def draw_raster(
 
 
 def _show_extent(axes: Axes, frame: LocalFrame, base: BaseMap) -> None:
-    _, right, _, top = frame.extent(base.bounds_m)
-    axes.set_xlim(0.0, right)
-    axes.set_ylim(0.0, top)
+    left, right, bottom, top = frame.extent(base.bounds_m)
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
 
 
 def _draw_points(axes: Axes, frame: LocalFrame, points_m: Floats, base: BaseMap) -> None:

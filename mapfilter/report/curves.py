@@ -152,7 +152,8 @@ def plot_cumulative(
     for curve in curves:
         look = Look(color=curve.colour, linestyle=curve.style, linewidth=1.6)
         draw_shares(axes, curve.errors_m, label=curve.name, **look)
-    axes.axhline(100 * share, color=GREY, linewidth=0.9, linestyle=(0, (2, 2)))
+    dotted = Look(color=GREY, linewidth=0.9, linestyle=(0, (2, 2)))
+    axes.axhline(100 * share, label=f"{100 * share:g} % of the epochs", **dotted)
     claims = [(curve.claim_m, curve.colour) for curve in curves if curve.claim_m is not None]
     for claim_m, colour in claims:
         look = Look(markeredgecolor=colour, zorder=5, clip_on=False) | _PUBLISHED

@@ -83,10 +83,11 @@ def plot_error_over_distance(
         axes.yaxis.set_major_formatter("{x:g}")
     shade_statuses(axes, estimate, distance_m)
     near = Look(color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 3)))
-    axes.axhline(SUCCESS_RADIUS_M, label=f"{SUCCESS_RADIUS_M:.0f} m", **near)
+    limit = f"{SUCCESS_RADIUS_M:.0f} m: limit of a right switch"
+    axes.axhline(SUCCESS_RADIUS_M, label=limit, **near)
     if np.isfinite(beside_m):
         dash_dot = Look(color=GREY, linewidth=1.2, linestyle=(0, (7, 2, 1, 2)))
-        axes.axhline(beside_m, label=f"single reports, median {beside_m:.0f} m", **dash_dot)
+        axes.axhline(beside_m, label=f"reports without motion, median {beside_m:.0f} m", **dash_dot)
     radii_m = estimate.radii_m.T
     if np.isfinite(radii_m[2]).any():
         for radius_m in radii_m:

@@ -26,7 +26,7 @@ class BaseMap:
     """
 
     bounds_m: Bounds
-    """West, south, east, north; the south-western corner is the local origin of the axes."""
+    """West, south, east, north."""
     streets: tuple[Floats, ...] = ()
     """Lines, arrays (k, 2), as east, north."""
     points_m: Floats | None = None
@@ -35,6 +35,9 @@ class BaseMap:
     """Owner of the map, such as "© OpenStreetMap contributors"; drawn small in a corner."""
     resolution_m: float = 5.0
     """Distance between neighbouring points."""
+    whole_m: Bounds | None = None
+    """Extent of the whole area, of which ``bounds_m`` is a part; equal to it when left out. Its
+    south-western corner is the local origin of the axes, so that parts of one area compare."""
 
     def __post_init__(self) -> None:
         west, south, east, north = self.bounds_m
@@ -48,5 +51,5 @@ class BaseMap:
         faults.raise_if_any(InputError)
 
     def zoomed(self, bounds_m: Bounds) -> BaseMap:
-        """Return the same map with another extent (and so another local origin)."""
-        return replace(self, bounds_m=bounds_m)
+        """Return the same map with another extent, and the same local origin."""
+        return replace(self, bounds_m=bounds_m, whole_m=self.whole_m or self.bounds_m)

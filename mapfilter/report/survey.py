@@ -72,8 +72,8 @@ class SurveyedLevels(NamedTuple):
 def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap) -> Figure:
     """Draw one to four cells: the level with the measured points in its colours, the deviation.
 
-    A point that vanishes in its surroundings is predicted well. The ends of both scales are those
-    of the data of all cells shown.
+    A point of its surroundings' colour is predicted well. All panels show the same extent, where
+    any of the cells was measured, and the ends of both scales are those of all cells shown.
 
     Raises
     ------
@@ -91,8 +91,8 @@ def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap) -> Figu
     height_in = count * (_PANEL_IN * _ASPECT + 0.95) + 0.15
     figure = new_figure(2 * (_PANEL_IN + _BAR_IN) + 0.4, height_in)
     panels = figure.subplots(count, 2, squeeze=False)
+    shown = base.zoomed(_surroundings(cells))
     for cell, (left, right) in zip(cells, panels, strict=True):
-        shown = base.zoomed(_surroundings(cell))
         for axes, values, ends, colours, label in (
             (left, cell.level_dbm, levels_dbm, "viridis", "level / dBm"),
             (right, cell.deviation_db, deviations_db, "magma_r", "deviation / dB"),
@@ -104,8 +104,10 @@ def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap) -> Figu
             look = Look(shrink=0.8, pad=0.02, aspect=28)
             figure.colorbar(image, ax=axes, label=label, **look)
         at = local_frame(shown)(cell.east_m, cell.north_m)
-        look = Look(cmap="viridis", clim=levels_dbm, edgecolors="white", linewidths=0.25)
-        left.scatter(*at, s=15, c=cell.measured_dbm, zorder=5, **look)
+        # A rim about all of them: rims of dense points would hide their colours.
+        left.scatter(*at, s=32, color=BLACK, linewidths=0, zorder=5)
+        look = Look(cmap="viridis", clim=levels_dbm, linewidths=0)
+        left.scatter(*at, s=15, c=cell.measured_dbm, zorder=5.5, **look)
         right.scatter(*at, s=3, color=BLACK, linewidths=0, zorder=5)
         points = grouped(len(cell.measured_dbm))
         left.set_title(f"{cell.cell_id}: level, {points} measurements", fontsize=10)
@@ -189,22 +191,28 @@ def plot_left_out(
     return axes
 
 
-def _surroundings(cell: SurveyedLevels) -> Bounds:
-    """Return the extent of where a cell was measured, brought to the shape of the panels."""
+def _surroundings(cells: Sequence[SurveyedLevels]) -> Bounds:
+    """Return the extent of where any cell was measured, brought to the shape of the panels."""
+    measured = np.array([_measured_m(cell) for cell in cells])
+    low_m, high_m = measured[:, :2].min(axis=0), measured[:, 2:].max(axis=0)
+    width_m, height_m = high_m - low_m
+    half_m = max(width_m, height_m / _ASPECT) / 2 * np.array([1.0, _ASPECT])
+    west, south = ((low_m + high_m) / 2 - half_m).tolist()
+    east, north = ((low_m + high_m) / 2 + half_m).tolist()
+    return west, south, east, north
+
+
+def _measured_m(cell: SurveyedLevels) -> Bounds:
+    """Return the extent of where a cell was measured with some room, the whole where nowhere."""
     row, col = np.nonzero(np.isfinite(cell.deviation_db))
     lattice = cell.lattice
     if not row.size:
         row, col = np.array([0, lattice.rows - 1]), np.array([0, lattice.cols - 1])
-    east, north = lattice.east_north(
-        np.array([row.min(), row.max()]), np.array([col.min(), col.max()])
-    )
+    ends = np.array([row.min(), row.max()]), np.array([col.min(), col.max()])
+    east_m, north_m = lattice.east_north(*ends)
     around_m = 3 * lattice.resolution_m
-    width_m, height_m = np.ptp(east) + 2 * around_m, np.ptp(north) + 2 * around_m
-    half_m = max(width_m, height_m / _ASPECT) / 2 * np.array([1.0, _ASPECT])
-    middle_m = np.array([east.mean(), north.mean()])
-    west, south = (middle_m - half_m).tolist()
-    east_end, north_end = (middle_m + half_m).tolist()
-    return west, south, east_end, north_end
+    west, south = float(east_m.min()) - around_m, float(north_m.min()) - around_m
+    return west, south, float(east_m.max()) + around_m, float(north_m.max()) + around_m
 
 
 def _range(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, accuracy, position_errors_m
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
@@ -51,7 +52,8 @@ def plot_track(
 
     Tracked estimates more than 50 m off are drawn in another colour and shape; those while the
     filter searched, was uncertain or lost are no claims, and small and pale whatever their error.
-    Epochs without a position are not drawn. Without a title it is the filter's name and the outcome
+    Epochs without a position are not drawn; crosses mark the true positions (without truth, the
+    estimates) at which the filter got lost. Without a title it is the filter's name and the outcome
     of the track; ``zoom`` shows only the surroundings of truth and estimate, not the whole area.
     """
     if truth is not None and not truth.time_s.size:
@@ -86,6 +88,10 @@ def plot_track(
             axes.scatter(*at, linewidths=0, **look)
             # Marks as small as on the map would not show their colour in the legend.
             axes.add_line(mark(label, look["marker"], 2 * look["s"] ** 0.5, color=look["color"]))
+    lost_m = _lost_m(estimate, truth)
+    if len(lost_m):
+        cross = Look(s=140, marker="X", color=BLACK, edgecolors="white", linewidths=1.0)
+        axes.scatter(*frame(*lost_m.T), zorder=10.5, label="got lost here", **cross)
     switch = estimate.converged_at
     if switch is not None and located[switch]:
         x, y = frame(estimate.east_m[[switch]], estimate.north_m[[switch]])
@@ -101,6 +107,18 @@ def plot_track(
     attribute(axes, shown)
     legend(axes, ax, 3)
     return axes
+
+
+def _lost_m(estimate: TrackEstimate, truth: Truth | None) -> Floats:
+    """Return where the filter got lost, (k, 2) as east and north; of moments with a position."""
+    lost = np.array([status is Status.LOST for status in estimate.status], dtype=bool)
+    begins = lost & ~np.concatenate([[False], lost[:-1]])
+    at = estimate.east_m, estimate.north_m
+    if truth is not None:
+        at = truth.at(estimate.time_s)
+    places: Floats = np.column_stack(at)[begins]
+    known: Floats = places[np.isfinite(places).all(axis=1)]
+    return known
 
 
 def _unclaimed(estimate: TrackEstimate) -> str:

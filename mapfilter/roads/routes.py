@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from geopandas import GeoDataFrame
 
+from mapfilter._arguments import Argument, check_arguments
 from mapfilter._types import Bools
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
@@ -81,6 +82,8 @@ def read_routes(
     InputError
         A file is missing, damaged or of another area, a half width is not a length, or no point is
         left.
+    ConfigError
+        Roads or lattice are neither.
 
     Examples
     --------
@@ -89,6 +92,11 @@ def read_routes(
     >>> len(routes), routes.mask().shape
     (166, (20, 20))
     """
+    check_arguments(
+        "read_routes",
+        Argument("roads", roads, Layer | Ways | None, "a map's path or name, or ways"),
+        Argument("lattice", lattice, Lattice, "a lattice such as rasters.lattice"),
+    )
     if roads is None and landuse is None:
         raise fail(InputError, "roads", "a map, a layer or ways; or landuse", "none")
     found = Roads(Ways.none(lattice.crs))

@@ -18,6 +18,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mapfilter._arguments import PATH, Argument, check_arguments
 from mapfilter._inputs import shown
 from mapfilter._io import (
     atomic_dir,
@@ -131,7 +132,14 @@ def write_log(
     ------
     OutputError
         The folder cannot be written, or holds files that no log of mapfilter lists.
+    ConfigError
+        There is no log, or no path.
     """
+    check_arguments(
+        "write_log",
+        Argument("log", log, TrackLog, "a log of read_log or make_log"),
+        Argument("folder", folder, PATH, "the path of a folder"),
+    )
     folder = Path(folder)
     check_log_replaceable(folder)
     with atomic_dir(folder) as new:

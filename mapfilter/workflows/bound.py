@@ -104,7 +104,11 @@ def run_bound(
         with atomic_file(out / f"{name}.parquet") as temporary:
             layer.to_parquet(temporary, index=False)
     write_layers(layers, out / "bound.gpkg")
-    base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
+    base = BaseMap(
+        radio.lattice.bounds_m,
+        attribution=database.attribution,
+        whole_m=database.lattice.bounds_m,
+    )
     on_map = radio.lattice, database.plan, base
     along, fix = rasters["along_bound_m"], rasters["levels_to_fix_m"]
     pairs_m = twins[["east_m", "north_m", "twin_east_m", "twin_north_m"]].to_numpy()

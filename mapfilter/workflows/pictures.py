@@ -128,7 +128,7 @@ def draw_network(
     def keep(picture: Drawn, number: int) -> None:
         drawn.append(save(picture, folder / NETWORK_PICTURES[number]))
 
-    on_map = lattice, plan, BaseMap(lattice.bounds_m, attribution=database.attribution)
+    on_map = lattice, plan, _base(database, lattice)
     title, ends_dbm = f"Level of the best server{where}", _ends(best.level_dbm)
     keep(plot_level(best.level_dbm, *on_map, title=title, range_dbm=ends_dbm), 0)
     keep(plot_best_server(best.server, plan.ids, *on_map, title=f"Best server{where}"), 1)
@@ -149,9 +149,15 @@ def draw_network(
         classes = land_use_of_map(points, buildings)
     if classes is not None:
         lattice = points.best.lattice
-        base = BaseMap(lattice.bounds_m, attribution=database.attribution)
+        base = _base(database, lattice)
         keep(plot_landuse(classes, lattice, base, title=f"Land use{where}"), 5)
     return tuple(drawn)
+
+
+def _base(database: RadioRouteDatabase, part: Lattice) -> BaseMap:
+    """Return the empty map of a part of a database's area."""
+    whole_m = database.lattice.bounds_m
+    return BaseMap(part.bounds_m, attribution=database.attribution, whole_m=whole_m)
 
 
 def _plot_site(database: RadioRouteDatabase, points: ServedPoints, site: str) -> Drawn:

@@ -219,4 +219,5 @@ def street_map(database: RadioRouteDatabase, points: ServedPoints) -> BaseMap:
         points_m=np.stack(points.places(), axis=-1),
         attribution=database.attribution,
         resolution_m=lattice.resolution_m,
+        whole_m=database.lattice.bounds_m,
     )

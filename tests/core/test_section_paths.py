@@ -43,6 +43,21 @@ def test_paths_are_relative_to_the_file(section, tmp_path):
     assert found == Terrain(tmp_path / "area" / "dem.tif", tmp_path / "table.csv")
 
 
+def test_paths_beside_the_folder_of_the_file_are_written_without_dots(tmp_path):
+    folder = tmp_path / "area"
+    values = {"heights": "../dem.tif", "table": str(folder / ".." / "table.csv")}
+    found = TerrainSection.model_validate(values, context={"folder": folder}).of(Terrain)
+    assert found == Terrain(tmp_path / "dem.tif", tmp_path / "table.csv")
+
+
+def test_the_folder_above_a_link_is_that_of_its_target(tmp_path):
+    (tmp_path / "far" / "area").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "far" / "area")
+    values = {"table": "../table.csv"}
+    found = TerrainSection.model_validate(values, context={"folder": tmp_path / "link"})
+    assert found.of(Terrain).table == tmp_path / "far" / "table.csv"
+
+
 def test_without_a_path_there_is_the_default():
     assert TerrainSection().of(Terrain) == Terrain()
     assert OtherSection().table is None

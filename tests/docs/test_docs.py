@@ -78,6 +78,9 @@ def test_quickstart_commands_run(tmp_path, monkeypatch):
     assert named_there | {"figures.json", "belief.png", "track.png", "evidence.png"} <= found
     drawn = {path.name for path in (tmp_path / "located-candidate").rglob("*.png")}
     assert drawn == {"candidates.png", "track.png", "error.png"}
+    (code,) = re.findall(r"code-block:: python\n\n((?:   .*\n|\n)+)", text)
+    exec(textwrap.dedent(code), {})
+    assert (tmp_path / "out" / "track.png").stat().st_size > 10_000
 
 
 def test_citation_is_of_this_version_and_licence():

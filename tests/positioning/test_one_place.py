@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import Status
+from mapfilter.filters.hypotheses import Bins
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes import claims
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
+from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.timing import TimingState, TimingTerm
 from mapfilter.positioning.bayes.weighing import Weighing, weighed_by
 from mapfilter.positioning.epochs import Epoch, ReportRow
@@ -134,6 +137,43 @@ def test_an_alternative_close_behind_leaves_a_doubt(lead, agrees):
     found = judged(replace(after_a_loss(100.0), alternative=other, belief=At()))
     assert found.status is Status.UNCERTAIN
     assert isnan(found.recovery.agrees_from_m) != agrees
+
+
+def hypotheses(east_m, log_evidence=-50.0):
+    """A tracked belief with all its hypotheses at one place."""
+    place = np.array([[east_m] * 100, [1000.0] * 100], dtype=np.float32)
+    belief = ParticleBelief(
+        place,
+        np.full(100, -np.log(100.0)),
+        Bins.over((0.0, 0.0, 2000.0, 2000.0)),
+        np.empty((0, 100), dtype=np.float32),
+        log_evidence=log_evidence,
+    )
+    return replace(belief, status=Status.TRACKING)
+
+
+def turned(log_odds, east_m):
+    """A phone turned on the way, whose belief is at one place."""
+    prior = -2.0
+    own = hypotheses(east_m, -50.0 + log_odds - prior)
+    return HeldOtherwise(own, Hold(1.0, 3.0), prior, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "claimed", "agrees"),
+    [(-6.0, True, True), (-4.0, True, False), (-2.0, False, False)],
+)
+def test_a_turned_phone_elsewhere_contradicts_a_claim(log_odds, claimed, agrees):
+    """By its odds: 1 in 400 hinders nothing, 1 in 55 a claim after a loss, 1 in 7 any claim."""
+    main = hypotheses(500.0)
+    far, near = turned(log_odds, 700.0), turned(log_odds, 520.0)
+    usual = State(main, held=(far,))
+    assert judged(usual).status is (Status.TRACKING if claimed else Status.UNCERTAIN)
+    lost = replace(after_a_loss(300.0, 100.0), belief=main)
+    for held, over in (((far,), agrees), ((near, far), agrees), ((near,), True), ((), True)):
+        found = judged(replace(lost, held=held))
+        assert found.status is (Status.TRACKING if over else Status.UNCERTAIN)
+        assert found.recovery == (None if over else Recovery())
 
 
 @pytest.mark.parametrize("doubt", [{"mass": 0.98}, {"null": -11.9}])

@@ -74,3 +74,9 @@ def test_epochs_without_a_position_keep_curves_below_all():
     np.testing.assert_allclose(some.get_xdata(), [0.0, 1.0, 2.0, 3.0])
     np.testing.assert_allclose(some.get_ydata(), [0.0, 25.0, 50.0, 75.0])
     assert none.get_xdata().tolist() == [0.0]
+
+
+def test_the_line_at_a_share_is_named():
+    axes = plot_cumulative(CURVES, title="errors", most_m=5.0, share=0.95)
+    (name,) = (line for line in axes.lines if line.get_label() == "95 % of the epochs")
+    assert list(name.get_ydata()) == [95.0, 95.0]

@@ -17,7 +17,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import Lattice, grid_convergence_rad, unproject
 from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.report.basemap import BaseMap, draw_base
+from mapfilter.report.basemap import BaseMap, draw_base, local_frame
 from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION, save
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.network import draw_cells, plot_best_server, plot_level, plot_points_per_cell
@@ -322,6 +322,42 @@ def test_sector_arrow_points_along_its_azimuth(area):
     # West of the central meridian 27° E, grid north lies west of true north.
     assert convergence < 0
     assert np.hypot(east, north) == pytest.approx(0.06 * np.hypot(500.0, 400.0))
+
+
+def test_parts_of_a_map_have_the_origin_and_the_unit_of_the_whole(area):
+    west, south, east, north = area.base.bounds_m
+    part = area.base.zoomed((west + 100.0, south + 50.0, east, north))
+    axes = Figure().subplots()
+    x, y = draw_base(axes, part)(np.array([west + 112.0]), np.array([south + 60.0]))
+    assert (x[0], y[0]) == (112.0, 60.0)
+    assert (axes.get_xlim(), axes.get_ylim()) == ((100.0, 500.0), (50.0, 400.0))
+    again = part.zoomed((west + 200.0, south + 50.0, east, north))
+    assert local_frame(again) == local_frame(area.base)
+    large = BaseMap((0.0, 0.0, 100.0, 100.0), whole_m=(-1000.0, -500.0, 3000.0, 3000.0))
+    x, y = local_frame(large)(np.array([0.0]), np.array([0.0]))
+    assert (x[0], y[0]) == (1.0, 0.5)
+
+
+def test_tracks_of_one_walk_are_drawn_in_one_frame(area):
+    for error_m in (10.0, 90.0):
+        axes = plot_track(estimate(area, 100.0, error_m), area.truth, area.base)
+        (start,) = (drawn for drawn in axes.texts if drawn.get_text() == "start")
+        assert start.xy == pytest.approx((20.0, 100.0))
+
+
+@pytest.mark.parametrize("with_truth", [True, False])
+def test_a_track_shows_where_it_got_lost(area, with_truth):
+    found = estimate(area, 0.0)
+    status = tuple(
+        Status.LOST if 30 <= i < 40 or i >= 50 else s for i, s in enumerate(found.status)
+    )
+    axes = plot_track(replace(found, status=status), area.truth if with_truth else None, area.base)
+    (lost,) = (one for one in axes.collections if one.get_label() == "got lost here")
+    x, y = lost.get_offsets().T
+    assert list(x) == pytest.approx([20.0 + 1.4 * 150, 20.0 + 1.4 * 250])
+    assert set(y) == {100.0 if with_truth else 110.0}
+    axes = plot_track(found, area.truth, area.base)
+    assert all(one.get_label() != "got lost here" for one in axes.collections)
 
 
 def test_local_frame_and_scale_bar(area):

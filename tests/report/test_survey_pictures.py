@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from mapfilter.errors import InputError, OutputError
@@ -9,7 +10,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
+from mapfilter.report.canvas import BLACK, save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 from mapfilter.survey.leave_out import LeftOut, leave_out
 from mapfilter.survey.measured_map import SurveyOptions, fit_survey
@@ -60,6 +61,25 @@ def test_same_data_give_same_bytes(tmp_path):
         assert one[:8] == b"\x89PNG\r\n\x1a\n"
         assert one == other
     assert len(list(tmp_path.rglob("*.*"))) == 4
+
+
+def test_all_cells_are_shown_in_one_extent_that_holds_them():
+    far = surveyed("B")._replace(deviation_db=np.where(np.mgrid[:40, :50][1] > 40, 4.0, np.nan))
+    figure = plot_surveyed_levels([surveyed("A"), far], BASE)
+    maps = [axes for axes in figure.axes if axes.get_xlabel().startswith("east")]
+    assert len(maps) == 4
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in maps}) == 1
+    (low, high), (bottom, top) = maps[0].get_xlim(), maps[0].get_ylim()
+    assert (low, bottom) <= (0.0, 0.0)
+    assert (high, top) >= (250.0, 200.0)
+
+
+def test_measured_points_have_a_dark_rim_under_them():
+    left = plot_surveyed_levels([surveyed()], BASE).axes[0]
+    under, over = sorted(left.collections, key=lambda drawn: drawn.get_zorder())[-2:]
+    assert under.get_sizes()[0] > over.get_sizes()[0]
+    assert to_rgb(under.get_facecolor()[0][:3]) == to_rgb(BLACK)
+    assert over.get_array().size == 3
 
 
 def test_survey_pictures_are_checked(tmp_path):

@@ -38,9 +38,8 @@ def test_the_walk_of_the_page_is_located(tmp_path, monkeypatch):
     exec(scripts[0], {})
     printed = dict(line.split(": ", 1) for line in run(commands[1]).splitlines() if ": " in line)
     shown = dict(line.split(": ", 1) for line in tables[1].splitlines() if ": " in line)
-    for name in ("final_status", "switched", "success"):
-        assert printed[name] == shown[name]
-    assert float(printed["error_mean_m"]) < 30
+    assert len(shown) == 8
+    assert {name: printed[name] for name in shown} == shown
     assert "unknown_cells" not in printed
     as_it_is = dict(line.split(": ", 1) for line in run(commands[0]).splitlines() if ": " in line)
     assert as_it_is["success"] == "True"

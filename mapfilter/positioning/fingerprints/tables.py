@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mapfilter._arguments import check_path
 from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail, listed
@@ -58,7 +59,10 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
     InputError
         The file cannot be read, has no column of positions or of levels, a column twice, or no row
         with a level; or the CRS is unknown.
+    ConfigError
+        The path is none.
     """
+    check_path("read_fingerprint_table", "path", path)
     path = Path(path)
     table, notes = _read(path)
     names = {name: str(name).strip() for name in table.columns}

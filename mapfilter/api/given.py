@@ -1,0 +1,32 @@
+"""What may be given as an object or by its path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mapfilter._arguments import PATH, Argument
+from mapfilter.api.logs import read_log
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.database.store import open_database
+from mapfilter.tracks.log import TrackLog
+
+
+def database_argument(value: object) -> Argument:
+    """Return the argument ``database`` to be checked."""
+    expected = "a database of open_database or build, or its path"
+    return Argument("database", value, RadioRouteDatabase | PATH, expected)
+
+
+def log_argument(value: object) -> Argument:
+    """Return the argument ``log`` to be checked."""
+    return Argument("log", value, TrackLog | PATH, "a log of read_log or make_log, or its path")
+
+
+def opened(database: RadioRouteDatabase | Path | str) -> RadioRouteDatabase:
+    """Return a database, opened where it is a path."""
+    return database if isinstance(database, RadioRouteDatabase) else open_database(database)
+
+
+def read(log: TrackLog | Path | str, crs: str) -> TrackLog:
+    """Return a log, read where it is a path; recordings are read in ``crs``."""
+    return log if isinstance(log, TrackLog) else read_log(log, crs=crs)
