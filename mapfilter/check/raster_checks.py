@@ -13,7 +13,7 @@ from rasterio.errors import RasterioError
 from mapfilter._gdal import open_raster
 from mapfilter._types import Floats, Floats32
 from mapfilter.check.findings import Findings
-from mapfilter.errors import InputError, listed
+from mapfilter.errors import Fault, InputError, listed
 from mapfilter.geodesy import (
     Lattice,
     azimuth_from_heading_deg,
@@ -21,6 +21,7 @@ from mapfilter.geodesy import (
     unproject,
 )
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.files import check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.resampling import read_on
 
@@ -244,9 +245,10 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
     -------
     list of RasterSample
         Levels, or losses with a minus sign, without what stands for no data; those of rasters
-        without anything to look at are left out.
+        without anything to look at, or beyond what the quantity can be, are left out.
     """
     kinds: dict[Kind, list[RasterSample]] = {}
+    beyond: dict[tuple[str, str], list[RasterSample]] = {}
     nodata: list[tuple[str, float, float]] = []
     constant, empty = [], []
     for cell_id in rasters.cell_ids:
@@ -267,6 +269,8 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
             empty.append(cell_id)
         elif np.ptp(sample.known) == 0:
             constant.append(f"{cell_id} {sample.known[0]:g}")
+        elif (fault := _beyond(sample, rasters, kind)) is not None:
+            beyond.setdefault((fault.expected, fault.hint), []).append(sample)
         else:
             kinds.setdefault(kind, []).append(sample)
     where = str(rasters.path)
@@ -281,15 +285,18 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
     if constant:
         evidence = f"One number in all pixels: {listed(constant)}."
         findings.add("raster-constant", where, evidence)
+    for (expected, hint), samples in beyond.items():
+        low = min(float(sample.known.min()) for sample in samples)
+        high = max(float(sample.known.max()) for sample in samples)
+        evidence = (
+            f"Expected {expected}; {len(samples)} of {len(rasters.cell_ids)} rasters hold "
+            f"{low:.5g}..{high:.5g} ({hint})."
+        )
+        ids = listed([sample.cell_id for sample in samples])
+        findings.add("values-implausible", f"{where}, cells {ids}", evidence)
     useful: list[RasterSample] = []
     for kind, samples in kinds.items():
-        by_sum: dict[tuple[str, Lattice], list[str]] = {}
-        for sample in samples:
-            by_sum.setdefault((sample.checksum, sample.lattice), []).append(sample.cell_id)
-        for same in by_sum.values():
-            if len(same) > 1:
-                evidence = f"The same numbers in all pixels of {len(same)} rasters."
-                findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
+        _check_copies(samples, where, findings)
         falls = kind == "loss" and _falls_away(samples, plan)
         if falls or kind not in (rasters.quantity, "empty"):
             code = "field-strength" if falls else f"{kind}-as-{rasters.quantity}"
@@ -303,9 +310,36 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
             evidence += ", which become less away from the sites." if falls else "."
             ids = listed([sample.cell_id for sample in samples])
             findings.add(code, f"{where}, cells {ids}", evidence)
+        if kind == "unclear":
+            # Whether more is stronger is not known.
+            continue
         negative = kind == "loss" and not falls
         useful += [replace(s, values=-s.values) for s in samples] if negative else samples
     return useful
+
+
+def _beyond(sample: RasterSample, rasters: RxLevRasters, kind: Kind) -> Fault | None:
+    """Return the fault of numbers that the declared quantity cannot have, and a build refuses.
+
+    None where they are of another quantity, which is told as such.
+    """
+    if kind not in (rasters.quantity, "empty"):
+        return None
+    try:
+        check_plausible(sample.values, rasters.quantity, rasters.path)
+    except InputError as error:
+        return error.faults[0]
+    return None
+
+
+def _check_copies(samples: Sequence[RasterSample], where: str, findings: Findings) -> None:
+    by_sum: dict[tuple[str, Lattice], list[str]] = {}
+    for sample in samples:
+        by_sum.setdefault((sample.checksum, sample.lattice), []).append(sample.cell_id)
+    for same in by_sum.values():
+        if len(same) > 1:
+            evidence = f"The same numbers in all pixels of {len(same)} rasters."
+            findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
 
 
 def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:
