@@ -58,8 +58,8 @@ ATOLL: Columns = {
     "bsic": ("BSIC", "PHY_CELL_ID", "PHYSICAL_CELL_ID", "PSC"),
     "technology": ("TECHNOLOGY",),
 }
-"""Names of fields, and headings that Atoll shows for them; blanks stand for underscores there, and a
-unit in brackets may follow."""
+"""Names of fields, and headings that Atoll shows for them, in which blanks stand for underscores
+and a unit in brackets may follow."""
 OPENCELLID: Columns = {
     "technology": ("radio",),
     "lat": ("lat",),
@@ -214,11 +214,7 @@ def none_of(header: Sequence[str]) -> str:
 def recognised(header: Sequence[str], columns: Columns) -> list[str]:
     """Return the headings that are among the names of some columns."""
     headings = [Heading.of(name) for name in header]
-    found = {
-        at
-        for field, names in columns.items()
-        for at in places_named(headings, field, names)
-    }
+    found = {at for field, names in columns.items() for at in places_named(headings, field, names)}
     return [header[at] for at in sorted(found)]
 
 
@@ -314,7 +310,7 @@ def _unused(
         for field, names in LAYOUTS[layout].items()
         if field not in has
     }
-    wanted = {field: [name for name in names if name] for field, names in wanted.items()}
+    wanted = {field: tuple(filter(None, names)) for field, names in wanted.items()}
     used = {at for places in picked.values() for at in places}
     found = resembling([Heading.of(name) for name in header], used, wanted)
     named = ", ".join(f"{name!r} ({field})" for name, field in found)

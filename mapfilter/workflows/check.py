@@ -184,7 +184,12 @@ class _Checks:
                 plan = World(self.config, lattice).plan
                 for note in plan.notes:
                     if note.startswith(UNUSED_COLUMNS):
-                        self.findings.add("plan-columns", self.plan_name, f"{note[:1].upper()}{note[1:]}.", "warning")
+                        self.findings.add(
+                            "plan-columns",
+                            self.plan_name,
+                            f"{note[:1].upper()}{note[1:]}.",
+                            "warning",
+                        )
                 return plan
         return None
 
