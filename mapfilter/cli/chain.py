@@ -9,6 +9,7 @@ from typing import Annotated, get_args
 import typer
 
 from mapfilter.cli.options import (
+    NO_CONFIG,
     PARTIAL,
     WRONG,
     ClusterOption,
@@ -27,6 +28,7 @@ from mapfilter.cli.options import (
     WorkersOption,
     check_custom_filter,
     given_path,
+    named_defaults,
     refuse,
     seeded,
     toml,
@@ -80,6 +82,8 @@ def check(
     else:
         print_text("\n\n".join(paragraphs(result)))
     if not result.ok:
+        if config is None and not given:
+            print_message(f"command line: expected {NO_CONFIG}, found none; defaults were checked")
         raise typer.Exit(WRONG)
 
 
@@ -94,9 +98,9 @@ def predict(
     from mapfilter.config.load import load_config
     from mapfilter.workflows.predict import run_predict
 
-    settings = seeded(settings, seed, "prediction.seed", "prediction.ground_truth.seed")
-    with progress_bar("predict") as progress:
-        result = run_predict(load_config(config, settings, out=out), progress)
+    given = seeded(settings, seed, "prediction.seed", "prediction.ground_truth.seed")
+    with named_defaults(config, settings), progress_bar("predict") as progress:
+        result = run_predict(load_config(config, given, out=out), progress)
     print_result(result, as_json)
 
 
@@ -121,9 +125,11 @@ def build(
     given = [*(settings or ()), *(["database.cells=false"] if roads_only else [])]
     loaded = load_config(config, given, out=out)
     if dry_run:
-        print_result(run_dry_build(loaded), as_json)
+        with named_defaults(config, given):
+            estimate = run_dry_build(loaded)
+        print_result(estimate, as_json)
         return
-    with progress_bar("build") as progress:
+    with named_defaults(config, given), progress_bar("build") as progress:
         result = run_build(
             loaded, workers=workers, cluster=cluster, resume=resume, progress=progress
         )
@@ -238,9 +244,9 @@ def simulate(
     from mapfilter.config.load import load_config
     from mapfilter.workflows.simulate import run_simulate
 
-    settings = seeded(settings, seed, "journeys.seed")
-    with progress_bar("simulate") as progress:
-        result = run_simulate(load_config(config, settings, out=out), progress)
+    given = seeded(settings, seed, "journeys.seed")
+    with named_defaults(config, settings), progress_bar("simulate") as progress:
+        result = run_simulate(load_config(config, given, out=out), progress)
     print_result(result, as_json)
     if result.partial:
         print_message("no journey receives a cell: the rasters hold no level along the streets")

@@ -23,6 +23,7 @@ from mapfilter.cli.options import (
     WorkersOption,
     check_custom_filter,
     given_path,
+    named_defaults,
     numbers,
     refuse,
     seeded,
@@ -61,10 +62,12 @@ def sweep(
     check_custom_filter(loaded)
     axes = vary_axes(vary or ())
     if dry_run:
-        print_result(forecast_sweep(loaded, axes, workers=workers), as_json)
+        with named_defaults(config, settings):
+            forecast = forecast_sweep(loaded, axes, workers=workers)
+        print_result(forecast, as_json)
         return
     try:
-        with rate_bar("sweep", "runs") as progress:
+        with named_defaults(config, settings), rate_bar("sweep", "runs") as progress:
             result = run_sweep(
                 loaded, axes, workers=workers, cluster=cluster, resume=resume, progress=progress
             )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mapfilter.errors import ConfigError, Faults, fail
+from mapfilter.errors import ConfigError, Fault, Faults, InputError, StoreError, fail
 from mapfilter.positioning import BUILT_IN, DEFAULT
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 DONE, WRONG, PARTIAL = 0, 2, 3
 """Exit codes."""
+NO_CONFIG = "a configuration (-c FILE), or settings (--set)"
 
 
 def given_path(path: Path | None) -> Path | None:
@@ -85,6 +87,24 @@ def toml(value: str | list[str]) -> str:
     """Return a text, or a list of texts, as TOML writes it."""
     # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML has not.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+@contextmanager
+def named_defaults(config: Path | None, settings: list[str] | None) -> Iterator[None]:
+    """Put first, where an input is wrong, that no configuration was given and defaults were taken.
+
+    Raises
+    ------
+    InputError, StoreError
+        As in the block, with one fault more where there was neither a file nor a setting.
+    """
+    try:
+        yield
+    except (InputError, StoreError) as error:
+        if config is not None or settings:
+            raise
+        missing = Fault("command line", NO_CONFIG, "none; defaults were taken")
+        raise type(error)((missing, *error.faults)) from error
 
 
 def numbers(text: str | None, count: int, where: str) -> list[float] | None:

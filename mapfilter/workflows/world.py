@@ -76,10 +76,12 @@ def open_by_section(path: Path, section: Rasters) -> RxLevRasters:
     InputError
         They are wrong, or do not fit their description.
     """
+    # Faults of the CRS name the setting.
+    crs = projected_crs(section.crs, "rasters.crs") if section.crs else section.crs
     return open_rasters(
         path,
         section.quantity,
-        crs=section.crs,
+        crs=crs,
         factor=section.factor,
         nodata=section.nodata,
         resolution_m=section.resolution_m,
