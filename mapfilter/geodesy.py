@@ -153,7 +153,8 @@ def _meant_crs(text: str) -> str:
     ('EPSG:32635, or EPSG:32735 south of the equator', 'EPSG:32635', 'EPSG:32734', '')
     """
     if code := re.fullmatch(r"\s*(?:epsg)?[\s:_-]*([0-9]{4,6})\s*", text, re.IGNORECASE):
-        return f"EPSG:{code[1]}"
+        meant = f"EPSG:{code[1]}"
+        return meant if meant != text.strip().upper() else ""
     utm = r"\bUTM[\s_-]*(?:zone)?[\s_-]*([0-9]{1,2})[\s_-]*(N|S|north|south)?\s*"
     zone = re.search(rf"{utm}$", text, re.IGNORECASE)
     if zone is None or not 1 <= int(zone[1]) <= 60:

@@ -145,3 +145,42 @@ def test_the_remedy_of_a_plan_fits_its_fault(text, remedy, world):
     (finding,) = check(world)
     assert finding["code"] == "plan-invalid"
     assert finding["remedy"].startswith(remedy)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        ("build", *settings(rasters__factor=1)),
+        ("build", *settings(rasters__factor=1), "--cluster", "local:1"),
+        ("build", "--roads-only", *settings(roads__half_width_m=0.001)),
+        ("predict", *settings(cells__antennas="none")),
+        ("predict", *settings(prediction__model="survey", prediction__survey__files="cells.csv")),
+        ("simulate",),
+        ("sweep",),
+        ("demo", *settings(area__map="none.osm.pbf")),
+    ],
+    ids=lambda given: " ".join(given[:2]),
+)
+def test_a_command_that_fails_leaves_no_folder(given, world, monkeypatch):
+    write_list(world, [name.replace("Site", "Antenna") for name in SHOWN])
+    monkeypatch.chdir(world.folder)
+    before = sorted(world.folder.rglob("*"))
+    command, *more = given
+    config = () if command == "demo" else ("-c", world.toml, *world.settings)
+    out = world.folder / "deep" / "out"
+    failed = mapfilter(command, *config, "--set=rasters.path=rxlev.tif", "--out", out, *more)
+    assert_refused(failed)
+    assert sorted(world.folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize("command", ["build", "sweep"])
+def test_a_cluster_is_asked_for_when_the_inputs_are_right(command, world, monkeypatch):
+    def connect(*_):
+        raise AssertionError("connected to")
+
+    monkeypatch.setattr(f"mapfilter.workflows.{command}.executor_of", connect)
+    (world.folder / "cells.csv").unlink()
+    given = *world.settings, "--cluster", "tcp://127.0.0.1:1", "--out", world.folder / "out"
+    refused = mapfilter(command, "-c", world.toml, *given)
+    assert_refused(refused)
+    assert "connected to" not in refused.err
