@@ -32,6 +32,7 @@ from mapfilter.cli.options import (
     refuse,
     seeded,
     toml,
+    undrawn,
     walk_changes,
 )
 from mapfilter.errors import ConfigError, fail
@@ -291,7 +292,7 @@ def locate(
 
     if not 0 < level_error_db <= 60:
         raise fail(ConfigError, "--level-error", "dB > 0, at most 60", level_error_db)
-    folder = (out or Path("located")).absolute()
+    folder = (out or Path("located-reports")).absolute()
     with progress_bar("locate") as progress:
         result = run_locate(
             database,
@@ -374,8 +375,7 @@ def replay(
     from mapfilter.workflows.drawer import drawer_process
 
     # What draws starts before the imports below, which take as long as its own.
-    undrawn = any("pictures" in setting and "none" in setting for setting in settings or ())
-    with nullcontext() if undrawn else drawer_process() as drawers:
+    with nullcontext() if undrawn(config, settings or ()) else drawer_process() as drawers:
         from mapfilter.config.load import load_config
         from mapfilter.workflows.replay import run_replay
         from mapfilter.workflows.replayed import replay_figures

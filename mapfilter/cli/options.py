@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mapfilter.errors import ConfigError, Fault, Faults, InputError, StoreError, fail
+from mapfilter.errors import (
+    ConfigError,
+    Fault,
+    Faults,
+    InputError,
+    MapfilterError,
+    StoreError,
+    fail,
+)
 from mapfilter.positioning import BUILT_IN, DEFAULT
 
 if TYPE_CHECKING:
@@ -19,6 +28,7 @@ if TYPE_CHECKING:
 
 DONE, WRONG, PARTIAL = 0, 2, 3
 """Exit codes."""
+_LARGEST_BYTES = 16 << 20
 NO_CONFIG = "a configuration (-c FILE), or settings (--set)"
 
 
@@ -137,6 +147,24 @@ def walk_changes(declination_deg: float | None, step_m: float | None) -> dict[st
     faults.raise_if_any(ConfigError)
     given = {"declination_deg": declination_deg, "step_m": step_m}
     return {name: value for name, value in given.items() if value is not None}
+
+
+def undrawn(config: Path | None, settings: Sequence[str]) -> bool:
+    """Return whether settings or the file ask for no pictures, before either is checked."""
+    from mapfilter._inputs import read_input
+
+    key = "output.pictures"
+    said = [text for name, _, text in (s.partition("=") for s in settings) if name.strip() == key]
+    if said:
+        return said[-1].strip().strip("\"'") == "none"
+    if config is None or not config.is_file():
+        return False
+    try:
+        text = read_input(config, _LARGEST_BYTES, "a TOML file", ConfigError).decode("utf-8-sig")
+        return bool(tomllib.loads(text)["output"]["pictures"] == "none")
+    except (MapfilterError, ValueError, RecursionError, KeyError, TypeError):
+        # What is wrong with it is told when it is loaded.
+        return False
 
 
 def check_custom_filter(config: Config) -> None:

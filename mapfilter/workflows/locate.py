@@ -30,9 +30,10 @@ from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.report.canvas import BLUE, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.fingerprints import read_database, read_reports
+from mapfilter.workflows.results import FIGURES, check_figures_of_reports
 from mapfilter.workflows.terminal import to_jsonable
 
-POSITIONS, FIGURES, PICTURE = "positions.csv", "figures.json", "errors.png"
+POSITIONS, PICTURE = "positions.csv", "errors.png"
 _SHARE = 0.95
 
 
@@ -99,9 +100,11 @@ def run_locate(
     Raises
     ------
     MapfilterError
-        An input is missing or wrong, there is no such method, or the output cannot be written.
+        An input is missing or wrong, there is no such method, or the output cannot be written, as
+        where it holds the figures of another command.
     """
     began_s = time.perf_counter()
+    check_figures_of_reports(out)
     known, (reports, names) = _inputs(database, log, crs, level_error_db)
     rng, strongest = np.random.default_rng(seed), usual_readings(reports)
     with nothing_left(out):
