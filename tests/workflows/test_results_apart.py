@@ -5,7 +5,7 @@ from command_line import ONE, assert_done, assert_refused, contents, mapfilter, 
 
 
 @pytest.fixture
-def commands(world, tmp_path):
+def commands(world):
     """Each command on the same log, with its results in the same folder."""
 
     def replay(log, *out):
