@@ -144,6 +144,9 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     return f"{authority[0]}:{authority[1]}" if authority else str(crs.to_wkt())
 
 
+_LONGEST_MEANT = 40
+
+
 def _meant_crs(text: str) -> str:
     """Return what a text that is no CRS most likely means, or "".
 
@@ -152,6 +155,8 @@ def _meant_crs(text: str) -> str:
     >>> _meant_crs("UTM35"), _meant_crs("epsg 32635"), _meant_crs("utm zone 34 S"), _meant_crs("x")
     ('EPSG:32635, or EPSG:32735 south of the equator', 'EPSG:32635', 'EPSG:32734', '')
     """
+    if len(text) > _LONGEST_MEANT:
+        return ""
     if code := re.fullmatch(r"\s*(?:epsg)?[\s:_-]*([0-9]{4,6})\s*", text, re.IGNORECASE):
         meant = f"EPSG:{code[1]}"
         return meant if meant != text.strip().upper() else ""

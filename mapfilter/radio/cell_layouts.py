@@ -146,8 +146,8 @@ def arrange(
     fields += [name for name in _IDENTITY if "cgi" in picked and name not in fields]
     fields = [name for name in fields if name != "cgi"]
     composed = "cell" not in fields and all(name in fields for name in _IDENTITY)
-    implied = any(header[i].casefold() in _IMPLIED for at in picked.values() for i in at)
-    if implied and "technology" not in fields:
+    implied = [_IMPLIED.get(Heading.of(name).words.replace(" ", "_")) for name in header]
+    if any(implied[i] for at in picked.values() for i in at) and "technology" not in fields:
         fields.append("technology")
     if (defaults or layout == "opencellid") and "assumed" not in fields:
         fields.append("assumed")
@@ -157,7 +157,7 @@ def arrange(
     for line, texts in table.whole_rows(len(header), faults):
         values = {name: _first(texts, at) for name, at in picked.items()}
         _by_technology(
-            values, [header[i] for at in picked.values() for i in at if texts[i].strip()]
+            values, [implied[i] for at in picked.values() for i in at if texts[i].strip()]
         )
         if layout == "opencellid":
             known = technology(values.get("technology", ""))
@@ -240,15 +240,14 @@ def _first(texts: list[str], places: tuple[int, ...]) -> str:
     return next((text for at in places if (text := texts[at].strip())), "")
 
 
-def _by_technology(values: dict[str, str], filled: list[str]) -> None:
-    """Fill in the parts of a CGI, and the technology of the columns in which a row has values."""
+def _by_technology(values: dict[str, str], implied: list[str | None]) -> None:
+    """Fill in the parts of a CGI, and the technology that columns with values imply."""
     identity = parse_cgi(values.pop("cgi", ""))
     if identity is not None:
         for name, part in zip(_IDENTITY, identity, strict=True):
             values[name] = values.get(name) or ("" if part is None else str(part))
     if not values.get("technology"):
-        named = (_IMPLIED.get(name.casefold()) for name in filled)
-        values["technology"] = next((name for name in named if name), "")
+        values["technology"] = next(filter(None, implied), "")
 
 
 def _pick(
@@ -275,12 +274,12 @@ def _pick(
         at = places_named(headings, field, names)
         if at:
             picked.setdefault(field, tuple(at if field in ALIASES else at[:1]))
-    for field, used in picked.items():
-        _check_unit(table, field, (headings[at] for at in used), faults)
-    faults.raise_if_any(InputError)
     if {"lat", "lon", "east", "north"} <= picked.keys():
         surplus = ("lat", "lon") if {"east", "north"} & columns.keys() else ("east", "north")
         picked = {field: at for field, at in picked.items() if field not in surplus}
+    for field, used in picked.items():
+        _check_unit(table, field, (headings[at] for at in used), faults)
+    faults.raise_if_any(InputError)
     return picked
 
 

@@ -29,10 +29,12 @@ _OTHER_UNITS = frozenset(
     }
 )
 _KNOWN_UNITS = _OTHER_UNITS.union(*(written for _, written in _UNITS.values()))
-_BRACKETS = re.compile(r"^(.*\S)\s*[(\[]\s*([^()\[\]]+?)\s*[)\]]$")
+_BRACKETS = {")": "(", "]": "["}
 _APART = re.compile(r"[\s_-]+")
 _ALIKE = 0.85
 _SHORTEST_WORD = 3
+_LONGEST = 80
+"""Longer headings resemble nothing."""
 _OF_OTHER_MEANING = frozenset({"frequency band"})
 """Headings that resemble a field and are none: a band is no frequency of a carrier."""
 
@@ -67,10 +69,11 @@ class Heading:
         >>> Heading.of("Mechanical Downtilt (°)").words, Heading.of("EIRP [dBm]").unit
         ('mechanical downtilt', 'dbm')
         """
-        found = _BRACKETS.match(name)
-        if found is None:
+        opening = _BRACKETS.get(name[-1:], "")
+        title, found, unit = name[:-1].rpartition(opening) if opening else ("", "", "")
+        title, unit = title.strip(), unit.strip()
+        if not (found and title and unit):
             return cls(name, _words(name), name, "")
-        title, unit = found.groups()
         return cls(name, _words(title), title, unit.casefold())
 
     def fits(self, field: str) -> bool:
@@ -140,6 +143,13 @@ def _words(name: str) -> str:
 
 def _likeness(heading: str, name: str) -> float:
     """Return how alike a heading and a name are, 0 for not enough."""
-    ratio = difflib.SequenceMatcher(None, heading, name).ratio()
-    within = len(name) >= _SHORTEST_WORD and set(name.split()) <= set(heading.split())
-    return ratio if within or (ratio >= _ALIKE and len(name) > _SHORTEST_WORD) else 0.0
+    if not heading or len(heading) > _LONGEST:
+        return 0.0
+    if len(name) >= _SHORTEST_WORD and set(name.split()) <= set(heading.split()):
+        return len(name) / len(heading)
+    if len(name) <= _SHORTEST_WORD:
+        return 0.0
+    matcher = difflib.SequenceMatcher(None, heading, name)
+    # The last of them takes most of the time.
+    bounds = matcher.real_quick_ratio, matcher.quick_ratio, matcher.ratio
+    return matcher.ratio() if all(ratio() >= _ALIKE for ratio in bounds) else 0.0

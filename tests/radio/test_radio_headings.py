@@ -1,5 +1,6 @@
 """Headings of cell lists as planning tools show them: units in brackets, words for field names."""
 
+import time
 from pathlib import Path
 
 import pytest
@@ -132,3 +133,26 @@ def test_misspelt_columns_of_a_plan_are_told_one_by_one(tmp_path):
     told = complaint(tmp_path, text, layout="plan")
     assert "'height' (likely: height_m meant" in told
     assert "cells.layout" not in told
+
+
+def test_metres_under_the_names_of_degrees_are_named(tmp_path):
+    text = SHOWN.replace(";X;Y;", ";Longitude (m);Latitude (m);")
+    columns = {"east": "Longitude (m)", "north": "Latitude (m)"}
+    assert read(tmp_path, text, columns=columns)["K1"].east_m == 385584.61
+    assert "expected lat in degrees, found 'Latitude (m)'" in complaint(tmp_path, text)
+
+
+def test_a_displayed_carrier_gives_the_technology_that_it_implies(tmp_path):
+    text = SHOWN.replace("Frequency Band", "NR ARFCN").replace("GSM 1800", "633984")
+    columns = {"cell": "Transmitter", "east": "X", "north": "Y"}
+    cell = read(tmp_path, text, layout="plan", columns=columns)["K1"]
+    assert (cell.technology, cell.arfcn) == ("NR", 633984)
+
+
+def test_long_headings_and_many_of_them_take_no_time(tmp_path):
+    more = ";".join([*("(" * 10_000, " " * 10_000 + ")"), *(f"height{n:03}" for n in range(900))])
+    text = SHOWN.replace("Height (m)", "AGL").replace("\n", f";{more}\n", 1)
+    text = text.rstrip("\n") + ";" * 902 + "\n"
+    began_s = time.process_time()
+    assert len(read(tmp_path, text).cells) == 1
+    assert time.process_time() - began_s < 5
