@@ -36,7 +36,7 @@ def nothing_left(*folders: Path) -> Iterator[None]:
     """
     made: list[Path] = []
     for folder in folders:
-        while folder not in made and not folder.exists() and folder != folder.parent:
+        while folder not in made and _is_absent(folder):
             made.append(folder)
             folder = folder.parent
     try:
@@ -50,6 +50,14 @@ def nothing_left(*folders: Path) -> Iterator[None]:
                     if ".partial-" not in inner.name:
                         inner.rmdir()
         raise
+
+
+def _is_absent(folder: Path) -> bool:
+    """Return whether there is no such folder; not where that cannot be told."""
+    try:
+        return folder != folder.parent and not folder.exists()
+    except OSError:
+        return False
 
 
 def new_partial(path: Path) -> Path:

@@ -205,8 +205,9 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
         high = max(float(sample.known.max()) for sample in samples)
         evidence = (
             f"Expected {expected}; {len(samples)} of {len(rasters.cell_ids)} rasters hold "
-            f"{low:.5g}..{high:.5g} ({hint})."
+            f"{low:.5g}..{high:.5g}"
         )
+        evidence += f" ({hint})." if hint else "."
         ids = listed([sample.cell_id for sample in samples])
         findings.add("values-implausible", f"{where}, cells {ids}", evidence)
     useful: list[RasterSample] = []

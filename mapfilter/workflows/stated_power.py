@@ -19,7 +19,7 @@ def cells_without_eirp(config: Config, rasters: RxLevRasters, plan: CellPlan) ->
     own = cells.layout == "plan" and not cells.columns.given
     if rasters.quantity != "loss" or cells.plan is None or own:
         return []
-    if config.surveyed_plan is not None or "eirp_dbm" in cells.model_fields_set:
+    if "eirp_dbm" in cells.model_fields_set:
         return []
     held = set(rasters.cell_ids)
     return [cell.id for cell in plan.cells if cell.id in held and "eirp_dbm" in cell.assumes]

@@ -143,3 +143,8 @@ def test_a_file_that_is_not_written_leaves_no_folder(tmp_path):
         with pytest.raises(ValueError, match="no"), write(tmp_path / "a" / "b"):
             raise ValueError("no")
         assert not list(tmp_path.iterdir())
+
+
+def test_a_place_that_cannot_be_looked_at_is_left_to_what_writes(tmp_path):
+    with nothing_left(tmp_path / ("a" * 300) / "b"):
+        pass
