@@ -184,3 +184,27 @@ def test_a_cluster_is_asked_for_when_the_inputs_are_right(command, world, monkey
     refused = mapfilter(command, "-c", world.toml, *given)
     assert_refused(refused)
     assert "connected to" not in refused.err
+
+
+def test_losses_to_calibrate_need_an_eirp_too(world, levels):
+    eirp_dbm = {cell.id: cell.eirp_dbm for cell in make_plan().cells}
+    world.levels = {i: eirp_dbm[i] - v for i, v in levels.items()}
+    world.quantity = "loss"
+    world.write()
+    write_list(world, without=("EIRP (dBm)",))
+    text = world.toml.read_text(encoding="utf-8").replace('[rasters]\npath = "rxlev.tif"\n', "")
+    world.toml.write_text(text, encoding="utf-8")
+    rows = "".join(f"S1A,60.18{n},24.94{n},-80\n" for n in range(9))
+    (world.folder / "drive.csv").write_text(f"cell,lat,lon,level_dbm\n{rows}", encoding="utf-8")
+    given = settings(
+        prediction__model="survey",
+        prediction__survey__files=world.folder / "drive.csv",
+        prediction__survey__calibrate=world.rasters,
+        cells__layout="atoll",
+    )
+    out = "--out", world.folder / "out"
+    refused = mapfilter("predict", "-c", world.toml, *given, *out)
+    assert_refused(refused, "expected an EIRP for each cell", "found none for 10 of 10 cells")
+    assert not (world.folder / "out").exists()
+    set_ = settings(cells__eirp_dbm=43.0)
+    assert "EIRP" not in mapfilter("predict", "-c", world.toml, *given, *set_, *out).err
