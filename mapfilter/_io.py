@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from mapfilter._inputs import is_unicode, json_value, open_input, read_input
-from mapfilter._partial import is_left, new_partial, partials
+from mapfilter._partial import is_left, new_partial, nothing_left, partials
 from mapfilter._replace import ASIDE, NEW, discard, exchange, note_old
 from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fail
 
@@ -56,16 +56,17 @@ def atomic_file(path: Path) -> Iterator[Path]:
     ``path`` is a link, its target is replaced. Raises OutputError where a file or its folder cannot
     be written, as on a full disk.
     """
-    target, partial = _partial_folder(path)
-    temporary = partial / path.name
-    try:
-        with _writing(temporary, path):
-            yield temporary
-            _sync(temporary)
-        with _into_place(path, target):
-            temporary.replace(target)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    with nothing_left(path.parent):
+        target, partial = _partial_folder(path)
+        temporary = partial / path.name
+        try:
+            with _writing(temporary, path):
+                yield temporary
+                _sync(temporary)
+            with _into_place(path, target):
+                temporary.replace(target)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
 
 
 @contextlib.contextmanager
@@ -78,25 +79,26 @@ def atomic_dir(path: Path) -> Iterator[Path]:
     """
     if path.exists() and not path.is_dir():
         raise fail(OutputError, str(path), "a folder, or nothing yet", "a file")
-    target, partial = _partial_folder(path)
-    new = partial / NEW
-    try:
-        with _writing(new, path):
-            new.mkdir()
-            note_old(partial, target)
-            yield new
-            # Most of the time of each is waiting for the disk, which takes many at once.
-            with ThreadPoolExecutor(_SYNCED_AT_ONCE) as pool:
-                for _ in pool.map(_sync, sorted(new.rglob("*"))):
-                    pass
-            _sync(new)
-        with _into_place(path, target):
-            if target.exists():
-                exchange(new, target)
-            else:
-                new.rename(target)
-    finally:
-        discard(partial, target)
+    with nothing_left(path.parent):
+        target, partial = _partial_folder(path)
+        new = partial / NEW
+        try:
+            with _writing(new, path):
+                new.mkdir()
+                note_old(partial, target)
+                yield new
+                # Most of the time of each is waiting for the disk, which takes many at once.
+                with ThreadPoolExecutor(_SYNCED_AT_ONCE) as pool:
+                    for _ in pool.map(_sync, sorted(new.rglob("*"))):
+                        pass
+                _sync(new)
+            with _into_place(path, target):
+                if target.exists():
+                    exchange(new, target)
+                else:
+                    new.rename(target)
+        finally:
+            discard(partial, target)
 
 
 @contextlib.contextmanager
@@ -107,31 +109,32 @@ def replaced_files(folder: Path, older: Callable[[], Iterable[Path]]) -> Iterato
     that have no successor are removed, with folders that they leave empty. All others stay, and if
     the block fails, all. Raises OutputError where the folder cannot be written.
     """
-    ensure_writable_folder(folder)
-    _, partial = _partial_folder(folder / "results")
-    new = partial / NEW
-    try:
-        with _writing(new, folder):
-            new.mkdir()
-            yield new
-        with _into_place(folder, folder):
-            stale = set(older())
-            files = sorted(path for path in new.rglob("*") if not path.is_dir())
-            for file in files:
-                _sync(file)
-            for file in files:
-                target = folder / file.relative_to(new)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                file.replace(target)
-                stale.discard(target)
-            for within in {(folder / file.relative_to(new)).parent for file in files}:
-                _sync(within)
-            for path in sorted(stale):
-                path.unlink(missing_ok=True)
-                if path.parent != folder and not any(path.parent.iterdir()):
-                    path.parent.rmdir()
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    with nothing_left(folder):
+        ensure_writable_folder(folder)
+        _, partial = _partial_folder(folder / "results")
+        new = partial / NEW
+        try:
+            with _writing(new, folder):
+                new.mkdir()
+                yield new
+            with _into_place(folder, folder):
+                stale = set(older())
+                files = sorted(path for path in new.rglob("*") if not path.is_dir())
+                for file in files:
+                    _sync(file)
+                for file in files:
+                    target = folder / file.relative_to(new)
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    file.replace(target)
+                    stale.discard(target)
+                for within in {(folder / file.relative_to(new)).parent for file in files}:
+                    _sync(within)
+                for path in sorted(stale):
+                    path.unlink(missing_ok=True)
+                    if path.parent != folder and not any(path.parent.iterdir()):
+                        path.parent.rmdir()
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
 
 
 def left_aside(path: Path) -> Path | None:

@@ -28,6 +28,38 @@ _LOOK_S = 0.02
 _NAME = re.compile(r"(?:(?P<host>h[0-9a-f]{8})-)?(?P<pid>[0-9]{1,20})-[^-]{0,64}")
 
 
+@contextlib.contextmanager
+def nothing_left(*folders: Path) -> Iterator[None]:
+    """Remove, where the block fails, folders that it made and that hold no file.
+
+    Those are the folders, their parents and what is in them, as far as they were not there before.
+    """
+    made: list[Path] = []
+    for folder in folders:
+        while folder not in made and _is_absent(folder):
+            made.append(folder)
+            folder = folder.parent
+    try:
+        yield
+    except BaseException:
+        # Longer paths are inside shorter ones.
+        for folder in sorted(made, key=lambda one: -len(one.parts)):
+            for inner in (Path(root) for root, _, _ in os.walk(folder, topdown=False)):
+                # A folder with something in it stays, and what another process begins.
+                with contextlib.suppress(OSError):
+                    if ".partial-" not in inner.name:
+                        inner.rmdir()
+        raise
+
+
+def _is_absent(folder: Path) -> bool:
+    """Return whether there is no such folder; not where that cannot be told."""
+    try:
+        return folder != folder.parent and not folder.exists()
+    except OSError:
+        return False
+
+
 def new_partial(path: Path) -> Path:
     """Make a new hidden folder beside a path; raises OSError."""
     prefix = f"{_prefix(path)}{_host()}-{os.getpid()}-"

@@ -8,6 +8,7 @@ east. The angle between true and grid north is the grid convergence.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from math import pi
@@ -128,7 +129,8 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     try:
         crs = known_crs(spec, where)
     except (CRSError, TypeError, ValueError) as error:
-        raise fail(InputError, where, "a CRS such as EPSG:32629", repr(spec)) from error
+        expected, hint = "a CRS such as EPSG:32629", _meant_crs(str(spec))
+        raise fail(InputError, where, expected, repr(spec), hint) from error
     if crs.is_geographic:
         hint = "degrees given for metres"
         raise fail(InputError, where, "a projected CRS in metres", crs.name, hint)
@@ -140,6 +142,31 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
         raise fail(InputError, where, "metres east and north", f"{crs.name} ({axes})")
     authority = crs.to_authority(min_confidence=100)
     return f"{authority[0]}:{authority[1]}" if authority else str(crs.to_wkt())
+
+
+_LONGEST_MEANT = 40
+
+
+def _meant_crs(text: str) -> str:
+    """Return what a text that is no CRS most likely means, or "".
+
+    Examples
+    --------
+    >>> _meant_crs("UTM35"), _meant_crs("epsg 32635"), _meant_crs("utm zone 34 S"), _meant_crs("x")
+    ('EPSG:32635, or EPSG:32735 south of the equator', 'EPSG:32635', 'EPSG:32734', '')
+    """
+    if len(text) > _LONGEST_MEANT:
+        return ""
+    if code := re.fullmatch(r"\s*(?:epsg)?[\s:_-]*([0-9]{4,6})\s*", text, re.IGNORECASE):
+        meant = f"EPSG:{code[1]}"
+        return meant if meant != text.strip().upper() else ""
+    utm = r"\bUTM[\s_-]*(?:zone)?[\s_-]*([0-9]{1,2})[\s_-]*(N|S|north|south)?\s*"
+    zone = re.search(rf"{utm}$", text, re.IGNORECASE)
+    if zone is None or not 1 <= int(zone[1]) <= 60:
+        return ""
+    north, south = f"EPSG:326{int(zone[1]):02}", f"EPSG:327{int(zone[1]):02}"
+    known = {"N": north, "S": south}
+    return known.get((zone[2] or "")[:1].upper(), f"{north}, or {south} south of the equator")
 
 
 def short_crs(crs: str) -> str:

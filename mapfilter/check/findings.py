@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -35,6 +36,8 @@ REMEDIES = {
     "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS.",
     "duplicate-id": "Give each cell an id of its own.",
     "east-north-swapped": "Exchange the columns east and north.",
+    "eirp-missing": "Name the column of the EIRP in cells.columns.eirp_dbm, or set cells.eirp_dbm, "
+    "which is then taken for all cells without one.",
     "eirp-watts": "Turn watts into dBm, 10 log10(1000 W), antenna gain included.",
     "field-strength": "Export received levels in dBm, not field strengths (dBµV/m).",
     "frequency-unit": "Give the frequency in MHz.",
@@ -72,6 +75,7 @@ REMEDIES = {
     "raster-constant": "Export the raster anew.",
     "raster-empty": "Export the raster anew, or take the cell out.",
     "raster-upside-down": "Write row 0 in the north and column 0 in the west.",
+    "plan-columns": "Name the columns that are of use in [cells.columns].",
     "raster-without-cell": "Add the cells to the plan, or take the rasters out.",
     "rasters-invalid": "Correct or export the raster anew.",
     "rasters-missing": "Run `mapfilter predict`, or correct rasters.path.",
@@ -123,6 +127,14 @@ _BY_EXPECTED = {
     "each cell once": "duplicate-id",
     "a pattern file": "antenna-missing",
 }
+_OF_HEADER = "Correct the header, or name its columns in [cells.columns]."
+_OF_FILES = {
+    "a readable file": "Correct the path, or put the file there.",
+    "a header line and rows": "Take another file, or export this one anew.",
+    "at least one cell": "Take another file, or export this one anew.",
+}
+"""Remedies by what was expected of a whole file."""
+_SETTING_OF_CRS = re.compile(r"[a-z_]+\.crs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,9 +177,16 @@ class Findings:
 
     found: list[Finding] = field(default_factory=list)
 
-    def add(self, code: str, where: str, evidence: str, severity: Severity = "error") -> None:
-        """Note one finding; its remedy is the one of its code."""
-        finding = Finding(code, severity, where, evidence, REMEDIES[code])
+    def add(
+        self,
+        code: str,
+        where: str,
+        evidence: str,
+        severity: Severity = "error",
+        remedy: str = "",
+    ) -> None:
+        """Note one finding; its remedy is the one of its code, where no other one is given."""
+        finding = Finding(code, severity, where, evidence, remedy or REMEDIES[code])
         if finding not in self.found:
             self.found.append(finding)
 
@@ -178,7 +197,8 @@ class Findings:
         for fault in error.faults:
             hint = f" ({fault.hint})" if fault.hint else ""
             evidence = f"Expected {fault.expected}, found {fault.got}{hint}."
-            self.add(_code(fault, otherwise), fault.where, evidence, severity)
+            code = _code(fault, otherwise)
+            self.add(code, fault.where, evidence, severity, _remedy(code, fault))
 
     def result(self) -> CheckResult:
         """Return everything found, errors first."""
@@ -207,3 +227,13 @@ def _code(fault: Fault, otherwise: str) -> str:
         return _BY_HINT[fault.hint]
     known = (code for start, code in _BY_EXPECTED.items() if fault.expected.startswith(start))
     return next(known, otherwise)
+
+
+def _remedy(code: str, fault: Fault) -> str:
+    """Return the remedy of a fault of a whole file or of its header, or ""."""
+    if code == "plan-invalid" and fault.where.endswith(" header"):
+        return _OF_HEADER
+    if _SETTING_OF_CRS.fullmatch(fault.where):
+        return f"Set {fault.where} to the projected CRS of the numbers, in metres."
+    known = (remedy for start, remedy in _OF_FILES.items() if fault.expected.startswith(start))
+    return next(known, "")

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from mapfilter._types import Floats, Floats32, Ints
-from mapfilter.check.raster_checks import RasterSample
+from mapfilter.check.samples import RasterSample
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell
 

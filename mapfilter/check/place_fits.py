@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.check.raster_checks import RasterSample
+from mapfilter.check.samples import RasterSample
 
 _SIDE = 40
 _LEAST_SQUARES = 60

@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
-from mapfilter._types import Floats, Floats32
+from mapfilter._types import Floats32
 from mapfilter.check.findings import Findings
-from mapfilter.errors import InputError, listed
-from mapfilter.geodesy import (
-    Lattice,
-    azimuth_from_heading_deg,
-    grid_convergence_rad,
-    unproject,
-)
+from mapfilter.check.samples import RasterSample, sample_raster
+from mapfilter.errors import Fault, InputError, listed
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.files import check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.rasters.resampling import read_on
 
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
 
-MOST_PX = 1 << 22
-"""Larger rasters are looked at in a square of so many pixels about the site."""
-_SAMPLED_SIDE_PX = 600
 _HIGHEST_RXLEV = 63
 _LEAST_LOSS_DB = 20.0
 _NO_LEVEL_BELOW = -300.0
@@ -40,66 +32,6 @@ _MANY_TIMES = 10
 _PHONE_M = 1.5
 _NEAREST_RING_M = 64.0
 _LEAST_IN_RING = 50
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RasterSample:
-    """Sample of one cell's raster, in equal steps over the raster or about the site.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Where the sampled pixels lie; its pixels are the sampled ones grown to the step.
-    values : ndarray of float32, shape (rows, cols) of the lattice
-        As stored, times the declared factor; NaN without data.
-    checksum : str
-        Of all pixels looked at, before sampling.
-    """
-
-    cell_id: str
-    lattice: Lattice
-    values: Floats32
-    checksum: str
-
-    @property
-    def known(self) -> Floats32:
-        """The values that are not NaN."""
-        return self.values[~np.isnan(self.values)]
-
-    def positions_m(self) -> tuple[Floats, Floats]:
-        """Return east and north of every sampled pixel, shape (rows, cols) each."""
-        rows, cols = np.mgrid[: self.lattice.rows, : self.lattice.cols]
-        east_m, north_m = self.lattice.east_north(rows, cols)
-        return east_m, north_m
-
-    def seen_from(self, east_m: float, north_m: float) -> tuple[Floats, Floats]:
-        """Return distance (m) and azimuth (degrees from true north) of every sampled pixel."""
-        east, north = self.positions_m()
-        lon, lat = unproject(self.lattice.crs, east_m, north_m)
-        convergence_rad = grid_convergence_rad(self.lattice.crs, float(lon), float(lat))
-        heading_rad = np.arctan2(north - north_m, east - east_m)
-        distance_m = np.hypot(east - east_m, north - north_m)
-        return distance_m, azimuth_from_heading_deg(heading_rad, convergence_rad)
-
-
-def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> RasterSample:
-    """Read a sample of one cell's raster, of a large one about its site or else its middle."""
-    file = next(file for file in rasters.files if cell_id in file.cell_ids)
-    band = file.cell_ids.index(cell_id)
-    window = _window(rasters.lattice, cell)
-    values = read_on(file, [band], rasters.lattice, window, rasters.resampling)[0]
-    checksum = hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
-    step = max(1, -(-max(values.shape) // _SAMPLED_SIDE_PX))
-    first = step // 2
-    values = values[first::step, first::step] if min(values.shape) > first else values
-    part = rasters.lattice.window(*window)
-    side_m = part.resolution_m
-    # Sampled pixels keep their centres.
-    shift_m = (first + 0.5 - step / 2) * side_m
-    lattice = Lattice(
-        part.crs, part.west_m + shift_m, part.north_m - shift_m, side_m * step, *values.shape
-    )
-    return RasterSample(cell_id, lattice, values * np.float32(rasters.factor), checksum)
 
 
 def kind_of(values: Floats32) -> Kind:
@@ -194,22 +126,6 @@ def above_free_space_db(sample: RasterSample, cell: Cell) -> float:
     return max(medians_db, default=-np.inf)
 
 
-def _window(lattice: Lattice, cell: Cell | None) -> tuple[int, int, int, int]:
-    """Return the whole lattice, or a square about a cell where it is too large."""
-    rows, cols = lattice.rows, lattice.cols
-    if rows * cols <= MOST_PX:
-        return 0, 0, rows, cols
-    side = int(np.sqrt(MOST_PX))
-    row, col = rows // 2, cols // 2
-    if cell is not None:
-        there = lattice.row_col(cell.east_m, cell.north_m)
-        row, col = there if lattice.contains(*there) else (row, col)
-    high, wide = min(side, rows), min(side, cols)
-    top = int(np.clip(row - high // 2, 0, rows - high))
-    left = int(np.clip(col - wide // 2, 0, cols - wide))
-    return top, left, high, wide
-
-
 _FALLS = 0.3
 
 
@@ -244,9 +160,10 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
     -------
     list of RasterSample
         Levels, or losses with a minus sign, without what stands for no data; those of rasters
-        without anything to look at are left out.
+        without anything to look at, or beyond what the quantity can be, are left out.
     """
     kinds: dict[Kind, list[RasterSample]] = {}
+    beyond: dict[tuple[str, str], list[RasterSample]] = {}
     nodata: list[tuple[str, float, float]] = []
     constant, empty = [], []
     for cell_id in rasters.cell_ids:
@@ -267,6 +184,8 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
             empty.append(cell_id)
         elif np.ptp(sample.known) == 0:
             constant.append(f"{cell_id} {sample.known[0]:g}")
+        elif (fault := _beyond(sample, rasters, kind)) is not None:
+            beyond.setdefault((fault.expected, fault.hint), []).append(sample)
         else:
             kinds.setdefault(kind, []).append(sample)
     where = str(rasters.path)
@@ -281,19 +200,25 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
     if constant:
         evidence = f"One number in all pixels: {listed(constant)}."
         findings.add("raster-constant", where, evidence)
+    for (expected, hint), samples in beyond.items():
+        low = min(float(sample.known.min()) for sample in samples)
+        high = max(float(sample.known.max()) for sample in samples)
+        evidence = (
+            f"Expected {expected}; {len(samples)} of {len(rasters.cell_ids)} rasters hold "
+            f"{low:.5g}..{high:.5g}"
+        )
+        evidence += f" ({hint})." if hint else "."
+        ids = listed([sample.cell_id for sample in samples])
+        findings.add("values-implausible", f"{where}, cells {ids}", evidence)
     useful: list[RasterSample] = []
     for kind, samples in kinds.items():
-        by_sum: dict[tuple[str, Lattice], list[str]] = {}
-        for sample in samples:
-            by_sum.setdefault((sample.checksum, sample.lattice), []).append(sample.cell_id)
-        for same in by_sum.values():
-            if len(same) > 1:
-                evidence = f"The same numbers in all pixels of {len(same)} rasters."
-                findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
+        _check_copies(samples, where, findings)
         falls = kind == "loss" and _falls_away(samples, plan)
         if falls or kind not in (rasters.quantity, "empty"):
             code = "field-strength" if falls else f"{kind}-as-{rasters.quantity}"
-            code = "values-implausible" if kind == "unclear" else code
+            # A negative factor turns levels into what looks like losses, and losses into levels.
+            if kind == "unclear" or (rasters.factor < 0 and kind in ("level", "loss")):
+                code = "values-implausible"
             numbers = np.concatenate([sample.known for sample in samples])
             low, middle, high = np.percentile(numbers, [1, 50, 99])
             evidence = (
@@ -303,9 +228,36 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
             evidence += ", which become less away from the sites." if falls else "."
             ids = listed([sample.cell_id for sample in samples])
             findings.add(code, f"{where}, cells {ids}", evidence)
+        if kind == "unclear":
+            # Whether more is stronger is not known.
+            continue
         negative = kind == "loss" and not falls
         useful += [replace(s, values=-s.values) for s in samples] if negative else samples
     return useful
+
+
+def _beyond(sample: RasterSample, rasters: RxLevRasters, kind: Kind) -> Fault | None:
+    """Return the fault of numbers that the declared quantity cannot have, and a build refuses.
+
+    None where they are of another quantity, which is told as such.
+    """
+    if kind not in (rasters.quantity, "empty"):
+        return None
+    try:
+        check_plausible(sample.values, rasters.quantity, rasters.path)
+    except InputError as error:
+        return error.faults[0]
+    return None
+
+
+def _check_copies(samples: Sequence[RasterSample], where: str, findings: Findings) -> None:
+    by_sum: dict[tuple[str, Lattice], list[str]] = {}
+    for sample in samples:
+        by_sum.setdefault((sample.checksum, sample.lattice), []).append(sample.cell_id)
+    for same in by_sum.values():
+        if len(same) > 1:
+            evidence = f"The same numbers in all pixels of {len(same)} rasters."
+            findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
 
 
 def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:

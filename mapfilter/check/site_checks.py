@@ -19,7 +19,8 @@ from mapfilter._types import Floats32
 from mapfilter.check.findings import Findings
 from mapfilter.check.lobes import Lobe, azimuth_mistakes, find_lobe
 from mapfilter.check.place_fits import best_place, in_squares, place_fits
-from mapfilter.check.raster_checks import RasterSample, above_free_space_db, falls_with_distance
+from mapfilter.check.raster_checks import above_free_space_db, falls_with_distance
+from mapfilter.check.samples import RasterSample
 from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -57,7 +57,7 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
     (bound, "area/database --out bound", "howto/where-will-it-work.rst"),
     (convert, "walk.txt --truth watch.gpx --out walk", "howto/recordings.rst"),
     (simulate, "-c area.toml --out area", "explanation/simulated-worlds.rst"),
-    (locate, "--db fingerprints --log walk --out located", "howto/single-reports.rst"),
+    (locate, "--db fingerprints --log walk --out located-reports", "howto/single-reports.rst"),
     (
         replay,
         "--db area/database --log walk --filter bayes --out located",

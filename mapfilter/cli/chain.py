@@ -9,6 +9,7 @@ from typing import Annotated, get_args
 import typer
 
 from mapfilter.cli.options import (
+    NO_CONFIG,
     PARTIAL,
     WRONG,
     ClusterOption,
@@ -27,9 +28,11 @@ from mapfilter.cli.options import (
     WorkersOption,
     check_custom_filter,
     given_path,
+    named_defaults,
     refuse,
     seeded,
     toml,
+    undrawn,
     walk_changes,
 )
 from mapfilter.errors import ConfigError, fail
@@ -80,6 +83,8 @@ def check(
     else:
         print_text("\n\n".join(paragraphs(result)))
     if not result.ok:
+        if config is None and not given:
+            print_message(f"command line: expected {NO_CONFIG}, found none; defaults were checked")
         raise typer.Exit(WRONG)
 
 
@@ -94,9 +99,9 @@ def predict(
     from mapfilter.config.load import load_config
     from mapfilter.workflows.predict import run_predict
 
-    settings = seeded(settings, seed, "prediction.seed", "prediction.ground_truth.seed")
-    with progress_bar("predict") as progress:
-        result = run_predict(load_config(config, settings, out=out), progress)
+    given = seeded(settings, seed, "prediction.seed", "prediction.ground_truth.seed")
+    with named_defaults(config, settings), progress_bar("predict") as progress:
+        result = run_predict(load_config(config, given, out=out), progress)
     print_result(result, as_json)
 
 
@@ -121,9 +126,11 @@ def build(
     given = [*(settings or ()), *(["database.cells=false"] if roads_only else [])]
     loaded = load_config(config, given, out=out)
     if dry_run:
-        print_result(run_dry_build(loaded), as_json)
+        with named_defaults(config, given):
+            estimate = run_dry_build(loaded)
+        print_result(estimate, as_json)
         return
-    with progress_bar("build") as progress:
+    with named_defaults(config, given), progress_bar("build") as progress:
         result = run_build(
             loaded, workers=workers, cluster=cluster, resume=resume, progress=progress
         )
@@ -238,9 +245,9 @@ def simulate(
     from mapfilter.config.load import load_config
     from mapfilter.workflows.simulate import run_simulate
 
-    settings = seeded(settings, seed, "journeys.seed")
-    with progress_bar("simulate") as progress:
-        result = run_simulate(load_config(config, settings, out=out), progress)
+    given = seeded(settings, seed, "journeys.seed")
+    with named_defaults(config, settings), progress_bar("simulate") as progress:
+        result = run_simulate(load_config(config, given, out=out), progress)
     print_result(result, as_json)
     if result.partial:
         print_message("no journey receives a cell: the rasters hold no level along the streets")
@@ -285,7 +292,7 @@ def locate(
 
     if not 0 < level_error_db <= 60:
         raise fail(ConfigError, "--level-error", "dB > 0, at most 60", level_error_db)
-    folder = (out or Path("located")).absolute()
+    folder = (out or Path("located-reports")).absolute()
     with progress_bar("locate") as progress:
         result = run_locate(
             database,
@@ -368,8 +375,7 @@ def replay(
     from mapfilter.workflows.drawer import drawer_process
 
     # What draws starts before the imports below, which take as long as its own.
-    undrawn = any("pictures" in setting and "none" in setting for setting in settings or ())
-    with nullcontext() if undrawn else drawer_process() as drawers:
+    with nullcontext() if undrawn(config, settings or ()) else drawer_process() as drawers:
         from mapfilter.config.load import load_config
         from mapfilter.workflows.replay import run_replay
         from mapfilter.workflows.replayed import replay_figures

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from mapfilter._partial import nothing_left
 from mapfilter.cli.options import (
     PARTIAL,
     BoxOption,
@@ -23,6 +24,7 @@ from mapfilter.cli.options import (
     WorkersOption,
     check_custom_filter,
     given_path,
+    named_defaults,
     numbers,
     refuse,
     seeded,
@@ -61,10 +63,12 @@ def sweep(
     check_custom_filter(loaded)
     axes = vary_axes(vary or ())
     if dry_run:
-        print_result(forecast_sweep(loaded, axes, workers=workers), as_json)
+        with named_defaults(config, settings):
+            forecast = forecast_sweep(loaded, axes, workers=workers)
+        print_result(forecast, as_json)
         return
     try:
-        with rate_bar("sweep", "runs") as progress:
+        with named_defaults(config, settings), rate_bar("sweep", "runs") as progress:
             result = run_sweep(
                 loaded, axes, workers=workers, cluster=cluster, resume=resume, progress=progress
             )
@@ -227,7 +231,7 @@ def evaluate(
         unused = {"--map": map_file, "--bbox": bbox, "--case": cases, "--filter": other}
         refuse(unused | {"--world": world, "--config": config, "--set": settings}, name)
         folder = (out or Path("out") / "ottawa").absolute()
-        with rate_bar("evaluate", "sessions") as progress:
+        with nothing_left(folder), rate_bar("evaluate", "sessions") as progress:
             result = run_ottawa(data, folder, runs=runs or OTTAWA_RUNS, progress=progress, **common)
         print_result(result, as_json)
         return
@@ -235,7 +239,7 @@ def evaluate(
         unused = {"--map": map_file, "--bbox": bbox, "--filter": filter_name, "--world": world}
         refuse(unused | {"--config": config, "--set": settings}, name)
         folder = (out or Path("out") / name).absolute()
-        with rate_bar("evaluate", "runs") as progress:
+        with nothing_left(folder), rate_bar("evaluate", "runs") as progress:
             if name == ALL:
                 refuse({"--case": cases, "--runs": runs}, name)
                 result = run_all(data, folder, progress=progress, **common)
@@ -255,7 +259,7 @@ def evaluate(
         refuse(unused | {"--world": world, "--set": settings}, name)
         refuse({"--runs": runs}, name)
         folder = (out or Path("out") / name).absolute()
-        with rate_bar("evaluate", "runs") as progress:
+        with nothing_left(folder), rate_bar("evaluate", "runs") as progress:
             result = run_single_reports(data, folder, sets=cases or SETS, progress=progress)
         print_result(result, as_json)
         return
@@ -277,7 +281,7 @@ def evaluate(
     check_custom_filter(loaded)
     folder = (out or loaded.output.dir / name).absolute()
     common["runs"] = runs or RUNS
-    with rate_bar("evaluate", "batches") as progress:
+    with nothing_left(folder), rate_bar("evaluate", "batches") as progress:
         common["progress"] = progress
         if name == "audit":
             result = run_audit(config, given, folder, names=cases or (), **common)

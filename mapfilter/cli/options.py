@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mapfilter.errors import ConfigError, Faults, fail
+from mapfilter.errors import (
+    ConfigError,
+    Fault,
+    Faults,
+    InputError,
+    MapfilterError,
+    StoreError,
+    fail,
+)
 from mapfilter.positioning import BUILT_IN, DEFAULT
 
 if TYPE_CHECKING:
@@ -18,6 +28,8 @@ if TYPE_CHECKING:
 
 DONE, WRONG, PARTIAL = 0, 2, 3
 """Exit codes."""
+_LARGEST_BYTES = 16 << 20
+NO_CONFIG = "a configuration (-c FILE), or settings (--set)"
 
 
 def given_path(path: Path | None) -> Path | None:
@@ -87,6 +99,24 @@ def toml(value: str | list[str]) -> str:
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
+@contextmanager
+def named_defaults(config: Path | None, settings: list[str] | None) -> Iterator[None]:
+    """Put first, where an input is wrong, that no configuration was given and defaults were taken.
+
+    Raises
+    ------
+    InputError, StoreError
+        As in the block, with one fault more where there was neither a file nor a setting.
+    """
+    try:
+        yield
+    except (InputError, StoreError) as error:
+        if config is not None or settings:
+            raise
+        missing = Fault("command line", NO_CONFIG, "none; defaults were taken")
+        raise type(error)((missing, *error.faults)) from error
+
+
 def numbers(text: str | None, count: int, where: str) -> list[float] | None:
     """Return so many numbers that commas separate, or None without a text."""
     if text is None:
@@ -117,6 +147,24 @@ def walk_changes(declination_deg: float | None, step_m: float | None) -> dict[st
     faults.raise_if_any(ConfigError)
     given = {"declination_deg": declination_deg, "step_m": step_m}
     return {name: value for name, value in given.items() if value is not None}
+
+
+def undrawn(config: Path | None, settings: Sequence[str]) -> bool:
+    """Return whether settings or the file ask for no pictures, before either is checked."""
+    from mapfilter._inputs import read_input
+
+    key = "output.pictures"
+    said = [text for name, _, text in (s.partition("=") for s in settings) if name.strip() == key]
+    if said:
+        return said[-1].strip().strip("\"'") == "none"
+    if config is None or not config.is_file():
+        return False
+    try:
+        text = read_input(config, _LARGEST_BYTES, "a TOML file", ConfigError).decode("utf-8-sig")
+        return bool(tomllib.loads(text)["output"]["pictures"] == "none")
+    except (MapfilterError, ValueError, RecursionError, KeyError, TypeError):
+        # What is wrong with it is told when it is loaded.
+        return False
 
 
 def check_custom_filter(config: Config) -> None:

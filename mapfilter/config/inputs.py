@@ -124,7 +124,8 @@ class Cells(Section):
         Carrier of a plan by rule, and of listed cells without one.
     eirp_dbm : float
         EIRP of a carrier: of outdoor cells by rule, and of listed cells without one. Of listed
-        UMTS, LTE and NR cells it is lowered to what phones report.
+        UMTS, LTE and NR cells it is lowered to what phones report. Has to be set where rasters
+        hold losses and listed cells have none.
     height_m : float
         Antenna height above ground of outdoor cells by rule, and of listed cells without one.
     seed : int

@@ -12,6 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ValidationError
 
 from mapfilter._inputs import path_fault, read_input, shown
 from mapfilter.config.fields import MAP_NAMES, field_annotation, resolve_map, resolve_path
+from mapfilter.config.mistakes import mistake_in_toml, mistake_in_value
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Fault, Faults, fail
 from mapfilter.options import expected, likely, without_none
@@ -154,11 +155,16 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
 def _read_toml(file: Path) -> dict[str, Any]:
     if wrong := path_fault(file):
         raise fail(ConfigError, "--config", wrong, shown(str(file)))
+    data = read_input(file, _LARGEST_BYTES, "a TOML file", ConfigError)
     try:
-        text = read_input(file, _LARGEST_BYTES, "a TOML file", ConfigError).decode("utf-8-sig")
-        values = tomllib.loads(text.replace("\r\n", "\n"))
-    except ValueError as error:
+        text = data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
         raise fail(ConfigError, str(file), "TOML", error) from error
+    try:
+        values = tomllib.loads(text)
+    except ValueError as error:
+        hint = mistake_in_toml(text, error)
+        raise fail(ConfigError, str(file), "TOML", error, hint) from error
     except RecursionError as error:
         raise fail(ConfigError, str(file), "TOML", "hundreds of nested values") from error
     if not text.strip():
@@ -272,4 +278,5 @@ def _fault(where: str, keys: Sequence[str], annotation: Any, detail: Mapping[str
     words = expected(wanted)
     if kind == "finite_number":
         words = words.replace("a number", "a finite number")
-    return Fault(where, words, shown(given), likely(wanted, given))
+    hint = likely(wanted, given) or mistake_in_value(keys, words, given)
+    return Fault(where, words, shown(given), hint)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.radio.cell_rules import TECHNOLOGIES, technology_faults
+from mapfilter.radio.headings import Heading, places_named, resembling, unit_of
 from mapfilter.radio.identities import parse_cgi, technology
 from mapfilter.radio.reported_power import ASSUMABLE, REPORTED_SHARE_DB, reported_eirp_dbm
 from mapfilter.radio.tables import Table
@@ -33,7 +34,7 @@ COLUMNS = (
 SELDOM = ("technology", "assumed")
 """Those that are left out where no cell has them."""
 ATOLL: Columns = {
-    "cell": ("TX_ID", "TX_NAME"),
+    "cell": ("TX_ID", "TX_NAME", "TRANSMITTER"),
     "site": ("SITE_NAME", "SITE"),
     "lat": ("LATITUDE",),
     "lon": ("LONGITUDE",),
@@ -41,9 +42,12 @@ ATOLL: Columns = {
     "north": ("Y",),
     "height_m": ("HEIGHT",),
     "azimuth_deg": ("AZIMUT", "AZIMUTH"),
-    "downtilt_deg": ("ELECTRICAL_TILT",),
-    "mechanical_downtilt_deg": ("TILT", "MECHANICAL_TILT"),
-    "antenna": ("ANTENNA_NAME",),
+    "downtilt_deg": (
+        *("ELECTRICAL_TILT", "ELECTRICAL_DOWNTILT"),
+        *("ADDITIONAL_ELECTRICAL_DOWNTILT", "REDT"),
+    ),
+    "mechanical_downtilt_deg": ("TILT", "MECHANICAL_TILT", "MECHANICAL_DOWNTILT"),
+    "antenna": ("ANTENNA_NAME", "ANTENNA"),
     "eirp_dbm": ("EIRP",),
     "frequency_mhz": ("FREQUENCY",),
     "mcc": ("MCC",),
@@ -51,9 +55,11 @@ ATOLL: Columns = {
     "lac": ("LAC",),
     "ci": ("CELL_IDENTITY", "CI"),
     "arfcn": ("CONTROL_CHANNEL", "BCCH"),
-    "bsic": ("BSIC", "PHY_CELL_ID", "PSC"),
+    "bsic": ("BSIC", "PHY_CELL_ID", "PHYSICAL_CELL_ID", "PSC"),
     "technology": ("TECHNOLOGY",),
 }
+"""Names of fields, and headings that Atoll shows for them, in which blanks stand for underscores
+and a unit in brackets may follow."""
 OPENCELLID: Columns = {
     "technology": ("radio",),
     "lat": ("lat",),
@@ -87,6 +93,9 @@ LAYOUTS: Mapping[Layout, Columns] = {
     "opencellid": OPENCELLID,
 }
 
+UNUSED_COLUMNS = "columns not used that resemble fields"
+"""What the note on such columns begins with."""
+_NOT_RESEMBLED = ("technology", "assumed", "crs", "cgi")
 _RADIOS = {"GSM", "UMTS", "LTE", "CDMA", "NR"}
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
 
@@ -132,12 +141,13 @@ def arrange(
         table = replace(table, rows=((1, list(header)), *table.rows))
         header = OPENCELLID_HEADER
     picked = _pick(table, header, layout, columns)
+    unused = _unused(header, picked, layout, columns)
     fields = [*picked, *(name for name in defaults if name not in picked)]
     fields += [name for name in _IDENTITY if "cgi" in picked and name not in fields]
     fields = [name for name in fields if name != "cgi"]
     composed = "cell" not in fields and all(name in fields for name in _IDENTITY)
-    implied = any(header[i].casefold() in _IMPLIED for at in picked.values() for i in at)
-    if implied and "technology" not in fields:
+    implied = [_IMPLIED.get(Heading.of(name).words.replace(" ", "_")) for name in header]
+    if any(implied[i] for at in picked.values() for i in at) and "technology" not in fields:
         fields.append("technology")
     if (defaults or layout == "opencellid") and "assumed" not in fields:
         fields.append("assumed")
@@ -147,7 +157,7 @@ def arrange(
     for line, texts in table.whole_rows(len(header), faults):
         values = {name: _first(texts, at) for name, at in picked.items()}
         _by_technology(
-            values, [header[i] for at in picked.values() for i in at if texts[i].strip()]
+            values, [implied[i] for at in picked.values() for i in at if texts[i].strip()]
         )
         if layout == "opencellid":
             known = technology(values.get("technology", ""))
@@ -186,6 +196,8 @@ def arrange(
             f"technology of {len(beyond)} cells left out, as their identities are beyond its "
             f"limits, such as {beyond[0]}",
         )
+    if unused:
+        notes += (unused,)
     shown = {
         name: f"{header[at[0]]} ({name})" for name, at in picked.items() if header[at[0]] != name
     }
@@ -197,6 +209,13 @@ def none_of(header: Sequence[str]) -> str:
     shown = ", ".join(header)
     shown = f"{shown[:_LONGEST_SHOWN]}, …" if len(shown) > _LONGEST_SHOWN else shown
     return f"none (columns: {shown})"
+
+
+def recognised(header: Sequence[str], columns: Columns) -> list[str]:
+    """Return the headings that are among the names of some columns."""
+    headings = [Heading.of(name) for name in header]
+    found = {at for field, names in columns.items() for at in places_named(headings, field, names)}
+    return [header[at] for at in sorted(found)]
 
 
 def _usual(name: str, default: float, stated: str) -> float:
@@ -221,15 +240,14 @@ def _first(texts: list[str], places: tuple[int, ...]) -> str:
     return next((text for at in places if (text := texts[at].strip())), "")
 
 
-def _by_technology(values: dict[str, str], filled: list[str]) -> None:
-    """Fill in the parts of a CGI, and the technology of the columns in which a row has values."""
+def _by_technology(values: dict[str, str], implied: list[str | None]) -> None:
+    """Fill in the parts of a CGI, and the technology that columns with values imply."""
     identity = parse_cgi(values.pop("cgi", ""))
     if identity is not None:
         for name, part in zip(_IDENTITY, identity, strict=True):
             values[name] = values.get(name) or ("" if part is None else str(part))
     if not values.get("technology"):
-        named = (_IMPLIED.get(name.casefold()) for name in filled)
-        values["technology"] = next((name for name in named if name), "")
+        values["technology"] = next(filter(None, implied), "")
 
 
 def _pick(
@@ -237,23 +255,62 @@ def _pick(
 ) -> dict[str, tuple[int, ...]]:
     """Return the places of each field's column, or columns."""
     faults = Faults()
-    places = {name: at for at, name in reversed(list(enumerate(header)))}
-    folded = {name.casefold(): at for name, at in places.items()}
+    headings = [Heading.of(name) for name in header]
+    # A name without its unit does where it is clear.
+    titles = Counter(heading.title for heading in headings)
+    places = {h.title: at for at, h in enumerate(headings) if titles[h.title] == 1}
+    places |= {name: at for at, name in reversed(list(enumerate(header)))}
     picked: dict[str, tuple[int, ...]] = {}
     for field, name in columns.items():
         if name in places:
             picked[field] = (places[name],)
         else:
-            near = difflib.get_close_matches(name, places, n=1, cutoff=0.5)
+            near = difflib.get_close_matches(name, header, n=1, cutoff=0.5)
             hint = f"{near[0]} meant" if near else ""
             got = none_of(header)
             faults.add(f"{table.path} header", f"a column {name} ({field})", got, hint)
     faults.raise_if_any(InputError)
     for field, names in LAYOUTS[layout].items():
-        at = [folded[name.casefold()] for name in names if name.casefold() in folded]
+        at = places_named(headings, field, names)
         if at:
             picked.setdefault(field, tuple(at if field in ALIASES else at[:1]))
     if {"lat", "lon", "east", "north"} <= picked.keys():
         surplus = ("lat", "lon") if {"east", "north"} & columns.keys() else ("east", "north")
         picked = {field: at for field, at in picked.items() if field not in surplus}
+    for field, used in picked.items():
+        _check_unit(table, field, (headings[at] for at in used), faults)
+    faults.raise_if_any(InputError)
     return picked
+
+
+def _check_unit(table: Table, field: str, used: Iterable[Heading], faults: Faults) -> None:
+    """Note headings that state another unit than that of the field."""
+    for heading in used:
+        if heading.has_other_unit(field):
+            hint = f"another unit; convert the column to {unit_of(field)}"
+            expected = f"{field} in {unit_of(field)}"
+            faults.add(f"{table.path} header", expected, repr(heading.name), hint)
+
+
+def _unused(
+    header: tuple[str, ...],
+    picked: Mapping[str, tuple[int, ...]],
+    layout: Layout,
+    columns: Mapping[str, str],
+) -> str:
+    """Return a note on columns that are ignored and resemble a field that has no column, or ""."""
+    if layout == "opencellid" or (layout == "plan" and not columns):
+        return ""
+    has = set(picked) | set(_NOT_RESEMBLED)
+    has |= {"east", "north"} if {"lat", "lon"} <= has else set()
+    has |= {"lat", "lon"} if {"east", "north"} <= has else set()
+    wanted = {
+        field: (*names, field.rpartition("_")[0] if unit_of(field) else field)
+        for field, names in LAYOUTS[layout].items()
+        if field not in has
+    }
+    wanted = {field: tuple(filter(None, names)) for field, names in wanted.items()}
+    used = {at for places in picked.values() for at in places}
+    found = resembling([Heading.of(name) for name in header], used, wanted)
+    named = ", ".join(f"{name!r} ({field})" for name, field in found)
+    return f"{UNUSED_COLUMNS}: {named}" if found else ""

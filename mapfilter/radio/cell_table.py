@@ -13,9 +13,19 @@ from typing import Any
 
 from pyproj import CRS
 
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.geodesy import degree_fault, project, projected_crs, unproject
-from mapfilter.radio.cell_layouts import ALIASES, COLUMNS, Arranged, Layout, arrange, none_of
+from mapfilter.radio.cell_layouts import (
+    ALIASES,
+    ATOLL,
+    COLUMNS,
+    LAYOUTS,
+    Arranged,
+    Layout,
+    arrange,
+    none_of,
+    recognised,
+)
 from mapfilter.radio.cell_rules import (
     ANTENNAS,
     OPTIONAL,
@@ -32,6 +42,17 @@ _ALLOWED = {*COLUMNS, "east", "north", "crs", *chain.from_iterable(ALIASES.value
 _REQUIRED = ("cell", "height_m", "eirp_dbm", "frequency_mhz")
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
 _NEAR_DEG = 3.0
+_OTHER_LAYOUTS: Mapping[Layout, str] = {
+    "atoll": "transmitters of Atoll",
+    "opencellid": "a list of OpenCellID or the Mozilla Location Service",
+}
+_TELLING: Mapping[Layout, tuple[str, ...]] = {"atoll": ATOLL["cell"], "opencellid": ("radio",)}
+"""Columns of which one is in every list of a layout, and in no plan."""
+_LEAST_KNOWN = 3
+_JOIN_SITES = (
+    "Atoll keeps positions in the table Sites; add them to each transmitter by the name of its "
+    "site, or name other columns in cells.columns.east and cells.columns.north"
+)
 _LONGEST_SHOWN = 80
 
 
@@ -64,10 +85,11 @@ def read_plan(
     table = read_table(path, "a cell plan")
     where, wrong = f"{path} header", Faults()
     if layout == "plan" and not columns:
+        _check_layout(where, table.header)
         _check_own_header(where, table.header, wrong)
         defaults = None
     arranged = arrange(table, layout, columns or {}, defaults or {}, faults)
-    _check_fields(where, arranged.header, table.header, wrong)
+    _check_fields(where, layout, arranged.header, table.header, wrong)
     wrong.raise_if_any(InputError)
     if not arranged.rows and not faults.found:
         raise fail(InputError, str(path), "at least one cell", "a header without rows")
@@ -80,6 +102,18 @@ def read_plan(
         faults.add(f"{path}, crs", "one CRS in all rows", ", ".join(sorted(systems)))
     _place(path, rows, crs, faults)
     return rows, arranged.notes
+
+
+def _check_layout(where: str, header: tuple[str, ...]) -> None:
+    """Raise InputError where a header is that of another layout."""
+    own = recognised(header, LAYOUTS["plan"])
+    for layout, what in _OTHER_LAYOUTS.items():
+        known = recognised(header, LAYOUTS[layout])
+        told = recognised(header, {"": _TELLING[layout]})
+        if told and len(set(known) - set(own)) >= _LEAST_KNOWN:
+            expected = f"columns of a cell plan ({', '.join(COLUMNS[:4])}, …)"
+            hint = f'{what}: set cells.layout = "{layout}"'
+            raise fail(InputError, where, expected, listed(known), hint)
 
 
 def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> None:
@@ -98,11 +132,15 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
 
 
 def _check_fields(
-    where: str, fields: tuple[str, ...], header: tuple[str, ...], faults: Faults
+    where: str, layout: Layout, fields: tuple[str, ...], header: tuple[str, ...], faults: Faults
 ) -> None:
     """Check that every field is there without which there is no cell."""
     wanted = list(_REQUIRED)
-    wanted += ["east", "north"] if {"east", "north"} & set(fields) else ["lat", "lon"]
+    if layout == "atoll" and not {"lat", "lon", "east", "north"} & set(fields):
+        expected, hint = "a position: X and Y, or LATITUDE and LONGITUDE", _JOIN_SITES
+        faults.add(where, expected, none_of(header), hint)
+    else:
+        wanted += ["east", "north"] if {"east", "north"} & set(fields) else ["lat", "lon"]
     for name in wanted:
         if name not in fields:
             hint = f"left out or misspelt; cells.columns.{name} names a column called otherwise"

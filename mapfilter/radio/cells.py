@@ -258,7 +258,8 @@ def read_cell_plan(
     layout : {"plan", "atoll", "opencellid"}
         Of the columns: as above, those of a planning tool's transmitters, or those of OpenCellID
         and the Mozilla Location Service, whose bad rows are left out with a note. In the latter
-        two columns of other names are ignored.
+        two columns of other names are ignored; those of a planning tool that resemble a field
+        without a column are noted. A unit in brackets after a name is checked.
     columns : mapping of str to str, optional
         The file's column by field, where it has another name; other columns are ignored, then.
     defaults : mapping of str to float, optional

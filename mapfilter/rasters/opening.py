@@ -87,7 +87,7 @@ def open_rasters(
     check_path("open_rasters", "path", path)
     path = Path(path)
     _check_options(crs, factor, nodata, resolution_m)
-    declared = Declared(projected_crs(crs) if crs is not None else None, nodata)
+    declared = Declared(projected_crs(crs, "rasters, crs") if crs is not None else None, nodata)
     index = find_index(path) if path.is_dir() else None
     if path.suffix.lower() in INDEX_SUFFIXES and not path.is_dir():
         check_file(path)

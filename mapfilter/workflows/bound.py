@@ -13,6 +13,7 @@ import shapely
 
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.database.export import write_layers
 from mapfilter.database.store import open_database
@@ -94,8 +95,9 @@ def run_bound(
     database = open_database(path)
     if not database.cell_ids:
         raise fail(InputError, str(path), "cells", "none", "a database of roads alone")
-    ensure_writable_folder(out)
-    found = bound(database, errors=errors, options=options, seed=seed, progress=progress)
+    with nothing_left(out):
+        ensure_writable_folder(out)
+        found = bound(database, errors=errors, options=options, seed=seed, progress=progress)
     radio, ways, twins = found.radio, found.by_way(), found.twins()
     rasters = {name: on_lattice(radio, values) for name, values in found.at_points().items()}
     write_bound(rasters, radio.lattice, out / "bound.tif", database.attribution)

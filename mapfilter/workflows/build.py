@@ -9,6 +9,7 @@ from typing import Any
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, executor_of, made_ready
+from mapfilter._partial import nothing_left
 from mapfilter.config.sections import Config
 from mapfilter.database.build import TASKS_A_WORKER, build, build_roads
 from mapfilter.database.estimate import BuildEstimate, dry_run
@@ -73,10 +74,11 @@ def run_build(
     target, section = config.database_path, config.database
     if not section.cells:
         return _build_roads(config, progress)
-    with executor_of(workers, cluster) as (executor, at_once):
-        # Workers start while the inputs are read.
+    # Local workers start while the inputs are read; a cluster is asked for when these are right.
+    read = None if cluster is None else raster_world(config, planned_rasters(config))
+    with nothing_left(target.parent), executor_of(workers, cluster) as (executor, at_once):
         made_ready(executor, at_once, get_ready_to_read)
-        rasters, plan, world = raster_world(config, planned_rasters(config))
+        rasters, plan, world = read or raster_world(config, planned_rasters(config))
         ensure_writable_folder(target.parent)
         database = build(
             rasters,
@@ -113,15 +115,16 @@ def _build_roads(config: Config, progress: Progress | None) -> BuildResult:
     """Build a database without cells."""
     began_s = time.perf_counter()
     world, target = World.of(config), config.database_path
-    ensure_writable_folder(target.parent)
-    database = build_roads(
-        world.route_tiles,
-        target,
-        tile_px=config.database.tile_px,
-        inputs=[InputFile.of(role, path) for role, path in world.streets.files],
-        attribution=world.streets.attribution,
-        progress=progress,
-    )
+    with nothing_left(target.parent):
+        ensure_writable_folder(target.parent)
+        database = build_roads(
+            world.route_tiles,
+            target,
+            tile_px=config.database.tile_px,
+            inputs=[InputFile.of(role, path) for role, path in world.streets.files],
+            attribution=world.streets.attribution,
+            progress=progress,
+        )
     clear_pictures(config.pictures_path, NETWORK_PICTURES)
     points = int(database.manifest["counts"]["points"])
     return BuildResult(
@@ -195,7 +198,10 @@ def _draw(
         return ()
     buildings = world.buildings if config.roads.cut_buildings else None
     area, landuse = world.lattice, world.landuse
-    return draw_network(rasters, database, folder, area=area, landuse=landuse, buildings=buildings)
+    with nothing_left(folder):
+        return draw_network(
+            rasters, database, folder, area=area, landuse=landuse, buildings=buildings
+        )
 
 
 def _inputs(world: World) -> list[InputFile]:

@@ -19,6 +19,7 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, MapfilterError, listed
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
+from mapfilter.radio.cell_layouts import UNUSED_COLUMNS
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
@@ -34,6 +35,7 @@ from mapfilter.workflows.check_places import (
     check_sites,
     check_ways,
 )
+from mapfilter.workflows.stated_power import cells_without_eirp
 from mapfilter.workflows.survey import survey_inputs
 from mapfilter.workflows.world import World, planned_rasters, roads_lattice
 
@@ -179,7 +181,16 @@ class _Checks:
             return None
         if lattice is not None and (surveyed_plan is None or surveyed_plan.exists()):
             with self._reported("plan-invalid"):
-                return World(self.config, lattice).plan
+                plan = World(self.config, lattice).plan
+                for note in plan.notes:
+                    if note.startswith(UNUSED_COLUMNS):
+                        self.findings.add(
+                            "plan-columns",
+                            self.plan_name,
+                            f"{note[:1].upper()}{note[1:]}.",
+                            "warning",
+                        )
+                return plan
         return None
 
     def check_rasters(self, rasters: RxLevRasters, plan: CellPlan | None) -> None:
@@ -192,6 +203,10 @@ class _Checks:
         if plan is None:
             return
         check_ids(rasters, plan, self.plan_name, findings)
+        if without := cells_without_eirp(config, rasters, plan):
+            evidence = f"The rasters hold losses, and {len(without)} of {len(plan)} cells have no "
+            evidence += f"EIRP to take them from ({listed(without)})."
+            findings.add("eirp-missing", self.plan_name, evidence)
         if config.surveyed_plan is not None and config.cells.plan is None:
             # Antennas were located from the same levels, and may well stand outside.
             return

@@ -9,6 +9,7 @@ from typing import Any
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter._partial import nothing_left
 from mapfilter.database.merge import merge
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
@@ -24,8 +25,9 @@ def run_merge(
     """Merge databases; within its area a later one overrides earlier ones in its own cells."""
     began_s = time.perf_counter()
     opened = [open_database(path, verify="full") for path in databases]
-    ensure_writable_folder(out.parent)
-    merged = merge(opened, out, without=without, progress=progress)
+    with nothing_left(out.parent):
+        ensure_writable_folder(out.parent)
+        merged = merge(opened, out, without=without, progress=progress)
     points = int(merged.manifest["counts"]["points"])
     seconds = time.perf_counter() - began_s
     return {"points": points, "cells": len(merged.cell_ids), "database": out, "seconds": seconds}

@@ -13,8 +13,9 @@ from typing import Any
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import begun, local_executor, spare_processes, warmed
-from mapfilter._partial import remove_left
+from mapfilter._partial import nothing_left, remove_left
 from mapfilter.config.load import load_config
+from mapfilter.config.sections import Config
 from mapfilter.workflows.build import draw_database, run_build
 from mapfilter.workflows.kernels import WORKERS, begin_kernels, to_compile
 from mapfilter.workflows.predict import run_predict
@@ -89,11 +90,16 @@ def run_demo(
         figures of the candidate filter, wall time of each stage, all files written, and the
         address of the page.
     """
-    ensure_writable_folder(out)
     seeds = [] if seed is None else [f"journeys.seed={seed}"]
     with resources.as_file(resources.files("mapfilter.data")) as data:
         plain = data / "world-plain.toml"
         config = load_config(data / "demo.toml", [*settings, *seeds], out=out, base=plain)
+    with nothing_left(out):
+        ensure_writable_folder(out)
+        return _all_stages(config, out, progress)
+
+
+def _all_stages(config: Config, out: Path, progress: StageProgress | None) -> dict[str, Any]:
     seconds: dict[str, float] = {}
 
     @contextmanager

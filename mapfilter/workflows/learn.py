@@ -10,6 +10,7 @@ from typing import Any
 
 from mapfilter._io import ensure_writable_folder, replaced_files
 from mapfilter._parallel import Progress
+from mapfilter._partial import nothing_left
 from mapfilter.config.sections import Config
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.store import open_database
@@ -75,15 +76,16 @@ def run_accept(
     notes = []
     if patch.database_sha256 != opened.generation:
         notes.append("the patch was learned from another database, or an older state of this one")
-    ensure_writable_folder(out.parent)
-    changed = apply_patch(
-        opened,
-        patch,
-        out,
-        inputs=(InputFile.of("patch", patch_file),),
-        where=str(patch_file),
-        progress=progress,
-    )
+    with nothing_left(out.parent):
+        ensure_writable_folder(out.parent)
+        changed = apply_patch(
+            opened,
+            patch,
+            out,
+            inputs=(InputFile.of("patch", patch_file),),
+            where=str(patch_file),
+            progress=progress,
+        )
     accepted = sum(change.accept for change in patch.changes)
     return {
         "changes": accepted,
@@ -135,10 +137,11 @@ def run_learn(
     _check_apart(config.database_path, out)
     check_out_apart(out, [config.database_path, *filter(is_log, journeys_of(config))])
     report = out.with_name(f"{out.name}-report") if accept else out
-    ensure_writable_folder(report)
-    taught = study_logs(
-        config, report, use_truth=use_truth, workers=workers, resume=resume, progress=progress
-    )
+    with nothing_left(report):
+        ensure_writable_folder(report)
+        taught = study_logs(
+            config, report, use_truth=use_truth, workers=workers, resume=resume, progress=progress
+        )
     proposed, changed = bool(taught.patch.changes), None
     with replaced_files(report, partial(older_report, report)) as new:
         findings = write_report(taught, new)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mapfilter._io import atomic_file, ensure_writable_folder, write_json
 from mapfilter._parallel import Progress
+from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
 from mapfilter.positioning.fingerprints.censoring import bounds_of
@@ -29,9 +30,10 @@ from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.report.canvas import BLUE, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.fingerprints import read_database, read_reports
+from mapfilter.workflows.results import FIGURES, check_figures_of_reports
 from mapfilter.workflows.terminal import to_jsonable
 
-POSITIONS, FIGURES, PICTURE = "positions.csv", "figures.json", "errors.png"
+POSITIONS, PICTURE = "positions.csv", "errors.png"
 _SHARE = 0.95
 
 
@@ -98,23 +100,25 @@ def run_locate(
     Raises
     ------
     MapfilterError
-        An input is missing or wrong, there is no such method, or the output cannot be written.
+        An input is missing or wrong, there is no such method, or the output cannot be written, as
+        where it holds the figures of another command.
     """
     began_s = time.perf_counter()
+    check_figures_of_reports(out)
     known, (reports, names) = _inputs(database, log, crs, level_error_db)
-    ensure_writable_folder(out)
     rng, strongest = np.random.default_rng(seed), usual_readings(reports)
-    bounds = bounds_of(reports)
-    fitted = fit_locator(
-        known,
-        method,
-        rng,
-        strongest=strongest,
-        bounds=bounds,
-        timed=timed_share(reports),
-        progress=progress,
-    )
-    located = locate_by(fitted, reports)
+    with nothing_left(out):
+        ensure_writable_folder(out)
+        fitted = fit_locator(
+            known,
+            method,
+            rng,
+            strongest=strongest,
+            bounds=bounds_of(reports),
+            timed=timed_share(reports),
+            progress=progress,
+        )
+        located = locate_by(fitted, reports)
     baseline_m = _centroid_errors_m(fitted, reports)
     figures = figures_of(located)
     outputs = [_write_positions(located, names, reports, out / POSITIONS)]

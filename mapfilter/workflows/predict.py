@@ -11,6 +11,7 @@ from rasterio.errors import RasterioError
 from mapfilter._gdal import open_raster
 from mapfilter._io import VERSION, ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
+from mapfilter._partial import nothing_left
 from mapfilter.config.sections import Config
 from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
@@ -129,11 +130,18 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     )
     outputs = target, ground_truth, config.deviation_path, config.output.dir / "cells.csv"
     check_no_input_replaced(config, *outputs)
-    if surveyed:
-        from mapfilter.workflows.survey import run_survey
+    with nothing_left(target.parent, ground_truth.parent, config.output.dir):
+        if surveyed:
+            from mapfilter.workflows.survey import run_survey
 
-        return run_survey(config, progress)
-    world = World.of(config)
+            return run_survey(config, progress)
+        return _predict_network(config, progress)
+
+
+def _predict_network(config: Config, progress: Progress | None) -> PredictResult:
+    """Predict every cell of the plan over the area, and on request the ground truth."""
+    target, ground_truth = config.rasters_path, config.ground_truth_path
+    both, world = config.prediction.ground_truth.write, World.of(config)
     for folder in (target.parent, ground_truth.parent, config.output.dir):
         ensure_writable_folder(folder)
     plan, lattice, model = world.plan, world.lattice, config.prediction.of(PredictionModel)

@@ -50,7 +50,14 @@ from mapfilter.workflows.replayed import (
     summary_figures,
     summary_of,
 )
-from mapfilter.workflows.results import ESTIMATES, FIGURES, REPLAY_HTML, SUMMARY, older_results
+from mapfilter.workflows.results import (
+    ESTIMATES,
+    FIGURES,
+    REPLAY_HTML,
+    SUMMARY,
+    check_figures_of_replay,
+    older_results,
+)
 from mapfilter.workflows.served import served_points, street_map
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.track_pictures import (
@@ -177,6 +184,7 @@ def run_replay(
 
     own = [database.path] if database is not None else []
     check_out_apart(out, [*own, *(path for path in journeys.paths if is_log(path))])
+    check_figures_of_replay(out)
     if database is None and config.cells.plan is None:
         journeys.check_siteless()
     if database is not None:
@@ -189,6 +197,8 @@ def run_replay(
     def located(index: int, path: Path, new: Path) -> ReplayedLog:
         opened = journeys.open(path)
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
+        if count > 1:
+            check_figures_of_replay(out / name)
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         fitted, notes = fitted_to_log(options, log)
         notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))

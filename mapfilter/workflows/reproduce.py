@@ -11,6 +11,7 @@ import pandas as pd
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter._partial import nothing_left
 from mapfilter.config.load import load_config
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
@@ -86,8 +87,8 @@ def run_reproduce(
         expected = f"at least {least}" if most is None else f"a number in {least}..{most}"
         raise fail(ConfigError, "--trials", expected, count, paper.why)
 
-    ensure_writable_folder(out)
-    with sweep_executor(workers, cluster) as (executor, in_flight):
+    with nothing_left(out), sweep_executor(workers, cluster) as (executor, in_flight):
+        ensure_writable_folder(out)
 
         def run_sweeps(
             settings: Sequence[str], plans: Sequence[SweepPlan]

@@ -1,11 +1,11 @@
-"""Files that a replay writes, by name; those of an older one in a folder."""
+"""Files that replays and single reports write, by name, and those of older ones in a folder."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from mapfilter._io import read_json
-from mapfilter.errors import StoreError
+from mapfilter.errors import OutputError, StoreError, fail
 
 ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")
 FIGURES = "figures.json"
@@ -15,6 +15,35 @@ SUMMARY = "summary.json"
 PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
 
 _OF_ONE_LOG = {*ESTIMATES, FIGURES, REPLAY_HTML, *PICTURES}
+
+
+_OF_REPLAY, _OF_REPORTS = "filter", "database_reports"
+"""Entries that only the figures of a replay, and only those of single reports have."""
+
+
+def check_figures_of_replay(out: Path) -> None:
+    """Raise OutputError where a folder holds figures that a replay did not write."""
+    _check_figures(out, _OF_REPLAY, "a replay")
+
+
+def check_figures_of_reports(out: Path) -> None:
+    """Raise OutputError where a folder holds figures that ``locate`` did not write."""
+    _check_figures(out, _OF_REPORTS, "mapfilter locate")
+
+
+def _check_figures(out: Path, entry: str, whose: str) -> None:
+    figures = out / FIGURES
+    if not figures.is_file():
+        return
+    try:
+        found = read_json(figures)
+    except StoreError:
+        found = {}
+    if entry not in found:
+        others = {_OF_REPLAY: "those of a replay", _OF_REPORTS: "those of mapfilter locate"}
+        got = next((words for own, words in others.items() if own in found), "others")
+        hint = "results of one command each; give another folder by --out"
+        raise fail(OutputError, str(figures), f"figures of {whose}, or nothing yet", got, hint)
 
 
 def older_results(out: Path) -> list[Path]:

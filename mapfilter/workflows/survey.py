@@ -31,6 +31,7 @@ from mapfilter.survey.measurements import Measurements, named_after
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.served import thinned_lattice
+from mapfilter.workflows.stated_power import check_eirp_stated
 from mapfilter.workflows.streets import measurements_of
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
@@ -277,6 +278,8 @@ def survey_inputs(config: Config) -> SurveyInputs:
     # A public list holds the cells of whole countries.
     if plan is not None and config.cells.layout != "opencellid":
         check_cells_near(plan, lattice, str(config.cells.plan))
+    if predicted is not None and plan is not None:
+        check_eirp_stated(config, predicted, plan)
     return SurveyInputs(measurements, plan, lattice, predicted)
 
 

@@ -16,6 +16,7 @@ import pandas as pd
 
 from mapfilter._io import ensure_writable_folder, replaced_files
 from mapfilter._parallel import Progress, executor_of, warmed
+from mapfilter._partial import nothing_left
 from mapfilter.config.axes import parse_axis
 from mapfilter.config.load import load_config, load_keys
 from mapfilter.config.sections import Config
@@ -200,10 +201,12 @@ def run_sweep(
     began_s = time.perf_counter()
     plans, databases = sweep_plans(config, axes)
     out = config.output.dir / "sweep"
-    with sweep_executor(workers, cluster) as (executor, in_flight):
-        # Workers start, and import what a batch needs, while the world is read.
+    # Local workers start, and import what a batch needs, while the world is read; a cluster is
+    # asked for when its inputs are right.
+    read = None if cluster is None else sweep_world(config, plans[0].radios)
+    with nothing_left(out), sweep_executor(workers, cluster) as (executor, in_flight):
         warmed(executor, workers, run_batch)
-        world = sweep_world(config, plans[0].radios)
+        world = read or sweep_world(config, plans[0].radios)
         ensure_writable_folder(out)
         table = sweep(
             plans,

@@ -36,6 +36,7 @@ from mapfilter.workflows.area_lattice import area_lattice as area_lattice
 from mapfilter.workflows.area_lattice import check_scale as check_scale
 from mapfilter.workflows.area_lattice import pixels_on
 from mapfilter.workflows.area_lattice import roads_lattice as roads_lattice
+from mapfilter.workflows.stated_power import check_eirp_stated
 from mapfilter.workflows.streets import Streets
 
 FARTHEST_M = 50_000.0
@@ -75,10 +76,12 @@ def open_by_section(path: Path, section: Rasters) -> RxLevRasters:
     InputError
         They are wrong, or do not fit their description.
     """
+    # Faults of the CRS name the setting.
+    crs = projected_crs(section.crs, "rasters.crs") if section.crs else section.crs
     return open_rasters(
         path,
         section.quantity,
-        crs=section.crs,
+        crs=crs,
         factor=section.factor,
         nodata=section.nodata,
         resolution_m=section.resolution_m,
@@ -133,6 +136,7 @@ def raster_world(config: Config, rasters: RxLevRasters) -> tuple[RxLevRasters, C
     check_scale(rasters.lattice.crs, rasters.lattice.bounds_m, f"{rasters.path}, CRS")
     whole = world = World(config, rasters.lattice)
     rasters = named_by_plan(rasters, whole.plan)
+    check_eirp_stated(config, rasters, whole.plan)
     if lattice != rasters.lattice:
         rasters, world = replace(rasters, lattice=lattice), World(config, lattice)
     check_cells_near(whole.plan, world.lattice, str(config.cells.plan or "cells"))

@@ -238,3 +238,21 @@ def test_one_angle_is_wrapped_to_the_same_bits(near):
         wrap_rad(angles).tobytes()
     )
     assert np.isnan(wrap_one_rad(float("nan")))
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("UTM35", "EPSG:32635, or EPSG:32735 south of the equator"),
+        ("utm zone 5 S", "EPSG:32705"),
+        ("WGS84 UTM 34N", "EPSG:32634"),
+        ("EPSG32635", "EPSG:32635"),
+        ("epsg 2154", "EPSG:2154"),
+        ("UTM61", ""),
+        ("UTM zone", ""),
+    ],
+)
+def test_a_text_that_is_nearly_a_system_says_which(text, hint):
+    with pytest.raises(InputError) as caught:
+        projected_crs(text, "rasters.crs")
+    assert caught.value.faults[0].hint == hint

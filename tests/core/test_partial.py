@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from mapfilter import _partial
-from mapfilter._io import atomic_file, replaced_files
-from mapfilter._partial import ABANDONED_S, is_left, new_partial, partials
+from mapfilter._io import atomic_dir, atomic_file, replaced_files
+from mapfilter._partial import ABANDONED_S, is_left, new_partial, nothing_left, partials
 
 
 def names(folder):
@@ -110,3 +110,41 @@ def test_files_are_on_the_disk_before_they_replace_others(tmp_path, monkeypatch)
         assert events.index(("flushed", name)) < events.index(("replaced", name))
     after = [name for what, name in events[events.index(("replaced", "b.txt")) :]]
     assert {"deep", "report"} <= set(after), "the lists of names are flushed, too"
+
+
+def test_folders_that_a_block_made_and_left_empty_are_removed_where_it_fails(tmp_path):
+    (tmp_path / "there").mkdir()
+    kept = tmp_path / "there" / "kept"
+
+    def make_folders_and_fail():
+        (tmp_path / "there" / "a" / "b" / "inner").mkdir(parents=True)
+        kept.mkdir()
+        (kept / "empty").mkdir()
+        (kept / "file").touch()
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"), nothing_left(tmp_path / "there" / "a" / "b", kept):
+        make_folders_and_fail()
+    assert sorted(path.name for path in (tmp_path / "there").rglob("*")) == ["file", "kept"]
+
+
+def test_an_older_folder_stays_and_so_does_what_a_block_made_that_succeeds(tmp_path):
+    older = tmp_path / "older"
+    older.mkdir()
+    with nothing_left(tmp_path / "new"):
+        (tmp_path / "new").mkdir()
+    with pytest.raises(KeyboardInterrupt), nothing_left(older):
+        raise KeyboardInterrupt
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["new", "older"]
+
+
+def test_a_file_that_is_not_written_leaves_no_folder(tmp_path):
+    for write in (atomic_file, atomic_dir, lambda path: replaced_files(path, lambda: ())):
+        with pytest.raises(ValueError, match="no"), write(tmp_path / "a" / "b"):
+            raise ValueError("no")
+        assert not list(tmp_path.iterdir())
+
+
+def test_a_place_that_cannot_be_looked_at_is_left_to_what_writes(tmp_path):
+    with nothing_left(tmp_path / ("a" * 300) / "b"):
+        pass

@@ -179,7 +179,8 @@ def test_faults_of_workbooks(tmp_path):
         assert "a workbook that can be read" in said
     assert "an empty sheet" in refusal(tmp_path, workbook([[""]]), "cells.xlsx")
     said = refusal(tmp_path, workbook(ROWS), "cells.xlsx")
-    assert "expected known columns only, found 'TX_ID' (likely: name what it holds in [c" in said
+    assert "expected columns of a cell plan (cell, site, lat, lon, …), found TX_ID, " in said
+    assert said.endswith('(likely: transmitters of Atoll: set cells.layout = "atoll")')
 
 
 def test_a_missing_column_lists_the_columns_and_the_map(tmp_path):

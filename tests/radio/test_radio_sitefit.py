@@ -5,7 +5,7 @@ import pytest
 from test_radio_lobes import LATTICE, SITE, sector
 
 from mapfilter.check.place_fits import MeanLevels, best_place, in_squares, place_fits
-from mapfilter.check.raster_checks import RasterSample
+from mapfilter.check.samples import RasterSample
 
 
 def test_squares_are_means_at_their_middles():

@@ -32,6 +32,11 @@ def test_missing_file(command, tmp_path):
         ("\n \n", "found an empty file"),
         ("[area]\nbbox = [24.9420, 60.16", "expected TOML"),
         (b"[area]\nmap = '\xff\xfe'", "expected TOML"),
+        ("[rasters]\nfactor = 0,0625  # dB", "(likely: a decimal comma; write a point)"),
+        ("[area]\nresolution_m = 5 m", "(likely: a unit after a number; write the number alone"),
+        ("[area]\ncrs = EPSG:32635", "(likely: a text without quotes)"),
+        ('[cells]\nplan = "C:\\maps\\cells.csv"', "(likely: backslashes in a text; write /"),
+        ('[cells]\nplan = "cells.csv\n', "(likely: a quotation mark left out)"),
         ("[area]\n[area]\n", "expected TOML"),
     ],
 )
@@ -119,6 +124,13 @@ def test_wrong_values(text, told, write):
             "setting area.bbox: expected four numbers: west, south, east, north, found ''",
         ),
         ("track.without=gnss", "setting track.without: expected a list, found 'gnss'"),
+        (
+            "rasters.factor=0,0625",
+            "expected a number, found '0,0625' (likely: a decimal comma; write 0.0625)",
+        ),
+        ("area.resolution_m=2,5", "found [2, 5] (likely: a decimal comma; write 2.5)"),
+        ("area.resolution_m=5 m", "found '5 m' (likely: a unit after the number; write 5)"),
+        ("area.crs=32635", 'area.crs: expected a text, found 32635 (likely: "EPSG:32635")'),
     ],
 )
 def test_malformed_settings(setting, told):
@@ -315,3 +327,44 @@ def test_out_of_memory_is_one_message(monkeypatch):
 
     monkeypatch.setattr("mapfilter.workflows.info.run_info", full)
     assert_refused(mapfilter("info", "x"), "memory: expected enough of it, found none left")
+
+
+@pytest.mark.parametrize(
+    ("command", "given"),
+    [
+        ("build", ()),
+        ("build", ("--dry-run",)),
+        ("simulate", ()),
+        ("sweep", ()),
+        ("sweep", ("--dry-run",)),
+    ],
+)
+def test_without_a_configuration_that_is_told_first(command, given, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    refused = mapfilter(command, *given)
+    assert_refused(refused, "found none; defaults were taken")
+    first = refused.err.splitlines()[0]
+    assert first.startswith("mapfilter: error: command line: expected a configuration (-c FILE)")
+    refused = mapfilter(command, *given, "--set=cells.sites=3")
+    assert_refused(refused)
+    assert "-c FILE" not in refused.err
+
+
+def test_check_without_a_configuration_says_so(tmp_path, monkeypatch, own_world):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    own_world.rasters.rename(tmp_path / "out" / "rxlev.tif")
+    checked = mapfilter("check")
+    assert (checked.code, "cell-without-raster" in checked.out) == (2, True)
+    assert "expected a configuration (-c FILE)" in checked.err
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "UTM35"])
+@pytest.mark.parametrize("command", ["build", "check"])
+def test_a_wrong_crs_of_rasters_names_the_setting(command, crs, own_world):
+    given = [f"--set=rasters.path={own_world.rasters}", f"--set=rasters.crs={crs}"]
+    done = mapfilter(command, "-c", own_world.toml, *given)
+    assert done.code == 2
+    assert "rasters.crs: " in (done.err if command == "build" else done.out)
+    if command == "check":
+        assert "Set rasters.crs to the projected CRS of the numbers" in done.out

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from mapfilter._parallel import SerialExecutor, begun
+from mapfilter.cli.options import undrawn
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.report.ground import BaseMap
@@ -122,3 +123,22 @@ def test_a_replay_starts_what_draws_before_its_imports(pictures):
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     expected = {"all": 40, "none": 2}[pictures]
     assert run.returncode == expected, run.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "settings", "expected"),
+    [
+        ('[output]\npictures = "none"\n', [], True),
+        ('[output]\npictures = "none"\n', ["output.pictures=first"], False),
+        ('[output]\npictures = "first"\n', ["output.pictures='none'"], True),
+        ('[output]\ndir = "none"\n', ["output.dir=pictures-none"], False),
+        ("output = 3\n", [], False),
+        ("no TOML", [], False),
+        (None, [], False),
+    ],
+)
+def test_pictures_that_file_or_settings_forbid_start_nothing(text, settings, expected, tmp_path):
+    file = tmp_path / "given.toml"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    assert undrawn(file, settings) is expected

@@ -1,0 +1,158 @@
+"""Headings of cell lists as planning tools show them: units in brackets, words for field names."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.radio.cells import CellPlan, read_cell_plan
+
+CRS = "EPSG:32635"
+DEFAULTS = {"height_m": 25.0, "eirp_dbm": 52.0, "frequency_mhz": 1800.0}
+SHOWN = (
+    "Site;Transmitter;X;Y;Antenna;Height (m);Azimuth (°);Mechanical Downtilt (°);"
+    "Additional Electrical Downtilt (°);EIRP (dBm);Frequency Band\n"
+    "Kamppi;K1;385584,61;6671974,34;65deg;32;120;4;2;55,5;GSM 1800\n"
+)
+
+
+def read(folder: Path, text: str, **options: object) -> CellPlan:
+    path = folder / "list.csv"
+    path.write_text(text, encoding="utf-8")
+    given = {"defaults": DEFAULTS, "layout": "atoll", **options}
+    return read_cell_plan(path, CRS, **given)  # type: ignore[arg-type]
+
+
+def complaint(folder: Path, text: str, **options: object) -> str:
+    with pytest.raises(InputError) as caught:
+        read(folder, text, **options)
+    return str(caught.value)
+
+
+def unused(plan: CellPlan) -> list[str]:
+    return [note for note in plan.notes if note.startswith("columns not used")]
+
+
+def test_displayed_headings_are_the_fields(tmp_path):
+    plan = read(tmp_path, SHOWN)
+    cell = plan["K1"]
+    assert (cell.site, cell.antenna, cell.height_m, cell.azimuth_deg) == (
+        *("Kamppi", "65deg"),
+        *(32.0, 120.0),
+    )
+    assert (cell.mechanical_downtilt_deg, cell.downtilt_deg, cell.eirp_dbm) == (4.0, 2.0, 55.5)
+    assert plan.notes == ("frequency_mhz = 1800 for 1 of 1 cells without one",)
+
+
+@pytest.mark.parametrize("shown", ["HEIGHT", "height [m]", "Height(m)", "Height (m AGL)"])
+def test_spellings_of_a_unit(shown, tmp_path):
+    assert read(tmp_path, SHOWN.replace("Height (m)", shown))["K1"].height_m == 32.0
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        ("Height (m)", "Height (ft)", "expected height_m in metres, found 'Height (ft)'"),
+        ("EIRP (dBm)", "EIRP (W)", "expected eirp_dbm in dBm, found 'EIRP (W)'"),
+        ("Azimuth (°)", "Azimuth (rad)", "expected azimuth_deg in degrees, found 'Azimuth (rad)'"),
+        ("X;", "X (km);", "expected east in metres, found 'X (km)'"),
+    ],
+)
+def test_another_unit_is_refused(right, wrong, told, tmp_path):
+    assert told in complaint(tmp_path, SHOWN.replace(right, wrong))
+    assert "another unit; convert the column to" in complaint(tmp_path, SHOWN.replace(right, wrong))
+
+
+def test_a_column_of_the_right_unit_goes_before_one_of_another(tmp_path):
+    text = SHOWN.replace("Site;", "Height (ft);").replace("Kamppi;", "105;")
+    assert read(tmp_path, text)["K1"].height_m == 32.0
+
+
+def test_a_named_column_has_its_unit_checked_and_needs_none_in_its_name(tmp_path):
+    text = SHOWN.replace("EIRP (dBm)", "Power total (dBm)")
+    assert read(tmp_path, text, columns={"eirp_dbm": "Power total"})["K1"].eirp_dbm == 55.5
+    told = complaint(
+        tmp_path, text.replace("(dBm)", "(W)"), columns={"eirp_dbm": "Power total (W)"}
+    )
+    assert "expected eirp_dbm in dBm, found 'Power total (W)'" in told
+
+
+def test_what_stands_in_brackets_and_is_no_unit_leaves_a_named_column_as_it_is(tmp_path):
+    text = SHOWN.replace("Height (m)", "Height (AGL)")
+    assert read(tmp_path, text, columns={"height_m": "Height (AGL)"})["K1"].height_m == 32.0
+
+
+def test_ignored_columns_that_resemble_a_field_are_noted(tmp_path):
+    text = SHOWN.replace("Height (m)", "Height (AGL)").replace("EIRP", "Max EIRP")
+    text = text.replace("Azimuth (°)", "Antenna Azimuth (°)")
+    assert unused(read(tmp_path, text)) == [
+        "columns not used that resemble fields: 'Height (AGL)' (height_m), 'Antenna Azimuth (°)' "
+        "(azimuth_deg), 'Max EIRP (dBm)' (eirp_dbm)"
+    ]
+
+
+def test_they_are_noted_with_a_map_of_columns_too(tmp_path):
+    text = "Name,E,N,Antenna Height (m),EIRP\nA,385500,6672000,30,50\n"
+    columns = {"cell": "Name", "east": "E", "north": "N"}
+    assert unused(read(tmp_path, text, layout="plan", columns=columns)) == [
+        "columns not used that resemble fields: 'Antenna Height (m)' (height_m), 'EIRP' (eirp_dbm)"
+    ]
+
+
+@pytest.mark.parametrize("more", ["DX (m)", "Comments", "Losses (dB)", "Active", "Cell type", "Y2"])
+def test_other_columns_are_ignored_without_a_word(more, tmp_path):
+    text = SHOWN.replace("Frequency Band", more)
+    assert not unused(read(tmp_path, text))
+
+
+def test_a_list_of_atoll_without_positions_is_told_where_they_are(tmp_path):
+    text = "TX_ID,SITE_NAME,HEIGHT,AZIMUT,EIRP\nA,S,30,0,50\n"
+    told = complaint(tmp_path, text)
+    assert told.count("\n") == 0
+    assert "expected a position: X and Y, or LATITUDE and LONGITUDE, found none (columns:" in told
+    assert "Atoll keeps positions in the table Sites" in told
+
+
+@pytest.mark.parametrize(
+    ("text", "layout"),
+    [
+        (SHOWN, "atoll"),
+        ("TX_ID,SITE_NAME,HEIGHT,AZIMUT,EIRP\nA,S,30,0,50\n", "atoll"),
+        ("radio,mcc,net,area,cell,lon,lat\nGSM,244,91,801,1001,24.9,60.1\n", "opencellid"),
+    ],
+)
+def test_a_list_of_another_layout_is_named_in_one_line(text, layout, tmp_path):
+    told = complaint(tmp_path, text, layout="plan")
+    assert told.count("\n") == 0
+    assert f'set cells.layout = "{layout}"' in told
+
+
+def test_misspelt_columns_of_a_plan_are_told_one_by_one(tmp_path):
+    text = "cell,lat,lon,height,azimuth,eirp\nA,60.1,24.9,30,0,50\n"
+    told = complaint(tmp_path, text, layout="plan")
+    assert "'height' (likely: height_m meant" in told
+    assert "cells.layout" not in told
+
+
+def test_metres_under_the_names_of_degrees_are_named(tmp_path):
+    text = SHOWN.replace(";X;Y;", ";Longitude (m);Latitude (m);")
+    columns = {"east": "Longitude (m)", "north": "Latitude (m)"}
+    assert read(tmp_path, text, columns=columns)["K1"].east_m == 385584.61
+    assert "expected lat in degrees, found 'Latitude (m)'" in complaint(tmp_path, text)
+
+
+def test_a_displayed_carrier_gives_the_technology_that_it_implies(tmp_path):
+    text = SHOWN.replace("Frequency Band", "NR ARFCN").replace("GSM 1800", "633984")
+    columns = {"cell": "Transmitter", "east": "X", "north": "Y"}
+    cell = read(tmp_path, text, layout="plan", columns=columns)["K1"]
+    assert (cell.technology, cell.arfcn) == ("NR", 633984)
+
+
+def test_long_headings_and_many_of_them_take_no_time(tmp_path):
+    more = ";".join([*("(" * 10_000, " " * 10_000 + ")"), *(f"height{n:03}" for n in range(900))])
+    text = SHOWN.replace("Height (m)", "AGL").replace("\n", f";{more}\n", 1)
+    text = text.rstrip("\n") + ";" * 902 + "\n"
+    began_s = time.process_time()
+    assert len(read(tmp_path, text).cells) == 1
+    assert time.process_time() - began_s < 5

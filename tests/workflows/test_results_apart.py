@@ -1,0 +1,61 @@
+"""Figures of one command are never replaced by those of another."""
+
+import pytest
+from command_line import ONE, assert_done, assert_refused, contents, mapfilter, settings
+
+
+@pytest.fixture
+def commands(world):
+    """Each command on the same log, with its results in the same folder."""
+
+    def replay(log, *out):
+        given = "-c", world.toml, "--db", world.database, *settings(output__pictures="none")
+        return mapfilter("replay", *given, "--log", log, *out)
+
+    def locate(log, *out):
+        return mapfilter("locate", "--db", world.database, "--log", log, *out)
+
+    return {"replay": replay, "locate": locate}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "told"),
+    [
+        (
+            "replay",
+            "locate",
+            "expected figures of mapfilter locate, or nothing yet, found those of",
+        ),
+        ("locate", "replay", "expected figures of a replay, or nothing yet, found those of mapfi"),
+    ],
+)
+def test_a_folder_of_another_command_is_refused(first, second, told, commands, log, tmp_path):
+    out = "--out", tmp_path / "located"
+    assert_done(commands[first](log, *out))
+    before = contents(tmp_path / "located")
+    assert_refused(commands[second](log, *out), "figures.json: ", told, "another folder by --out")
+    assert contents(tmp_path / "located") == before
+    assert_done(commands[first](log, *out))
+
+
+def test_figures_of_nobody_are_left_as_they_are(commands, log, tmp_path):
+    folder = tmp_path / "located"
+    folder.mkdir()
+    (folder / "figures.json").write_text("mine", encoding="utf-8")
+    for command in commands.values():
+        assert_refused(command(log, "--out", folder), "or nothing yet, found others")
+    assert (folder / "figures.json").read_text(encoding="utf-8") == "mine"
+
+
+def test_the_folder_of_one_log_of_several_is_looked_at_too(commands, world, log, tmp_path):
+    assert_done(commands["locate"](log, "--out", tmp_path / "all" / ONE))
+    before = contents(tmp_path / "all")
+    assert_refused(commands["replay"](world.journeys, "--out", tmp_path / "all"), f"{ONE}/figures")
+    assert contents(tmp_path / "all") == before
+
+
+def test_the_default_folders_differ(commands, log, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert_done(commands["replay"](log, "--out", "located"))
+    assert_done(commands["locate"](log))
+    assert (tmp_path / "located-reports" / "positions.csv").is_file()
