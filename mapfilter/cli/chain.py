@@ -406,7 +406,7 @@ def replay(
                 loaded, folder, html=html, beside=True, drawers=drawers, progress=progress
             )
         print_result(replay_figures(result), as_json)
-        for warning in result.warnings:
+        for warning in (*result.losses, *result.warnings):
             print_message(warning)
         if result.partial:
             raise typer.Exit(PARTIAL)

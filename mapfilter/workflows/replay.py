@@ -216,7 +216,8 @@ def run_replay(
         if recorder is not None:
             written = _with_view(written, log, track, recorder, database, into)
         files = tuple(out / file.relative_to(new) for file in written.outputs)
-        return replace(written, outputs=files)
+        losses = tuple(loss for recording in opened.recordings for loss in recording.losses)
+        return replace(written, outputs=files, losses=losses)
 
     place: AbstractContextManager[Executor] = nullcontext(drawers or SerialExecutor())
     if drawers is None and beside and wanted != "none":

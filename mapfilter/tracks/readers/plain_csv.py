@@ -39,6 +39,11 @@ _CONTENT = (
     *(("wheel_speed_kmh",), ("steps",)),
     *((speed, rate) for speed in _SPEEDS for rate in ("yaw_rate_radps", "yaw_rate_degps")),
 )
+_VITAL = (
+    *("step_m", "heading_rad", "turn_rad", "turn_deg", "compass_deg", "steps", "level_dbm", "bars"),
+    *("yaw_rate_radps", "yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh"),
+)
+"""Fields that must hold numbers where a column has them."""
 _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 
 
@@ -85,6 +90,9 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     rows = header_columns(text.data, reading, text.line)
     _check_map(rows, reading, options.columns)
     mapped = _Mapped(rows, options.columns)
+    reading.tallies.columns |= {
+        field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
+    }
     time_s = _times(mapped, reading, options)
     if mapped.has("lat_deg", "lon_deg"):
         speed = mapped.number("speed_mps")
@@ -108,8 +116,9 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     _add_sensors(mapped, reading, time_s)
     _add_cells(mapped, reading, time_s)
     taken = {name for field in FIELDS for name in mapped.names(field)}
-    if unused := [name for name in rows.names if name and name not in taken]:
-        reading.note(f"columns not used: {listed(unused)}; see --column")
+    reading.unread = tuple(name for name in rows.names if name and name not in taken)
+    if reading.unread:
+        reading.note(f"columns not used: {listed(reading.unread)}; see --column")
 
 
 def _add(

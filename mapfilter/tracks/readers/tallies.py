@@ -1,0 +1,108 @@
+"""Columns most of whose values cannot be used: a wrong unit or a lost sign, not a few bad rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.errors import Faults, InputError
+from mapfilter.tracks.readers.tables import Field
+from mapfilter.tracks.schema import MISSING_SIGNS
+
+_MOSTLY = 0.5
+_UNAVAILABLE = 2e9
+"""Programs write larger numbers where they have no value."""
+
+
+@dataclass(slots=True)
+class _Values:
+    """Values of one column of a table: how many are given, and those out of range."""
+
+    given: int = 0
+    outside: int = 0
+    low: float = np.inf
+    high: float = -np.inf
+    first: float = np.nan
+    first_line: int = 0
+
+
+@dataclass(slots=True)
+class _Texts:
+    """Texts of one column of a file: how many are given, and those that are no numbers."""
+
+    given: int = 0
+    bad: int = 0
+    example: str = ""
+
+
+@dataclass(slots=True)
+class Tallies:
+    """Counts of unusable values in columns that a log needs, over all parts of a file.
+
+    Parameters
+    ----------
+    columns : dict of str to str
+        Names in the file of columns that must hold numbers, by field.
+    """
+
+    columns: dict[str, str] = field(default_factory=dict)
+    _values: dict[tuple[str, str], _Values] = field(default_factory=dict)
+    _texts: dict[tuple[str, int], _Texts] = field(default_factory=dict)
+
+    def add_values(
+        self, table: str, known: Field, values: Floats, outside: Bools, line: Ints
+    ) -> None:
+        """Count the values of a vital column, NaN where there is none."""
+        marked = (np.abs(values) >= _UNAVAILABLE) | np.isin(values, MISSING_SIGNS)
+        found = self._values.setdefault((table, known.name), _Values())
+        found.given += int(np.sum(~np.isnan(values) & ~marked))
+        outside = outside & ~marked
+        if not outside.any():
+            return
+        if not found.outside:
+            first = int(np.argmax(outside))
+            found.first, found.first_line = float(values[first]), int(line[first])
+        found.outside += int(outside.sum())
+        found.low = min(found.low, float(values[outside].min()))
+        found.high = max(found.high, float(values[outside].max()))
+
+    def add_texts(self, column: str, part: int, given: int, bad: int, example: str) -> None:
+        """Count the texts of a column in a part of the file; each part counts once."""
+        self._texts[column, part] = _Texts(given, bad, example)
+
+    def check(self, path: Path, known: Mapping[str, tuple[Field, ...]]) -> None:
+        """Raise InputError for every column that is mostly out of range, or mostly no numbers."""
+        faults = Faults()
+        for name, column in self.columns.items():
+            parts = [texts for (of, _), texts in self._texts.items() if of == column.lower()]
+            bad, given = sum(one.bad for one in parts), sum(one.given for one in parts)
+            if bad > _MOSTLY * given:
+                example = next(one.example for one in parts if one.bad)
+                got = f"{bad} of {given} values that are none, such as {example[:40]!r}"
+                hint = "a unit in each field" if any(map(str.isdigit, example)) else ""
+                faults.add(self._where(path, name), "numbers", got, hint)
+        for (table, name), values in self._values.items():
+            if values.outside > _MOSTLY * values.given:
+                of = next(one for one in known[table] if one.name == name)
+                got = (
+                    f"{values.outside} of {values.given} values outside, {values.low:g} to "
+                    f"{values.high:g} (first {values.first:g} in line {values.first_line})"
+                )
+                faults.add(self._where(path, name), of.expected, got, _mistake(of, values))
+        faults.raise_if_any(InputError)
+
+    def _where(self, path: Path, name: str) -> str:
+        column = self.columns.get(name, name)
+        return f"{path}, {name}" if column == name else f"{path}, column {column} ({name})"
+
+
+def _mistake(known: Field, values: _Values) -> str:
+    """Return the likely mistake behind values out of range, by the largest of them."""
+    most = max(abs(values.low), abs(values.high))
+    if known.name == "level_dbm" and values.high <= 0:
+        return ""
+    return next((hint for low, high, hint in known.hints if low <= most <= high), "")
