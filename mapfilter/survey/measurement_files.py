@@ -15,12 +15,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
-from mapfilter._inputs import open_input, wide_encoding
+from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.tables import number
 from mapfilter.survey.measurement_rows import FIELDS, IDENTITY, REQUIRED, Rows
 
-_LONGEST_LINE = 1 << 16
+_LONGEST_LINE = _HEAD_BYTES = 1 << 16
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
 _KEY = re.compile(r'(\w[\w ]{0,31}+)=\s{0,9}("[^"]{0,4000}"|[^,]{0,4000})')
 _LEVEL = re.compile(r"^(>?)\s*(-?\d+)\s*dBm$")
@@ -244,11 +244,12 @@ def _iso(time: str) -> str:
 def _open_text(path: Path) -> TextIO:
     """Open a file as text in which an invalid byte invalidates only its own row."""
     with open_input(path) as stream:
-        head = stream.read(4)
+        head = stream.read(_HEAD_BYTES)
     if not head:
         raise fail(InputError, str(path), "measurements", "an empty file")
     if wide := wide_encoding(head):
         raise fail(InputError, str(path), "text in UTF-8", wide, "saved as Unicode by Excel")
     if head.startswith(b"\x1f\x8b"):
         raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
-    return io.TextIOWrapper(open_input(path), encoding="utf-8-sig", errors="replace")
+    encoding = "cp1252" if first_foreign_byte(head) >= 0 else "utf-8-sig"
+    return io.TextIOWrapper(open_input(path), encoding=encoding, errors="replace")
