@@ -12,6 +12,7 @@ from mapfilter.cli.options import (
     PARTIAL,
     WRONG,
     ClusterOption,
+    ColumnOption,
     ConfigOption,
     DatabaseArgument,
     DeclinationOption,
@@ -26,6 +27,7 @@ from mapfilter.cli.options import (
     StepLengthOption,
     WorkersOption,
     check_custom_filter,
+    column_map,
     given_path,
     refuse,
     seeded,
@@ -270,6 +272,12 @@ def locate(
     crs: Annotated[
         str | None, typer.Option("--crs", metavar="EPSG", help="CRS of metres in a table.")
     ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column", metavar="FIELD=COLUMN", help="Column of a plain CSV, the log; repeatable."
+        ),
+    ] = None,
     level_error_db: Annotated[
         float,
         typer.Option(
@@ -293,6 +301,7 @@ def locate(
             folder,
             method=method,
             crs=crs,
+            columns=column_map(column),
             level_error_db=level_error_db,
             seed=seed or 0,
             progress=progress,
@@ -323,6 +332,7 @@ def replay(
     zone: Annotated[
         str | None, typer.Option("--zone", help="Zone of local times in recordings.")
     ] = None,
+    column: ColumnOption = None,
     course_motion: Annotated[
         bool,
         typer.Option(
@@ -382,6 +392,8 @@ def replay(
         for key, files in (("track.recordings", (log or [])[1:]), ("track.truth", truth or [])):
             if files:
                 given.append(f"{key}={toml([str(file) for file in files])}")
+        columns = column_map(column)
+        given += [f"track.columns.{field}={toml(name)}" for field, name in columns.items()]
         if course_motion:
             given.append("track.course_motion=true")
         walk = walk_changes(declination, step_length)

@@ -64,6 +64,10 @@ StepLengthOption = Annotated[
     float | None,
     typer.Option("--step-length", metavar="M", help="Length of a step that is only counted."),
 ]
+ColumnOption = Annotated[
+    list[str] | None,
+    typer.Option("--column", metavar="FIELD=COLUMN", help="Column of a plain CSV; repeatable."),
+]
 BoxOption = Annotated[
     str | None,
     typer.Option("--bbox", metavar="W,S,E,N", help="Part of the map, in degrees; else all of it."),
@@ -98,6 +102,25 @@ def numbers(text: str | None, count: int, where: str) -> list[float] | None:
     if len(found) != count:
         raise fail(ConfigError, where, f"{count} numbers with commas between them", repr(text))
     return found
+
+
+def column_map(texts: list[str] | None) -> dict[str, str]:
+    """Read ``--column``: the column of each field of a plain CSV.
+
+    Raises
+    ------
+    ConfigError
+        A text is no ``FIELD=COLUMN``, or a field does not exist.
+    """
+    if not texts:
+        return {}
+    from mapfilter.tracks.readers.csv_fields import check_fields
+    from mapfilter.workflows.convert import parse_pairs
+
+    columns, faults = parse_pairs(texts, "--column"), Faults()
+    check_fields(columns, faults)
+    faults.raise_if_any(ConfigError)
+    return columns
 
 
 def walk_changes(declination_deg: float | None, step_m: float | None) -> dict[str, Any]:

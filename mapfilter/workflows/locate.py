@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -73,6 +73,7 @@ def run_locate(
     *,
     method: str = AUTO,
     crs: str | None = None,
+    columns: Mapping[str, str] | None = None,
     level_error_db: float = 6.0,
     seed: int = 0,
     progress: Progress | None = None,
@@ -90,6 +91,8 @@ def run_locate(
         Gets ``positions.csv``, ``figures.json``, and ``errors.png`` where there is ground truth.
     crs : str, optional
         Of metres in a table.
+    columns : mapping of str to str, optional
+        Where the log is a plain CSV recording: column of each field.
     level_error_db : float
         Of the levels of a radio-route database.
     seed : int
@@ -101,7 +104,7 @@ def run_locate(
         An input is missing or wrong, there is no such method, or the output cannot be written.
     """
     began_s = time.perf_counter()
-    known, (reports, names) = _inputs(database, log, crs, level_error_db)
+    known, (reports, names) = _inputs(database, log, crs, level_error_db, columns or {})
     ensure_writable_folder(out)
     rng, strongest = np.random.default_rng(seed), usual_readings(reports)
     bounds = bounds_of(reports)
@@ -137,7 +140,11 @@ def run_locate(
 
 
 def _inputs(
-    database: Path, log: Path, crs: str | None, level_error_db: float
+    database: Path,
+    log: Path,
+    crs: str | None,
+    level_error_db: float,
+    columns: Mapping[str, str],
 ) -> tuple[Reports, tuple[Reports, Sequence[str]]]:
     """Read both inputs, and report the faults of both."""
     faults = Faults()
@@ -147,7 +154,7 @@ def _inputs(
     except MapfilterError as error:
         faults.found.extend(error.faults)
     try:
-        query = read_reports(log, known.crs if known is not None else crs, plan)
+        query = read_reports(log, known.crs if known is not None else crs, plan, columns)
     except MapfilterError as error:
         faults.found.extend(error.faults)
     if known is None or query is None:

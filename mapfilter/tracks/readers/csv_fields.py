@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
+
+from mapfilter.errors import Faults
 
 FIELDS: Mapping[str, tuple[str, ...]] = {
     "time": (
@@ -64,3 +67,12 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     },
 }
 """Fields that a column map may name, and the names of columns that are known without one."""
+
+
+def check_fields(columns: Mapping[str, str], faults: Faults) -> None:
+    """Note each field of a column map that does not exist, with the most similar one."""
+    for field in columns:
+        if field not in FIELDS:
+            near = get_close_matches(field, FIELDS, 1)
+            expected = f"one of {', '.join(FIELDS)}"
+            faults.add(f"--column {field}", expected, field, near[0] if near else "")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from mapfilter.tracks.readers.columns import (
     likely_separator,
     only,
 )
-from mapfilter.tracks.readers.csv_fields import FIELDS
+from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import (
     add_radio,
@@ -137,12 +136,11 @@ def _check_map(rows: Columns, reading: Reading, own: Mapping[str, str]) -> None:
     """Raise InputError with every fault of a column map, and where times are missing."""
     faults = Faults()
     present = f"{', '.join(rows.names)[:300]}"
+    check_fields(own, faults)
     for field, column in own.items():
         if field not in FIELDS:
-            near = get_close_matches(field, FIELDS, 1)
-            hint = near[0] if near else ""
-            faults.add(f"--column {field}", f"one of {', '.join(FIELDS)}", field, hint)
-        elif column.lower() not in rows.names:
+            continue
+        if column.lower() not in rows.names:
             faults.add(f"{reading.path} header", f"a column {column} for {field}", present)
         elif rows.names.count(column.lower()) > 1:
             faults.add(f"{reading.path} header", f"one column {column}", "several")
