@@ -15,6 +15,7 @@ from mapfilter.geodesy import (
 )
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.frame import Frame
+from mapfilter.tracks.headings import mirrored_positions
 from mapfilter.tracks.journey_motion import journey_motion, measured_positions
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.moved import places_of_poses
@@ -143,10 +144,24 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         imu=moved.imu,
         vehicle=moved.vehicle,
     )
+    if moved.compass:
+        log = _with_positions_checked(log)
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)
         raise fail(InputError, names, "rows of a journey", "none")
     return Combined(log, sensors, alignment, tuple(notes))
+
+
+def _with_positions_checked(log: TrackLog) -> TrackLog:
+    """Return a log whose headings are those of a compass, with a note on mirrored positions.
+
+    Notes on the sense of its headings are left out: mapfilter made them of azimuths.
+    """
+    kept = [note for note in log.notes if not note.startswith("motion, heading_rad: headings run")]
+    for name in ("truth", "gnss"):
+        if wrong := mirrored_positions(log.motion, getattr(log, name)):
+            kept.append(f"{name}: {wrong}")
+    return replace(log, notes=tuple(kept))
 
 
 def _shifted(recording: Recording, offset_s: float) -> Recording:

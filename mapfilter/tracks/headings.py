@@ -1,4 +1,4 @@
-"""Checks of headings: sense of rotation and reference by positions, and the unit of a compass."""
+"""Checks of headings by positions and of positions by headings; the unit of a compass."""
 
 from __future__ import annotations
 
@@ -17,6 +17,13 @@ _WALKED_M = 100.0
 _TURNED = np.pi / 2
 _ROUNDED = 0.005
 _LASTING = 0.25
+_MIRRORS = {
+    "latitude and longitude swapped": 90.0,
+    "a lost sign of longitude": 180.0,
+    "a lost sign of latitude": 0.0,
+    "latitude and longitude swapped, with a lost sign": -90.0,
+}
+"""Sum of course and heading, degrees, by what is wrong with the positions."""
 
 
 def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
@@ -60,6 +67,35 @@ def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
         off_deg = np.rad2deg(off_rad)
         origin = "; counted from north?" if abs(off_deg - 90) <= 20 else ""
         return f"headings are {off_deg:.0f} degrees off the course of the positions{origin}"
+    return ""
+
+
+def mirrored_positions(motion: pd.DataFrame, places: pd.DataFrame) -> str:
+    """Return what mirrors positions, by headings of a compass; "" for nothing.
+
+    Latitudes given as longitudes mirror a way about the diagonal, and a lost sign mirrors it about
+    north or east: the course of the positions and the heading have the same sum everywhere.
+
+    Parameters
+    ----------
+    motion : pandas.DataFrame
+        time_s, step_m and heading_rad, of a compass.
+    places : pandas.DataFrame
+        time_s, east_m and north_m.
+    """
+    heading, course = _both(motion, places)
+    if heading.size < _FEWEST:
+        return ""
+    same, other = (np.mean(np.exp(1j * (course + sign * heading))) for sign in (-1, 1))
+    if abs(other) < _CONSTANT or abs(other) - abs(same) < _LEAST_GAIN:
+        return ""
+    sum_deg = np.rad2deg(np.angle(other))
+    for cause, expected_deg in _MIRRORS.items():
+        if abs((sum_deg - expected_deg + 180) % 360 - 180) <= np.rad2deg(_OFF_RAD) / 2:
+            return (
+                f"positions are a mirror image of the way by steps and compass: {cause}, or "
+                "azimuths that run counter-clockwise?"
+            )
     return ""
 
 

@@ -17,9 +17,8 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.schema import PLACE, SERVING
-from mapfilter.workflows.world import outside_m
+from mapfilter.workflows.misplaced import is_near, misplaced_by
 
-_AWAY_M = 5000.0
 _BY_CELLS = ("candidate", "grid")
 _BY_STREETS = "--filter bayes starts by the streets alone"
 
@@ -167,17 +166,12 @@ def lacking(
 def _check_near(
     where: str, east_m: Floats, north_m: Floats, lattice: Lattice, faults: Faults
 ) -> None:
-    if not east_m.size or outside_m(east_m, north_m, lattice).min() <= _AWAY_M:
+    if not east_m.size or is_near(east_m, north_m, lattice):
         return
     box = lattice.bounds_m
     found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
-    swapped = outside_m(north_m, east_m, lattice).min() <= _AWAY_M
-    faults.add(
-        where,
-        f"positions near the database's {_box(*box)}",
-        _box(*found),
-        "east and north swapped" if swapped else "log of another area or zone",
-    )
+    expected = f"positions near the database's {_box(*box)}"
+    faults.add(where, expected, _box(*found), misplaced_by(east_m, north_m, lattice))
 
 
 def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:
