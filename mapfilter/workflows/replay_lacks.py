@@ -7,7 +7,7 @@ from typing import Any
 
 from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import Faults
+from mapfilter.errors import Faults, listed
 from mapfilter.geodesy import Lattice, same_crs, short_crs
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
@@ -16,9 +16,15 @@ from mapfilter.positioning.log_options import by_streets_alone
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
+from mapfilter.tracks.readers import plain_csv
+from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
 from mapfilter.tracks.schema import PLACE, SERVING
 from mapfilter.workflows.misplaced import is_near, misplaced_by
 
+_MOTION_COLUMNS = (
+    "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps "
+    "or wheel_speed_kmh"
+)
 _BY_CELLS = ("candidate", "grid")
 _BY_STREETS = "--filter bayes starts by the streets alone"
 
@@ -78,11 +84,25 @@ def lack_of(
         return f"{lack} ({_BY_STREETS})"
     if "no motion" not in lack:
         return lack
+    columns = _columns_of_motion(opened)
     if source := _receiver_motion(opened):
-        return f"{lack} (--course-motion, track.course_motion, makes it from {source})"
+        return f"{lack} (--course-motion, track.course_motion, makes it from {source}){columns}"
     if has_cells and len(log.radio):
-        return f"{lack} (mapfilter locate needs none)"
-    return lack
+        return f"{lack} (mapfilter locate needs none){columns}"
+    return f"{lack}{columns}"
+
+
+def _columns_of_motion(opened: OpenedLog) -> str:
+    """Return which columns of motion tables were looked for, and which others there are."""
+    tables = [one for one in opened.recordings if one.format == plain_csv.FORMAT.name]
+    if not tables:
+        return ""
+    text = f"; looked for {_MOTION_COLUMNS}"
+    for one in tables:
+        found = [field for field in MOTION_FIELDS if field in one.fields]
+        text += f"; {one.path.name} has {', '.join(found) or 'none of them'}"
+        text += f", columns not used: {listed(one.unread)} (--column)" if one.unread else ""
+    return text
 
 
 def _unused_ranges(log: TrackLog) -> str:

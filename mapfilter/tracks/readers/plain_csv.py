@@ -18,7 +18,7 @@ from mapfilter.tracks.readers.columns import (
     likely_separator,
     only,
 )
-from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields
+from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields, meant
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import (
     add_radio,
@@ -115,7 +115,12 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     _add_sensors(mapped, reading, time_s)
     _add_cells(mapped, reading, time_s)
     taken = {name for field in FIELDS for name in mapped.names(field)}
-    reading.unread = tuple(name for name in rows.names if name and name not in taken)
+    found = [field for field in FIELDS if mapped.has(field)]
+    reading.fields = tuple(found)
+    unread = (name for name in rows.names if name and name not in taken)
+    reading.unread = tuple(
+        f"{name} ({near}?)" if (near := meant(name, found)) else name for name in unread
+    )
     if reading.unread:
         reading.note(f"columns not used: {listed(reading.unread)}; see --column")
 

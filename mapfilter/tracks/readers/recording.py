@@ -99,8 +99,9 @@ class Recording:
         Projected CRS of positions in metres; "" for a frame of the file's own.
     ignored : tuple of str
         Those of the notes that are on values left out.
-    unread : tuple of str
-        Names of the file's columns that were not used, where it has columns.
+    fields, unread : tuple of str
+        Of a plain CSV: the fields that it has, and columns that were not used, each with the field
+        that its name resembles.
     """
 
     path: Path
@@ -113,6 +114,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     crs: str = ""
     ignored: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
 
     @property
@@ -149,6 +151,7 @@ class Reading:
     tables: dict[str, list[pd.DataFrame]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     ignored: list[str] = field(default_factory=list)
+    fields: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
     tallies: Tallies = field(default_factory=Tallies)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
@@ -285,6 +288,7 @@ class Reading:
             tuple(self.notes),
             self.crs,
             tuple(note for note in self.ignored if note in self.notes),
+            self.fields,
             self.unread,
         )
 
