@@ -42,7 +42,7 @@ from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
-from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
+from mapfilter.workflows.replay_lacks import advice_of, check_log, fixes_note, lack_of
 from mapfilter.workflows.replayed import (
     ReplayedLog,
     ReplayResult,
@@ -211,6 +211,8 @@ def run_replay(
             pictures = with_error_picture(pictures, shown, drawing, beside_m)
         if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
+        fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
+        log = replace(log, notes=(*log.notes, *fixes))
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)
         if recorder is not None:

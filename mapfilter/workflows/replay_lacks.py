@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,37 @@ def _columns_of_motion(opened: OpenedLog) -> str:
         text += f"; {one.path.name} has {', '.join(found) or 'none of them'}"
         text += f", columns not used: {listed(one.unread)} (--column)" if one.unread else ""
     return text
+
+
+def fixes_note(
+    opened: OpenedLog,
+    log: TrackLog,
+    truth: Collection[Path],
+    uses: Collection[str],
+    estimate: TrackEstimate,
+) -> tuple[str, ...]:
+    """Return a note on positions of recordings that the filter took for GNSS fixes; none without.
+
+    Parameters
+    ----------
+    opened : OpenedLog
+        The log as it was opened.
+    log : TrackLog
+        What of it the filter was given.
+    truth : collection of Path
+        Recordings whose positions are the truth.
+    uses : collection of str
+        Kinds of measurements that the filter uses.
+    """
+    measured = (one for one in opened.recordings if one.path not in truth)
+    placed = [one for one in measured if {"positions", "places"} & set(one.tables)]
+    if not placed or log.gnss.empty or "gnss" not in uses:
+        return ()
+    unused = sum(one.readings for one in estimate.unused if one.kind == "gnss")
+    names = listed([one.path.name for one in placed], 2)
+    text = f"gnss: {len(log.gnss) - unused} of {len(log.gnss)} positions of {names} used as GNSS "
+    text += "fixes; --without gnss leaves them out"
+    return (text if len(log.truth) else f"{text}, --truth {placed[0].path.name} scores by them",)
 
 
 def _unused_ranges(log: TrackLog) -> str:
