@@ -15,6 +15,7 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.errors import Fault
 from mapfilter.geodesy import degree_fault
+from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, is_above_asu
 from mapfilter.radio.cell_rules import RANGES, id_fault
 from mapfilter.radio.tables import number
 
@@ -131,7 +132,9 @@ class Rows:
             return
         if not _LEVEL_DBM[0] <= level_dbm <= _LEVEL_DBM[1]:
             expected = f"dBm in {_LEVEL_DBM[0]:g}..{_LEVEL_DBM[1]:g}"
-            hint = "RXLEV or ASU given for dBm" if 0 <= level_dbm <= 97 else ""
+            hint = LOST_SIGN if is_above_asu(level_dbm) else ""
+            if 0 <= level_dbm <= LARGEST_ASU:
+                hint = f"RXLEV or ASU given for dBm, or {LOST_SIGN}"
             if abs(level_dbm) >= _UNAVAILABLE:
                 hint = "the marker of a level that was not available"
             self.refuse(line, "level_dbm", expected, given["level_dbm"][:40], hint)

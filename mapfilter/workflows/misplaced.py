@@ -37,8 +37,8 @@ def misplaced_by(east_m: Floats, north_m: Floats, lattice: Lattice) -> str:
     """
     step = max(1, len(east_m) // _MOST_TRIED)
     east_m, north_m = east_m[::step], north_m[::step]
-    for mistake, *place in _undone(lattice.crs, east_m, north_m):
-        if is_near(*place, lattice):
+    for mistake, east, north in _undone(lattice.crs, east_m, north_m):
+        if is_near(east, north, lattice):
             return mistake
     return _ELSEWHERE
 
