@@ -29,6 +29,7 @@ from mapfilter.cli.options import (
     check_custom_filter,
     column_map,
     given_path,
+    named_options,
     refuse,
     seeded,
     toml,
@@ -406,7 +407,8 @@ def replay(
             given.append("filter.smooth=true")
         if protection is not None:
             given.append(f"integrity.risk={protection!r}")
-        loaded = load_config(config, given)
+        with named_options({} if without is None else {"track.without": "--without"}):
+            loaded = load_config(config, given)
         if walk and not loaded.track.steps:
             refuse(
                 {"--declination": declination, "--step-length": step_length}, "track.steps = false"

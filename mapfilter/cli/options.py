@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -148,6 +150,26 @@ def check_custom_filter(config: Config) -> None:
     folder = str(Path.cwd())
     if any(":" in name for name in names) and folder not in sys.path:
         sys.path.append(folder)
+
+
+@contextmanager
+def named_options(options: Mapping[str, str]) -> Iterator[None]:
+    """Name the option beside the setting that it made, where a configuration is wrong.
+
+    Parameters
+    ----------
+    options : mapping of str to str
+        Option of each setting.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        faults = []
+        for fault in error.faults:
+            of = (o for key, o in options.items() if fault.where.startswith(f"setting {key}"))
+            option = next(of, "")
+            faults.append(replace(fault, where=f"{option}, {fault.where}") if option else fault)
+        raise ConfigError(tuple(faults)) from None
 
 
 def refuse(given: Mapping[str, object], whom: str) -> None:

@@ -136,14 +136,19 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     if moved.reckoning is not None:
         sensors["reckoning"] = moved.reckoning
     sensors = {name: rows.assign(time_s=rows["time_s"] - start_s) for name, rows in sensors.items()}
-    log = make_log(
-        frame.crs,
-        **given,
-        start_utc_s=start_s if alignment.absolute else float("nan"),
-        notes=notes,
-        imu=moved.imu,
-        vehicle=moved.vehicle,
-    )
+    try:
+        log = make_log(
+            frame.crs,
+            **given,
+            start_utc_s=start_s if alignment.absolute else float("nan"),
+            notes=notes,
+            imu=moved.imu,
+            vehicle=moved.vehicle,
+        )
+    except InputError as error:
+        names = ", ".join(str(r.path) for r in journey)
+        faults = (replace(one, where=f"{names}, {one.where}") for one in error.faults)
+        raise InputError(tuple(faults)) from error
     if moved.compass:
         log = _with_positions_checked(log)
     if not given and not sensors:

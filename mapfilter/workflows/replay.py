@@ -28,6 +28,7 @@ from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, f
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
+from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.open_log import OpenedLog
@@ -219,7 +220,8 @@ def run_replay(
             written = _with_view(written, log, track, recorder, database, into)
         files = tuple(out / file.relative_to(new) for file in written.outputs)
         losses = tuple(loss for recording in opened.recordings for loss in recording.losses)
-        return replace(written, outputs=files, losses=losses)
+        foreign = foreign_cells(written.outcome.unknown_cells, sites(crs))
+        return replace(written, outputs=files, losses=losses, foreign=foreign)
 
     place: AbstractContextManager[Executor] = nullcontext(drawers or SerialExecutor())
     if drawers is None and beside and wanted != "none":

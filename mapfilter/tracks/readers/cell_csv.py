@@ -141,6 +141,8 @@ def _levels(rows: Columns, reading: Reading, families: np.ndarray, dialect: _Dia
     given, column = level.copy(), rows.find(*dialect.of("level"))
     if column is not None:
         reading.tallies.columns["level_dbm"] = column
+    elif not rows.has("asu"):
+        reading.note(f"no column {' or '.join(dialect.of('level'))}: cells without levels")
     asu = np.where(level >= 0, level, rows.number("asu"))
     level = np.where(level < 0, level, np.nan)
     turned = 0

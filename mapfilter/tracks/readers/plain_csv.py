@@ -166,11 +166,20 @@ def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:
     time_s, zoned = mapped.rows.times(*mapped.names("time"), zone=options.zone)
     reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
     if len(time_s) and not np.isfinite(time_s).any():
-        first = next((text for text in mapped.texts("time").tolist() if text), "nothing")
-        unclear = re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", first.strip())
-        hint = "day or month first? Write 2021-03-04, or 4.3.2021 with dots" if unclear else ""
-        raise fail(InputError, f"{reading.path}, time", _TIMES, repr(first[:40]), hint)
+        texts = mapped.texts("time").tolist()
+        at = next((row for row, text in enumerate(texts) if text), 0)
+        where = f"{reading.path} row {mapped.rows.line[at]}, time"
+        raise fail(InputError, where, _TIMES, repr(texts[at][:40] or "nothing"), _of_time(texts[at]))
     return time_s
+
+
+def _of_time(text: str) -> str:
+    """Return the likely mistake behind a text that is no time."""
+    if re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", text.strip()):
+        return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
+    if re.match(r"\d{1,2}:\d\d", text.strip()):
+        return "a time of day without its date; write 2026-05-01T08:00:00, or seconds"
+    return ""
 
 
 def _add_odometry(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
