@@ -1,4 +1,4 @@
-"""Cells that a plan does not have: of another network, or with parts of their identity exchanged."""
+"""Cells that a plan does not have: of another network, or with parts of the identity exchanged."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ def foreign_cells(names: Collection[str], plan: CellPlan) -> str:
     Examples
     --------
     >>> from mapfilter.radio.cells import Cell
-    >>> cell = Cell("A", "", 0.0, 0.0, 30.0, 0.0, 55.0, 1800.0, mcc=244, mnc=91, lac=3021, ci=11701)
+    >>> identity = {"mcc": 244, "mnc": 91, "lac": 3021, "ci": 11701}
+    >>> cell = Cell("A", "S", 0.0, 0.0, 30.0, 0.0, 55.0, 1800.0, **identity)
     >>> plan = CellPlan("EPSG:32635", (cell,))
     >>> foreign_cells(["244-91-11701-3021"], plan)
     '1 of them would be with lac (tac) and ci exchanged: columns exchanged?'

@@ -169,7 +169,9 @@ def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:
         texts = mapped.texts("time").tolist()
         at = next((row for row, text in enumerate(texts) if text), 0)
         where = f"{reading.path} row {mapped.rows.line[at]}, time"
-        raise fail(InputError, where, _TIMES, repr(texts[at][:40] or "nothing"), _of_time(texts[at]))
+        raise fail(
+            InputError, where, _TIMES, repr(texts[at][:40] or "nothing"), _of_time(texts[at])
+        )
     return time_s
 
 

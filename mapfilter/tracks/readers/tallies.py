@@ -29,6 +29,7 @@ class _Values:
     high: float = -np.inf
     first: float = np.nan
     first_line: int = 0
+    whole: bool = True
 
 
 @dataclass(slots=True)
@@ -71,6 +72,7 @@ class Tallies:
             first = int(np.argmax(outside))
             found.first, found.first_line = float(values[first]), int(line[first])
         found.outside += int(outside.sum())
+        found.whole &= bool((values[outside] % 1 == 0).all())
         found.low = min(found.low, float(values[outside].min()))
         found.high = max(found.high, float(values[outside].max()))
 
@@ -118,6 +120,7 @@ class Tallies:
 def _mistake(known: Field, values: _Values) -> str:
     """Return the likely mistake behind values out of range, by the largest of them."""
     most = max(abs(values.low), abs(values.high))
-    if known.name == "level_dbm" and values.high <= 0:
-        return ""
+    if known.name == "level_dbm" and (values.high <= 0 or not values.whole):
+        # ASU, RXLEV and bars are whole numbers.
+        return LOST_SIGN if 0 <= values.low and values.high <= -known.low else ""
     return next((hint for low, high, hint in known.hints if low <= most <= high), "")
