@@ -122,5 +122,5 @@ def _mistake(known: Field, values: _Values) -> str:
     most = max(abs(values.low), abs(values.high))
     if known.name == "level_dbm" and (values.high <= 0 or not values.whole):
         # ASU, RXLEV and bars are whole numbers.
-        return LOST_SIGN if 0 <= values.low and values.high <= -known.low else ""
+        return LOST_SIGN if values.low >= 0 and values.high <= -known.low else ""
     return next((hint for low, high, hint in known.hints if low <= most <= high), "")
