@@ -134,7 +134,7 @@ class Rows:
             expected = f"dBm in {_LEVEL_DBM[0]:g}..{_LEVEL_DBM[1]:g}"
             hint = LOST_SIGN if is_above_asu(level_dbm) else ""
             if 0 <= level_dbm <= LARGEST_ASU:
-                hint = f"RXLEV or ASU given for dBm, or {LOST_SIGN}"
+                hint = "RXLEV or ASU given for dBm"
             if abs(level_dbm) >= _UNAVAILABLE:
                 hint = "the marker of a level that was not available"
             self.refuse(line, "level_dbm", expected, given["level_dbm"][:40], hint)
