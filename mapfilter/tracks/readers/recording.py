@@ -220,9 +220,8 @@ class Reading:
             missing = np.isnan(values)
             outside = ~missing & ~((values >= known.low) & (values <= known.high))
             if known.vital:
-                self.tallies.add_values(
-                    table, known, np.where(good, values, np.nan), good & outside, line
-                )
+                given = int(np.count_nonzero(good & ~missing))
+                self.tallies.add_values(table, known, values, given, good & outside, line)
         label = f"{table}, {known.name}"
         if known.required:
             self.refuse(line[good & missing], f"{known.name}: missing, or no {known.kind}")

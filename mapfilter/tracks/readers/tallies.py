@@ -59,22 +59,25 @@ class Tallies:
     _above: int = 0
 
     def add_values(
-        self, table: str, known: Field, values: Floats, outside: Bools, line: Ints
+        self, table: str, known: Field, values: Floats, given: int, outside: Bools, line: Ints
     ) -> None:
-        """Count the values of a vital column, NaN where there is none."""
-        marked = (np.abs(values) >= _UNAVAILABLE) | np.isin(values, MISSING_SIGNS)
+        """Count the values of a vital column that are given, and those out of range."""
         found = self._values.setdefault((table, known.name), _Values())
-        found.given += int(np.sum(~np.isnan(values) & ~marked))
-        outside = outside & ~marked
+        found.given += given
         if not outside.any():
             return
+        bad, line = values[outside], line[outside]
+        marked = (np.abs(bad) >= _UNAVAILABLE) | np.isin(bad, MISSING_SIGNS)
+        found.given -= int(marked.sum())
+        bad, line = bad[~marked], line[~marked]
+        if not bad.size:
+            return
         if not found.outside:
-            first = int(np.argmax(outside))
-            found.first, found.first_line = float(values[first]), int(line[first])
-        found.outside += int(outside.sum())
-        found.whole &= bool((values[outside] % 1 == 0).all())
-        found.low = min(found.low, float(values[outside].min()))
-        found.high = max(found.high, float(values[outside].max()))
+            found.first, found.first_line = float(bad[0]), int(line[0])
+        found.outside += bad.size
+        found.whole &= bool((bad % 1 == 0).all())
+        found.low = min(found.low, float(bad.min()))
+        found.high = max(found.high, float(bad.max()))
 
     def add_texts(self, column: str, part: int, given: int, bad: int, example: str) -> None:
         """Count the texts of a column in a part of the file; each part counts once."""
