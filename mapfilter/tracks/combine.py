@@ -15,9 +15,9 @@ from mapfilter.geodesy import (
 )
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.frame import Frame
-from mapfilter.tracks.headings import mirrored_positions
 from mapfilter.tracks.journey_motion import journey_motion, measured_positions
 from mapfilter.tracks.log import TrackLog, make_log
+from mapfilter.tracks.mirrored import mirrored_notes
 from mapfilter.tracks.moved import places_of_poses
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
@@ -115,6 +115,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         walk=options.walk,
         true=[r for r in shifted if r.path in true_alone],
     )
+    notes += mirrored_notes(shifted, moved)
     tables = {
         "motion": moved.rows,
         "radio": _joined(shifted, "radio"),
@@ -150,23 +151,13 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         faults = (replace(one, where=f"{names}, {one.where}") for one in error.faults)
         raise InputError(tuple(faults)) from error
     if moved.compass:
-        log = _with_positions_checked(log)
+        # They were made of azimuths, so that none can run the other way round.
+        sense = "motion, heading_rad: headings run"
+        log = replace(log, notes=tuple(n for n in log.notes if not n.startswith(sense)))
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)
         raise fail(InputError, names, "rows of a journey", "none")
     return Combined(log, sensors, alignment, tuple(notes))
-
-
-def _with_positions_checked(log: TrackLog) -> TrackLog:
-    """Return a log whose headings are those of a compass, with a note on mirrored positions.
-
-    Notes on the sense of its headings are left out: mapfilter made them of azimuths.
-    """
-    kept = [note for note in log.notes if not note.startswith("motion, heading_rad: headings run")]
-    for name in ("truth", "gnss"):
-        if wrong := mirrored_positions(log.motion, getattr(log, name)):
-            kept.append(f"{name}: {wrong}")
-    return replace(log, notes=tuple(kept))
 
 
 def _shifted(recording: Recording, offset_s: float) -> Recording:

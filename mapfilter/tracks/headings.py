@@ -1,4 +1,4 @@
-"""Checks of headings by positions and of positions by headings; the unit of a compass."""
+"""Checks of headings: sense of rotation and reference by positions, and the unit of a compass."""
 
 from __future__ import annotations
 
@@ -17,13 +17,6 @@ _WALKED_M = 100.0
 _TURNED = np.pi / 2
 _ROUNDED = 0.005
 _LASTING = 0.25
-_MIRRORS = {
-    "latitude and longitude swapped": 90.0,
-    "a lost sign of longitude": 180.0,
-    "a lost sign of latitude": 0.0,
-    "latitude and longitude swapped, with a lost sign": -90.0,
-}
-"""Sum of course and heading, degrees, by what is wrong with the positions."""
 
 
 def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
@@ -52,7 +45,7 @@ def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
     >>> heading_fault(steps.assign(heading_rad=course), truth)
     ''
     """
-    heading, course = _both(motion, places)
+    heading, course = headings_and_courses(motion, places)
     if heading.size < _FEWEST:
         return ""
     same, other = (np.mean(np.exp(1j * (course + sign * heading))) for sign in (-1, 1))
@@ -67,35 +60,6 @@ def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
         off_deg = np.rad2deg(off_rad)
         origin = "; counted from north?" if abs(off_deg - 90) <= 20 else ""
         return f"headings are {off_deg:.0f} degrees off the course of the positions{origin}"
-    return ""
-
-
-def mirrored_positions(motion: pd.DataFrame, places: pd.DataFrame) -> str:
-    """Return what mirrors positions, by headings of a compass; "" for nothing.
-
-    Latitudes given as longitudes mirror a way about the diagonal, and a lost sign mirrors it about
-    north or east: the course of the positions and the heading have the same sum everywhere.
-
-    Parameters
-    ----------
-    motion : pandas.DataFrame
-        time_s, step_m and heading_rad, of a compass.
-    places : pandas.DataFrame
-        time_s, east_m and north_m.
-    """
-    heading, course = _both(motion, places)
-    if heading.size < _FEWEST:
-        return ""
-    same, other = (np.mean(np.exp(1j * (course + sign * heading))) for sign in (-1, 1))
-    if abs(other) < _CONSTANT or abs(other) - abs(same) < _LEAST_GAIN:
-        return ""
-    sum_deg = np.rad2deg(np.angle(other))
-    for cause, expected_deg in _MIRRORS.items():
-        if abs((sum_deg - expected_deg + 180) % 360 - 180) <= np.rad2deg(_OFF_RAD) / 2:
-            return (
-                f"positions are a mirror image of the way by steps and compass: {cause}, or "
-                "azimuths that run counter-clockwise?"
-            )
     return ""
 
 
@@ -137,8 +101,14 @@ def compass_fault(azimuth_deg: Floats, walked_m: float) -> str:
     return f"compass_deg: all azimuths lie within {span}: radians for degrees?"
 
 
-def _both(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:
-    """Return headings, and the courses of the positions within the same intervals."""
+def headings_and_courses(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:
+    """Return headings, and the courses of the positions within the same intervals.
+
+    Parameters
+    ----------
+    motion, places : pandas.DataFrame
+        As of :func:`heading_fault`.
+    """
     nothing = np.empty(0)
     places = places[np.isfinite(places[["east_m", "north_m"]].to_numpy(np.float64)).all(axis=1)]
     if len(motion) < _FEWEST or len(places) < 2:

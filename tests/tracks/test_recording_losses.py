@@ -160,6 +160,14 @@ def test_mirrored_positions_are_no_fault_of_the_headings(lon, lat, cause, walk, 
     assert not any("headings run clockwise" in note for note in notes)
 
 
+def test_mirrored_positions_are_told_by_their_courses(walk, read):
+    drive = walk.drop(columns="steps").rename(columns={"compass_deg": "course_deg"})
+    assert not any("mirror" in note for note in read(drive).notes)
+    swapped = {"latitude": "longitude", "longitude": "latitude"}
+    told = "phone.csv: positions are a mirror image of the way by their courses: latitude and long"
+    assert any(note.startswith(told) for note in read(drive.rename(columns=swapped)).notes)
+
+
 def opencellid(change):
     """The made file of OpenCellID with other levels, by row."""
     head, *rows = MADE["opencellid"][1].splitlines()
