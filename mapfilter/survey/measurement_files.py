@@ -83,6 +83,9 @@ DIALECTS: Mapping[str, Dialect] = {
 def read_csv(path: Path, dialect: Dialect) -> Rows:
     """Read a file of measurements; bad rows are refused one by one."""
     rows = Rows(path)
+    with open_input(path) as stream:
+        if _is_windows(stream.read(_HEAD_BYTES)):
+            rows.remarks.append("no UTF-8; read as Windows-1252")
     lines = _lines(path)
     separator, header = _header(lines)
     if not header:
@@ -285,5 +288,10 @@ def _open_text(path: Path) -> TextIO:
         raise fail(InputError, str(path), "text in UTF-8", wide, "saved as Unicode by Excel")
     if head.startswith(b"\x1f\x8b"):
         raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
-    encoding = "cp1252" if first_foreign_byte(head) >= 0 else "utf-8-sig"
+    encoding = "cp1252" if _is_windows(head) else "utf-8-sig"
     return io.TextIOWrapper(open_input(path), encoding=encoding, errors="replace")
+
+
+def _is_windows(head: bytes) -> bool:
+    """Return whether the names of columns are in Windows-1252; a wrong byte below is only that."""
+    return first_foreign_byte(head.lstrip().split(b"\n", 1)[0]) >= 0

@@ -50,7 +50,8 @@ class Rows:
     """Good rows as columns, the faults of bad ones, and counts of what is set aside.
 
     ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``identified`` is the
-    cell of identities that were looked at before, ``odd_time`` the first time not understood.
+    cell of identities that were looked at before, ``odd_time`` the first time not understood;
+    ``remarks`` are on the file as a whole.
     """
 
     path: Path
@@ -66,6 +67,7 @@ class Rows:
     faults: list[Fault] = field(default_factory=list)
     aside: Counter[str] = field(default_factory=Counter)
     odd_time: str = ""
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def columns(self) -> Floats:
@@ -161,7 +163,7 @@ class Rows:
             some = "; ".join(str(fault) for fault in self.faults[:_FAULTS_SHOWN])
             more = "; …" if self.refused > _FAULTS_SHOWN else ""
             found.insert(0, f"{self.refused} of {self.read} rows left out: {some}{more}")
-        return [f"{self.path.name}: {note}" for note in found]
+        return [f"{self.path.name}: {note}" for note in (*self.remarks, *found)]
 
     def _example(self, what: str) -> str:
         return f", such as {self.odd_time}; {_TIMES}" if what == NO_TIME and self.odd_time else ""

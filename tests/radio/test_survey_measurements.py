@@ -333,3 +333,4 @@ def test_a_survey_in_windows_1252_can_be_mapped(tmp_path):
     path.write_bytes(text.encode("cp1252"))
     found = read_measurements([path], columns={"lat": "Breite", "lon": "Länge"})
     assert len(found) == 20
+    assert found.notes == ("messung.csv: no UTF-8; read as Windows-1252",)
