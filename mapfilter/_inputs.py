@@ -30,6 +30,8 @@ _WIDE = {
     codecs.BOM_UTF16_BE: "UTF-16",
 }
 """By their marks; that of UTF-32 begins with one of UTF-16, and is looked for first."""
+_CUT_OFF = "unexpected end of data"
+"""As decoders name a text that ends within a letter."""
 _SHOWN = 60
 _FILE_OF_CRS = re.compile(
     r"(?:grids|init|file|catalog|model)=[^\s\"=]*[/\\~]|"
@@ -135,6 +137,34 @@ def wide_encoding(data: bytes) -> str:
     ['UTF-32', 'UTF-16', '']
     """
     return next((name for mark, name in _WIDE.items() if data.startswith(mark)), "")
+
+
+def first_foreign_byte(data: bytes) -> int:
+    r"""Return the place of the first byte by which a text is Windows-1252 and no UTF-8; else -1.
+
+    Text that is cut off within a letter is UTF-8, and so is a damaged one most of whose other
+    letters are whole.
+
+    Examples
+    --------
+    >>> first_foreign_byte("Länge".encode("cp1252")), first_foreign_byte("Länge".encode())
+    (1, -1)
+    >>> first_foreign_byte("Länge, Höhe".encode() + b"\xc3")
+    -1
+    """
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        text = data.decode("utf-8", "replace")
+        damaged, letters = text.count("\ufffd"), len(text) - len(text.encode("ascii", "ignore"))
+        if letters - damaged >= damaged or error.reason == _CUT_OFF:
+            return -1
+        try:
+            data.decode("cp1252")
+        except UnicodeDecodeError:
+            return -1
+        return error.start
+    return -1
 
 
 def json_value(data: bytes, constant: Callable[[str], Any] | None = None) -> Any:

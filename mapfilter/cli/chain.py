@@ -13,6 +13,7 @@ from mapfilter.cli.options import (
     PARTIAL,
     WRONG,
     ClusterOption,
+    ColumnOption,
     ConfigOption,
     DatabaseArgument,
     DeclinationOption,
@@ -27,8 +28,10 @@ from mapfilter.cli.options import (
     StepLengthOption,
     WorkersOption,
     check_custom_filter,
+    column_map,
     given_path,
     named_defaults,
+    named_options,
     refuse,
     seeded,
     toml,
@@ -277,6 +280,12 @@ def locate(
     crs: Annotated[
         str | None, typer.Option("--crs", metavar="EPSG", help="CRS of metres in a table.")
     ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column", metavar="FIELD=COLUMN", help="Column of a plain CSV, the log; repeatable."
+        ),
+    ] = None,
     level_error_db: Annotated[
         float,
         typer.Option(
@@ -300,6 +309,7 @@ def locate(
             folder,
             method=method,
             crs=crs,
+            columns=column_map(column),
             level_error_db=level_error_db,
             seed=seed or 0,
             progress=progress,
@@ -330,6 +340,7 @@ def replay(
     zone: Annotated[
         str | None, typer.Option("--zone", help="Zone of local times in recordings.")
     ] = None,
+    column: ColumnOption = None,
     course_motion: Annotated[
         bool,
         typer.Option(
@@ -388,6 +399,8 @@ def replay(
         for key, files in (("track.recordings", (log or [])[1:]), ("track.truth", truth or [])):
             if files:
                 given.append(f"{key}={toml([str(file) for file in files])}")
+        columns = column_map(column)
+        given += [f"track.columns.{field}={toml(name)}" for field, name in columns.items()]
         if course_motion:
             given.append("track.course_motion=true")
         walk = walk_changes(declination, step_length)
@@ -400,7 +413,8 @@ def replay(
             given.append("filter.smooth=true")
         if protection is not None:
             given.append(f"integrity.risk={protection!r}")
-        loaded = load_config(config, given)
+        with named_options({} if without is None else {"track.without": "--without"}):
+            loaded = load_config(config, given)
         if walk and not loaded.track.steps:
             refuse(
                 {"--declination": declination, "--step-length": step_length}, "track.steps = false"
@@ -412,7 +426,7 @@ def replay(
                 loaded, folder, html=html, beside=True, drawers=drawers, progress=progress
             )
         print_result(replay_figures(result), as_json)
-        for warning in result.warnings:
+        for warning in (*result.losses, *result.warnings):
             print_message(warning)
         if result.partial:
             raise typer.Exit(PARTIAL)

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from mapfilter.cli.options import (
+    ColumnOption,
     DeclinationOption,
     JsonOption,
     StepLengthOption,
+    column_map,
     given_path,
     numbers,
     refuse,
@@ -54,10 +56,7 @@ def convert(
         str | None,
         typer.Option("--zone", help="Zone of local times, such as Europe/Brussels or +01:00."),
     ] = None,
-    column: Annotated[
-        list[str] | None,
-        typer.Option("--column", metavar="FIELD=COLUMN", help="Column of a plain CSV; repeatable."),
-    ] = None,
+    column: ColumnOption = None,
     offset: Annotated[
         list[str] | None,
         typer.Option(
@@ -101,7 +100,7 @@ def convert(
     options = OpenOptions(
         format=form or "",
         zone=zone or "",
-        columns=parse_pairs(column or (), "--column"),
+        columns=column_map(column),
         combine=CombineOptions(
             crs=crs or "",
             origin_deg=None if place is None else (place[0], place[1]),

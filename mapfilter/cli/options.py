@@ -7,6 +7,7 @@ import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -76,6 +77,10 @@ StepLengthOption = Annotated[
     float | None,
     typer.Option("--step-length", metavar="M", help="Length of a step that is only counted."),
 ]
+ColumnOption = Annotated[
+    list[str] | None,
+    typer.Option("--column", metavar="FIELD=COLUMN", help="Column of a plain CSV; repeatable."),
+]
 BoxOption = Annotated[
     str | None,
     typer.Option("--bbox", metavar="W,S,E,N", help="Part of the map, in degrees; else all of it."),
@@ -130,6 +135,25 @@ def numbers(text: str | None, count: int, where: str) -> list[float] | None:
     return found
 
 
+def column_map(texts: list[str] | None) -> dict[str, str]:
+    """Read ``--column``: the column of each field of a plain CSV.
+
+    Raises
+    ------
+    ConfigError
+        A text is no ``FIELD=COLUMN``, or a field does not exist.
+    """
+    if not texts:
+        return {}
+    from mapfilter.tracks.readers.csv_fields import check_fields
+    from mapfilter.workflows.convert import parse_pairs
+
+    columns, faults = parse_pairs(texts, "--column"), Faults()
+    check_fields(columns, faults)
+    faults.raise_if_any(ConfigError)
+    return columns
+
+
 def walk_changes(declination_deg: float | None, step_m: float | None) -> dict[str, Any]:
     """Return what ``--declination`` and ``--step-length`` set of the options of a walk.
 
@@ -173,6 +197,26 @@ def check_custom_filter(config: Config) -> None:
     folder = str(Path.cwd())
     if any(":" in name for name in names) and folder not in sys.path:
         sys.path.append(folder)
+
+
+@contextmanager
+def named_options(options: Mapping[str, str]) -> Iterator[None]:
+    """Name the option beside the setting that it made, where a configuration is wrong.
+
+    Parameters
+    ----------
+    options : mapping of str to str
+        Option of each setting.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        faults = []
+        for fault in error.faults:
+            of = (o for key, o in options.items() if fault.where.startswith(f"setting {key}"))
+            option = next(of, "")
+            faults.append(replace(fault, where=f"{option}, {fault.where}") if option else fault)
+        raise ConfigError(tuple(faults)) from None
 
 
 def refuse(given: Mapping[str, object], whom: str) -> None:

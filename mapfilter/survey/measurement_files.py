@@ -11,16 +11,19 @@ import difflib
 import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
-from mapfilter._inputs import open_input, wide_encoding
+from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter.errors import Faults, InputError, fail
+from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, have_lost_sign, is_above_asu
 from mapfilter.radio.tables import number
 from mapfilter.survey.measurement_rows import FIELDS, IDENTITY, REQUIRED, Rows
 
-_LONGEST_LINE = 1 << 16
+_LONGEST_LINE = _HEAD_BYTES = 1 << 16
+_UNAVAILABLE = 1e9
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
 _KEY = re.compile(r'(\w[\w ]{0,31}+)=\s{0,9}("[^"]{0,4000}"|[^,]{0,4000})')
 _LEVEL = re.compile(r"^(>?)\s*(-?\d+)\s*dBm$")
@@ -80,11 +83,14 @@ DIALECTS: Mapping[str, Dialect] = {
 def read_csv(path: Path, dialect: Dialect) -> Rows:
     """Read a file of measurements; bad rows are refused one by one."""
     rows = Rows(path)
+    with open_input(path) as stream:
+        if _is_windows(stream.read(_HEAD_BYTES)):
+            rows.remarks.append("no UTF-8; read as Windows-1252")
     lines = _lines(path)
     separator, header = _header(lines)
     if not header:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "no text file")
-    places = _places(path, header, dialect)
+    places, signs = _places(path, header, dialect), _Signs()
     for line, text in lines:
         if text is not None and not text.strip():
             continue
@@ -108,12 +114,43 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
         cell = rows.identify(line, found["cell"], [found[name] for name in IDENTITY])
         if not cell:
             continue
+        signs.add(line, found["level_dbm"])
         dbm = _from_asu(found["level_dbm"], found["technology"].upper())
         if dbm is not None:
             rows.aside["levels given as ASU (turned into dBm)"] += 1
             found["level_dbm"] = repr(dbm)
         rows.add(line, cell, found)
+    column = "".join(header[at] for at in places["level_dbm"][:1])
+    signs.check(f"{path}, column {column}")
     return rows
+
+
+@dataclass(slots=True)
+class _Signs:
+    """Counts of positive levels in a column."""
+
+    levels: int = 0
+    positive: int = 0
+    above: int = 0
+    first: str = ""
+
+    def add(self, line: int, text: str) -> None:
+        level = number(text)
+        if level is None or level >= _UNAVAILABLE:
+            return
+        self.levels += 1
+        self.positive += level > 0
+        if is_above_asu(level):
+            self.above += 1
+            self.first = self.first or f"{text[:20]} in line {line}"
+
+    def check(self, where: str) -> None:
+        """Raise InputError where levels have no sign: neither dBm nor ASU."""
+        if have_lost_sign(self.above, self.positive, self.levels):
+            got = f"{self.positive} of {self.levels} positive, {self.above} of them above "
+            got += f"{LARGEST_ASU} (first {self.first})"
+            expected = f"dBm below 0, or ASU up to {LARGEST_ASU}"
+            raise fail(InputError, where, expected, got, LOST_SIGN)
 
 
 def header_of(path: Path) -> list[str]:
@@ -244,11 +281,17 @@ def _iso(time: str) -> str:
 def _open_text(path: Path) -> TextIO:
     """Open a file as text in which an invalid byte invalidates only its own row."""
     with open_input(path) as stream:
-        head = stream.read(4)
+        head = stream.read(_HEAD_BYTES)
     if not head:
         raise fail(InputError, str(path), "measurements", "an empty file")
     if wide := wide_encoding(head):
         raise fail(InputError, str(path), "text in UTF-8", wide, "saved as Unicode by Excel")
     if head.startswith(b"\x1f\x8b"):
         raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
-    return io.TextIOWrapper(open_input(path), encoding="utf-8-sig", errors="replace")
+    encoding = "cp1252" if _is_windows(head) else "utf-8-sig"
+    return io.TextIOWrapper(open_input(path), encoding=encoding, errors="replace")
+
+
+def _is_windows(head: bytes) -> bool:
+    """Return whether the names of columns are in Windows-1252; a wrong byte below is only that."""
+    return first_foreign_byte(head.lstrip().split(b"\n", 1)[0]) >= 0

@@ -15,6 +15,7 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.errors import Fault
 from mapfilter.geodesy import degree_fault
+from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, is_above_asu
 from mapfilter.radio.cell_rules import RANGES, id_fault
 from mapfilter.radio.tables import number
 
@@ -49,7 +50,8 @@ class Rows:
     """Good rows as columns, the faults of bad ones, and counts of what is set aside.
 
     ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``identified`` is the
-    cell of identities that were looked at before, ``odd_time`` the first time not understood.
+    cell of identities that were looked at before, ``odd_time`` the first time not understood;
+    ``remarks`` are on the file as a whole.
     """
 
     path: Path
@@ -65,6 +67,7 @@ class Rows:
     faults: list[Fault] = field(default_factory=list)
     aside: Counter[str] = field(default_factory=Counter)
     odd_time: str = ""
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def columns(self) -> Floats:
@@ -131,7 +134,9 @@ class Rows:
             return
         if not _LEVEL_DBM[0] <= level_dbm <= _LEVEL_DBM[1]:
             expected = f"dBm in {_LEVEL_DBM[0]:g}..{_LEVEL_DBM[1]:g}"
-            hint = "RXLEV or ASU given for dBm" if 0 <= level_dbm <= 97 else ""
+            hint = LOST_SIGN if is_above_asu(level_dbm) else ""
+            if 0 <= level_dbm <= LARGEST_ASU:
+                hint = "RXLEV or ASU given for dBm"
             if abs(level_dbm) >= _UNAVAILABLE:
                 hint = "the marker of a level that was not available"
             self.refuse(line, "level_dbm", expected, given["level_dbm"][:40], hint)
@@ -158,7 +163,7 @@ class Rows:
             some = "; ".join(str(fault) for fault in self.faults[:_FAULTS_SHOWN])
             more = "; …" if self.refused > _FAULTS_SHOWN else ""
             found.insert(0, f"{self.refused} of {self.read} rows left out: {some}{more}")
-        return [f"{self.path.name}: {note}" for note in found]
+        return [f"{self.path.name}: {note}" for note in (*self.remarks, *found)]
 
     def _example(self, what: str) -> str:
         return f", such as {self.odd_time}; {_TIMES}" if what == NO_TIME and self.odd_time else ""

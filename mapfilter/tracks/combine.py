@@ -17,6 +17,7 @@ from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.journey_motion import journey_motion, measured_positions
 from mapfilter.tracks.log import TrackLog, make_log
+from mapfilter.tracks.mirrored import mirrored_notes
 from mapfilter.tracks.moved import places_of_poses
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
@@ -114,6 +115,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         walk=options.walk,
         true=[r for r in shifted if r.path in true_alone],
     )
+    notes += mirrored_notes(shifted, moved)
     tables = {
         "motion": moved.rows,
         "radio": _joined(shifted, "radio"),
@@ -135,14 +137,23 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     if moved.reckoning is not None:
         sensors["reckoning"] = moved.reckoning
     sensors = {name: rows.assign(time_s=rows["time_s"] - start_s) for name, rows in sensors.items()}
-    log = make_log(
-        frame.crs,
-        **given,
-        start_utc_s=start_s if alignment.absolute else float("nan"),
-        notes=notes,
-        imu=moved.imu,
-        vehicle=moved.vehicle,
-    )
+    try:
+        log = make_log(
+            frame.crs,
+            **given,
+            start_utc_s=start_s if alignment.absolute else float("nan"),
+            notes=notes,
+            imu=moved.imu,
+            vehicle=moved.vehicle,
+        )
+    except InputError as error:
+        names = ", ".join(str(r.path) for r in journey)
+        faults = (replace(one, where=f"{names}, {one.where}") for one in error.faults)
+        raise InputError(tuple(faults)) from error
+    if moved.compass:
+        # They were made of azimuths, so that none can run the other way round.
+        sense = "motion, heading_rad: headings run"
+        log = replace(log, notes=tuple(n for n in log.notes if not n.startswith(sense)))
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)
         raise fail(InputError, names, "rows of a journey", "none")

@@ -45,7 +45,7 @@ def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
     >>> heading_fault(steps.assign(heading_rad=course), truth)
     ''
     """
-    heading, course = _both(motion, places)
+    heading, course = headings_and_courses(motion, places)
     if heading.size < _FEWEST:
         return ""
     same, other = (np.mean(np.exp(1j * (course + sign * heading))) for sign in (-1, 1))
@@ -101,8 +101,14 @@ def compass_fault(azimuth_deg: Floats, walked_m: float) -> str:
     return f"compass_deg: all azimuths lie within {span}: radians for degrees?"
 
 
-def _both(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:
-    """Return headings, and the courses of the positions within the same intervals."""
+def headings_and_courses(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:
+    """Return headings, and the courses of the positions within the same intervals.
+
+    Parameters
+    ----------
+    motion, places : pandas.DataFrame
+        As of :func:`heading_fault`.
+    """
     nothing = np.empty(0)
     places = places[np.isfinite(places[["east_m", "north_m"]].to_numpy(np.float64)).all(axis=1)]
     if len(motion) < _FEWEST or len(places) < 2:

@@ -51,7 +51,8 @@ def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
 class Moved:
     """A motion table, its errors, its rows' further columns, and whose it is, as far as known.
 
-    ``source`` is, in notes, where motion comes from that is no walk by a phone's sensors.
+    ``source`` is, in notes, where motion comes from that is no walk by a phone's sensors;
+    ``compass`` tells whether headings were made of azimuths, and so have the right sense.
     """
 
     rows: pd.DataFrame | None = None
@@ -59,6 +60,7 @@ class Moved:
     reckoning: pd.DataFrame | None = None
     vehicle: bool | None = None
     source: str = ""
+    compass: bool = False
 
 
 def journey_motion(
@@ -119,8 +121,9 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
             moved, imu, words = reckon_odometry(rows)
             notes += words
             return Moved(moved, imu, vehicle=True, source=source)
-        poses = name == "poses"
+        poses, compass = name == "poses", False
         if "compass_deg" in rows and rows["compass_deg"].notna().any():
+            compass = bool(rows["heading_rad"].isna().all())
             source += ", whose compass_deg counts from true north"
             stepped = rows[rows["step_m"] > 0]
             azimuth_deg = stepped["compass_deg"].to_numpy(dtype=np.float64)
@@ -128,7 +131,7 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
             notes += [fault] if fault else []
         moved = motion_from_poses(rows) if poses else by_compass(rows, frame.convergence_rad)
         moved = moved.assign(heading_rad=wrap_rad(moved["heading_rad"]))
-        return Moved(moved, source=source)
+        return Moved(moved, source=source, compass=compass)
     return None
 
 
@@ -145,7 +148,7 @@ def _walked(
             {"pose", "declination_deg", "field_ut"} if with_compass else set()
         )
         notes += without_effect(walk, used, why)
-        return Moved(walked.motion, walked.imu, walked.reckoning)
+        return Moved(walked.motion, walked.imu, walked.reckoning, compass=with_compass)
     counted, noise, reasons = reckon_counted(sensors, walk, frame.convergence_rad)
     notes += words if counted is None else ()
     notes += reasons
@@ -156,7 +159,7 @@ def _walked(
     why = f"steps are counted by the phone, {why}"
     used = {"step_m", "declination_deg"} if with_compass else {"step_m"}
     notes += without_effect(walk, used, why)
-    return Moved(counted, noise)
+    return Moved(counted, noise, compass=with_compass)
 
 
 def _compass_of(motion: pd.DataFrame) -> tuple[bool, str]:

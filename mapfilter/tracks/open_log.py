@@ -66,7 +66,7 @@ def open_log(
     """Open a track log, or the recordings of one journey by other programs.
 
     Nothing is written. A track log is read as it is; recordings are read, aligned and joined as
-    ``mapfilter convert`` does.
+    ``mapfilter convert`` does. Notes of the log say what of each recording was not used.
 
     Parameters
     ----------
@@ -99,7 +99,9 @@ def open_log(
         recordings, notes = read_recordings(given, options)
         wanted = with_measured(options.combine, given)
         joined = combine(recordings, replace(wanted, crs=wanted.crs or crs))
-        log = replace(joined.log, notes=(*notes, *joined.log.notes))
+        of_files = [remark for recording in recordings for remark in recording.remarks]
+        every_note = dict.fromkeys((*notes, *of_files, *joined.log.notes))
+        log = replace(joined.log, notes=tuple(every_note))
         name = given[0].name.partition(".")[0] or given[0].name
         opened = OpenedLog(name, log, joined.sensors, tuple(recordings))
     if plan is None:

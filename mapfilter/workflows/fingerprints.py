@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,7 +49,10 @@ def read_database(
 
 
 def read_reports(
-    path: Path, crs: str | None, plan: CellPlan | None = None
+    path: Path,
+    crs: str | None,
+    plan: CellPlan | None = None,
+    columns: Mapping[str, str] | None = None,
 ) -> tuple[Reports, Sequence[str]]:
     """Return the reports of logs, recordings or a table, and the name of each block.
 
@@ -59,19 +62,22 @@ def read_reports(
         For recordings, and for metres in a table.
     plan : CellPlan, optional
         Gives cells its ids.
+    columns : mapping of str to str, optional
+        Column of each field of a plain CSV, which then is a recording and no table.
 
     Raises
     ------
     InputError
         With the faults of all logs.
     """
-    if _is_fingerprints(path):
+    if not columns and _is_fingerprints(path):
         return read_fingerprint_table(path, crs), ()
+    options = replace(_WITHOUT_STEPS, columns=columns or {})
     faults, logs, names = Faults(), list[TrackLog](), list[str]()
     for one in _journeys(path):
         try:
             frame = crs or (logs[0].crs if logs else "")
-            opened = open_log(one, crs=frame, plan=plan, options=_WITHOUT_STEPS)
+            opened = open_log(one, crs=frame, plan=plan, options=options)
         except MapfilterError as error:
             faults.found.extend(error.faults)
         else:

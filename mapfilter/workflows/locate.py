@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -75,6 +75,7 @@ def run_locate(
     *,
     method: str = AUTO,
     crs: str | None = None,
+    columns: Mapping[str, str] | None = None,
     level_error_db: float = 6.0,
     seed: int = 0,
     progress: Progress | None = None,
@@ -92,6 +93,8 @@ def run_locate(
         Gets ``positions.csv``, ``figures.json``, and ``errors.png`` where there is ground truth.
     crs : str, optional
         Of metres in a table.
+    columns : mapping of str to str, optional
+        Where the log is a plain CSV recording: column of each field.
     level_error_db : float
         Of the levels of a radio-route database.
     seed : int
@@ -105,7 +108,7 @@ def run_locate(
     """
     began_s = time.perf_counter()
     check_figures_of_reports(out)
-    known, (reports, names) = _inputs(database, log, crs, level_error_db)
+    known, (reports, names) = _inputs(database, log, crs, level_error_db, columns or {})
     rng, strongest = np.random.default_rng(seed), usual_readings(reports)
     with nothing_left(out):
         ensure_writable_folder(out)
@@ -141,7 +144,11 @@ def run_locate(
 
 
 def _inputs(
-    database: Path, log: Path, crs: str | None, level_error_db: float
+    database: Path,
+    log: Path,
+    crs: str | None,
+    level_error_db: float,
+    columns: Mapping[str, str],
 ) -> tuple[Reports, tuple[Reports, Sequence[str]]]:
     """Read both inputs, and report the faults of both."""
     faults = Faults()
@@ -151,7 +158,7 @@ def _inputs(
     except MapfilterError as error:
         faults.found.extend(error.faults)
     try:
-        query = read_reports(log, known.crs if known is not None else crs, plan)
+        query = read_reports(log, known.crs if known is not None else crs, plan, columns)
     except MapfilterError as error:
         faults.found.extend(error.faults)
     if known is None or query is None:

@@ -28,6 +28,7 @@ from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, f
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
+from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.open_log import OpenedLog
@@ -42,7 +43,7 @@ from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
-from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
+from mapfilter.workflows.replay_lacks import advice_of, check_log, fixes_note, lack_of
 from mapfilter.workflows.replayed import (
     ReplayedLog,
     ReplayResult,
@@ -221,12 +222,16 @@ def run_replay(
             pictures = with_error_picture(pictures, shown, drawing, beside_m)
         if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
+        fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
+        log = replace(log, notes=(*log.notes, *fixes))
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)
         if recorder is not None:
             written = _with_view(written, log, track, recorder, database, into)
         files = tuple(out / file.relative_to(new) for file in written.outputs)
-        return replace(written, outputs=files)
+        losses = tuple(loss for recording in opened.recordings for loss in recording.losses)
+        foreign = foreign_cells(written.outcome.unknown_cells, sites(crs))
+        return replace(written, outputs=files, losses=losses, foreign=foreign)
 
     place: AbstractContextManager[Executor] = nullcontext(drawers or SerialExecutor())
     if drawers is None and beside and wanted != "none":

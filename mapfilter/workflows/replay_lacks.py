@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
 from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import Faults
+from mapfilter.errors import Faults, listed
 from mapfilter.geodesy import Lattice, same_crs, short_crs
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
@@ -16,10 +17,15 @@ from mapfilter.positioning.log_options import by_streets_alone
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
+from mapfilter.tracks.readers import plain_csv
+from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
 from mapfilter.tracks.schema import PLACE, SERVING
-from mapfilter.workflows.world import outside_m
+from mapfilter.workflows.misplaced import is_near, misplaced_by
 
-_AWAY_M = 5000.0
+_MOTION_COLUMNS = (
+    "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps "
+    "or wheel_speed_kmh"
+)
 _BY_CELLS = ("candidate", "grid")
 _BY_STREETS = "--filter bayes starts by the streets alone"
 
@@ -79,11 +85,56 @@ def lack_of(
         return f"{lack} ({_BY_STREETS})"
     if "no motion" not in lack:
         return lack
+    columns = _columns_of_motion(opened)
     if source := _receiver_motion(opened):
-        return f"{lack} (--course-motion, track.course_motion, makes it from {source})"
+        return f"{lack} (--course-motion, track.course_motion, makes it from {source}){columns}"
     if has_cells and len(log.radio):
-        return f"{lack} (mapfilter locate needs none)"
-    return lack
+        return f"{lack} (mapfilter locate needs none){columns}"
+    return f"{lack}{columns}"
+
+
+def _columns_of_motion(opened: OpenedLog) -> str:
+    """Return which columns of motion tables were looked for, and which others there are."""
+    tables = [one for one in opened.recordings if one.format == plain_csv.FORMAT.name]
+    if not tables:
+        return ""
+    text = f"; looked for {_MOTION_COLUMNS}"
+    for one in tables:
+        found = [field for field in MOTION_FIELDS if field in one.fields]
+        text += f"; {one.path.name} has {', '.join(found) or 'none of them'}"
+        text += f", columns not used: {listed(one.unread)} (--column)" if one.unread else ""
+    return text
+
+
+def fixes_note(
+    opened: OpenedLog,
+    log: TrackLog,
+    truth: Collection[Path],
+    uses: Collection[str],
+    estimate: TrackEstimate,
+) -> tuple[str, ...]:
+    """Return a note on positions of recordings that the filter took for GNSS fixes; none without.
+
+    Parameters
+    ----------
+    opened : OpenedLog
+        The log as it was opened.
+    log : TrackLog
+        What of it the filter was given.
+    truth : collection of Path
+        Recordings whose positions are the truth.
+    uses : collection of str
+        Kinds of measurements that the filter uses.
+    """
+    measured = (one for one in opened.recordings if one.path not in truth)
+    placed = [one for one in measured if {"positions", "places"} & set(one.tables)]
+    if not placed or log.gnss.empty or "gnss" not in uses:
+        return ()
+    unused = sum(one.readings for one in estimate.unused if one.kind == "gnss")
+    names = listed([one.path.name for one in placed], 2)
+    text = f"gnss: {len(log.gnss) - unused} of {len(log.gnss)} positions of {names} used as GNSS "
+    text += "fixes; --without gnss leaves them out"
+    return (text if len(log.truth) else f"{text}, --truth {placed[0].path.name} scores by them",)
 
 
 def _unused_ranges(log: TrackLog) -> str:
@@ -167,17 +218,12 @@ def lacking(
 def _check_near(
     where: str, east_m: Floats, north_m: Floats, lattice: Lattice, faults: Faults
 ) -> None:
-    if not east_m.size or outside_m(east_m, north_m, lattice).min() <= _AWAY_M:
+    if not east_m.size or is_near(east_m, north_m, lattice):
         return
     box = lattice.bounds_m
     found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
-    swapped = outside_m(north_m, east_m, lattice).min() <= _AWAY_M
-    faults.add(
-        where,
-        f"positions near the database's {_box(*box)}",
-        _box(*found),
-        "east and north swapped" if swapped else "log of another area or zone",
-    )
+    expected = f"positions near the database's {_box(*box)}"
+    faults.add(where, expected, _box(*found), misplaced_by(east_m, north_m, lattice))
 
 
 def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:

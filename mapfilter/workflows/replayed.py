@@ -44,6 +44,10 @@ class ReplayedLog:
         Equal for logs with the same true path; empty without a truth.
     baseline : SingleReports or None
         Errors of the reports, each located by itself; None without truth, reports or cells.
+    losses : tuple of str
+        Rows and values of its recordings that are not used; they are among the notes, too.
+    foreign : str
+        Why the database may lack all of its unknown cells, or an empty text.
     """
 
     name: str
@@ -55,6 +59,8 @@ class ReplayedLog:
     outputs: tuple[Path, ...]
     route: str = ""
     baseline: SingleReports | None = None
+    losses: tuple[str, ...] = ()
+    foreign: str = ""
 
     @property
     def figures(self) -> dict[str, Any]:
@@ -101,10 +107,16 @@ class ReplayResult:
                 f"{len(unknown)} {verb} unknown to the database ({_named(list(unknown))}; in "
                 f"{where}); their readings are labelled {Reason.UNKNOWN_CELL}"
             )
+            found += sorted({f"unknown cells: {log.foreign}" for log in self.logs if log.foreign})
         for lack in sorted({log.lack for log in self.logs if log.lack}):
             names = [log.name for log in self.logs if log.lack == lack]
             found.append(f"nothing is located in {_named(names)}: {lack}")
         return tuple(found)
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """Rows and values of recordings that are not used."""
+        return tuple(dict.fromkeys(loss for log in self.logs for loss in log.losses))
 
 
 def route_of(log: TrackLog) -> str:

@@ -303,3 +303,34 @@ def test_mutated_files_are_read_or_refused(tmp_path, mutation_count, sample, rea
 
     tally = fuzz(sample.encode(), feed, mutation_count)
     assert tally.read > mutation_count / 10
+
+
+def test_positive_levels_above_the_largest_asu_have_lost_their_sign(tmp_path):
+    head, *rows = OPENCELLID.splitlines()
+    level = head.split(",").index("signal")
+
+    def upload(levels):
+        lines = [row.split(",") for row in rows]
+        for line, value in zip(lines, levels, strict=True):
+            line[level] = value
+        path = tmp_path / "upload.csv"
+        path.write_text("\n".join([head, *map(",".join, lines)]) + "\n")
+        return read_measurements([path])
+
+    with pytest.raises(InputError) as caught:
+        upload(["73", "75", "108", "91"])
+    told = "column signal: expected dBm below 0, or ASU up to 97, found 4 of 4 positive, 1 of them "
+    assert f"{told}above 97 (first 108 in line 4)" in str(caught.value)
+    assert "a lost sign (70 for -70 dBm)" in str(caught.value)
+    # 99 and 255 are units of an unknown level; one odd level among dBm costs its row only.
+    assert len(upload(["73", "75", "99", "255"])) == 2
+    assert len(upload(["-73", "-75", "108", "-91"])) == 3
+
+
+def test_a_survey_in_windows_1252_can_be_mapped(tmp_path):
+    path = tmp_path / "messung.csv"
+    text = PLAIN.replace("lat,lon", "Breite,Länge", 1)
+    path.write_bytes(text.encode("cp1252"))
+    found = read_measurements([path], columns={"lat": "Breite", "lon": "Länge"})
+    assert len(found) == 20
+    assert found.notes == ("messung.csv: no UTF-8; read as Windows-1252",)

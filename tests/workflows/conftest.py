@@ -16,6 +16,9 @@ B,S1,60.16690,24.94300,30,180,50,1826.4,618,17
 C,S2,60.16890,24.94880,25,240,50,1827.6,624,17
 """
 
+IDENTITIES = {"A": (3021, 117001), "B": (3021, 117002), "C": (3022, 117003)}
+"""LAC and CI of the cells in the plan with identities."""
+
 TOML = """[area]
 bbox = [24.9420, 60.1660, 24.9495, 60.1697]
 [cells]
@@ -96,6 +99,20 @@ def make_world(folder: Path) -> World:
 def world(tmp_path_factory: pytest.TempPathFactory) -> World:
     """Plan, rasters, database and two journeys, made by the commands themselves."""
     return make_world(tmp_path_factory.mktemp("world"))
+
+
+@pytest.fixture(scope="session")
+def database(tmp_path_factory):
+    """The small world's database, of a plan with identities."""
+    folder = tmp_path_factory.mktemp("identified")
+    head, *rows = PLAN.splitlines()
+    lines = [f"{head},technology,mcc,mnc,lac,ci"]
+    lines += [f"{row},LTE,244,91,{','.join(map(str, IDENTITIES[row[0]]))}" for row in rows]
+    (folder / "cells.csv").write_text("\n".join(lines) + "\n")
+    (folder / "world.toml").write_text(TOML)
+    for command in ("predict", "build"):
+        assert_done(mapfilter(command, "-c", folder / "world.toml"))
+    return folder / "out" / "database"
 
 
 @pytest.fixture

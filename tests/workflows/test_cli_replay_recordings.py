@@ -8,29 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import ONE, assert_done, assert_refused, mapfilter, settings
-from conftest import PLAN, TOML
+from conftest import IDENTITIES
 from made_recordings import MADE
 
 from mapfilter.geodesy import azimuth_from_heading_deg, unproject
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.tracks.store import read_log, write_log
 
-IDENTITIES = {"A": (3021, 117001), "B": (3021, 117002), "C": (3022, 117003)}
 START_UTC_S = 1_777_629_600
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    """The small world's database, of a plan with identities."""
-    folder = tmp_path_factory.mktemp("identified")
-    head, *rows = PLAN.splitlines()
-    lines = [f"{head},technology,mcc,mnc,lac,ci"]
-    lines += [f"{row},LTE,244,91,{','.join(map(str, IDENTITIES[row[0]]))}" for row in rows]
-    (folder / "cells.csv").write_text("\n".join(lines) + "\n")
-    (folder / "world.toml").write_text(TOML)
-    for command in ("predict", "build"):
-        assert_done(mapfilter(command, "-c", folder / "world.toml"))
-    return folder / "out" / "database"
 
 
 @pytest.fixture

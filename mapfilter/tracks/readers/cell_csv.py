@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.radio.asu import UNKNOWN_ASU
 from mapfilter.radio.identities import technology
 from mapfilter.tracks.readers.columns import (
     Columns,
@@ -21,6 +22,7 @@ from mapfilter.tracks.readers.identities import add_radio, available
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 
+_UNAVAILABLE = 1e9
 _ASU = {"GSM": (-113.0, 2.0, 31.0), "UMTS": (-120.0, 1.0, 96.0), "LTE": (-140.0, 1.0, 97.0)}
 """Level of ASU 0, step and largest ASU: 3GPP TS 27.007, +CSQ and +CESQ."""
 
@@ -136,6 +138,11 @@ def _add_cells(rows: Columns, reading: Reading, time_s: Floats, dialect: _Dialec
 def _levels(rows: Columns, reading: Reading, families: np.ndarray, dialect: _Dialect) -> Floats:
     """Return levels in dBm; those given as ASU are turned, NaN where neither is known."""
     level = rows.number(*dialect.of("level"))
+    given, column = level.copy(), rows.find(*dialect.of("level"))
+    if column is not None:
+        reading.tallies.columns["level_dbm"] = column
+    elif not rows.has("asu"):
+        reading.note(f"no column {' or '.join(dialect.of('level'))}: cells without levels")
     asu = np.where(level >= 0, level, rows.number("asu"))
     level = np.where(level < 0, level, np.nan)
     turned = 0
@@ -143,6 +150,10 @@ def _levels(rows: Columns, reading: Reading, families: np.ndarray, dialect: _Dia
         of = np.isnan(level) & (families == family) & (asu >= 0) & (asu <= most)
         level = np.where(of, lowest + step * asu, level)
         turned += int(of.sum())
+    # What is left positive is counted, and ignored, as no level.
+    left = np.isnan(level) & (given > 0) & (given < _UNAVAILABLE) & ~np.isin(given, UNKNOWN_ASU)
+    level = np.where(left, given, level)
+    reading.tallies.add_signs(given[given < _UNAVAILABLE])
     if turned:
         reading.note(f"radio, level_dbm: {turned} levels given as ASU, turned into dBm")
     return level

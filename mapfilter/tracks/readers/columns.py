@@ -170,15 +170,23 @@ class Columns:
     def _cast(
         self, column: pa.ChunkedArray, kind: pa.DataType, pattern: str, names: Sequence[str]
     ) -> pa.ChunkedArray:
+        name, part = self.find(*names) or "", int(self.line[0]) if len(self) else 0
         try:
-            return pc.cast(column, kind)
+            numbers = pc.cast(column, kind)
         except pa.ArrowInvalid:
             pass
+        else:
+            self.reading.tallies.add_texts(name, part, len(column), 0, "")
+            return numbers
         column = pc.utf8_trim_whitespace(column)
         missing = pc.is_in(column, pa.array(_MISSING))
         good = pc.match_substring_regex(column, pattern)
-        if bad := pc.sum(pc.and_not(pc.invert(good), missing)).as_py():
-            self.reading.note(f"{self.find(*names)}: {bad} values are no numbers, taken as missing")
+        wrong = pc.and_not(pc.invert(good), missing)
+        bad, given = pc.sum(wrong).as_py(), len(column) - pc.sum(missing).as_py()
+        example = pc.filter(column, wrong)[0].as_py() if bad else ""
+        self.reading.tallies.add_texts(name, part, given, bad, example)
+        if bad:
+            self.reading.ignore(f"{name}: {bad} values are no numbers, taken as missing")
         column = pc.replace_substring_regex(column, r"^\+", "")
         return pc.cast(pc.if_else(good, column, None), kind)
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from difflib import get_close_matches
 
+from mapfilter.errors import Faults
+
+_ALIKE = 0.7
+_UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_m")
 FIELDS: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
@@ -64,3 +69,41 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     },
 }
 """Fields that a column map may name, and the names of columns that are known without one."""
+
+
+MOTION_FIELDS = (
+    *("step_m", "steps", "compass_deg", "heading_rad", "turn_rad", "turn_deg", "yaw_rate_radps"),
+    *("yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh"),
+)
+"""Fields of which motion is made; step_m, steps or a wheel speed among them."""
+
+
+def meant(column: str, taken: Collection[str] = ()) -> str:
+    """Return the field that a column's name resembles, in the same unit; "" for none.
+
+    Parameters
+    ----------
+    column : str
+        In lower case.
+    taken : collection of str
+        Fields that other columns hold.
+
+    Examples
+    --------
+    >>> [meant(name) for name in ("stepcount", "compas", "compass_rad", "operator")]
+    ['steps', 'compass_deg', '', '']
+    """
+    names = {name: field for field, some in FIELDS.items() if field not in taken for name in some}
+    for near in get_close_matches(column, names, 3, _ALIKE):
+        if all(column.endswith(unit) == near.endswith(unit) for unit in _UNITS if unit in column):
+            return names[near]
+    return ""
+
+
+def check_fields(columns: Mapping[str, str], faults: Faults) -> None:
+    """Note each field of a column map that does not exist, with the most similar one."""
+    for field in columns:
+        if field not in FIELDS:
+            near = get_close_matches(field, FIELDS, 1)
+            expected = f"one of {', '.join(FIELDS)}"
+            faults.add(f"--column {field}", expected, field, near[0] if near else "")

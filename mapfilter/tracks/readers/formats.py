@@ -170,8 +170,8 @@ def _unknown(path: Path, text: Text) -> MapfilterError:
     hint = _NOT_READ.get(path.suffix.lower(), "")
     if not hint and len(names) > 1 and names & fields:
         hint = (
-            "a CSV with other names of columns: --column FIELD=COLUMN, such as acc_x=AX or "
-            "wheel_speed_mps=SPEED"
+            "a CSV with other names of columns: --column FIELD=COLUMN (track.columns in a "
+            "configuration), such as acc_x=AX or wheel_speed_mps=SPEED"
         )
         if not names & set(FIELDS["time"]):
             hint = f"a CSV without a column of times; {hint}, and time=COLUMN"

@@ -84,7 +84,7 @@ def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) ->
         for name, most in limits.items():
             bad = of & ~np.isnan(given[name]) & ~((given[name] >= 0) & (given[name] <= most))
             if bad.any():
-                reading.note(
+                reading.ignore(
                     f"radio, {name}: {int(bad.sum())} values are not 0..{most} as in {family}, "
                     f"ignored (first in line {line[bad][0]})"
                 )

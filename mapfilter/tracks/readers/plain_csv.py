@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from mapfilter.tracks.readers.columns import (
     likely_separator,
     only,
 )
-from mapfilter.tracks.readers.csv_fields import FIELDS
+from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields, meant
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import (
     add_radio,
@@ -39,6 +38,11 @@ _CONTENT = (
     *(("wheel_speed_kmh",), ("steps",)),
     *((speed, rate) for speed in _SPEEDS for rate in ("yaw_rate_radps", "yaw_rate_degps")),
 )
+_VITAL = (
+    *("step_m", "heading_rad", "turn_rad", "turn_deg", "compass_deg", "steps", "level_dbm", "bars"),
+    *("yaw_rate_radps", "yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh"),
+)
+"""Fields that must hold numbers where a column has them."""
 _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 
 
@@ -85,6 +89,9 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     rows = header_columns(text.data, reading, text.line)
     _check_map(rows, reading, options.columns)
     mapped = _Mapped(rows, options.columns)
+    reading.tallies.columns |= {
+        field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
+    }
     time_s = _times(mapped, reading, options)
     if mapped.has("lat_deg", "lon_deg"):
         speed = mapped.number("speed_mps")
@@ -108,8 +115,14 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     _add_sensors(mapped, reading, time_s)
     _add_cells(mapped, reading, time_s)
     taken = {name for field in FIELDS for name in mapped.names(field)}
-    if unused := [name for name in rows.names if name and name not in taken]:
-        reading.note(f"columns not used: {listed(unused)}; see --column")
+    found = [field for field in FIELDS if mapped.has(field)]
+    reading.fields = tuple(found)
+    unread = (name for name in rows.names if name and name not in taken)
+    reading.unread = tuple(
+        f"{name} ({near}?)" if (near := meant(name, found)) else name for name in unread
+    )
+    if reading.unread:
+        reading.note(f"columns not used: {listed(reading.unread)}; see --column")
 
 
 def _add(
@@ -128,12 +141,11 @@ def _check_map(rows: Columns, reading: Reading, own: Mapping[str, str]) -> None:
     """Raise InputError with every fault of a column map, and where times are missing."""
     faults = Faults()
     present = f"{', '.join(rows.names)[:300]}"
+    check_fields(own, faults)
     for field, column in own.items():
         if field not in FIELDS:
-            near = get_close_matches(field, FIELDS, 1)
-            hint = near[0] if near else ""
-            faults.add(f"--column {field}", f"one of {', '.join(FIELDS)}", field, hint)
-        elif column.lower() not in rows.names:
+            continue
+        if column.lower() not in rows.names:
             faults.add(f"{reading.path} header", f"a column {column} for {field}", present)
         elif rows.names.count(column.lower()) > 1:
             faults.add(f"{reading.path} header", f"one column {column}", "several")
@@ -154,11 +166,22 @@ def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:
     time_s, zoned = mapped.rows.times(*mapped.names("time"), zone=options.zone)
     reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
     if len(time_s) and not np.isfinite(time_s).any():
-        first = next((text for text in mapped.texts("time").tolist() if text), "nothing")
-        unclear = re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", first.strip())
-        hint = "day or month first? Write 2021-03-04, or 4.3.2021 with dots" if unclear else ""
-        raise fail(InputError, f"{reading.path}, time", _TIMES, repr(first[:40]), hint)
+        texts = mapped.texts("time").tolist()
+        at = next((row for row, text in enumerate(texts) if text), 0)
+        where = f"{reading.path} row {mapped.rows.line[at]}, time"
+        raise fail(
+            InputError, where, _TIMES, repr(texts[at][:40] or "nothing"), _of_time(texts[at])
+        )
     return time_s
+
+
+def _of_time(text: str) -> str:
+    """Return the likely mistake behind a text that is no time."""
+    if re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", text.strip()):
+        return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
+    if re.match(r"\d{1,2}:\d\d", text.strip()):
+        return "a time of day without its date; write 2026-05-01T08:00:00, or seconds"
+    return ""
 
 
 def _add_odometry(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:

@@ -20,6 +20,7 @@ from mapfilter.tracks.readers.recorded_values import (
     reordered,
 )
 from mapfilter.tracks.readers.tables import RECORDED, Field
+from mapfilter.tracks.readers.tallies import Tallies
 
 ClockKind = Literal["utc", "gps", "local", "monotonic"]
 
@@ -96,6 +97,11 @@ class Recording:
         What was ignored, changed or is remarkable.
     crs : str
         Projected CRS of positions in metres; "" for a frame of the file's own.
+    ignored : tuple of str
+        Those of the notes that are on values left out.
+    fields, unread : tuple of str
+        Of a plain CSV: the fields that it has, and columns that were not used, each with the field
+        that its name resembles.
     """
 
     path: Path
@@ -107,6 +113,21 @@ class Recording:
     unusable: tuple[Unusable, ...] = ()
     notes: tuple[str, ...] = ()
     crs: str = ""
+    ignored: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """What of the file is not used, rows and values, with its name."""
+        rows = (f"not used: {found}" for found in self.unusable)
+        return tuple(f"{self.path.name}: {text}" for text in (*rows, *self.ignored))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Losses and all other notes, with the file's name."""
+        others = (f"{self.path.name}: {note}" for note in self.notes if note not in self.ignored)
+        return (*self.losses, *others)
 
     @property
     def unusable_rows(self) -> int:
@@ -129,6 +150,10 @@ class Reading:
     crs: str = ""
     tables: dict[str, list[pd.DataFrame]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    ignored: list[str] = field(default_factory=list)
+    fields: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
+    tallies: Tallies = field(default_factory=Tallies)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
 
     def refuse(self, lines: ArrayLike, reason: str) -> None:
@@ -141,6 +166,12 @@ class Reading:
         """Add a remark, once."""
         if text not in self.notes:
             self.notes.append(text)
+
+    def ignore(self, text: str) -> None:
+        """Add a remark on values that are left out."""
+        self.note(text)
+        if text not in self.ignored:
+            self.ignored.append(text)
 
     def add(self, table: str, columns: Mapping[str, Any], lines: ArrayLike) -> None:
         """Check rows of a table, and keep the usable ones.
@@ -188,6 +219,9 @@ class Reading:
         else:
             missing = np.isnan(values)
             outside = ~missing & ~((values >= known.low) & (values <= known.high))
+            if known.vital:
+                given = int(np.count_nonzero(good & ~missing))
+                self.tallies.add_values(table, known, values, given, good & outside, line)
         label = f"{table}, {known.name}"
         if known.required:
             self.refuse(line[good & missing], f"{known.name}: missing, or no {known.kind}")
@@ -196,7 +230,7 @@ class Reading:
             return ~missing & ~outside
         if (ignored := good & outside).any():
             first = line[ignored][0]
-            self.note(
+            self.ignore(
                 f"{label}: {int(ignored.sum())} values are not {known.expected}, ignored "
                 f"(first in line {first})"
             )
@@ -227,7 +261,7 @@ class Reading:
         Raises
         ------
         InputError
-            No row can be used.
+            No row can be used, or most values of a column that a log needs are out of range.
         """
         found = {reason: np.unique(np.concatenate(some)) for reason, some in self._refused.items()}
         refused = tuple(
@@ -236,6 +270,7 @@ class Reading:
         )
         if not self.tables:
             raise nothing_usable(self.path, name, self.rows, refused, rows_word)
+        self.tallies.check(self.path, RECORDED)
         kept = {
             table: self._tidy(table, joined_parts(self.tables.pop(table)))
             for table in RECORDED
@@ -251,6 +286,9 @@ class Reading:
             refused,
             tuple(self.notes),
             self.crs,
+            tuple(note for note in self.ignored if note in self.notes),
+            self.fields,
+            self.unread,
         )
 
     def _tidy(self, table: str, rows: pd.DataFrame) -> pd.DataFrame:

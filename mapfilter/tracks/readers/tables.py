@@ -32,6 +32,8 @@ class Field:
         Whether values are texts.
     hints : tuple of (float, float, str)
         Likely mistakes behind values within these intervals.
+    vital : bool
+        Whether a file is refused most of whose values are out of range, as a log needs them.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Field:
     required: bool = False
     text: bool = False
     hints: tuple[tuple[float, float, str], ...] = ()
+    vital: bool = False
 
     @property
     def kind(self) -> str:
@@ -69,18 +72,50 @@ def _text(name: str, *, required: bool = False) -> Field:
 
 
 _TIME = Field("time_s", -1e11, 1e11, "seconds", required=True)
-_SWAPPED = ((90.0, 180.0, "latitude and longitude swapped"), (180.0, np.inf, "metres for degrees"))
+_NO_DEGREES = (
+    (180.0, 18_060.0, "degrees and minutes as one number (NMEA), or metres for degrees"),
+    (18_060.0, 1e7, "metres for degrees"),
+    (1e7, 2e9, "degrees times 1e6 or 1e7"),
+)
+_LATITUDE = Field(
+    *("lat_deg", -90, 90, "degrees in -90..90"),
+    required=True,
+    hints=((90.0, 180.0, "latitude and longitude swapped"), *_NO_DEGREES),
+)
+_LONGITUDE = Field(
+    *("lon_deg", -180, 180, "degrees in -180..180"),
+    required=True,
+    hints=_NO_DEGREES,
+)
 _METRES = "metres"
+_EAST, _NORTH = (
+    Field(
+        *(f"{axis}_m", -1e8, 1e8, _METRES),
+        required=True,
+        hints=((1e8, 2e9, "degrees times 1e7 for metres"),),
+    )
+    for axis in ("east", "north")
+)
+_DEGREES = ((6.3, 360.0, "degrees given for radians"),)
+_RATES = ((20.0, 2000.0, "degrees for radians per second"),)
+_TURN = Field("turn_rad", -6.3, 6.3, "radians in -2π..2π", hints=_DEGREES, vital=True)
+_LEVEL = Field(
+    *("level_dbm", -200, 0, "dBm in -200..0"),
+    hints=(
+        (0.0, 4.0, "signal bars; name the column bars"),
+        (4.0, 31.0, "ASU of GSM (dBm = 2 ASU - 113), or raw RXLEV (dBm = RXLEV - 110)"),
+        (31.0, 63.0, "raw RXLEV (dBm = RXLEV - 110), ASU (LTE: dBm = ASU - 140), or a lost sign"),
+        (63.0, 97.0, "a lost sign (70 for -70 dBm), or ASU (LTE: dBm = ASU - 140)"),
+        (97.0, 200.0, "a lost sign (70 for -70 dBm)"),
+    ),
+    vital=True,
+)
 
 RECORDED: dict[str, tuple[Field, ...]] = {
     "positions": (
         _TIME,
-        Field("lat_deg", -90, 90, "degrees in -90..90", required=True, hints=_SWAPPED),
-        Field(
-            *("lon_deg", -180, 180, "degrees in -180..180"),
-            required=True,
-            hints=((180.0, np.inf, "metres for degrees"),),
-        ),
+        _LATITUDE,
+        _LONGITUDE,
         Field("altitude_m", -500, 20_000, "metres in -500..20000"),
         Field("accuracy_m", 0, 1e5, "metres >= 0"),
         Field("speed_mps", 0, 350, "m/s in 0..350"),
@@ -89,21 +124,21 @@ RECORDED: dict[str, tuple[Field, ...]] = {
     ),
     "places": (
         _TIME,
-        Field("east_m", -1e8, 1e8, _METRES, required=True),
-        Field("north_m", -1e8, 1e8, _METRES, required=True),
+        _EAST,
+        _NORTH,
         Field("up_m", -1e5, 1e5, _METRES),
         Field("heading_rad", -6.3, 6.3, "radians"),
     ),
     "truth": (
         _TIME,
-        Field("lat_deg", -90, 90, "degrees in -90..90", required=True, hints=_SWAPPED),
-        Field("lon_deg", -180, 180, "degrees in -180..180", required=True),
+        _LATITUDE,
+        _LONGITUDE,
         Field("altitude_m", -500, 20_000, "metres in -500..20000"),
     ),
     "true_places": (
         _TIME,
-        Field("east_m", -1e8, 1e8, _METRES, required=True),
-        Field("north_m", -1e8, 1e8, _METRES, required=True),
+        _EAST,
+        _NORTH,
         Field("heading_rad", -6.3, 6.3, "radians"),
     ),
     "radio": (
@@ -117,22 +152,22 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         _text("cell"),
         Field("arfcn", 0, 3_279_165, "a carrier number"),
         Field("bsic", 0, 1007, "0..1007"),
-        Field("level_dbm", -200, 0, "dBm in -200..0"),
+        _LEVEL,
         Field("timing_advance", 0, 3846, "steps in 0..3846"),
         Field("censored", -1, 1, "-1, 0 or 1"),
         Field("level_step_db", 0, 60, "dB in 0..60"),
     ),
     "motion": (
         _TIME,
-        Field("step_m", -1e6, 1e6, _METRES),
-        Field("heading_rad", -6.3, 6.3, "radians in -2π..2π"),
-        Field("turn_rad", -6.3, 6.3, "radians in -2π..2π"),
-        Field("compass_deg", -180, 360, "degrees in -180..360"),
+        Field("step_m", -1e6, 1e6, _METRES, vital=True),
+        Field("heading_rad", -6.3, 6.3, "radians in -2π..2π", hints=_DEGREES, vital=True),
+        _TURN,
+        Field("compass_deg", -180, 360, "degrees in -180..360", vital=True),
     ),
     "odometry": (
         _TIME,
-        Field("speed_mps", -150, 350, "m/s in -150..350", required=True),
-        Field("yaw_rate_radps", -20, 20, "rad/s in -20..20"),
+        Field("speed_mps", -150, 350, "m/s in -150..350", required=True, vital=True),
+        Field("yaw_rate_radps", -20, 20, "rad/s in -20..20", hints=_RATES, vital=True),
         Field("speed_sd_mps", 0, 100, "m/s >= 0"),
         Field("yaw_rate_sd_radps", 0, 10, "rad/s >= 0"),
     ),
@@ -171,11 +206,14 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         ),
     ),
     "steps": (_TIME, Field("count", 0, 1e9, "steps >= 0", required=True)),
-    "compass": (_TIME, Field("magnetic_deg", -180, 360, "degrees in -180..360", required=True)),
+    "compass": (
+        _TIME,
+        Field("magnetic_deg", -180, 360, "degrees in -180..360", required=True, vital=True),
+    ),
     "turns": (
         _TIME,
-        Field("turn_rad", -6.3, 6.3, "radians in -2π..2π"),
-        Field("yaw_rate_radps", -20, 20, "rad/s in -20..20"),
+        _TURN,
+        Field("yaw_rate_radps", -20, 20, "rad/s in -20..20", hints=_RATES, vital=True),
     ),
     "ephemerides": (
         _TIME,
@@ -199,8 +237,8 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         Field("mnc", 0, 999, "0..999", required=True),
         Field("lac", 0, 2**24 - 1, "0..16777215", required=True),
         Field("ci", 0, 2**36 - 1, "0..68719476735", required=True),
-        Field("lat_deg", -90, 90, "degrees in -90..90", required=True, hints=_SWAPPED),
-        Field("lon_deg", -180, 180, "degrees in -180..180", required=True),
+        _LATITUDE,
+        _LONGITUDE,
         Field("range_m", 0, 1e6, "metres >= 0"),
         Field("samples", 0, 1e12, ">= 0"),
     ),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from mapfilter._inputs import open_input, wide_encoding
+from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter.errors import InputError, fail
 
 _HINTS = {
@@ -94,7 +94,9 @@ def parts_of(text: Text) -> Iterator[Text]:
 
 
 def read_text(path: Path, most_bytes: int = -1) -> Text:
-    r"""Read a file as text: plain or gzip, UTF-8, UTF-16 or UTF-32, any line ends.
+    r"""Read a file as text: plain or gzip, any line ends.
+
+    It is UTF-8, UTF-16 or UTF-32, else Windows-1252, with a note.
 
     ``most_bytes`` are read at most, all of them where it is negative.
 
@@ -178,11 +180,14 @@ def _as_utf8(path: Path, data: bytes, notes: list[str]) -> bytes:
         try:
             data.decode("utf-8")
         except UnicodeDecodeError:
-            notes.append("some bytes are not UTF-8")
             strange = data[:_HEAD_BYTES].decode("utf-8", "replace").count("\ufffd")
             if strange > _MOST_STRANGE_SHARE * min(len(data), _HEAD_BYTES):
                 got = "a binary file"
                 raise fail(InputError, str(path), "a recording as text", got) from None
+            if (at := first_foreign_byte(data)) >= 0:
+                notes.append(f"no UTF-8 (byte {at}); read as Windows-1252")
+                return data.decode("cp1252").encode()
+            notes.append("some bytes are not UTF-8")
             data = data.decode("utf-8", "replace").encode()
     return data
 

@@ -1,0 +1,129 @@
+"""Columns most of whose values cannot be used: a wrong unit or a lost sign, not a few bad rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.errors import Faults, InputError
+from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, have_lost_sign, is_above_asu
+from mapfilter.tracks.readers.tables import Field
+from mapfilter.tracks.schema import MISSING_SIGNS
+
+_MOSTLY = 0.5
+_UNAVAILABLE = 2e9
+"""Programs write larger numbers where they have no value."""
+
+
+@dataclass(slots=True)
+class _Values:
+    """Values of one column of a table: how many are given, and those out of range."""
+
+    given: int = 0
+    outside: int = 0
+    low: float = np.inf
+    high: float = -np.inf
+    first: float = np.nan
+    first_line: int = 0
+    whole: bool = True
+
+
+@dataclass(slots=True)
+class _Texts:
+    """Texts of one column of a file: how many are given, and those that are no numbers."""
+
+    given: int = 0
+    bad: int = 0
+    example: str = ""
+
+
+@dataclass(slots=True)
+class Tallies:
+    """Counts of unusable values in columns that a log needs, over all parts of a file.
+
+    Parameters
+    ----------
+    columns : dict of str to str
+        Names in the file of columns that must hold numbers, by field.
+    """
+
+    columns: dict[str, str] = field(default_factory=dict)
+    _values: dict[tuple[str, str], _Values] = field(default_factory=dict)
+    _texts: dict[tuple[str, int], _Texts] = field(default_factory=dict)
+    _levels: int = 0
+    _positive: int = 0
+    _above: int = 0
+
+    def add_values(
+        self, table: str, known: Field, values: Floats, given: int, outside: Bools, line: Ints
+    ) -> None:
+        """Count the values of a vital column that are given, and those out of range."""
+        found = self._values.setdefault((table, known.name), _Values())
+        found.given += given
+        if not outside.any():
+            return
+        bad, line = values[outside], line[outside]
+        marked = (np.abs(bad) >= _UNAVAILABLE) | np.isin(bad, MISSING_SIGNS)
+        found.given -= int(marked.sum())
+        bad, line = bad[~marked], line[~marked]
+        if not bad.size:
+            return
+        if not found.outside:
+            found.first, found.first_line = float(bad[0]), int(line[0])
+        found.outside += bad.size
+        found.whole &= bool((bad % 1 == 0).all())
+        found.low = min(found.low, float(bad.min()))
+        found.high = max(found.high, float(bad.max()))
+
+    def add_texts(self, column: str, part: int, given: int, bad: int, example: str) -> None:
+        """Count the texts of a column in a part of the file; each part counts once."""
+        self._texts[column, part] = _Texts(given, bad, example)
+
+    def add_signs(self, levels: Floats) -> None:
+        """Count levels of a column that holds dBm or ASU, those that are neither among them."""
+        self._levels += int(np.sum(~np.isnan(levels)))
+        self._positive += int(np.sum(levels > 0))
+        self._above += sum(map(is_above_asu, levels[levels > LARGEST_ASU].tolist()))
+
+    def check(self, path: Path, known: Mapping[str, tuple[Field, ...]]) -> None:
+        """Raise InputError for every column that is mostly out of range, or mostly no numbers."""
+        faults = Faults()
+        for name, column in self.columns.items():
+            parts = [texts for (of, _), texts in self._texts.items() if of == column.lower()]
+            bad, given = sum(one.bad for one in parts), sum(one.given for one in parts)
+            if bad > _MOSTLY * given:
+                example = next(one.example for one in parts if one.bad)
+                got = f"{bad} of {given} values that are none, such as {example[:40]!r}"
+                hint = "a unit in each field" if any(map(str.isdigit, example)) else ""
+                faults.add(self._where(path, name), "numbers", got, hint)
+        for (table, name), values in self._values.items():
+            if values.outside > _MOSTLY * values.given:
+                of = next(one for one in known[table] if one.name == name)
+                got = (
+                    f"{values.outside} of {values.given} values outside, {values.low:g} to "
+                    f"{values.high:g} (first {values.first:g} in line {values.first_line})"
+                )
+                faults.add(self._where(path, name), of.expected, got, _mistake(of, values))
+        if have_lost_sign(self._above, self._positive, self._levels) and not faults.found:
+            got = f"{self._positive} of {self._levels} positive, {self._above} of them above "
+            expected = f"dBm below 0, or ASU up to {LARGEST_ASU}"
+            where = self._where(path, "level_dbm")
+            faults.add(where, expected, f"{got}{LARGEST_ASU}", LOST_SIGN)
+        faults.raise_if_any(InputError)
+
+    def _where(self, path: Path, name: str) -> str:
+        column = self.columns.get(name, name)
+        return f"{path}, {name}" if column == name else f"{path}, column {column} ({name})"
+
+
+def _mistake(known: Field, values: _Values) -> str:
+    """Return the likely mistake behind values out of range, by the largest of them."""
+    most = max(abs(values.low), abs(values.high))
+    if known.name == "level_dbm" and (values.high <= 0 or not values.whole):
+        # ASU, RXLEV and bars are whole numbers.
+        return LOST_SIGN if values.low >= 0 and values.high <= -known.low else ""
+    return next((hint for low, high, hint in known.hints if low <= most <= high), "")
