@@ -190,7 +190,7 @@ def test_both_at_one_place_confirm_the_belief(null, reset):
     assert now.null.log_odds == pytest.approx(reset)
 
 
-@pytest.mark.parametrize(("lead", "travelled_m"), [(-30.0, 200.0), (0.0, 1000.0)])
+@pytest.mark.parametrize(("lead", "travelled_m"), [(-30.0, 200.0), (0.0, 900.0)])
 def test_an_alternative_is_abandoned(lead, travelled_m):
     now = after(Belief(TRACKING), rival(lead), null=-2.0, travelled_m=travelled_m)
     assert (now.status, now.taken_over, now.alternative) == (TRACKING, False, None)

@@ -1,6 +1,7 @@
 """Filters take the step of timing advance, and of levels, from the log that states them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from mapfilter.positioning.bayes.options import VEHICLE, BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.positioning.log_options import by_streets_alone, fitted_to_log
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -288,6 +289,24 @@ def test_what_a_log_states_of_its_vehicle_counts_more_than_signs(options):
     assert notes == ("motion: no vehicle's, as the log states it (filter.bayes.vehicle)",)
     own = replace(options, vehicle=False)
     assert fitted_to_log(own, replace(walked, vehicle=True)) == (own, ())
+
+
+def test_a_log_that_states_no_drift_leaves_the_assumed_one():
+    fitted, _ = fitted_to_log(BayesFilter(), moving(sigma_trans_m=0.1, sigma_orient_deg=8.0))
+    assert fitted.drift_deg_per_sqrt_m == BayesFilter().drift_deg_per_sqrt_m > 0
+
+
+@pytest.mark.parametrize(
+    ("cells", "step_m", "alone"), [(("A",), 1.4, True), ((), 1.4, False), (("A",), np.nan, False)]
+)
+def test_streets_alone_start_the_filter_where_a_log_of_a_radio_map_has_but_motion(
+    cells, step_m, alone
+):
+    given, database = headed_rows(step_m), SimpleNamespace(cell_ids=cells)
+    assert by_streets_alone(BayesFilter(), given, database) is alone
+    assert not by_streets_alone(GridFilter(), given, database)
+    fix = pd.DataFrame({"time_s": [1.0], "east_m": [0.0], "north_m": [0.0]})
+    assert not by_streets_alone(BayesFilter(), replace(given, gnss=fix), database)
 
 
 def headed_rows(step_m):
