@@ -8,7 +8,7 @@ import pytest
 import scalar_oracle as oracle
 import small_area
 from fusion_world import MOVING_3D
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import MotionStep
@@ -83,6 +83,10 @@ def test_radii_of_round_and_of_narrow_beliefs():
         width = 2 * ndtr(np.sqrt(radius**2 - along**2) / 0.5) - 1
         total = np.sum(width * np.exp(-0.5 * (along / 5.0) ** 2)) * (along[1] - along[0])
         assert total / (5.0 * sqrt(2 * pi)) == pytest.approx(held, abs=1e-4)
+    # A line: the quantiles of a normal number.
+    radii, share = gaussian_radii_m(np.diag([1e-4, 100.0]), 0.0)
+    np.testing.assert_allclose(radii, 10 * ndtri([0.75, 0.835, 0.975]), rtol=1e-5)
+    assert share == pytest.approx(0.0, abs=1e-12)
     # Between: against many draws.
     covariance = np.array([[100.0, 30.0], [30.0, 40.0]])
     drawn = np.random.default_rng(1).multivariate_normal([0, 0], covariance, 400_000)

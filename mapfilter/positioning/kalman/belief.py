@@ -201,8 +201,8 @@ def _moved(transitions: list[Floats], shifts: list[Floats]) -> Floats:
 def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, float]:
     """Return the radii that hold 50, 67 and 95 %, and the share within a distance.
 
-    In polar coordinates, ``P(r > R) = 1/(π sqrt(ab)) ∫ exp(-R² q / 2) / q dθ`` over half a turn,
-    ``q = cos²θ/a + sin²θ/b``, with the eigenvalues a and b of the covariance.
+    ``P(r > R) = 1/π ∫ exp(-R² / 2v) dφ`` over half a turn, ``v = a cos²φ + b sin²φ``, with the
+    eigenvalues a and b of the covariance: polar coordinates, with ``tan φ = sqrt(a/b) tan θ``.
 
     Examples
     --------
@@ -210,17 +210,16 @@ def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, fl
     >>> radii.round(2).tolist(), round(share, 4)
     ([11.77, 14.89, 24.48], 0.8647)
     """
-    high_m, ratio = _spread(covariance_m2)
-    inverse = _inverse_variances(ratio)
+    high_m, variances = _spread(covariance_m2)
     # The logarithm of what lies beyond is a convex function of the squared radius (the hazard of a
     # sum of two squared normal numbers never grows). So Newton's steps, which begin where the
     # belief is a line, come from below and never pass the root.
     squared = _LINE_SQUARED
     for _ in range(_NEWTON_STEPS):
-        decay = np.exp(-0.5 * squared[:, None] * inverse)
-        beyond = (decay / inverse).mean(axis=1)
-        slope = -0.5 * decay.mean(axis=1)
-        step = np.log((1 - _SHARES) * ratio / beyond) * beyond / slope
+        decay = np.exp(-0.5 * squared[:, None] / variances)
+        beyond = decay.mean(axis=1)
+        slope = -0.5 * (decay / variances).mean(axis=1)
+        step = np.log((1 - _SHARES) / beyond) * beyond / slope
         squared = squared + step
         if np.all(np.abs(step) <= 1e-12 * squared):
             break
@@ -235,19 +234,11 @@ def share_within(covariance_m2: Floats, within_m: float) -> float:
     >>> round(share_within(np.diag([100.0, 100.0]), 20.0), 4)
     0.8647
     """
-    high_m, ratio = _spread(covariance_m2)
-    inverse = _inverse_variances(ratio)
-    beyond = np.exp(-0.5 * (within_m / high_m) ** 2 * inverse) / inverse
-    return float(1 - beyond.mean() / ratio)
+    high_m, variances = _spread(covariance_m2)
+    return float(1 - np.exp(-0.5 * (within_m / high_m) ** 2 / variances).mean())
 
 
-def _spread(covariance_m2: Floats) -> tuple[float, float]:
-    """Return the largest standard deviation, and the least one in relation to it."""
-    values = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
-    # Ratios beyond this are a line for any radius.
-    return float(np.sqrt(values[1])), float(np.sqrt(max(values[0] / values[1], 1e-4)))
-
-
-def _inverse_variances(ratio: float) -> Floats:
-    """Return 1 / variance along each angle, q in :func:`gaussian_radii_m`, with ``a = 1``."""
-    return _COS_SQUARED + (1 - _COS_SQUARED) / ratio**2
+def _spread(covariance_m2: Floats) -> tuple[float, Floats]:
+    """Return the largest standard deviation, and v in :func:`gaussian_radii_m`, with ``a = 1``."""
+    low, high = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
+    return float(np.sqrt(high)), _COS_SQUARED + (1 - _COS_SQUARED) * (low / high)
