@@ -16,7 +16,8 @@ import numpy as np
 
 from mapfilter.errors import ConfigError, Faults, fail
 
-PATH: UnionType = os.PathLike | str
+# As a call, since type checkers want to know of what texts a PathLike is, and isinstance must not.
+PATH: UnionType = operator.or_(Path | str, os.PathLike)
 """With entries of os.scandir and paths of other libraries; each function makes a Path of them."""
 _SHOWN = Path | str | int | float | None
 _MOST_SHOWN = 60

@@ -11,6 +11,7 @@ from cross_world import LATTICE, make_database, walk_log
 
 import mapfilter as mf
 from mapfilter._arguments import Argument, check_arguments
+from mapfilter.geodesy import Lattice
 from mapfilter.roads.maps import resolve_map
 
 
@@ -79,7 +80,8 @@ def test_an_entry_of_a_folder_is_a_path(world, folder, database_path, tmp_path):
     assert mf.open_rasters(entry(next(folder.rglob("*.tif"))), "level").files
     shutil.copy(resolve_map("helsinki"), tmp_path / "helsinki.osm.pbf")
     town = entry(tmp_path / "helsinki.osm.pbf")
-    assert len(mf.read_routes(town, LATTICE)) == len(mf.read_routes("helsinki", LATTICE))
+    lattice = Lattice.covering("EPSG:32635", (385500.0, 6671500.0, 385700.0, 6671700.0), 10.0)
+    assert len(mf.read_routes(town, lattice)) == len(mf.read_routes("helsinki", lattice))
     (tmp_path / "copy").mkdir()
     mf.write_log(world["log"], entry(tmp_path / "copy"))
     assert len(mf.read_log(tmp_path / "copy").truth) == len(world["log"].truth)
