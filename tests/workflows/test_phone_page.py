@@ -9,8 +9,8 @@ import pytest
 from command_line import mapfilter
 
 SAMPLED = 0.1
-"""Share by which figures of a sampled filter may differ: on other processors last digits differ, and
-so may what is drawn by them."""
+"""Share by which figures of a sampled filter may differ: on other processors last digits differ,
+and so may what is drawn by them."""
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "phone-log.rst"
 
 
