@@ -146,11 +146,10 @@ def places_named(headings: Sequence[Heading], field: str, names: Sequence[str]) 
     found: list[int] = []
     for name in map(_words, names):
         same = [at for at, heading in enumerate(headings) if heading.words == name]
-        fitting = [at for at in same if headings[at].fits(field)]
-        doubtful = [at for at in same if headings[at].has_doubtful_unit(field)]
-        found += [*fitting, *doubtful, *(at for at in same if headings[at].has_other_unit(field))][
-            :1
-        ]
+        for judged in (Heading.fits, Heading.has_doubtful_unit, Heading.has_other_unit):
+            if at := [at for at in same if judged(headings[at], field)][:1]:
+                found += at
+                break
     found.sort(key=lambda at: _doubt(headings[at], field))
     return list(dict.fromkeys(found))
 
