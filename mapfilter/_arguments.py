@@ -6,6 +6,7 @@ A wrong object would fail somewhere inside, with a message about an attribute th
 from __future__ import annotations
 
 import operator
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from types import UnionType
@@ -15,8 +16,10 @@ import numpy as np
 
 from mapfilter.errors import ConfigError, Faults, fail
 
-PATH = Path | str
-_SHOWN = PATH | int | float | None
+# As a call, since type checkers want to know of what texts a PathLike is, and isinstance must not.
+PATH: UnionType = operator.or_(Path | str, os.PathLike)
+"""With entries of os.scandir and paths of other libraries; each function makes a Path of them."""
+_SHOWN = Path | str | int | float | None
 _MOST_SHOWN = 60
 
 

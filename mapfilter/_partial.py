@@ -32,24 +32,38 @@ _NAME = re.compile(r"(?:(?P<host>h[0-9a-f]{8})-)?(?P<pid>[0-9]{1,20})-[^-]{0,64}
 def nothing_left(*folders: Path) -> Iterator[None]:
     """Remove, where the block fails, folders that it made and that hold no file.
 
-    Those are the folders, their parents and what is in them, as far as they were not there before.
+    Those are the folders and what is in them, as far as they were not there before, and their
+    parents that were made for them, where nothing else is in those.
     """
-    made: list[Path] = []
-    for folder in folders:
-        while folder not in made and _is_absent(folder):
-            made.append(folder)
-            folder = folder.parent
+    made = [(folder, tuple(_absent_parents(folder))) for folder in folders if _is_absent(folder)]
     try:
         yield
     except BaseException:
         # Longer paths are inside shorter ones.
-        for folder in sorted(made, key=lambda one: -len(one.parts)):
-            for inner in (Path(root) for root, _, _ in os.walk(folder, topdown=False)):
-                # A folder with something in it stays, and what another process begins.
-                with contextlib.suppress(OSError):
-                    if ".partial-" not in inner.name:
-                        inner.rmdir()
+        for folder, parents in sorted(made, key=lambda one: -len(one[0].parts)):
+            removed = False
+            if not folder.is_symlink():
+                for inner in (Path(root) for root, _, _ in os.walk(folder, topdown=False)):
+                    removed = _remove_empty(inner)
+            # Parents of a folder that was not made are of others, and those that hold anything.
+            if removed:
+                all(map(_remove_empty, parents))
         raise
+
+
+def _remove_empty(folder: Path) -> bool:
+    """Remove a folder unless something is in it, or another process begins it."""
+    with contextlib.suppress(OSError):
+        if ".partial-" not in folder.name:
+            folder.rmdir()
+            return True
+    return False
+
+
+def _absent_parents(folder: Path) -> Iterator[Path]:
+    """Yield the parents of a folder that are not there, the innermost first."""
+    while _is_absent(folder := folder.parent):
+        yield folder
 
 
 def _is_absent(folder: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -69,7 +70,7 @@ def locate_reports(
     )
     rng = generator("locate_reports", seed)
     plan = None
-    if isinstance(database, RadioRouteDatabase | PATH):
+    if isinstance(database, RadioRouteDatabase | str | os.PathLike):
         database = opened(database)
         known, plan = reports_of_database(database, level_error_db), database.plan
     elif isinstance(database, Reports):

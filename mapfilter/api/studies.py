@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import pandas as pd
 
-from mapfilter._arguments import Argument, check_arguments, check_seed
+from mapfilter._arguments import PATH, Argument, check_arguments, check_seed
 from mapfilter.api.given import database_argument, opened
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
@@ -288,7 +288,7 @@ def _rasters(value: object) -> Argument:
 
 
 def _roads(value: object) -> Argument:
-    return Argument("roads", value, Layer | Ways, "a map's path or name, or ways")
+    return Argument("roads", value, Layer | PATH | Ways, "a map's path or name, or ways")
 
 
 def _network(

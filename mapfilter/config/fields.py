@@ -52,9 +52,21 @@ def resolve_path(value: Any, info: ValidationInfo) -> Any:
             raise ValueError("a path whose ~ is the folder of a user") from error
         if fault := path_fault(path):
             raise ValueError(fault)
-        # What is printed names no folder that is left again.
-        return Path(os.path.realpath(path)) if ".." in path.parts else path
+        return _without_dots(path)
     return value
+
+
+def _without_dots(path: Path) -> Path:
+    """Return a path that names no folder that is left again, for what is printed.
+
+    Links that follow stay: what a file is, is told by its own name and not by that of its target,
+    which in a store of data has no suffix.
+    """
+    parts = path.parts
+    if ".." not in parts:
+        return path
+    after = len(parts) - parts[::-1].index("..")
+    return Path(os.path.realpath(Path(*parts[:after])), *parts[after:])
 
 
 def resolve_map(value: Any, info: ValidationInfo) -> Any:

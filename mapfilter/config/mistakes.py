@@ -17,10 +17,19 @@ _IN_LINES: tuple[tuple[re.Pattern[str], str], ...] = (
         "a unit after a number; write the number alone, or a text in quotes",
     ),
     (re.compile(rf'{_KEY}\s*"[^"]*\\[^"]*"'), "backslashes in a text; write / or single quotes"),
-    (re.compile(rf"{_KEY}\s*[^\s\"'\[{{0-9#+-]"), "a text without quotes"),
+    (
+        re.compile(rf"{_KEY}\s*(?!(?:true|false|inf|nan)\s*(?:#|$))[^\s\"'\[{{0-9#+-]"),
+        "a text without quotes",
+    ),
     (re.compile(rf"{_KEY}\s*[\"'][^\"']*$"), "a quotation mark left out"),
 )
 """By the line at which TOML ends; the first that matches counts."""
+_TWICE = (
+    ("Cannot overwrite a value", "a key given twice"),
+    ("Duplicate inline table key", "a key given twice"),
+    ("Cannot declare", "a section given twice"),
+)
+"""By what the parser says, whose line is good TOML by itself."""
 
 
 def mistake_in_toml(text: str, error: Exception) -> str:
@@ -31,6 +40,9 @@ def mistake_in_toml(text: str, error: Exception) -> str:
     >>> mistake_in_toml("a = 0,5", ValueError("Expected a newline (at line 1, column 6)"))
     'a decimal comma; write a point'
     """
+    for said, hint in _TWICE:
+        if str(error).startswith(said):
+            return hint
     found, lines = _AT_LINE.search(str(error)), text.splitlines()
     if found is None or not 1 <= int(found[1]) <= len(lines):
         return ""

@@ -10,7 +10,13 @@ from typing import Literal
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.radio.cell_rules import TECHNOLOGIES, technology_faults
-from mapfilter.radio.headings import Heading, places_named, resembling, unit_of
+from mapfilter.radio.headings import (
+    Heading,
+    doubtful_units,
+    places_named,
+    resembling,
+    unit_of,
+)
 from mapfilter.radio.identities import parse_cgi, technology
 from mapfilter.radio.reported_power import ASSUMABLE, REPORTED_SHARE_DB, reported_eirp_dbm
 from mapfilter.radio.tables import Table
@@ -141,12 +147,13 @@ def arrange(
         table = replace(table, rows=((1, list(header)), *table.rows))
         header = OPENCELLID_HEADER
     picked = _pick(table, header, layout, columns)
+    headings = [Heading.of(name) for name in header]
     unused = _unused(header, picked, layout, columns)
     fields = [*picked, *(name for name in defaults if name not in picked)]
     fields += [name for name in _IDENTITY if "cgi" in picked and name not in fields]
     fields = [name for name in fields if name != "cgi"]
     composed = "cell" not in fields and all(name in fields for name in _IDENTITY)
-    implied = [_IMPLIED.get(Heading.of(name).words.replace(" ", "_")) for name in header]
+    implied = [_IMPLIED.get(heading.words.replace(" ", "_")) for heading in headings]
     if any(implied[i] for at in picked.values() for i in at) and "technology" not in fields:
         fields.append("technology")
     if (defaults or layout == "opencellid") and "assumed" not in fields:
@@ -196,8 +203,7 @@ def arrange(
             f"technology of {len(beyond)} cells left out, as their identities are beyond its "
             f"limits, such as {beyond[0]}",
         )
-    if unused:
-        notes += (unused,)
+    notes += tuple(filter(None, (doubtful_units(headings, picked), unused)))
     shown = {
         name: f"{header[at[0]]} ({name})" for name, at in picked.items() if header[at[0]] != name
     }

@@ -6,29 +6,62 @@ import difflib
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-_METRES = frozenset({"m", "metre", "metres", "meter", "meters"})
-_DEGREES = frozenset({"°", "º", "˚", "deg", "degree", "degrees"})
-_UNITS: Mapping[str, tuple[str, frozenset[str]]] = {
-    "_m": ("metres", _METRES),
-    "_deg": ("degrees", _DEGREES),
-    "_dbm": ("dBm", frozenset({"dbm"})),
-    "_db": ("dB", frozenset({"db"})),
-    "_mhz": ("MHz", frozenset({"mhz"})),
-}
-"""By the ending of a field, its unit in messages, and how headings may write it."""
-_NO_UNIT: tuple[str, frozenset[str]] = ("", frozenset())
-_ENDINGS = {"lat": "_deg", "lon": "_deg", "east": "_m", "north": "_m"}
-"""Of fields whose names have none."""
-_OTHER_UNITS = frozenset(
+_METRES = frozenset(
+    {"m", "metre", "metres", "meter", "meters", "mètre", "mètres", "metros", "metri", "mtr", "magl"}
+)
+# In German a "Grad" is a degree; gradians are found as "gon" too.
+_DEGREES = frozenset(
     {
-        *("ft", "foot", "feet", "in", "inch", "yd", "km", "cm", "mm", "mi"),
-        *("rad", "radian", "radians", "mrad", "gon", "grad", "mil", "mils"),
-        *("w", "watt", "watts", "mw", "kw", "dbw", "dbµv/m", "dbuv/m"),
-        *("hz", "khz", "ghz"),
+        "°",
+        "º",
+        "˚",
+        "deg",
+        "degs",
+        "degree",
+        "degrees",
+        "grad",
+        "grados",
+        "gradi",
+        "degré",
+        "degrés",
     }
 )
-_KNOWN_UNITS = _OTHER_UNITS.union(*(written for _, written in _UNITS.values()))
+_POSITIONS_IN = frozenset({"e", "n", "east", "north"})
+"""Ways in which positions count, which headings write in place of a unit."""
+_LENGTHS = frozenset({"ft", "foot", "feet", "in", "inch", "inches", "yd", "km", "cm", "mm", "mi"})
+_ANGLES = frozenset({"rad", "radian", "radians", "mrad", "gon", "mil", "mils"})
+_POWERS = frozenset({"w", "watt", "watts", "mw", "kw", "dbw", "dbµv/m", "dbμv/m", "dbuv/m"})
+_FREQUENCIES = frozenset({"hz", "khz", "ghz"})
+_DECIBELS = frozenset({"db"})
+
+
+class _Unit(NamedTuple):
+    """A unit as messages name it, how headings may write it, and others of its dimension."""
+
+    name: str
+    written: frozenset[str]
+    others: frozenset[str]
+
+
+_UNITS: Mapping[str, _Unit] = {
+    "_m": _Unit("metres", _METRES, _LENGTHS),
+    "_deg": _Unit("degrees", _DEGREES, _ANGLES),
+    "_dbm": _Unit("dBm", frozenset({"dbm"}), _POWERS),
+    "_db": _Unit("dB", _DECIBELS, frozenset()),
+    "_mhz": _Unit("MHz", frozenset({"mhz"}), _FREQUENCIES),
+}
+"""By the ending of a field."""
+_NO_UNIT = _Unit("", frozenset(), frozenset())
+# A position may be in degrees or in metres; each of them is wrong for the other's field.
+_OF_DEGREES = _Unit("degrees", _DEGREES | _POSITIONS_IN, _ANGLES | _LENGTHS | _METRES)
+_OF_METRES = _Unit("metres", _METRES | _POSITIONS_IN, _ANGLES | _LENGTHS | _DEGREES)
+_PLACES = {"lat": _OF_DEGREES, "lon": _OF_DEGREES, "east": _OF_METRES, "north": _OF_METRES}
+"""Of fields whose names have no ending."""
+_KNOWN_UNITS = frozenset[str]().union(*(unit.written | unit.others for unit in _UNITS.values()))
+_BEFORE_UNITS = re.compile(r"^(in|decimal)\s+")
+"""Words before a unit, as in "in m"; "in" alone is inches."""
 _BRACKETS = {")": "(", "]": "["}
 _APART = re.compile(r"[\s_-]+")
 _ALIKE = 0.85
@@ -78,14 +111,19 @@ class Heading:
 
     def fits(self, field: str) -> bool:
         """Return whether the heading has no unit, or the unit of a field."""
-        # What follows a unit explains it, as in "m AGL".
-        return not self.unit or self.unit.split()[0] in _unit(field)[1]
+        return not self.unit or _written(self.unit) in _unit(field).written
 
     def has_other_unit(self, field: str) -> bool:
-        """Return whether the heading has a unit that is known and not that of a field."""
-        unit = self.unit.split()[0] if self.unit else ""
-        own = _unit(field)[1]
-        return bool(own) and unit in _KNOWN_UNITS and unit not in own
+        """Return whether the heading has another unit of what a field measures, as feet."""
+        return _written(self.unit) in _unit(field).others
+
+    def has_doubtful_unit(self, field: str) -> bool:
+        """Return whether the heading has a known unit that does not measure a field, as dB do.
+
+        Letters may mean something else then: the W of a longitude is no watt.
+        """
+        unit, known = _written(self.unit), _unit(field)
+        return bool(known.name) and unit in _KNOWN_UNITS - known.written - known.others
 
 
 def unit_of(field: str) -> str:
@@ -96,20 +134,41 @@ def unit_of(field: str) -> str:
     >>> unit_of("eirp_dbm"), unit_of("east"), unit_of("antenna")
     ('dBm', 'metres', '')
     """
-    return _unit(field)[0]
+    return _unit(field).name
 
 
 def places_named(headings: Sequence[Heading], field: str, names: Sequence[str]) -> list[int]:
     """Return which headings have one of the names of a field, in the order of the names.
 
-    Those of the field's unit come before those of another one, which the caller refuses.
+    Those of the field's unit come before those of a doubtful one, and these before those of another
+    one, which the caller refuses.
     """
     found: list[int] = []
     for name in map(_words, names):
         same = [at for at, heading in enumerate(headings) if heading.words == name]
-        fitting = [at for at in same if headings[at].fits(field)][:1]
-        found += fitting or [at for at in same if headings[at].has_other_unit(field)][:1]
+        for judged in (Heading.fits, Heading.has_doubtful_unit, Heading.has_other_unit):
+            if at := [at for at in same if judged(headings[at], field)][:1]:
+                found += at
+                break
+    found.sort(key=lambda at: _doubt(headings[at], field))
     return list(dict.fromkeys(found))
+
+
+def doubtful_units(headings: Sequence[Heading], picked: Mapping[str, Sequence[int]]) -> str:
+    """Return a note on the columns of fields that are read in spite of their units, or "".
+
+    Examples
+    --------
+    >>> doubtful_units([Heading.of("EIRP (dB)")], {"eirp_dbm": [0]})
+    "units that do not belong to fields: 'EIRP (dB)' is read as eirp_dbm in dBm"
+    """
+    named = ", ".join(
+        f"{headings[at].name!r} is read as {field} in {unit_of(field)}"
+        for field, places in picked.items()
+        for at in places
+        if headings[at].has_doubtful_unit(field)
+    )
+    return f"units that do not belong to fields: {named}" if named else ""
 
 
 def resembling(
@@ -132,9 +191,21 @@ def resembling(
     return found
 
 
-def _unit(field: str) -> tuple[str, frozenset[str]]:
-    ending = _ENDINGS.get(field, f"_{field.rpartition('_')[2]}")
-    return _UNITS.get(ending, _NO_UNIT)
+def _unit(field: str) -> _Unit:
+    return _PLACES.get(field) or _UNITS.get(f"_{field.rpartition('_')[2]}", _NO_UNIT)
+
+
+def _written(unit: str) -> str:
+    """Return a unit alone: what follows explains it, as in "m AGL", and so do "in m" and "°N"."""
+    first = re.split(r"[\s,;_-]", _BEFORE_UNITS.sub("", unit), maxsplit=1)[0].rstrip(".")
+    if first[:1] in _DEGREES:
+        return first[0]
+    without_points = first.replace(".", "")
+    return without_points if without_points in _KNOWN_UNITS else first
+
+
+def _doubt(heading: Heading, field: str) -> int:
+    return 0 if heading.fits(field) else 1 if heading.has_doubtful_unit(field) else 2
 
 
 def _words(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +12,7 @@ import numpy as np
 import shapely
 from geopandas import GeoDataFrame
 
-from mapfilter._arguments import Argument, check_arguments
+from mapfilter._arguments import PATH, Argument, check_arguments
 from mapfilter._types import Bools
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
@@ -94,12 +95,13 @@ def read_routes(
     """
     check_arguments(
         "read_routes",
-        Argument("roads", roads, Layer | Ways | None, "a map's path or name, or ways"),
+        Argument("roads", roads, Layer | PATH | Ways | None, "a map's path or name, or ways"),
         Argument("lattice", lattice, Lattice, "a lattice such as rasters.lattice"),
     )
     if roads is None and landuse is None:
         raise fail(InputError, "roads", "a map, a layer or ways; or landuse", "none")
     found = Roads(Ways.none(lattice.crs))
+    roads = Path(roads) if isinstance(roads, os.PathLike) else roads
     if isinstance(roads, Ways):
         found = Roads(roads)
     elif roads is not None:
@@ -172,6 +174,7 @@ def read_roads(
     InputError
         The file is missing or damaged, or has nothing in the area.
     """
+    source = Path(source) if isinstance(source, os.PathLike) else source
     by_class_m = half_width_by_class_m or {}
     crs, wide_m = lattice.crs, within_reach_m(lattice.bounds_m, half_width_m, by_class_m)
     if isinstance(source, GeoDataFrame) or layer_name is not None or not is_map(source):

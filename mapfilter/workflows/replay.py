@@ -185,7 +185,10 @@ def run_replay(
 
     own = [database.path] if database is not None else []
     check_out_apart(out, [*own, *(path for path in journeys.paths if is_log(path))])
-    check_figures_of_replay(out)
+    # Several logs are folders of these names.
+    several = journeys.paths if len(journeys.paths) > 1 else []
+    for folder in (out, *(out / path.name for path in several)):
+        check_figures_of_replay(folder)
     if database is None and config.cells.plan is None:
         journeys.check_siteless()
     if database is not None:
@@ -198,8 +201,6 @@ def run_replay(
     def located(index: int, path: Path, new: Path) -> ReplayedLog:
         opened = journeys.open(path)
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
-        if count > 1:
-            check_figures_of_replay(out / name)
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         fitted, notes = fitted_to_log(options, log)
         notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from mapfilter._io import read_json
@@ -11,6 +12,8 @@ ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")
 FIGURES = "figures.json"
 REPLAY_HTML = "replay.html"
 SUMMARY = "summary.json"
+POSITIONS = "positions.csv"
+"""Of single reports."""
 
 PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
 
@@ -22,22 +25,30 @@ _OF_REPLAY, _OF_REPORTS = "filter", "database_reports"
 
 
 def check_figures_of_replay(out: Path) -> None:
-    """Raise OutputError where a folder holds figures that a replay did not write."""
-    _check_figures(out, _OF_REPLAY, "a replay")
+    """Raise OutputError where a folder holds figures that a replay did not write.
+
+    Damaged ones beside its other files are taken for its own.
+    """
+    _check_figures(out, _OF_REPLAY, "a replay", ESTIMATES)
 
 
 def check_figures_of_reports(out: Path) -> None:
-    """Raise OutputError where a folder holds figures that ``locate`` did not write."""
-    _check_figures(out, _OF_REPORTS, "mapfilter locate")
+    """Raise OutputError where a folder holds figures that ``locate`` did not write.
+
+    Damaged ones beside its other files are taken for its own.
+    """
+    _check_figures(out, _OF_REPORTS, "mapfilter locate", (POSITIONS,))
 
 
-def _check_figures(out: Path, entry: str, whose: str) -> None:
+def _check_figures(out: Path, entry: str, whose: str, others_of_it: Sequence[str]) -> None:
     figures = out / FIGURES
     if not figures.is_file():
         return
     try:
         found = read_json(figures)
     except StoreError:
+        if any((out / name).is_file() for name in others_of_it):
+            return
         found = {}
     if entry not in found:
         others = {_OF_REPLAY: "those of a replay", _OF_REPORTS: "those of mapfilter locate"}

@@ -128,6 +128,42 @@ def test_folders_that_a_block_made_and_left_empty_are_removed_where_it_fails(tmp
     assert sorted(path.name for path in (tmp_path / "there").rglob("*")) == ["file", "kept"]
 
 
+def test_folders_that_another_program_makes_meanwhile_stay(tmp_path):
+    runs = tmp_path / "deep" / "runs"
+
+    def make_folders_and_fail():
+        (runs / "a" / "inner").mkdir(parents=True)
+        (runs / "b" / "raw").mkdir(parents=True)
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"), nothing_left(runs / "a"):
+        make_folders_and_fail()
+    left = sorted(str(path.relative_to(runs)) for path in runs.rglob("*"))
+    assert left == ["b", "b/raw"]
+
+
+def test_a_folder_above_that_another_program_makes_meanwhile_stays(tmp_path):
+    def make_folder_and_fail():
+        (tmp_path / "runs").mkdir()
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"), nothing_left(tmp_path / "runs" / "a"):
+        make_folder_and_fail()
+    assert (tmp_path / "runs").is_dir()
+
+
+def test_folders_behind_a_link_stay(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "far")
+
+    def make_folders_and_fail():
+        (tmp_path / "far" / "empty").mkdir(parents=True)
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"), nothing_left(tmp_path / "link"):
+        make_folders_and_fail()
+    assert (tmp_path / "far" / "empty").is_dir()
+
+
 def test_an_older_folder_stays_and_so_does_what_a_block_made_that_succeeds(tmp_path):
     older = tmp_path / "older"
     older.mkdir()

@@ -58,6 +58,24 @@ def test_the_folder_above_a_link_is_that_of_its_target(tmp_path):
     assert found.of(Terrain).table == tmp_path / "far" / "table.csv"
 
 
+@pytest.mark.parametrize("given", ["../plans/table.csv", "../area/../plans/table.csv"])
+def test_links_into_a_store_of_data_keep_their_names(given, tmp_path):
+    for name in ("store", "area"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "store" / "9f3ac1").write_text("cell\n", encoding="utf-8")
+    (tmp_path / "store" / "77b0.dir").mkdir()
+    (tmp_path / "store" / "77b0.dir" / "table.csv").symlink_to(tmp_path / "store" / "9f3ac1")
+    (tmp_path / "plans").symlink_to(tmp_path / "store" / "77b0.dir")
+    found = TerrainSection.model_validate({"table": given}, context={"folder": tmp_path / "area"})
+    assert found.of(Terrain).table == tmp_path / "plans" / "table.csv"
+
+
+def test_the_folder_above_is_named_without_dots(tmp_path):
+    (tmp_path / "area").mkdir()
+    found = TerrainSection.model_validate({"table": ".."}, context={"folder": tmp_path / "area"})
+    assert found.of(Terrain).table == tmp_path
+
+
 def test_without_a_path_there_is_the_default():
     assert TerrainSection().of(Terrain) == Terrain()
     assert OtherSection().table is None

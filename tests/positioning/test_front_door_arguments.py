@@ -1,5 +1,7 @@
 """Wrong arguments at the front door: the message names what was expected, found and exchanged."""
 
+import os
+import shutil
 import subprocess
 import sys
 
@@ -9,6 +11,8 @@ from cross_world import LATTICE, make_database, walk_log
 
 import mapfilter as mf
 from mapfilter._arguments import Argument, check_arguments
+from mapfilter.geodesy import Lattice
+from mapfilter.roads.maps import resolve_map
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +61,30 @@ def test_a_log_and_a_database_may_be_given_by_path(world, folder, database_path)
     found = mf.locate_reports(str(folder / "log"), database_path)
     pd.testing.assert_frame_equal(found.to_dataframe(), by_object)
     assert repr(mf.bound(database_path)) == repr(mf.bound(world["database"]))
+
+
+def entry(path):
+    """Return a path as os.scandir gives it, which is neither a Path nor a text."""
+    with os.scandir(path.parent) as entries:
+        return next(one for one in entries if one.name == path.name)
+
+
+def test_an_entry_of_a_folder_is_a_path(world, folder, database_path, tmp_path):
+    log, database = entry(folder / "log"), entry(database_path)
+    found = mf.locate(log, database, "candidate")
+    pd.testing.assert_frame_equal(found.to_dataframe(), world["track"].to_dataframe())
+    assert mf.open_database(database).cell_ids == world["database"].cell_ids
+    for given in (log, [log]):
+        assert len(mf.read_log(given, truth=log).truth) == len(world["log"].truth)
+    assert len(mf.locate_reports(log, database).to_dataframe())
+    assert mf.open_rasters(entry(next(folder.rglob("*.tif"))), "level").files
+    shutil.copy(resolve_map("helsinki"), tmp_path / "helsinki.osm.pbf")
+    town = entry(tmp_path / "helsinki.osm.pbf")
+    lattice = Lattice.covering("EPSG:32635", (385500.0, 6671500.0, 385700.0, 6671700.0), 10.0)
+    assert len(mf.read_routes(town, lattice)) == len(mf.read_routes("helsinki", lattice))
+    (tmp_path / "copy").mkdir()
+    mf.write_log(world["log"], entry(tmp_path / "copy"))
+    assert len(mf.read_log(tmp_path / "copy").truth) == len(world["log"].truth)
 
 
 def test_a_path_without_a_database_is_named(world, tmp_path):

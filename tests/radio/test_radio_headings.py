@@ -45,9 +45,66 @@ def test_displayed_headings_are_the_fields(tmp_path):
     assert plan.notes == ("frequency_mhz = 1800 for 1 of 1 cells without one",)
 
 
-@pytest.mark.parametrize("shown", ["HEIGHT", "height [m]", "Height(m)", "Height (m AGL)"])
+@pytest.mark.parametrize(
+    "shown",
+    [
+        *("HEIGHT", "height [m]", "Height(m)", "Height (m AGL)"),
+        *("Height (in m)", "Height [m.]", "Height (mAGL)", "Height (m.a.g.l.)", "Height (m, AGL)"),
+        *("Height (in metres above ground)", "Height (Meter)", "HEIGHT (m-AGL)"),
+    ],
+)
 def test_spellings_of_a_unit(shown, tmp_path):
-    assert read(tmp_path, SHOWN.replace("Height (m)", shown))["K1"].height_m == 32.0
+    plan = read(tmp_path, SHOWN.replace("Height (m)", shown))
+    assert plan["K1"].height_m == 32.0
+    assert plan.notes == ("frequency_mhz = 1800 for 1 of 1 cells without one",)
+
+
+@pytest.mark.parametrize(
+    "shown",
+    ["Azimuth [in deg]", "Azimut (Grad)", "Azimuth (deg.)", "Azimuth (°N)", "Azimuth (° T)"],
+)
+def test_spellings_of_degrees(shown, tmp_path):
+    plan = read(tmp_path, SHOWN.replace("Azimuth (°)", shown))
+    assert plan["K1"].azimuth_deg == 120.0
+    assert plan.notes == ("frequency_mhz = 1800 for 1 of 1 cells without one",)
+
+
+def test_spellings_of_megahertz(tmp_path):
+    text = SHOWN.replace("Frequency Band", "Frequency (in MHz)").replace("GSM 1800", "942,5")
+    plan = read(tmp_path, text)
+    assert (plan["K1"].frequency_mhz, plan.notes) == (942.5, ())
+
+
+@pytest.mark.parametrize(
+    ("east", "north"), [("E", "N"), ("decimal degrees", "Decimal Degrees"), ("°E", "in °")]
+)
+def test_spellings_of_positions(east, north, tmp_path):
+    text = SHOWN.replace(";X;Y;", f";Longitude ({east});Latitude ({north});")
+    cell = read(tmp_path, text.replace("385584,61;6671974,34", "24,94;60,17"))["K1"]
+    assert (cell.east_m, cell.north_m) == pytest.approx((385_700, 6_672_100), abs=300)
+
+
+def test_a_unit_that_does_not_measure_the_field_is_read_and_noted(tmp_path):
+    """The W of a longitude is no watt, and an EIRP in "dB" is one in dBm that was cut short."""
+    text = SHOWN.replace(";X;Y;", ";Longitude (W);Latitude;").replace("EIRP (dBm)", "EIRP (dB)")
+    plan = read(tmp_path, text.replace("385584,61;6671974,34", "24,94;60,17"))
+    assert plan["K1"].eirp_dbm == 55.5
+    assert plan.notes[-1] == (
+        "units that do not belong to fields: 'Longitude (W)' is read as lon in degrees, "
+        "'EIRP (dB)' is read as eirp_dbm in dBm"
+    )
+
+
+@pytest.mark.parametrize("shown", ["Höhe (in m)", "Höhe (m ü. G.)", "Höhe (dB)", "Höhe (üNN)"])
+def test_a_named_column_is_read_whatever_its_unit_may_mean(shown, tmp_path):
+    plan = read(tmp_path, SHOWN.replace("Height (m)", shown), columns={"height_m": shown})
+    assert plan["K1"].height_m == 32.0
+    assert any(shown in note for note in plan.notes) == (shown == "Höhe (dB)")
+
+
+def test_a_field_of_the_right_unit_goes_before_another_name_of_another_one(tmp_path):
+    text = SHOWN.replace("Additional Electrical Downtilt (°)", "Electrical Tilt (rad);REDT")
+    assert read(tmp_path, text.replace(";2;", ";0,03;2;"))["K1"].downtilt_deg == 2.0
 
 
 @pytest.mark.parametrize(
@@ -57,6 +114,9 @@ def test_spellings_of_a_unit(shown, tmp_path):
         ("EIRP (dBm)", "EIRP (W)", "expected eirp_dbm in dBm, found 'EIRP (W)'"),
         ("Azimuth (°)", "Azimuth (rad)", "expected azimuth_deg in degrees, found 'Azimuth (rad)'"),
         ("X;", "X (km);", "expected east in metres, found 'X (km)'"),
+        ("Height (m)", "Height (in)", "expected height_m in metres, found 'Height (in)'"),
+        ("Height (m)", "Height (in feet)", "expected height_m in metres, found 'Height (in feet)'"),
+        ("Azimuth (°)", "Azimuth (gon)", "expected azimuth_deg in degrees, found 'Azimuth (gon)'"),
     ],
 )
 def test_another_unit_is_refused(right, wrong, told, tmp_path):

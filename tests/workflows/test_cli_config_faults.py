@@ -5,6 +5,8 @@ import os
 import pytest
 from command_line import assert_done, assert_refused, contents, mapfilter
 
+from mapfilter.config.mistakes import mistake_in_toml
+
 BOX = "area.bbox=24.9420,60.1660,24.9495,60.1697"
 
 
@@ -38,10 +40,21 @@ def test_missing_file(command, tmp_path):
         ('[cells]\nplan = "C:\\maps\\cells.csv"', "(likely: backslashes in a text; write /"),
         ('[cells]\nplan = "cells.csv\n', "(likely: a quotation mark left out)"),
         ("[area]\n[area]\n", "expected TOML"),
+        ("[area]\n[area]\n", "(likely: a section given twice)"),
+        ("[x]\nsmooth = true\nsmooth = true\ny = 1", "(likely: a key given twice)"),
+        ("[x]\nmap = 'a'\nmap = 'b'  # new", "(likely: a key given twice)"),
+        ("x = {y = 1, y = 2}\n", "(likely: a key given twice)"),
+        ("[x]\nsmooth = true yes\n", "(likely: a text without quotes)"),
+        ("[x]\nsmooth = True\n", "(likely: a text without quotes)"),
     ],
 )
 def test_empty_truncated_or_other_file(text, told, write):
     assert_refused(mapfilter("predict", "-c", write(text)), "given.toml: ", told)
+
+
+@pytest.mark.parametrize("value", ["true", "false", "inf", "nan", "true  # as before"])
+def test_a_good_value_is_not_called_a_text_without_quotes(value):
+    assert mistake_in_toml(f"a = {value}", ValueError("Else (at line 1, column 5)")) == ""
 
 
 def test_a_folder_for_a_file(tmp_path):

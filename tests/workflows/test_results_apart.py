@@ -1,7 +1,11 @@
 """Figures of one command are never replaced by those of another."""
 
+import json
+
 import pytest
 from command_line import ONE, assert_done, assert_refused, contents, mapfilter, settings
+
+from mapfilter.workflows import replay
 
 
 @pytest.fixture
@@ -52,6 +56,41 @@ def test_the_folder_of_one_log_of_several_is_looked_at_too(commands, world, log,
     before = contents(tmp_path / "all")
     assert_refused(commands["replay"](world.journeys, "--out", tmp_path / "all"), f"{ONE}/figures")
     assert contents(tmp_path / "all") == before
+
+
+def test_the_folders_of_all_logs_are_looked_at_before_the_first_is_located(
+    commands, world, tmp_path, monkeypatch
+):
+    last = max(path.name for path in world.journeys.iterdir() if path.is_dir())
+    assert last != ONE
+    (tmp_path / "all" / last).mkdir(parents=True)
+    (tmp_path / "all" / last / "figures.json").write_text('{"mine": 1}', encoding="utf-8")
+    located = []
+    monkeypatch.setattr(replay, "locate", lambda *given, **_: located.append(given))
+    out = "--out", tmp_path / "all"
+    assert_refused(commands["replay"](world.journeys, *out), f"{last}/figures.json", "found others")
+    assert not located
+
+
+def test_results_of_several_logs_are_replaced_by_those_of_another_replay(commands, world, tmp_path):
+    for _ in range(2):
+        assert_done(commands["replay"](world.journeys, "--out", tmp_path / "all"))
+
+
+@pytest.mark.parametrize("damage", ["", '{"log": "my-wa'])
+@pytest.mark.parametrize("command", ["replay", "locate"])
+def test_damaged_figures_beside_files_of_the_command_are_replaced(
+    command, damage, commands, log, tmp_path
+):
+    folder = tmp_path / "located"
+    assert_done(commands[command](log, "--out", folder))
+    whole = (folder / "figures.json").read_text(encoding="utf-8")
+    (folder / "figures.json").write_text(damage, encoding="utf-8")
+    other = "locate" if command == "replay" else "replay"
+    assert_refused(commands[other](log, "--out", folder), "or nothing yet, found others")
+    assert_done(commands[command](log, "--out", folder))
+    again = json.loads((folder / "figures.json").read_text(encoding="utf-8"))
+    assert again.keys() == json.loads(whole).keys()
 
 
 def test_the_default_folders_differ(commands, log, tmp_path, monkeypatch):
