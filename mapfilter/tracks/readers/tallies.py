@@ -10,7 +10,7 @@ import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, have_lost_sign, is_above_asu
+from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs
 from mapfilter.tracks.readers.tables import Field
 from mapfilter.tracks.schema import MISSING_SIGNS
 
@@ -49,14 +49,14 @@ class Tallies:
     ----------
     columns : dict of str to str
         Names in the file of columns that must hold numbers, by field.
+    signs : Signs
+        Of levels in a column that holds dBm or ASU.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
     _values: dict[tuple[str, str], _Values] = field(default_factory=dict)
     _texts: dict[tuple[str, int], _Texts] = field(default_factory=dict)
-    _levels: int = 0
-    _positive: int = 0
-    _above: int = 0
+    signs: Signs = field(default_factory=Signs)
 
     def add_values(
         self, table: str, known: Field, values: Floats, given: int, outside: Bools, line: Ints
@@ -83,12 +83,6 @@ class Tallies:
         """Count the texts of a column in a part of the file; each part counts once."""
         self._texts[column, part] = _Texts(given, bad, example)
 
-    def add_signs(self, levels: Floats) -> None:
-        """Count levels of a column that holds dBm or ASU, those that are neither among them."""
-        self._levels += int(np.sum(~np.isnan(levels)))
-        self._positive += int(np.sum(levels > 0))
-        self._above += sum(map(is_above_asu, levels[levels > LARGEST_ASU].tolist()))
-
     def check(self, path: Path, known: Mapping[str, tuple[Field, ...]]) -> None:
         """Raise InputError for every column that is mostly out of range, or mostly no numbers."""
         faults = Faults()
@@ -108,8 +102,9 @@ class Tallies:
                     f"{values.high:g} (first {values.first:g} in line {values.first_line})"
                 )
                 faults.add(self._where(path, name), of.expected, got, _mistake(of, values))
-        if have_lost_sign(self._above, self._positive, self._levels) and not faults.found:
-            got = f"{self._positive} of {self._levels} positive, {self._above} of them above "
+        signs = self.signs
+        if signs.lost and not faults.found:
+            got = f"{signs.positive} of {signs.levels} positive, {signs.above} of them above "
             expected = f"dBm below 0, or ASU up to {LARGEST_ASU}"
             where = self._where(path, "level_dbm")
             faults.add(where, expected, f"{got}{LARGEST_ASU}", LOST_SIGN)
