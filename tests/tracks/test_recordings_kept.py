@@ -120,3 +120,33 @@ def test_where_a_file_is_cut_into_parts_does_not_matter(drive, monkeypatch):
         monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", part_bytes)
         with pytest.raises(InputError, match="found 20 of 32 values"):
             drive(level_dbm=levels)
+
+
+def test_unwrapped_headings_are_wrapped(drive, monkeypatch):
+    heading = np.linspace(0.0, 19.8, 60)
+    told = "motion, heading_rad: 41 values beyond a turn, wrapped (unwrapped)"
+    for part_bytes in (1 << 24, 700):
+        monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", part_bytes)
+        found = drive(heading_rad=heading)
+        kept = found.tables["motion"]["heading_rad"].to_numpy()
+        assert np.cos(kept - heading) == pytest.approx(1.0)
+        assert np.abs(kept).max() <= 6.3
+        assert not found.ignored
+        assert told in found.notes or part_bytes == 700
+    # Strays are left out, and cut off files stay in doubt.
+    heading[[20, 50]] = 999.0
+    found = drive(heading_rad=heading)
+    assert found.tables["motion"]["heading_rad"].isna().sum() == 2
+    found = drive(heading_rad=12.0 + heading)
+    assert found.tables["motion"]["heading_rad"].isna().all()
+    assert any("values are not radians" in note for note in found.ignored)
+
+
+@pytest.mark.parametrize(
+    "degrees",
+    [ROW + 1, (7.3 * ROW) % 360, np.repeat([30.4, 120.2, 211.9, 300.3], 15) + 4 * np.sin(5 * ROW)],
+    ids=["whole", "circle", "block"],
+)
+def test_degrees_that_can_be_no_radians_are_refused(degrees, drive):
+    with pytest.raises(InputError, match=r"heading_rad: expected radians .*degrees given for"):
+        drive(heading_rad=degrees)

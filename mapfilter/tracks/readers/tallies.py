@@ -12,6 +12,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs
 from mapfilter.tracks.readers.tables import Field
+from mapfilter.tracks.readers.wound import Winding
 
 _MOSTLY = 0.5
 _UNAVAILABLE = 2e9
@@ -57,6 +58,7 @@ class Tallies:
     columns: dict[str, str] = field(default_factory=dict)
     _values: dict[tuple[str, str], _Values] = field(default_factory=dict)
     _texts: dict[tuple[str, int], _Texts] = field(default_factory=dict)
+    _windings: dict[tuple[str, str], Winding] = field(default_factory=dict)
     signs: Signs = field(default_factory=Signs)
 
     def add_values(
@@ -79,6 +81,10 @@ class Tallies:
         found.whole &= bool((bad % 1 == 0).all())
         found.low = min(found.low, float(bad.min()))
         found.high = max(found.high, float(bad.max()))
+
+    def winding(self, table: str, known: Field) -> Winding:
+        """Return what is known so far of the headings of a column."""
+        return self._windings.setdefault((table, known.name), Winding())
 
     def add_texts(
         self, column: str, part: int, given: int, bad: int = 0, examples: Sequence[str] = ()
@@ -103,7 +109,8 @@ class Tallies:
                 faults.add(self._where(path, name), "numbers", got, "a unit in each field")
         for (table, name), values in self._values.items():
             # One and the same number is a mark of missing values.
-            if values.low < values.high and values.outside > _MOSTLY * values.given:
+            mark = values.low >= values.high
+            if not mark and values.outside > _MOSTLY * values.given and self._sure(table, name):
                 of = next(one for one in known[table] if one.name == name)
                 got = (
                     f"{values.outside} of {values.given} values outside, {values.low:g} to "
@@ -117,6 +124,11 @@ class Tallies:
             where = self._where(path, "level_dbm")
             faults.add(where, expected, f"{got}{LARGEST_ASU}", LOST_SIGN)
         faults.raise_if_any(InputError)
+
+    def _sure(self, table: str, name: str) -> bool:
+        """Return whether values out of range can be no good ones."""
+        winding = self._windings.get((table, name))
+        return winding is None or winding.degrees
 
     def _where(self, path: Path, name: str) -> str:
         column = self.columns.get(name, name)
