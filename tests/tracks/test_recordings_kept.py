@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from made_recordings import COUNT, MADE
 
+import mapfilter as mf
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers.formats import read_recording
 
@@ -150,3 +151,26 @@ def test_unwrapped_headings_are_wrapped(drive, monkeypatch):
 def test_degrees_that_can_be_no_radians_are_refused(degrees, drive):
     with pytest.raises(InputError, match=r"heading_rad: expected radians .*degrees given for"):
         drive(heading_rad=degrees)
+
+
+AZIMUTH_DEG = np.repeat([20.0, 110.0, 65.0, 160.0, 20.0], 12)
+
+
+def log_notes(folder, azimuth_deg, east_m, north_m):
+    """Return the notes of a log of steps with a compass, and of a truth in metres."""
+    time_s = 1_777_629_600 + np.arange(60)
+    steps = pd.DataFrame({"time": time_s, "step_m": 1.4, "compass_deg": azimuth_deg})
+    truth = pd.DataFrame({"time": time_s, "east_m": east_m, "north_m": north_m})
+    steps.to_csv(folder / "steps.csv", index=False)
+    truth.to_csv(folder / "truth.csv", index=False)
+    paths = [folder / "steps.csv", folder / "truth.csv"]
+    return mf.read_log(paths, crs="EPSG:32635", truth=paths[1]).notes
+
+
+def test_azimuths_that_run_the_other_way_round_are_told(tmp_path):
+    east, north = (np.cumsum(1.4 * way(np.radians(AZIMUTH_DEG))) for way in (np.sin, np.cos))
+    place = 385_900.0 + east, 6_671_900.0 + north
+    told = "motion, heading_rad: headings run clockwise"
+    assert any(n.startswith(told) for n in log_notes(tmp_path, -AZIMUTH_DEG % 360, *place))
+    assert any(n.startswith(told) for n in log_notes(tmp_path, (40 - AZIMUTH_DEG) % 360, *place))
+    assert not any(n.startswith(told) for n in log_notes(tmp_path, AZIMUTH_DEG, *place))
