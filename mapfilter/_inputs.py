@@ -30,8 +30,8 @@ _WIDE = {
     codecs.BOM_UTF16_BE: "UTF-16",
 }
 """By their marks; that of UTF-32 begins with one of UTF-16, and is looked for first."""
-_CUT_OFF = "unexpected end of data"
-"""As decoders name a text that ends within a letter."""
+_MOST_DAMAGED = 20
+"""Of Windows-1252, "É»" is a letter of UTF-8: there are many more that are none."""
 _SHOWN = 60
 _FILE_OF_CRS = re.compile(
     r"(?:grids|init|file|catalog|model)=[^\s\"=]*[/\\~]|"
@@ -142,22 +142,22 @@ def wide_encoding(data: bytes) -> str:
 def first_foreign_byte(data: bytes) -> int:
     r"""Return the place of the first byte by which a text is Windows-1252 and no UTF-8; else -1.
 
-    Text that is cut off within a letter is UTF-8, and so is a damaged one most of whose other
-    letters are whole.
+    Damaged text with whole letters of UTF-8 is UTF-8, too, also where it is cut off within one:
+    in Windows-1252 two letters in a row hardly ever make one.
 
     Examples
     --------
     >>> first_foreign_byte("Länge".encode("cp1252")), first_foreign_byte("Länge".encode())
     (1, -1)
-    >>> first_foreign_byte("Länge, Höhe".encode() + b"\xc3")
-    -1
+    >>> first_foreign_byte("Länge".encode() + b",\xe4,\xfc"), first_foreign_byte(b"Qualit\xe9")
+    (-1, 6)
     """
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
         text = data.decode("utf-8", "replace")
         damaged, letters = text.count("\ufffd"), len(text) - len(text.encode("ascii", "ignore"))
-        if letters - damaged >= damaged or error.reason == _CUT_OFF:
+        if (letters - damaged) * _MOST_DAMAGED >= damaged:
             return -1
         try:
             data.decode("cp1252")

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from mapfilter._arguments import PATH, Argument, check_arguments
+from mapfilter._arguments import PATH, Argument, check_arguments, shown
 from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenOptions, open_log
 from mapfilter.tracks.pdr.options import WalkOptions
 
+_FILES = "a path, or several"
 _WALK = WalkOptions()
 
 
@@ -56,23 +56,29 @@ def read_log(
     StoreError
         A file of a log is missing, cut off or changed since it was written.
     ConfigError
-        There is no path, or the CRS is no text.
+        There is no path, one is no path, or the CRS is no text.
     """
-    files = "a path, or several"
     check_arguments(
         "read_log",
-        Argument("paths", paths, PATH | Iterable, files),
+        Argument("paths", paths, PATH | Iterable, _FILES),
         Argument("crs", crs, str, "a CRS such as database.lattice.crs"),
-        Argument("truth", truth, PATH | Iterable, files),
+        Argument("truth", truth, PATH | Iterable, _FILES),
     )
-    given, true = _several(paths), _several(truth)
+    given, true = _several("paths", paths), _several("truth", truth)
     if not given:
-        raise fail(ConfigError, "read_log, paths", files, "none", "a pattern that no file matches")
+        raise fail(ConfigError, "read_log, paths", _FILES, "none", "a pattern that no file matches")
     combine = CombineOptions(truth=true, course_motion=course_motion, walk=walk)
     options = OpenOptions(zone=zone, columns=columns or {}, combine=combine)
     return open_log(given, crs=crs, options=options).log
 
 
-def _several(paths: str | Path | Iterable[str | Path]) -> list[Path]:
-    several = [paths] if isinstance(paths, str | os.PathLike) else paths
-    return [Path(path) for path in several]
+def _several(name: str, paths: object) -> list[Path]:
+    """Return paths as a list; ConfigError for what is none."""
+    if isinstance(paths, PATH):
+        return [Path(paths)]
+    if isinstance(paths, bytes) or not isinstance(paths, Iterable):
+        raise fail(ConfigError, f"read_log, {name}", _FILES, shown(paths))
+    given = list(paths)
+    items = (Argument(f"{name}[{i}]", one, PATH, "a path") for i, one in enumerate(given))
+    check_arguments("read_log", *items)
+    return [Path(path) for path in given]

@@ -75,8 +75,8 @@ def mistake_in_value(keys: Sequence[str], words: str, given: Any) -> str:
     if isinstance(given, list) and len(given) == 2 and all(type(one) is int for one in given):
         # As a setting, which is a list where it has commas.
         text = ",".join(map(str, given))
-    if re.fullmatch(r"[-+]?[0-9]+,[0-9]+", text):
+    if re.fullmatch(r"[-+]?[0-9]{1,40},[0-9]{1,40}", text):
         return f"a decimal comma; write {text.replace(',', '.')}"
-    if found := re.fullmatch(r"([-+]?[0-9][0-9.]*)\s*[^\W0-9_][^0-9]*", text):
+    if found := re.fullmatch(r"([-+]?[0-9][0-9.]{0,40})\s{0,9}[^\W0-9_][^0-9]{0,40}", text):
         return f"a unit after the number; write {found[1]}"
     return ""

@@ -2,13 +2,68 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapfilter._types import Floats
+
 LARGEST_ASU = 97
-"""Of any technology: 3GPP TS 27.007, +CESQ."""
+"""Of GSM, UMTS and LTE: 3GPP TS 27.007, +CESQ; units of NR go up to 126, and are not judged."""
 LOST_SIGN = "a lost sign (70 for -70 dBm)"
 _LARGEST_LOSS_DB = 200
 UNKNOWN_ASU = (99, 255)
 """Units that mean an unknown level."""
-_LEAST_SHARE = 0.01
+_STRONGEST_DBM = -50
+_LEAST_ABOVE, _MOST_BELOW = 0.05, 0.25
+
+
+@dataclass(slots=True)
+class Signs:
+    """Counts of levels of a column without their sign, or in ASU, but not of NR.
+
+    Parameters
+    ----------
+    levels, positive : int
+        How many there are, and how many of them are positive.
+    above, below : int
+        Positive ones too large for an ASU, and those that would be stronger than -50 dBm.
+    """
+
+    levels: int = 0
+    positive: int = 0
+    above: int = 0
+    below: int = 0
+
+    def add(self, levels: Floats) -> None:
+        """Count levels; NaN is none."""
+        self.levels += int(np.count_nonzero(~np.isnan(levels)))
+        positive = levels[levels > 0]
+        self.positive += positive.size
+        self.below += int(np.count_nonzero(positive < -_STRONGEST_DBM))
+        above = (positive > LARGEST_ASU) & (positive <= _LARGEST_LOSS_DB)
+        self.above += int(np.count_nonzero(above & ~np.isin(positive, UNKNOWN_ASU)))
+
+    @property
+    def lost(self) -> bool:
+        """Whether positive levels are no ASU, but dBm without their sign.
+
+        Some must be too large for an ASU, more than stray values would be, and few so small that
+        they were hardly ever received as dBm.
+
+        Examples
+        --------
+        >>> signs = Signs()
+        >>> signs.add(np.array([70.0, 82.0, 95.0, 104.0]))
+        >>> signs.lost
+        True
+        >>> signs.add(np.array([20.0, 31.0, 45.0]))
+        >>> signs.lost
+        False
+        """
+        most = self.positive > self.levels / 2
+        many = self.above > 0 and self.above >= _LEAST_ABOVE * self.positive
+        return most and many and self.below <= _MOST_BELOW * self.positive
 
 
 def is_above_asu(level: float) -> bool:
@@ -20,19 +75,3 @@ def is_above_asu(level: float) -> bool:
     [False, False, True, False]
     """
     return LARGEST_ASU < level <= _LARGEST_LOSS_DB and level not in UNKNOWN_ASU
-
-
-def have_lost_sign(above: int, positive: int, levels: int) -> bool:
-    """Return whether positive levels of a column are no ASU, but dBm without their sign.
-
-    Parameters
-    ----------
-    above, positive, levels : int
-        How many are too large for an ASU, how many are positive, and how many there are.
-
-    Examples
-    --------
-    >>> have_lost_sign(10, 177, 177), have_lost_sign(1, 177, 177), have_lost_sign(10, 12, 177)
-    (True, False, False)
-    """
-    return above > 0 and above >= _LEAST_SHARE * positive and positive > levels / 2

@@ -13,7 +13,7 @@ from typing import Any
 
 from python_calamine import CalamineError, CalamineWorkbook
 
-from mapfilter._inputs import read_input, wide_encoding
+from mapfilter._inputs import first_foreign_byte, read_input, wide_encoding
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
 
 _LARGEST_BYTES = 1 << 26
@@ -135,7 +135,11 @@ def _decoded(path: Path, data: bytes) -> tuple[str, tuple[str, ...]]:
             text = data.decode("cp1252")
         except UnicodeDecodeError:
             raise fail(InputError, str(path), expected, got, "no text file") from error
-        notes = (f"{path.name}: no UTF-8 (byte {error.start}); read as Windows-1252",)
+        note = f"no UTF-8 (byte {error.start}); read as Windows-1252"
+        if first_foreign_byte(data) < 0:
+            text = data.decode("utf-8-sig", "replace")
+            note = f"some bytes are not UTF-8 (the first is byte {error.start})"
+        notes = (f"{path.name}: {note}",)
     if text.count("\0") > _WIDE_SHARE * len(text):
         got, hint = "UTF-16 text without a byte order mark", "saved as Unicode; save as UTF-8"
         raise fail(InputError, str(path), "text in UTF-8", got, hint)

@@ -10,15 +10,19 @@ import csv
 import difflib
 import io
 import re
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
+import numpy as np
+
 from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, have_lost_sign, is_above_asu
+from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs, is_above_asu
+from mapfilter.radio.identities import technology
 from mapfilter.radio.tables import number
 from mapfilter.survey.measurement_rows import FIELDS, IDENTITY, REQUIRED, Rows
 
@@ -114,8 +118,9 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
         cell = rows.identify(line, found["cell"], [found[name] for name in IDENTITY])
         if not cell:
             continue
-        signs.add(line, found["level_dbm"])
-        dbm = _from_asu(found["level_dbm"], found["technology"].upper())
+        family = found["technology"].upper()
+        signs.add(line, found["level_dbm"], family)
+        dbm = _from_asu(found["level_dbm"], family)
         if dbm is not None:
             rows.aside["levels given as ASU (turned into dBm)"] += 1
             found["level_dbm"] = repr(dbm)
@@ -127,27 +132,25 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
 
 @dataclass(slots=True)
 class _Signs:
-    """Counts of positive levels in a column."""
+    """Levels of a column, and where the first one is that is too large for an ASU."""
 
-    levels: int = 0
-    positive: int = 0
-    above: int = 0
+    levels: array[float] = field(default_factory=lambda: array("d"))
     first: str = ""
 
-    def add(self, line: int, text: str) -> None:
+    def add(self, line: int, text: str, family: str) -> None:
         level = number(text)
-        if level is None or level >= _UNAVAILABLE:
+        if level is None or level >= _UNAVAILABLE or technology(family) == "NR":
             return
-        self.levels += 1
-        self.positive += level > 0
-        if is_above_asu(level):
-            self.above += 1
-            self.first = self.first or f"{text[:20]} in line {line}"
+        self.levels.append(level)
+        if not self.first and is_above_asu(level):
+            self.first = f"{text[:20]} in line {line}"
 
     def check(self, where: str) -> None:
         """Raise InputError where levels have no sign: neither dBm nor ASU."""
-        if have_lost_sign(self.above, self.positive, self.levels):
-            got = f"{self.positive} of {self.levels} positive, {self.above} of them above "
+        signs = Signs()
+        signs.add(np.array(self.levels))
+        if signs.lost:
+            got = f"{signs.positive} of {signs.levels} positive, {signs.above} of them above "
             got += f"{LARGEST_ASU} (first {self.first})"
             expected = f"dBm below 0, or ASU up to {LARGEST_ASU}"
             raise fail(InputError, where, expected, got, LOST_SIGN)

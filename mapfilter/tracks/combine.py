@@ -115,7 +115,8 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         walk=options.walk,
         true=[r for r in shifted if r.path in true_alone],
     )
-    notes += mirrored_notes(shifted, moved)
+    mirrored = mirrored_notes(shifted, moved)
+    notes += mirrored
     tables = {
         "motion": moved.rows,
         "radio": _joined(shifted, "radio"),
@@ -150,8 +151,8 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         names = ", ".join(str(r.path) for r in journey)
         faults = (replace(one, where=f"{names}, {one.where}") for one in error.faults)
         raise InputError(tuple(faults)) from error
-    if moved.compass:
-        # They were made of azimuths, so that none can run the other way round.
+    if moved.compass and mirrored:
+        # The other half of the same fault: either positions or azimuths are mirrored.
         sense = "motion, heading_rad: headings run"
         log = replace(log, notes=tuple(n for n in log.notes if not n.startswith(sense)))
     if not given and not sensors:

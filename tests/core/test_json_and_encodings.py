@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import mapfilter
-from mapfilter._inputs import json_value
+from mapfilter._inputs import first_foreign_byte, json_value
 from mapfilter._io import read_json, write_sealed
 from mapfilter.errors import MapfilterError, StoreError
 from mapfilter.radio.tables import read_table as read_plan_table
@@ -113,3 +113,27 @@ def test_letters_of_a_path_that_the_locale_lacks_are_named_as_that(name, wanted)
     text = done.stdout.decode()
     assert wanted in text
     assert ("PYTHONUTF8=1" in text) == (b"\xc3" in name)
+
+
+@pytest.mark.parametrize(
+    ("data", "place"),
+    [
+        ("Zeit,Länge\n1,2\n".encode() + b"\xe4,\xfc\n", -1),
+        (b"RxLev;Qualit\xe9", 12),
+        ("Zeit,Länge\n1,\u00e4".encode()[:-1], -1),
+        ("PRÉ» ".encode("cp1252") + 50 * b"caf\xe9 de la gare ", 8),
+    ],
+    ids=["damaged", "cut at a letter", "cut off", "accidental"],
+)
+def test_one_whole_letter_tells_utf_8_from_windows_1252(data, place, tmp_path):
+    assert first_foreign_byte(data) == place
+    file = tmp_path / "recording.csv"
+    file.write_bytes(data)
+    text, notes = read_text(file).data.decode(), read_plan_table(file, "a cell plan").notes
+    assert ("read as Windows-1252" in notes[0]) == (place >= 0)
+    assert any("Windows-1252" in note for note in read_text(file).notes) == (place >= 0)
+    for word in ("Länge", "Qualité", "PRÉ»"):
+        if word.encode() in data or word.encode("cp1252") in data:
+            assert word in text
+            header = read_plan_table(file, "a cell plan").header
+            assert any(word in name for name in header)

@@ -143,6 +143,10 @@ def test_exchanged_arguments_are_named_with_their_order(world, order, call):
         ("read_log, paths: expected a path, or several, found none", lambda _: mf.read_log([])),
         ("read_log, crs: expected a CRS such as", lambda _: mf.read_log("log", crs=LATTICE)),
         ("read_log, truth: expected a path", lambda _: mf.read_log("log", truth=3)),
+        ("read_log, paths[0]: expected a path, found 1", lambda _: mf.read_log([1])),
+        ("read_log, paths[1]: expected a path, found None", lambda _: mf.read_log(["a", None])),
+        ("read_log, paths: expected a path", lambda _: mf.read_log(b"a")),
+        ("read_log, truth[0]: expected a path", lambda _: mf.read_log("log", truth=[b"a"])),
         ("write_log, folder", lambda w: mf.write_log(w["log"], None)),
     ],
 )

@@ -334,3 +334,18 @@ def test_a_survey_in_windows_1252_can_be_mapped(tmp_path):
     found = read_measurements([path], columns={"lat": "Breite", "lon": "Länge"})
     assert len(found) == 20
     assert found.notes == ("messung.csv: no UTF-8; read as Windows-1252",)
+
+
+@pytest.mark.parametrize(("family", "levels"), [("LTE", range(20, 60)), ("NR", range(58, 98))])
+def test_a_few_values_above_the_largest_asu_lose_their_rows_only(family, levels, tmp_path):
+    head = "mcc,mnc,lac,cellid,lat,lon,signal,measured_at,rating,act,ta"
+    strays = [127] if family == "LTE" else [100, 110, 120]
+    rows = [
+        f"302,720,29100,8302920,45.411,-75.705,{level},15993197{at:02d}000,9,{family},0"
+        for at, level in enumerate([*levels, *strays])
+    ]
+    path = tmp_path / "upload.csv"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    found = read_measurements([path])
+    assert sorted(found.level_dbm) == [level - 140.0 for level in levels]
+    assert any(f"{len(strays)} of {len(rows)} rows left out" in note for note in found.notes)

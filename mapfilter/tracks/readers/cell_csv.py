@@ -150,10 +150,13 @@ def _levels(rows: Columns, reading: Reading, families: np.ndarray, dialect: _Dia
         of = np.isnan(level) & (families == family) & (asu >= 0) & (asu <= most)
         level = np.where(of, lowest + step * asu, level)
         turned += int(of.sum())
-    # What is left positive is counted, and ignored, as no level.
+    reading.tallies.signs.add(given[(given < _UNAVAILABLE) & (families != "NR")])
     left = np.isnan(level) & (given > 0) & (given < _UNAVAILABLE) & ~np.isin(given, UNKNOWN_ASU)
-    level = np.where(left, given, level)
-    reading.tallies.add_signs(given[given < _UNAVAILABLE])
+    if left.any():
+        reading.ignore(
+            f"radio, level_dbm: {int(left.sum())} levels as ASU of an unknown technology, or "
+            f"beyond those of theirs, ignored (first in line {rows.line[left][0]})"
+        )
     if turned:
         reading.note(f"radio, level_dbm: {turned} levels given as ASU, turned into dBm")
     return level

@@ -27,6 +27,7 @@ _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
 _LEAST_UNIX_S = 1e8
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
+_DIGIT = r"\d"
 _WHOLE = r"^[-+]?(\d{1,18}|[0-8]\d{18})$"
 _MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
 
@@ -176,15 +177,21 @@ class Columns:
         except pa.ArrowInvalid:
             pass
         else:
-            self.reading.tallies.add_texts(name, part, len(column), 0, "")
+            given = pc.is_valid(numbers)
+            if pa.types.is_floating(kind):
+                given = pc.and_not(given, pc.is_nan(numbers))
+            self.reading.tallies.add_texts(name, part, pc.sum(given).as_py() or 0)
             return numbers
         column = pc.utf8_trim_whitespace(column)
         missing = pc.is_in(column, pa.array(_MISSING))
         good = pc.match_substring_regex(column, pattern)
         wrong = pc.and_not(pc.invert(good), missing)
-        bad, given = pc.sum(wrong).as_py(), len(column) - pc.sum(missing).as_py()
-        example = pc.filter(column, wrong)[0].as_py() if bad else ""
-        self.reading.tallies.add_texts(name, part, given, bad, example)
+        bad = pc.sum(wrong).as_py()
+        # A word such as "unknown" stands for a missing value.
+        odd = pc.and_(wrong, pc.match_substring_regex(column, _DIGIT))
+        count = pc.sum(odd).as_py() or 0
+        examples = pc.unique(pc.filter(column, odd))[:2].to_pylist()
+        self.reading.tallies.add_texts(name, part, pc.sum(good).as_py() + count, count, examples)
         if bad:
             self.reading.ignore(f"{name}: {bad} values are no numbers, taken as missing")
         column = pc.replace_substring_regex(column, r"^\+", "")

@@ -219,6 +219,9 @@ class Reading:
         else:
             missing = np.isnan(values)
             outside = ~missing & ~((values >= known.low) & (values <= known.high))
+            if known.winds and not missing.all():
+                values, outside = self._unwound(table, known, values, outside)
+                checked[known.name] = values
             if known.vital:
                 given = int(np.count_nonzero(good & ~missing))
                 self.tallies.add_values(table, known, values, given, good & outside, line)
@@ -236,6 +239,16 @@ class Reading:
             )
             checked[known.name] = np.where(outside, np.nan, values)
         return np.ones(len(line), dtype=bool)
+
+    def _unwound(
+        self, table: str, known: Field, values: Floats, outside: Bools
+    ) -> tuple[Floats, Bools]:
+        """Return headings with unwrapped ones wrapped, and which are out of range still."""
+        values = self.tallies.winding(table, known).unwound(values, outside)
+        left = outside & ~(np.abs(values) <= known.high)
+        if count := int(np.count_nonzero(outside & ~left)):
+            self.note(f"{table}, {known.name}: {count} values beyond a turn, wrapped (unwrapped)")
+        return values, left
 
     def _in_era(self, time_s: Floats, line: Ints, good: Bools) -> Bools:
         """Refuse times that are no dates, and few rows that lie days away from all others."""

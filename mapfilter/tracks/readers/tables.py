@@ -34,6 +34,8 @@ class Field:
         Likely mistakes behind values within these intervals.
     vital : bool
         Whether a file is refused most of whose values are out of range, as a log needs them.
+    winds : bool
+        Whether values are headings in radians, which may be unwrapped.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Field:
     text: bool = False
     hints: tuple[tuple[float, float, str], ...] = ()
     vital: bool = False
+    winds: bool = False
 
     @property
     def kind(self) -> str:
@@ -160,7 +163,12 @@ RECORDED: dict[str, tuple[Field, ...]] = {
     "motion": (
         _TIME,
         Field("step_m", -1e6, 1e6, _METRES, vital=True),
-        Field("heading_rad", -6.3, 6.3, "radians in -2π..2π", hints=_DEGREES, vital=True),
+        Field(
+            *("heading_rad", -6.3, 6.3, "radians in -2π..2π"),
+            hints=_DEGREES,
+            vital=True,
+            winds=True,
+        ),
         _TURN,
         Field("compass_deg", -180, 360, "degrees in -180..360", vital=True),
     ),

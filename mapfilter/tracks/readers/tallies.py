@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,13 +10,15 @@ import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, have_lost_sign, is_above_asu
+from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs
 from mapfilter.tracks.readers.tables import Field
-from mapfilter.tracks.schema import MISSING_SIGNS
+from mapfilter.tracks.readers.wound import Winding
 
 _MOSTLY = 0.5
 _UNAVAILABLE = 2e9
 """Programs write larger numbers where they have no value."""
+_MARKS = (999.0, 9999.0, 99999.0, 999999.0, 32767.0, 32768.0, 65535.0)
+"""Numbers of either sign that programs write where they have no value, too."""
 
 
 @dataclass(slots=True)
@@ -34,11 +36,11 @@ class _Values:
 
 @dataclass(slots=True)
 class _Texts:
-    """Texts of one column of a file: how many are given, and those that are no numbers."""
+    """Texts of one column of a file: numbers, and texts with digits that are none."""
 
     given: int = 0
     bad: int = 0
-    example: str = ""
+    examples: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -49,14 +51,15 @@ class Tallies:
     ----------
     columns : dict of str to str
         Names in the file of columns that must hold numbers, by field.
+    signs : Signs
+        Of levels in a column that holds dBm or ASU.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
     _values: dict[tuple[str, str], _Values] = field(default_factory=dict)
     _texts: dict[tuple[str, int], _Texts] = field(default_factory=dict)
-    _levels: int = 0
-    _positive: int = 0
-    _above: int = 0
+    _windings: dict[tuple[str, str], Winding] = field(default_factory=dict)
+    signs: Signs = field(default_factory=Signs)
 
     def add_values(
         self, table: str, known: Field, values: Floats, given: int, outside: Bools, line: Ints
@@ -67,7 +70,7 @@ class Tallies:
         if not outside.any():
             return
         bad, line = values[outside], line[outside]
-        marked = (np.abs(bad) >= _UNAVAILABLE) | np.isin(bad, MISSING_SIGNS)
+        marked = (np.abs(bad) >= _UNAVAILABLE) | np.isin(np.abs(bad), _MARKS)
         found.given -= int(marked.sum())
         bad, line = bad[~marked], line[~marked]
         if not bad.size:
@@ -79,15 +82,19 @@ class Tallies:
         found.low = min(found.low, float(bad.min()))
         found.high = max(found.high, float(bad.max()))
 
-    def add_texts(self, column: str, part: int, given: int, bad: int, example: str) -> None:
-        """Count the texts of a column in a part of the file; each part counts once."""
-        self._texts[column, part] = _Texts(given, bad, example)
+    def winding(self, table: str, known: Field) -> Winding:
+        """Return what is known so far of the headings of a column."""
+        return self._windings.setdefault((table, known.name), Winding())
 
-    def add_signs(self, levels: Floats) -> None:
-        """Count levels of a column that holds dBm or ASU, those that are neither among them."""
-        self._levels += int(np.sum(~np.isnan(levels)))
-        self._positive += int(np.sum(levels > 0))
-        self._above += sum(map(is_above_asu, levels[levels > LARGEST_ASU].tolist()))
+    def add_texts(
+        self, column: str, part: int, given: int, bad: int = 0, examples: Sequence[str] = ()
+    ) -> None:
+        """Count the texts of a column in a part of the file; each part counts once.
+
+        Words without a digit are missing values to programs, and neither given nor bad.
+        ``examples`` are two different bad texts, or one where all are alike.
+        """
+        self._texts[column, part] = _Texts(given, bad, tuple(examples))
 
     def check(self, path: Path, known: Mapping[str, tuple[Field, ...]]) -> None:
         """Raise InputError for every column that is mostly out of range, or mostly no numbers."""
@@ -95,25 +102,33 @@ class Tallies:
         for name, column in self.columns.items():
             parts = [texts for (of, _), texts in self._texts.items() if of == column.lower()]
             bad, given = sum(one.bad for one in parts), sum(one.given for one in parts)
-            if bad > _MOSTLY * given:
-                example = next(one.example for one in parts if one.bad)
-                got = f"{bad} of {given} values that are none, such as {example[:40]!r}"
-                hint = "a unit in each field" if any(map(str.isdigit, example)) else ""
-                faults.add(self._where(path, name), "numbers", got, hint)
+            examples = list(dict.fromkeys(text for one in parts for text in one.examples))
+            # One and the same text, such as 1.#QNAN, is a mark of missing values.
+            if len(examples) > 1 and bad > _MOSTLY * given:
+                got = f"{bad} of {given} values that are none, such as {examples[0][:40]!r}"
+                faults.add(self._where(path, name), "numbers", got, "a unit in each field")
         for (table, name), values in self._values.items():
-            if values.outside > _MOSTLY * values.given:
+            # One and the same number is a mark of missing values.
+            mark = values.low >= values.high
+            if not mark and values.outside > _MOSTLY * values.given and self._sure(table, name):
                 of = next(one for one in known[table] if one.name == name)
                 got = (
                     f"{values.outside} of {values.given} values outside, {values.low:g} to "
                     f"{values.high:g} (first {values.first:g} in line {values.first_line})"
                 )
                 faults.add(self._where(path, name), of.expected, got, _mistake(of, values))
-        if have_lost_sign(self._above, self._positive, self._levels) and not faults.found:
-            got = f"{self._positive} of {self._levels} positive, {self._above} of them above "
+        signs = self.signs
+        if signs.lost and not faults.found:
+            got = f"{signs.positive} of {signs.levels} positive, {signs.above} of them above "
             expected = f"dBm below 0, or ASU up to {LARGEST_ASU}"
             where = self._where(path, "level_dbm")
             faults.add(where, expected, f"{got}{LARGEST_ASU}", LOST_SIGN)
         faults.raise_if_any(InputError)
+
+    def _sure(self, table: str, name: str) -> bool:
+        """Return whether values out of range can be no good ones."""
+        winding = self._windings.get((table, name))
+        return winding is None or winding.degrees
 
     def _where(self, path: Path, name: str) -> str:
         column = self.columns.get(name, name)
