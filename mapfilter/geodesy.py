@@ -157,10 +157,10 @@ def _meant_crs(text: str) -> str:
     """
     if len(text) > _LONGEST_MEANT:
         return ""
-    if code := re.fullmatch(r"\s*(?:epsg)?[\s:_-]*([0-9]{4,6})\s*", text, re.IGNORECASE):
+    if code := re.fullmatch(r"(?:epsg)?[\s:_-]{0,3}([0-9]{4,6})", text.strip(), re.IGNORECASE):
         meant = f"EPSG:{code[1]}"
         return meant if meant != text.strip().upper() else ""
-    utm = r"\bUTM[\s_-]*(?:zone)?[\s_-]*([0-9]{1,2})[\s_-]*(N|S|north|south)?\s*"
+    utm = r"\bUTM[\s_-]{0,3}(?:zone)?[\s_-]{0,3}([0-9]{1,2})[\s_-]{0,3}(N|S|north|south)?\s{0,3}"
     zone = re.search(rf"{utm}$", text, re.IGNORECASE)
     if zone is None or not 1 <= int(zone[1]) <= 60:
         return ""

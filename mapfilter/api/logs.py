@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -74,7 +75,7 @@ def read_log(
 
 def _several(name: str, paths: object) -> list[Path]:
     """Return paths as a list; ConfigError for what is none."""
-    if isinstance(paths, PATH):
+    if isinstance(paths, str | os.PathLike):
         return [Path(paths)]
     if isinstance(paths, bytes) or not isinstance(paths, Iterable):
         raise fail(ConfigError, f"read_log, {name}", _FILES, shown(paths))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -134,7 +133,6 @@ _OF_FILES = {
     "at least one cell": "Take another file, or export this one anew.",
 }
 """Remedies by what was expected of a whole file."""
-_SETTING_OF_CRS = re.compile(r"[a-z_]+\.crs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,7 +231,8 @@ def _remedy(code: str, fault: Fault) -> str:
     """Return the remedy of a fault of a whole file or of its header, or ""."""
     if code == "plan-invalid" and fault.where.endswith(" header"):
         return _OF_HEADER
-    if _SETTING_OF_CRS.fullmatch(fault.where):
+    section, _, setting = fault.where.rpartition(".")
+    if setting == "crs" and section.isidentifier():
         return f"Set {fault.where} to the projected CRS of the numbers, in metres."
     known = (remedy for start, remedy in _OF_FILES.items() if fault.expected.startswith(start))
     return next(known, "")
