@@ -248,8 +248,9 @@ def _no_log(path: Path, expected: str) -> MapfilterError:
         if path.stem not in TABLES and path.name != HEAD:
             hint = f"convert it first: mapfilter convert {path.name} --out LOG"
         return fail(InputError, str(path), expected, "a file", hint)
-    got = "a folder without any" if path.is_dir() else "no such folder"
-    return fail(InputError, str(path), expected, got)
+    if path.is_dir():
+        return fail(InputError, str(path), expected, "a folder without any")
+    return fail(InputError, str(path), expected, "nothing", "a mistyped path")
 
 
 def _check_head(head: dict[str, Any], where: str) -> float:
