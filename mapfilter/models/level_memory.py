@@ -96,8 +96,11 @@ class LevelMemory:
 
     @property
     def width(self) -> int:
-        """Numbers that each hypothesis keeps: means of errors, then log odds of faults."""
-        return 3 * self.slots + 1
+        """Numbers that each hypothesis keeps: means of errors, then log odds.
+
+        Those are of faults, and at last that no prediction holds at all, beyond the area.
+        """
+        return 3 * self.slots + 2
 
     @cached_property
     def slot_of(self) -> dict[int, int]:
@@ -121,6 +124,18 @@ class LevelMemory:
         """Return the log odds of a cell's fault among what hypotheses keep, (N,)."""
         row: Floats32 = kept[self.fault_row(band)]
         return row
+
+    def beyond_odds(self, kept: Floats32) -> Floats32:
+        """Return the log odds that no prediction holds beyond the area, (N,).
+
+        They change over a distance as those of faults do, but towards even odds.
+        """
+        odds: Floats32 = kept[-1] - np.float32(self.errors.fault_log_odds)
+        return odds
+
+    def keep_beyond_odds(self, kept: Floats32, at: Any, log_odds: Any) -> None:
+        """Put the log odds that no prediction holds in place, of some hypotheses."""
+        kept[-1, at] = log_odds + self.errors.fault_log_odds
 
     def has_slots(self, bands: Ints32) -> bool:
         """Return whether all of these cells have slots."""

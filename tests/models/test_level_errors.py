@@ -237,12 +237,13 @@ def test_new_cells_in_the_slots_of_others_follow_from_those_that_stay():
 
 def test_the_memory_before_the_first_report():
     few, many = LevelMemory.empty(SOUND, SITE), LevelMemory.empty(SOUND, np.arange(50))
-    assert (few.slots, few.width, many.slots, many.width) == (6, 19, 24, 73)
+    assert (few.slots, few.width, many.slots, many.width) == (6, 20, 24, 74)
     assert few.slot_of == {}
     kept = few.start(3)
-    assert (kept.shape, kept.dtype) == ((19, 3), np.float32)
+    assert (kept.shape, kept.dtype) == ((20, 3), np.float32)
     np.testing.assert_array_equal(kept[:13], 0.0)
     np.testing.assert_allclose(kept[13:], log(1e-300), rtol=1e-6)
+    np.testing.assert_array_equal(few.beyond_odds(kept), 0.0)
     assert LevelErrors(fault_probability=0.2).fault_log_odds == pytest.approx(log(0.25))
     total = LevelErrors(slow_db=3.0, fast_db=4.0, white_db=12.0).total_db
     assert total == pytest.approx(13.0)
@@ -347,10 +348,13 @@ def test_a_fault_is_forgotten_over_the_metres_that_it_lasts():
     usual = log(0.1 / 0.9)
     kept[13:] = np.array([-8.0, -3.0, 0.5, 8.0], dtype=np.float32)
     kept[:13] = np.arange(13.0)[:, None]
-    _, now = moved(memory, kept, 120.0)
+    memory.keep_beyond_odds(kept, slice(None), np.array([-8.0, 0.0, 0.5, 8.0], np.float32))
+    memory, now = moved(memory, kept, 120.0)
     share = exp(-120 / 300)
     expected = usual + share * (np.array([-8.0, -3.0, 0.5, 8.0]) - usual)
-    np.testing.assert_allclose(now[13:], np.tile(expected, (6, 1)), rtol=1e-5)
+    np.testing.assert_allclose(now[13:-1], np.tile(expected, (6, 1)), rtol=1e-5)
+    odds = share * np.array([-8.0, 0.0, 0.5, 8.0])
+    np.testing.assert_allclose(memory.beyond_odds(now), odds, rtol=1e-5, atol=1e-6)
     decay = [exp(-120 / 150)] * 6 + [exp(-120 / 15)] * 6 + [1.0]
     np.testing.assert_allclose(now[:13].T, np.tile(np.arange(13) * decay, (4, 1)), rtol=1e-5)
     # Hypotheses keep their own copies.

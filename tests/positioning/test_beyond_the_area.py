@@ -66,6 +66,97 @@ def test_there_predictions_of_the_edge_may_hold_or_not(serving):
     assert abs(found[1] - found[0]) > 0.01
 
 
+def edge_and_null(model, readings):
+    """Return the log-likelihoods of reports at the nearest pixel, and of the null hypothesis."""
+    inside, edge, null = cloud_at((WIDTH_M - small_area.PIXEL_M / 2, 25.0)), [], []
+    for reading in readings:
+        found = np.zeros(1)
+        inside, _ = model.weigh(inside, found, reading)
+        edge.append(found[0])
+        null.append(inside.shared.other_log_likelihood - 0.7 * 0.4)
+    return edge, null
+
+
+def reports(length_m):
+    """Return the report, and one after a distance that is less like the edge's prediction."""
+    weaker = REPORT._replace(level_dbm=REPORT.level_dbm - np.float32(9.0))
+    return [
+        RadioReading(BANDS["A"], 0.4, REPORT),
+        RadioReading(BANDS["A"], 0.4, weaker, length_m=length_m),
+        RadioReading(BANDS["A"], 0.4, weaker, length_m=length_m),
+    ]
+
+
+def weighed_beyond(model, readings):
+    cloud, gained = cloud_at((WIDTH_M + 80.0, 25.0)), []
+    for reading in readings:
+        found = np.zeros(1)
+        cloud, _ = model.weigh(cloud, found, reading)
+        gained.append(found[0])
+    return gained
+
+
+def test_what_holds_there_holds_for_all_reports():
+    """The mean of two products: a hypothesis does not choose again at each report."""
+    readings = reports(0.0)
+    edge, null = edge_and_null(MODEL, readings)
+    gained = weighed_beyond(MODEL, readings)
+    assert sum(gained) == pytest.approx(np.logaddexp(sum(edge), sum(null)) - np.log(2), abs=1e-4)
+    chosen_anew = sum(np.logaddexp(e, n) - np.log(2) for e, n in zip(edge, null, strict=True))
+    assert abs(sum(gained) - chosen_anew) > 0.05
+
+
+def test_what_holds_there_is_forgotten_as_faults_are():
+    readings = reports(150.0)
+    edge, null = edge_and_null(MODEL, readings)
+    gained = weighed_beyond(MODEL, readings)
+    odds = 0.0
+    for k in range(3):
+        odds *= np.exp(-150.0 / MODEL.evidence.levels.fault_m) if k else 1.0
+        likelihood = (np.exp(edge[k]) + np.exp(odds + null[k])) / (1 + np.exp(odds))
+        assert gained[k] == pytest.approx(np.log(likelihood), abs=1e-4)
+        odds += null[k] - edge[k]
+    far = weighed_beyond(MODEL, [readings[0], replace(readings[1], length_m=1e6)])
+    edge, null = edge_and_null(MODEL, [readings[0], replace(readings[1], length_m=1e6)])
+    assert far[1] == pytest.approx(np.logaddexp(edge[1], null[1]) - np.log(2), abs=1e-4)
+
+
+def test_in_the_area_nothing_is_chosen():
+    cloud, _ = MODEL.weigh(cloud_at((25.0, 25.0), (-80.0, 25.0)), np.zeros(2), reports(0.0)[0])
+    inside, outside = cloud.shared.beyond_odds(cloud.kept)
+    assert inside == 0.0
+    assert outside != 0.0
+
+
+def test_a_memory_of_one_report_chooses_anew():
+    model = replace(MODEL, remember=False)
+    first, second, _ = reports(0.0)
+    gained = weighed_beyond(model, [first, second])
+    assert gained[1] == pytest.approx(weighed_beyond(model, [second])[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("length_m", [0.0, 20.0])
+def test_a_tracked_belief_withholds_a_part_there_too(length_m):
+    """The weights count a part of the levels; what holds there is judged by all of them."""
+    first, second, third = (replace(one, tracked=True) for one in reports(length_m))
+    share = MODEL.evidence.levels.tracking_share
+    assert 0 < share < 1
+    levels_only = [replace(one, serving=-1, serving_weight=0.0) for one in (first, second, third)]
+    edge, null = [], []
+    inside = cloud_at((WIDTH_M - small_area.PIXEL_M / 2, 25.0))
+    for one in levels_only:
+        found = np.zeros(1)
+        inside, _ = MODEL.weigh(inside, found, replace(one, tracked=False))
+        edge.append(found[0])
+        null.append(inside.shared.other_log_likelihood)
+    gained, odds = weighed_beyond(MODEL, levels_only), 0.0
+    for k in range(3):
+        odds *= np.exp(-length_m / MODEL.evidence.levels.fault_m) if k else 1.0
+        both = np.exp(share * edge[k]) + np.exp(odds + share * null[k])
+        assert gained[k] == pytest.approx(np.log(both / (1 + np.exp(odds))), abs=1e-4)
+        odds += null[k] - edge[k]
+
+
 def test_a_cell_that_the_map_lacks_is_likelier_there():
     """By half of what the null hypothesis gains from it: 0.5 nats at full weight."""
     found = np.zeros(2)
@@ -78,7 +169,7 @@ def test_a_metre_costs_the_same_on_and_off_ways_there(off):
     state = cloud_at((-50.0, 20.0)).state
     state[OFF] = off
     moved, log_weight = MODEL.move(state, np.zeros(1), MotionStep(2.0, 0.5), np.uint64(7))
-    cost = 0.015 * 2.0
+    cost = 0.03 * 2.0
     away = off * np.exp(-0.02) + (1 - off) * (1 - np.exp(-0.002))
     likelihood = away * np.exp(-0.04 * 2.0) + (1 - away) * np.exp(-cost)
     assert log_weight[0] == pytest.approx(np.log(likelihood), abs=1e-5)

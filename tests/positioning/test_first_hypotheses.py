@@ -215,9 +215,9 @@ def test_a_step_moves_by_the_bias_and_weighs_by_the_map_where_it_ends():
     )
     for i, one in enumerate(before.T.astype(np.float64)):
         place = oracle.moved(*one[:4], 8.0, 0.6)
-        # Beyond the area nobody knows the ways, and a metre costs 0.015.
+        # Beyond the area nobody knows the ways, and a metre costs 0.03.
         inside = 0 <= place[0] <= WIDTH_M and 0 <= place[1] <= HEIGHT_M
-        here = oracle.bilinear(log_map, *place, PIXEL_M) if inside else -0.015 / 0.08
+        here = oracle.bilinear(log_map, *place, PIXEL_M) if inside else -0.03 / 0.08
         gained, off = oracle.map_step(here, one[4], 8.0, WEIGHTS)
         assert moved[:2, i] == pytest.approx(place, abs=1e-3)
         assert weighed[i] - given[i] == pytest.approx(gained, abs=2e-4)

@@ -109,7 +109,7 @@ def test_journeys_of_a_path(made, tmp_path):
         with pytest.raises(InputError):
             list_journeys(tmp_path / wrong)
     for absent in ("none", "none.csv"):
-        with pytest.raises(InputError, match="found nothing .*mistyped path"):
+        with pytest.raises(InputError, match=r"found nothing .*mistyped path"):
             list_journeys(tmp_path / absent)
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="a folder without any"):

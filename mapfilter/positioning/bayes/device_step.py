@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, isfinite, log, nan
+from math import exp, isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -26,9 +26,9 @@ from mapfilter.models import cuda_motion, cuda_reports, fingerprint
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import LevelTerms, Prediction
 from mapfilter.models.level_memory import LevelMemory
+from mapfilter.positioning.bayes.beyond_edge import BEYOND_COST_PER_M, beyond_edge
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import (
-    BEYOND_COST_PER_M,
     SAMPLE,
     BayesModel,
     expected_absent,
@@ -132,9 +132,12 @@ class DeviceStep:
         (wide, high), (east, north) = area.size_m, (cloud.state[0], cloud.state[1])
         beyond = (east < np.float32(0.0)) | (east > np.float32(wide))
         beyond = beyond | (north < np.float32(0.0)) | (north > np.float32(high))
-        unknown = before + reading.radio_under_null(other)
-        mixed = arrays.logaddexp(log_weight, unknown) - log(2)
-        log_weight[:] = arrays.where(beyond, mixed, log_weight)
+        unknown, memory = reading.radio_under_null(other), cloud.shared
+        odds = memory.beyond_odds(cloud.kept)
+        at_edge = beyond_edge(odds, log_weight - before, unknown, arrays)
+        log_weight[:] = arrays.where(beyond, before + at_edge.gained, log_weight)
+        kept_odds = arrays.where(beyond, at_edge.log_odds, odds)
+        memory.keep_beyond_odds(cloud.kept, slice(None), kept_odds)
         return cloud
 
     def resample(

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from math import exp, isfinite, log, nan, sqrt
+from math import exp, isfinite, nan, sqrt
 
 import numpy as np
 
 from mapfilter._threads import ONE, Call, Threads
-from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
+from mapfilter._types import Bytes, Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.copies import columns_of
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
@@ -43,14 +43,13 @@ from mapfilter.models.street_motion import (
 from mapfilter.models.way_map import WayMap, weigh_by_ways, weighed_at_places
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.beyond_edge import BEYOND_COST_PER_M, beyond_edge
 from mapfilter.positioning.bayes.evidence import SERVING_UNDER_NULL, RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import BEYOND_M, Start, first_hypotheses
 from mapfilter.positioning.bayes.likely_points import KEPT_REPORTS, KnownReading, likelihoods
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 
-BEYOND_COST_PER_M = 0.015
-"""Negative log-likelihood of each metre beyond the area, in a database with cells."""
 _NEW_M = 50.0
 _LEAST_EXPECTED = 0.02
 SAMPLE = 256
@@ -217,11 +216,17 @@ class BayesModel:
                 )
             if kept_back is not None:
                 counted = log_weight - kept_back
-                share = self.evidence.levels.tracking_share
-                if beyond.size:
-                    _weigh_beyond(beyond, before, counted, reading, share * other)
             if beyond.size:
-                _weigh_beyond(beyond, before, log_weight, reading, other)
+                unknown = reading.radio_under_null(other)
+                odds = memory.beyond_odds(kept.now)[beyond]
+                if counted is not None:
+                    share = self.evidence.levels.tracking_share
+                    counted_unknown = reading.radio_under_null(share * other)
+                    held = counted[beyond] - before
+                    counted[beyond] = before + beyond_edge(odds, held, counted_unknown).gained
+                at_edge = beyond_edge(odds, log_weight[beyond] - before, unknown)
+                log_weight[beyond] = before + at_edge.gained
+                memory.keep_beyond_odds(kept.now, beyond, at_edge.log_odds)
         for term in reading.terms:
             log_likelihood = term.log_likelihood(cloud.state)
             log_weight += log_likelihood
@@ -411,18 +416,3 @@ def _most_expected(absent: Ints32, share: Floats) -> Ints32:
 def _every(pixel: Ints32) -> int:
     """Return how many hypotheses one stands for, where some stand for all of them."""
     return max(pixel.size // SAMPLE, 1)
-
-
-def _weigh_beyond(
-    beyond: Ints,
-    before: Floats,
-    log_weight: Floats,
-    reading: RadioReading,
-    other_log_likelihood: float,
-) -> None:
-    """Mix what a report says beyond the area: predictions at the edge may hold, or not.
-
-    ``beyond`` (M,) are the hypotheses there, ``before`` (M,) their log weights before the report.
-    """
-    unknown = before + reading.radio_under_null(other_log_likelihood)
-    log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
