@@ -13,6 +13,7 @@ from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import Lattice
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MapWeights, MotionErrors
+from mapfilter.positioning.bayes.beyond_edge import beyond_edge
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.model import BayesModel
@@ -119,6 +120,14 @@ def test_what_holds_there_is_forgotten_as_faults_are():
     far = weighed_beyond(MODEL, [readings[0], replace(readings[1], length_m=1e6)])
     edge, null = edge_and_null(MODEL, [readings[0], replace(readings[1], length_m=1e6)])
     assert far[1] == pytest.approx(np.logaddexp(edge[1], null[1]) - np.log(2), abs=1e-4)
+
+
+def test_neither_is_ever_certain():
+    held = np.array([-100.0, 100.0, -1.0])
+    found = beyond_edge(np.array([0.0, 0.0, 0.5]), held, 0.0)
+    np.testing.assert_allclose(found.log_odds, [8.0, -8.0, 1.5])
+    mixed = np.log([0.5, np.exp(100.0) / 2, (np.exp(-1.0) + np.exp(0.5)) / (1 + np.exp(0.5))])
+    np.testing.assert_allclose(found.gained, mixed, rtol=1e-12)
 
 
 def test_in_the_area_nothing_is_chosen():
