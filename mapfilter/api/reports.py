@@ -11,14 +11,8 @@ import numpy as np
 from mapfilter._arguments import PATH, Argument, check_arguments, generator
 from mapfilter.api.given import opened, read
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.positioning.fingerprints.censoring import bounds_of
 from mapfilter.positioning.fingerprints.located import LocatedReports
-from mapfilter.positioning.fingerprints.locating import (
-    fit_locator,
-    locate_by,
-    timed_share,
-    usual_readings,
-)
+from mapfilter.positioning.fingerprints.locating import locate_by, locator_for
 from mapfilter.positioning.fingerprints.options import AUTO, Method
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
@@ -82,13 +76,4 @@ def locate_reports(
         known = reports_of_logs(logs)
     if not isinstance(log, Reports):
         log = reports_of_logs([read(log, known.crs)], plan)
-    strongest = usual_readings(log)
-    fitted = fit_locator(
-        known,
-        method,
-        rng,
-        strongest=strongest,
-        bounds=bounds_of(log),
-        timed=timed_share(log),
-    )
-    return locate_by(fitted, log)
+    return locate_by(locator_for(log, known, method, rng), log)

@@ -15,14 +15,11 @@ from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
-from mapfilter.positioning.fingerprints.censoring import bounds_of
 from mapfilter.positioning.fingerprints.located import LocatedReports, figures_of
 from mapfilter.positioning.fingerprints.locating import (
     ReportLocator,
-    fit_locator,
     locate_by,
-    timed_share,
-    usual_readings,
+    locator_for,
 )
 from mapfilter.positioning.fingerprints.matches import locator
 from mapfilter.positioning.fingerprints.options import AUTO, Centroid, method_name
@@ -109,18 +106,10 @@ def run_locate(
     began_s = time.perf_counter()
     check_figures_of_reports(out)
     known, (reports, names) = _inputs(database, log, crs, level_error_db, columns or {})
-    rng, strongest = np.random.default_rng(seed), usual_readings(reports)
+    rng = np.random.default_rng(seed)
     with nothing_left(out):
         ensure_writable_folder(out)
-        fitted = fit_locator(
-            known,
-            method,
-            rng,
-            strongest=strongest,
-            bounds=bounds_of(reports),
-            timed=timed_share(reports),
-            progress=progress,
-        )
+        fitted = locator_for(reports, known, method, rng, progress=progress)
         located = locate_by(fitted, reports)
     baseline_m = _centroid_errors_m(fitted, reports)
     figures = figures_of(located)

@@ -38,13 +38,10 @@ from mapfilter.experiments.recorded.worst_report import WorstReport, worst_repor
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.fingerprints.censoring import bounds_of
 from mapfilter.positioning.fingerprints.locating import (
     ReportLocator,
-    fit_locator,
     locate_by,
-    timed_share,
-    usual_readings,
+    locator_for,
 )
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
 from mapfilter.propagation.shadowing import named_rng
@@ -99,13 +96,7 @@ def read(task: Task) -> Place:
     box = open_database(task.work / task.part / _BOX)
     # As ``locate`` does: regions are those of reports with as many cells and timing advances.
     reports = reports_of_logs([name_by_plan(log, plan) for log in logs.values()], plan)
-    fitted = fit_locator(
-        reports_of_database(box),
-        "probabilistic",
-        strongest=usual_readings(reports),
-        bounds=bounds_of(reports),
-        timed=timed_share(reports),
-    )
+    fitted = locator_for(reports, reports_of_database(box), "probabilistic")
     return Place(logs, plan, fitted)
 
 

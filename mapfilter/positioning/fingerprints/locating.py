@@ -11,7 +11,7 @@ import numpy as np
 from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import same_crs
-from mapfilter.positioning.fingerprints.censoring import OPEN, Bounds, bounded
+from mapfilter.positioning.fingerprints.censoring import OPEN, Bounds, bounded, bounds_of
 from mapfilter.positioning.fingerprints.cross_validation import (
     MOST_VALIDATED,
     cross_validate,
@@ -142,6 +142,30 @@ def fit_locator(
     )
     regions = calibrate(errors) if enough else None
     return ReportLocator(chosen, placed, locator(chosen, placed), regions, validations)
+
+
+def locator_for(
+    reports: Reports,
+    database: Reports,
+    method: Method | str = AUTO,
+    rng: np.random.Generator | None = None,
+    *,
+    progress: Progress | None = None,
+) -> ReportLocator:
+    """Fit a method as :func:`fit_locator` does, calibrated by reports that are like given ones.
+
+    They have as many cells, ends of the scale and timing advances as ``reports``, which are to be
+    located.
+    """
+    return fit_locator(
+        database,
+        method,
+        rng,
+        strongest=usual_readings(reports),
+        bounds=bounds_of(reports),
+        timed=timed_share(reports),
+        progress=progress,
+    )
 
 
 def usual_readings(reports: Reports) -> int:
