@@ -96,9 +96,9 @@ class LevelMemory:
 
     @property
     def width(self) -> int:
-        """Numbers that each hypothesis keeps: means of errors, then log odds.
+        """Numbers that each hypothesis keeps: means of errors, then log odds of faults.
 
-        Those are of faults, and at last that no prediction holds at all, beyond the area.
+        The last number is the log odds that no prediction holds, for hypotheses beyond the area.
         """
         return 3 * self.slots + 2
 
