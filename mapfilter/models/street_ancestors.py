@@ -6,17 +6,50 @@ Earlier hypotheses, led on by their own errors, are compared with later ones (Go
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, uniforms, wrap32
-from mapfilter._types import Floats32, Ints32
+from mapfilter._types import Floats, Floats32, Ints32
 
 _F = np.float32
 _MOST_SQUARES = 400
 _PARTS = 4
 _MOST_NATS = 14.0
 """Hypotheses that are less likely than by this many nats are not compared."""
+_PAIRS_A_TRY, _MOST_TRIES = 16, 256
+"""Number of hypotheses that are compared in about the time of one draw, and the most draws."""
+
+
+class _Led(NamedTuple):
+    """Earlier hypotheses where their own errors lead them, in the order of their squares."""
+
+    east_m: Floats32
+    north_m: Floats32
+    bias_rad: Floats32
+    log_scale: Floats32
+    weight: Floats
+
+
+class _Near(NamedTuple):
+    """The squares around a later hypothesis: rows and columns, and where its own ones begin.
+
+    ``masses`` are the weights in a square times the most that they can be likely (``most``), summed
+    over all squares so far.
+    """
+
+    first: int
+    last: int
+    left: int
+    right: int
+    corner: int
+    across: int
+    cols: int
+    start: Ints32
+    most: Floats
+    masses: Floats
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -73,39 +106,116 @@ def draw_ancestors(
     corner_m, side_m, (rows, cols), start, order = _squares(to_east, to_north, reach_m / _PARTS)
     west_m, north_m = corner_m
     # In the order of the squares they lie side by side in memory.
-    to_east, to_north, weight = to_east[order], to_north[order], weight[order]
-    bias, scale = earlier[2][order], earlier[3][order]
-    per_place, per_bias = _F(-0.5 / place_var_m2), _F(-0.5 / bias_var_rad2)
-    per_scale, jump = _F(-0.5 / scale_var), _F(log_jump)
+    led = _Led(to_east[order], to_north[order], earlier[2][order], earlier[3][order], weight[order])
+    before = np.zeros(count + 1)
+    for i in range(count):
+        before[i + 1] = before[i] + led.weight[i]
+    per = _F(-0.5 / place_var_m2), _F(-0.5 / bias_var_rad2), _F(-0.5 / scale_var)
+    jump = _F(log_jump)
     jumped, around = np.float64(exp32(jump)), int(np.ceil(reach_m / side_m))
+    most = _most_likely(around, np.float64(per[0]) * side_m**2)
+    masses, across = np.zeros(most.size), 2 * around + 1
     near_by, reached = np.empty(count, dtype=np.int32), np.empty(count)
     chosen = np.empty(later.shape[1], dtype=np.int32)
     for j in range(later.shape[1]):
-        x, y, b, s = later[0, j], later[1, j], later[2, j], later[3, j]
-        col, row = int((x - west_m) // side_m), int((north_m - y) // side_m)
-        found, gone = 0, 0.0
+        place = later[0, j], later[1, j], later[2, j], later[3, j]
+        col, row = int((place[0] - west_m) // side_m), int((north_m - place[1]) // side_m)
         left, right = max(col - around, 0), min(col + around + 1, cols)
-        for r in range(max(row - around, 0), min(row + around + 1, rows)):
-            if left >= right:
+        first, last = max(row - around, 0), min(row + around + 1, rows)
+        if left >= right:
+            last = first
+        corner = (around - row) * across + around - col
+        near = _Near(first, last, left, right, corner, across, cols, start, most, masses)
+        mass, nearby = _summed(near, before)
+        chosen[j] = -1
+        for t in range(min(nearby // _PAIRS_A_TRY, _MOST_TRIES)):
+            one, other = uniforms(hashed(key, np.uint64(later.shape[1] + j * _MOST_TRIES + t)))
+            goal, accept = np.float64(one) * (mass + jumped * total), np.float64(other)
+            if goal >= mass:
+                chosen[j] = min(np.searchsorted(passed, accept * total), count - 1)
                 break
+            i, most_likely = _drawn(near, before, goal)
+            log_led = _log_led(place, led, i, per)
+            if log_led > jump and accept * most_likely < np.float64(exp32(log_led)) - jumped:
+                chosen[j] = order[i]
+                break
+        if chosen[j] >= 0:
+            continue
+        found, gone = 0, 0.0
+        for r in range(first, last):
             for i in range(start[r * cols + left], start[r * cols + right]):
-                dx, dy = x - to_east[i], y - to_north[i]
-                near = per_place * (dx * dx + dy * dy)
-                if near <= jump:
-                    continue
-                db, ds = wrap32(b - bias[i]), s - scale[i]
-                near += per_bias * db * db + per_scale * ds * ds
-                if near > jump:
-                    gone += weight[i] * (np.float64(exp32(near)) - jumped)
+                log_led = _log_led(place, led, i, per)
+                if log_led > jump:
+                    gone += led.weight[i] * (np.float64(exp32(log_led)) - jumped)
                     near_by[found], reached[found] = i, gone
                     found += 1
-        place, _ = uniforms(hashed(key, np.uint64(j)))
-        goal = place * (gone + jumped * total)
+        goal = np.float64(uniforms(hashed(key, np.uint64(j)))[0]) * (gone + jumped * total)
         if goal < gone:
             chosen[j] = order[near_by[np.searchsorted(reached[:found], goal)]]
         else:
             chosen[j] = min(np.searchsorted(passed, (goal - gone) / jumped), count - 1)
     return chosen
+
+
+@njit(inline="always")
+def _log_led(
+    place: tuple[np.float32, np.float32, np.float32, np.float32],
+    led: _Led,
+    i: int,
+    per: tuple[np.float32, np.float32, np.float32],
+) -> np.float32:
+    """Return the log-likelihood of an earlier hypothesis having been led to a later one."""
+    dx, dy = place[0] - led.east_m[i], place[1] - led.north_m[i]
+    db, ds = wrap32(place[2] - led.bias_rad[i]), place[3] - led.log_scale[i]
+    return _F(per[0] * (dx * dx + dy * dy) + per[1] * db * db + per[2] * ds * ds)
+
+
+@njit(error_model="numpy", cache=True)
+def _most_likely(around: int, per_square: float) -> Floats:
+    """Return the most that places in each of the squares around one are likely for one in it."""
+    across = 2 * around + 1
+    most = np.empty(across * across)
+    for r in range(across):
+        for c in range(across):
+            apart = max(abs(r - around) - 1, 0) ** 2 + max(abs(c - around) - 1, 0) ** 2
+            most[r * across + c] = np.exp(per_square * apart)
+    return most
+
+
+@njit(inline="always")
+def _summed(near: _Near, before: Floats) -> tuple[float, int]:
+    """Fill in the masses; return their sum, and the number of hypotheses nearby."""
+    mass, nearby = 0.0, 0
+    for r in range(near.first, near.last):
+        at = near.corner + r * near.across
+        for c in range(near.left, near.right):
+            low, high = near.start[r * near.cols + c], near.start[r * near.cols + c + 1]
+            nearby += high - low
+            mass += (before[high] - before[low]) * near.most[at + c]
+            near.masses[at + c] = mass
+    return mass, nearby
+
+
+@njit(inline="always")
+def _drawn(near: _Near, before: Floats, goal: float) -> tuple[int, float]:
+    """Return the hypothesis at which the masses exceed a number, and the most it can be likely."""
+    r = near.first
+    while near.masses[near.corner + r * near.across + near.right - 1] <= goal:
+        r += 1
+    at, c = near.corner + r * near.across, near.left
+    while near.masses[at + c] <= goal:
+        c += 1
+    low, high = near.start[r * near.cols + c], near.start[r * near.cols + c + 1]
+    most = near.most[at + c]
+    # From the end of the square back, by what is left of its mass.
+    weighed = before[high] - (near.masses[at + c] - goal) / most
+    while high - low > 1:
+        middle = (low + high) // 2
+        if before[middle] <= weighed:
+            low = middle
+        else:
+            high = middle
+    return low, most
 
 
 @njit(error_model="numpy", cache=True)

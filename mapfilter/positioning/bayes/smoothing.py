@@ -184,8 +184,11 @@ class BayesSmoother:
         bins = Bins.over((0.0, 0.0, *area.size_m))
         weight = np.full(paths, 1 / paths, dtype=np.float32)
         new = {name: getattr(estimate, name).copy() for name in _SMOOTHED}
-        for index in range(kept[0].epoch, len(estimate)):
-            place = _between(kept, states, moved, index)
+        indices = range(kept[0].epoch, len(estimate))
+        # The first belief at each epoch or after it; none is kept after the last one.
+        following = np.searchsorted([one.epoch for one in kept], indices)
+        for index, after in zip(indices, np.minimum(following, len(kept) - 1), strict=True):
+            place = _between(kept, states, moved, index, int(after))
             found = summarise(place, weight, bins)
             way = area.matched_way(place[0], place[1], weight)
             mean = found.mean[0] + west, found.mean[1] + south
@@ -247,9 +250,10 @@ def _new_share(length_m: float, correlation_m: float) -> float:
     return 1 - exp(-2 * length_m / correlation_m)
 
 
-def _between(kept: list[Kept], states: list[Floats32], moved: Floats, index: int) -> Floats32:
-    """Return where all paths are at an epoch."""
-    after = next((k for k, one in enumerate(kept) if one.epoch >= index), len(kept) - 1)
+def _between(
+    kept: list[Kept], states: list[Floats32], moved: Floats, index: int, after: int
+) -> Floats32:
+    """Return where all paths are at an epoch, ``after`` which the next belief is kept."""
     if kept[after].epoch == index or after == 0:
         return states[after]
     first, last = kept[after - 1], kept[after]
