@@ -66,7 +66,9 @@ def draw_ancestors(
 
     An earlier hypothesis is weighed by how well its own errors of heading and scale lead it, over
     the displacement by dead reckoning, to the later one. Hypotheses are sorted by place, and only
-    those nearby are compared.
+    those nearby are compared. Some of them are drawn by their weights first, and taken by their
+    likelihood (rejection sampling, Douc et al. 2011); where none is taken, all nearby are weighed,
+    which draws from the same distribution.
 
     Parameters
     ----------
