@@ -138,6 +138,24 @@ def test_a_timing_advance_counts_by_the_distance_to_the_site():
     assert east_m[1] > east_m[0] + 150
 
 
+@pytest.mark.parametrize("technology", ["LTE", "GSM"])
+def test_a_timing_advance_is_normal_about_the_middle_of_its_step_and_clipped(technology):
+    """Its deviation is 200 m and that of a step's width; beyond three of them all is alike."""
+    bit_m = 299_792_458 * 48e-6 / 13
+    step_m = {"LTE": LTE_STEP_M, "GSM": bit_m / 2}[technology]
+    cell = replace(_cell("a", 0, 0, 1800.0), technology=technology)
+    planned = Planned.of(CellPlan(CRS, (cell,)), ("a",))
+    sd_m = np.sqrt(200.0**2 + step_m**2 / 12)
+    middle_m = 7.5 * step_m
+    off_sd = np.array([0.0, 1.0, -2.0, 2.9, 3.1, 5.0, 9.0])
+    places = AT_M + np.outer(middle_m + off_sd * sd_m, [0.6, 0.8])
+    found = planned.log_timing(places, 0, 7.0)
+    expected = [0.0, -0.5, -2.0, -0.5 * 2.9**2, -4.5, -4.5, -4.5]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    for serving, steps in ((-1, 7.0), (0, np.nan)):
+        assert planned.log_timing(places, serving, steps).tolist() == [0.0] * 7
+
+
 def test_a_database_keeps_what_its_plan_assumes(tmp_path):
     """Levels of a database err by what its plan lacks; powers of whole carriers are named."""
     lattice = Lattice.covering(CRS, (EAST_M, NORTH_M, EAST_M + 400, NORTH_M + 400), 50.0)

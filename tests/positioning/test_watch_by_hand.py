@@ -280,6 +280,12 @@ def test_a_repeated_report_gains_by_levels_and_metres(levels, way_m, nats):
     assert feet.repeated_nats == pytest.approx(min(0.25 * 0.12 * min(levels, 3) * way_m, nats))
 
 
+def test_a_repeated_report_without_levels_ends_the_sum():
+    rows = (ReportRow("serving", "A", None, None, nan, 0),)
+    heard = SensorWatch(report=rows, repeated_nats=3.0, moved_m=5.0)
+    assert after(epoch(1.0, radio=rows), watch=heard).repeated_nats == 0.0
+
+
 def test_any_difference_makes_a_report_another():
     rows = report(-70.0, -80.0)
     others = [
