@@ -102,14 +102,6 @@ def test_a_serving_cell_is_none_of_its_neighbours():
     assert (reading.bounds, unused) == ((), [])
 
 
-@pytest.mark.parametrize("row", [serving("Z", -70.0), serving("E", -70.0), named("A", -90.0)])
-def test_a_report_without_a_usable_serving_cell_has_band_minus_one(row):
-    """Unknown, nowhere received, or none at all."""
-    _, reading, reason, _ = read(row, named("B", -75.0))
-    assert reason is not Reason.USED
-    assert reading.serving == -1
-
-
 def test_a_cell_reported_twice_counts_once():
     _, reading, _, _ = read(serving("B", -70.0), named("B", -60.0), named("C", -80.0))
     assert inside(reading) == {B: -70.0, C: -80.0}
