@@ -109,6 +109,32 @@ def test_behind_an_assumed_sector_levels_err_by_more():
     assert behind > front + 4
 
 
+def test_behind_an_assumed_sector_two_fifths_of_what_the_pattern_loses_are_added():
+    sector = replace(_cell("c", 0, 0, 800.0, assumed="height_m"), azimuth_deg=90.0, antenna="3gpp")
+    sector = replace(sector, beamwidth_deg=65.0, max_attenuation_db=25.0)
+    behind = np.array([[EAST_M - 500, NORTH_M]])
+    found = level_deviations_db(sector, CRS, behind, 6.0)
+    assert found == pytest.approx(np.sqrt(6.0**2 + 4.0**2 + (0.4 * 25.0) ** 2))
+    turned = replace(sector, assumed="azimuth_deg eirp_dbm")
+    own_db2 = 6.0**2 + 9.0**2 + 4.0**2
+    assert level_deviations_db(turned, CRS, behind, 6.0) == pytest.approx(np.sqrt(own_db2 + 100.0))
+    stated = replace(sector, assumed="")
+    assert level_deviations_db(stated, CRS, behind, 6.0).tolist() == [6.0]
+
+
+def test_the_common_error_is_the_mean_of_what_each_cell_lacks():
+    fields = ("", "eirp_dbm", "height_m", "azimuth_deg", "eirp_dbm height_m")
+    for k, field in enumerate(fields):
+        plan = CellPlan(CRS, (_cell("a", 0, 0, 1800.0, assumed=field),))
+        expected = [0.0, 5.0, 3.0, 0.0, np.sqrt(34.0)][k]
+        assert Planned.of(plan, ("a",)).common_db == pytest.approx(expected)
+    cells = (_cell("a", 0, 0, 1800.0, assumed="eirp_dbm"), _cell("b", 0, 0, 800.0))
+    made = Planned.of(CellPlan(CRS, cells), ("a", "b"))
+    assert made.common_db == pytest.approx(2.5)
+    assert made.step_m == pytest.approx([78.07, 78.07], abs=0.01)
+    assert Planned.of(CellPlan(CRS, cells), ()).common_db == 0.0
+
+
 def _one(plan: CellPlan, names: list[str], level_dbm: list[float], **more: object) -> np.ndarray:
     fitted = fit_locator(_map(plan), "probabilistic", np.random.default_rng(1))
     reports = make_reports(CRS, np.zeros(len(names), int), names, level_dbm, count=1, **more)
