@@ -1,5 +1,8 @@
 """How often motion rows come and how fast one moves: limits and means, by hand."""
 
+from dataclasses import replace
+from math import exp, nan
+
 import pytest
 
 from mapfilter.filters.contract import MotionStep
@@ -52,3 +55,82 @@ def test_a_step_covers_the_time_since_the_last_one_of_a_walk(stepped_s, fastest_
     """Up to 1.6 s; after a longer time it follows a rest, and covers the time of its row."""
     pace = Pace(motion_s=1.1, stepped_s=stepped_s, rows=5, interval_s=0.5)
     assert after(pace, 1.6, 3.2).fastest_mps == pytest.approx(fastest_mps)
+
+
+def test_a_first_row_covers_no_time_and_is_a_walk_however_short():
+    pace, going = Pace().read(7.0, (MotionStep(0.05, 0.1),), 1.0)
+    assert going == (0.05, True, True)
+    assert (pace.motion_s, pace.stepped_s, pace.rows, pace.rests) == (7.0, 7.0, 1, False)
+    assert (pace.recent_mps, pace.speed_mps, pace.interval_s) == (1.4, 1.4, 0.0)
+
+
+@pytest.mark.parametrize(("rows", "step_s"), [(1, 2.5), (2, 1.0), (3, 1.0)])
+def test_a_step_after_a_pause_counts_for_the_usual_interval(rows, step_s):
+    """The second row has no usual interval yet."""
+    pace = Pace(motion_s=0.0, rows=rows, interval_s=1.0)
+    gained = (1 - exp(-step_s / 2.5)) * (2.0 / step_s - 1.4)
+    assert after(pace, 2.5, 2.0).recent_mps == pytest.approx(1.4 + gained)
+
+
+def test_a_row_at_a_tenth_of_a_metre_a_second_is_a_rest():
+    pace = Pace(motion_s=0.0, stepped_s=-3.0, rows=29, interval_s=2.0)
+    rest = after(pace, 2.0, 0.2)
+    assert rest.rests
+    assert (rest.motion_s, rest.stepped_s, rest.speed_mps) == (2.0, -3.0, 1.4)
+    # Rows without a length, and at the time of the last one, are none.
+    assert not after(pace, 2.0, nan).rests
+    assert not after(pace, 0.0, 0.01).rests
+    assert after(pace, 0.0, 0.0).rests
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "recent_mps", "moves"),
+    [(1.0, 0.3, True), (1.0, 0.29, False), (2.5, 0.5, False), (2.51, 0.5, True)],
+)
+def test_a_walker_slower_than_three_tenths_of_before_does_not_move(speed_mps, recent_mps, moves):
+    pace = Pace(0.0, rows=30, interval_s=1.0, speed_mps=speed_mps, recent_mps=recent_mps)
+    for unit_m in (1.0, 0.5):
+        scaled = replace(pace, speed_mps=speed_mps / unit_m, recent_mps=recent_mps / unit_m)
+        steps = (MotionStep(recent_mps / unit_m, 0.1),)
+        _, going = scaled.read(1.0, steps, unit_m)
+        assert going.moves == moves
+        assert going.gone_m == recent_mps / unit_m
+
+
+@pytest.mark.parametrize(("recent_mps", "learnt"), [(0.5, True), (0.49, False)])
+def test_the_speed_of_a_walker_is_learnt_from_half_of_it_on(recent_mps, learnt):
+    pace = Pace(0.0, rows=30, interval_s=1.0, speed_mps=1.0, recent_mps=recent_mps)
+    expected = 1.0 + (recent_mps - 1.0) / 20 if learnt else 1.0
+    assert after(pace, 1.0, recent_mps).speed_mps == pytest.approx(expected)
+
+
+def test_of_rows_more_often_than_once_a_second_each_counts_a_twentieth_of_its_way():
+    pace = Pace(9.5, 9.5, rows=100, interval_s=0.5, speed_mps=1.0, recent_mps=1.0)
+    assert after(pace, 10.0, 1.5).speed_mps == pytest.approx(1.0 + (1.5 - 0.5) / 20)
+    # A step covers the time since the last one.
+    stepped = replace(pace, stepped_s=9.0)
+    assert after(stepped, 10.0, 0.8).speed_mps == pytest.approx(1.0 + (0.8 - 1.0) / 20)
+
+
+def test_rows_at_one_time_say_nothing_of_intervals_and_speeds():
+    pace = Pace(10.0, 10.0, rows=50, interval_s=0.5, irregular_s=0.1, fastest_mps=2.0)
+    found = after(pace, 10.0, 0.7)
+    assert found == replace(pace, rows=51)
+
+
+def test_means_of_intervals_are_those_of_all_rows_up_to_twenty():
+    for rows, share in ((2, 1 / 2), (19, 1 / 19), (20, 1 / 20), (21, 1 / 20)):
+        pace = Pace(0.0, 0.0, rows, 1.0, 0.3)
+        found = after(pace, 2.0, 1.0)
+        assert found.interval_s == pytest.approx(1.0 + share)
+        # The deviation is that from the mean with the row itself.
+        assert found.irregular_s == pytest.approx(0.3 + share * ((1.0 - share) - 0.3))
+
+
+def test_what_a_slow_way_teaches_is_half():
+    assert Pace(speed_mps=1.2).slowed(0.4).speed_mps == pytest.approx(0.8)
+
+
+def test_a_gap_counts_as_five_usual_intervals():
+    found = after(Pace(0.0, 0.0, rows=11, interval_s=2.0), 100.0, 1.0)
+    assert found.interval_s == pytest.approx(2.0 + (5 * 2.0 - 2.0) / 11)
