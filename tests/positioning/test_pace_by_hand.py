@@ -134,3 +134,15 @@ def test_what_a_slow_way_teaches_is_half():
 def test_a_gap_counts_as_five_usual_intervals():
     found = after(Pace(0.0, 0.0, rows=11, interval_s=2.0), 100.0, 1.0)
     assert found.interval_s == pytest.approx(2.0 + (5 * 2.0 - 2.0) / 11)
+
+
+@pytest.mark.parametrize(("rows", "least_m"), [(1, 0.7), (2, 0.3), (5, 0.3)])
+def test_after_a_pause_a_row_covers_three_usual_intervals(rows, least_m):
+    """The second row has no usual interval yet, and covers all of it."""
+    pace = Pace(0.0, 0.0, rows, interval_s=1.0)
+    assert after(pace, 7.0, least_m - 0.01).rests
+    assert not after(pace, 7.0, least_m + 0.01).rests
+
+
+def test_rows_without_any_time_have_no_speed():
+    assert after(Pace(1.0, 1.0, rows=2), 1.0, 5.0).fastest_mps == 0.0
