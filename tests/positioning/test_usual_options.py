@@ -5,6 +5,8 @@ from dataclasses import asdict
 import pytest
 
 from mapfilter.positioning.bayes.alternative import AlternativeRules
+from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.mirrored import MirrorRules
 from mapfilter.positioning.fingerprints.options import (
     CANDIDATES,
     Centroid,
@@ -47,6 +49,20 @@ def test_the_usual_rules_of_alternatives():
         "claimed_from": 0.95,
         "takes_over_searching": False,
     }
+
+
+def test_the_usual_rules_of_phones_that_are_turned_and_of_mirrored_paths():
+    assert asdict(HoldRules()) == {
+        "watched": True, "jump_deg": 60.0, "around_deg": 150.0, "longest_row_m": 3.0,
+        "longest_pause_s": 3.0, "probability": 0.006, "around_probability": 0.25,
+        "mirrored_odds": 0.25, "lost_log_odds": -1.0, "lost_after_m": 7.0, "win_log_odds": 8.0,
+        "abandon_threshold": -4.0, "abandon_after_m": 400.0, "abandon_ahead_after_m": 1200.0,
+        "max_beliefs": 6, "particles": 1000,
+    }  # fmt: skip
+    assert asdict(MirrorRules()) == {
+        "least_lead": 6.0, "lead_share": 0.4, "usual_nats_per_m": 0.03, "margin_nats": 4.0,
+        "least_turned_rad": pytest.approx(3.14159, abs=1e-5),
+    }  # fmt: skip
 
 
 def test_the_usual_options_of_methods_for_single_reports():
