@@ -326,6 +326,17 @@ def test_the_log_odds_are_bounded_so_that_a_change_is_seen_in_time():
     assert exp(-12.0) > 5e-6
 
 
+@pytest.mark.parametrize(
+    ("converge_log_odds", "searching", "least"),
+    [(-12.0, True, -15.0), (-12.0, False, -12.0), (-5.0, True, -12.0), (-20.0, True, -23.0)],
+)
+def test_a_search_has_to_refute_it_by_three_nats_more_than_convergence_asks_for(
+    converge_log_odds, searching, least
+):
+    rules = AlternativeRules(converge_log_odds=converge_log_odds)
+    assert rules.least_log_odds(searching=searching) == least
+
+
 def test_the_null_hypothesis_starts_again_unless_it_is_less_probable():
     assert NullHypothesis(4.0).reset().log_odds == pytest.approx(PRIOR)
     assert NullHypothesis(-8.0).reset().log_odds == -8.0

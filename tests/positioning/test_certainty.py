@@ -95,7 +95,8 @@ def test_the_share_near_a_place_is_that_within_fifty_metres_to_all_sides():
     main = SimpleNamespace(summary=SimpleNamespace(mean=np.array([100.0, 200.0, 7.0])))
     away = [(0, 0), (30, 40), (-30, -40), (40, -30), (30, 41), (-41, 30), (0, -51), (51, 0)]
     state = np.zeros((3, 8), dtype=np.float32)
-    state[:2] = np.array(away, dtype=np.float32).T + [[100.0], [200.0]]
+    state[0] = [100 + east_m for east_m, _ in away]
+    state[1] = [200 + north_m for _, north_m in away]
     weight = 2.0 ** -np.arange(1, 9)
     one = SimpleNamespace(state=state, weight=weight)
     assert _share_near(one, main) == 1 / 2 + 1 / 4 + 1 / 8 + 1 / 16
