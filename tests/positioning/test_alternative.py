@@ -202,6 +202,22 @@ def test_the_bayes_factor_of_satellites_counts():
     assert after(Belief(TRACKING), by_gnss).status is LOST
 
 
+def test_the_bayes_factor_is_the_lead_in_evidence_since_the_alternative_began():
+    """The belief had lost 10 nats by then and 20 since; the alternative lost 15."""
+    main, belief = Belief(TRACKING, -30.0), Belief(SEARCHING, -15.0)
+    other = AlternativeHypothesis(belief, 100.0, -10.0)
+    assert other.log_bayes_factor(main) == 5.0
+    assert replace(other, gnss_log_bayes_factor=2.0).log_bayes_factor(main) == 7.0
+    # Beside a belief that was improbable beforehand it leads by so much more.
+    for log_prior in (-2.0, 3.0):
+        beside = other.beside(log_prior)
+        assert beside.log_bayes_factor(main) == 5.0 - log_prior
+        assert (beside.start_m, beside.belief) == (100.0, belief)
+    assert (other.step_unit_m, other.gnss_log_bayes_factor, other.sources) == (1.0, 0.0, {})
+    assert other.null == NullHypothesis()
+    assert NullHypothesis().travelled_m == 0.0
+
+
 TABLE = """
 none, undecided  any        belief            its own    kept     kept
 confirmed        any        belief            its own    reset    dropped
