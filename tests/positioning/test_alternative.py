@@ -1,6 +1,7 @@
 """A belief, its alternative and the null hypothesis: lost, replaced, confirmed, or neither."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import exp, log, nan
 
 import numpy as np
@@ -17,6 +18,7 @@ from mapfilter.positioning.bayes.alternative import (
     Outcome,
     doubted,
     judge,
+    report,
     resolve_alternative,
 )
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -188,6 +190,78 @@ def test_both_at_one_place_confirm_the_belief(null, reset):
     assert now.status is (TRACKING if reset < -5 else LOST)
     assert (now.taken_over, now.alternative) == (False, None)
     assert now.null.log_odds == pytest.approx(reset)
+
+
+@pytest.mark.parametrize(
+    ("east_m", "north_m", "mass", "outcome"),
+    [
+        (30.0, 40.0, 0.9, Outcome.CONFIRMED),
+        (-30.0, -40.0, 0.9, Outcome.CONFIRMED),
+        (30.0, 40.0, 0.89, Outcome.UNDECIDED),
+        (30.0, 41.0, 0.9, Outcome.UNDECIDED),
+        (-31.0, 40.0, 0.9, Outcome.UNDECIDED),
+        (0.0, -51.0, 0.9, Outcome.UNDECIDED),
+    ],
+)
+def test_one_place_is_fifty_metres_to_all_sides(east_m, north_m, mass, outcome):
+    own, place = at(0.0, 1.0), at(0.0, mass)
+    own.mean[:2] = 400.0, 700.0
+    place.mean[:2] = 400.0 + east_m, 700.0 + north_m
+    other = AlternativeHypothesis(Belief(SEARCHING, 0.0, summary=place), 100.0, 0.0)
+    assert judge(RULES, Belief(TRACKING, summary=own), other, 200.0) is outcome
+
+
+@pytest.mark.parametrize(
+    ("status", "null", "outcome"),
+    [(CONVERGED, -5.0, Outcome.WON), (TRACKING, -5.0, Outcome.WON), (TRACKING, -4.9, Outcome.AHEAD),
+     (SEARCHING, -9.0, Outcome.AHEAD), (SEARCHING, 0.0, Outcome.AHEAD),
+     (SEARCHING, 0.1, Outcome.SUSPECT), (TRACKING, 0.1, Outcome.SUSPECT)],
+)  # fmt: skip
+def test_what_an_alternative_ahead_has_shown(status, null, outcome):
+    other = rival(10.0, status=status, null=null)
+    assert judge(RULES, Belief(TRACKING), other, 200.0) is outcome
+    at_once = replace(RULES, takes_over_searching=True)
+    suspect = Outcome.WON if outcome is Outcome.WON else Outcome.SUSPECT
+    assert judge(at_once, Belief(TRACKING), other, 200.0) is suspect
+
+
+@pytest.mark.parametrize(
+    ("lead", "travelled_m", "outcome"),
+    [(-24.9, 899.9, Outcome.UNDECIDED), (-25.0, 200.0, Outcome.ABANDONED),
+     (0.0, 900.0, Outcome.ABANDONED)],
+)  # fmt: skip
+def test_when_an_alternative_is_given_up(lead, travelled_m, outcome):
+    """It began at 100 m."""
+    assert judge(RULES, Belief(TRACKING), rival(lead), travelled_m) is outcome
+
+
+def test_the_distance_of_agreement_stays_unless_the_search_begins_anew():
+    for lead, status, start_m in ((12.0, CONVERGED, 70.0), (5.0, SEARCHING, nan)):
+        other = rival(lead, status=status, null=-6.0)
+        other = replace(other, belief=replace(other.belief, agreement_start_m=70.0))
+        now = after(Belief(SEARCHING), other)
+        assert now.taken_over
+        assert now.belief.agreement_start_m == pytest.approx(start_m, nan_ok=True)
+
+
+@dataclass(frozen=True)
+class Summed:
+    """A belief that adds itself up when it is asked."""
+
+    status: Status
+
+    @cached_property
+    def summary(self):
+        return at(0.0, 1.0)
+
+
+def test_a_belief_that_is_tracked_keeps_the_sums_it_had():
+    found = Summed(CONVERGED)
+    belief, status = report(CONVERGED, found, CONVERGED)
+    assert (status, belief.status) == (TRACKING, TRACKING)
+    assert belief.summary is found.summary
+    for before, now in ((SEARCHING, CONVERGED), (TRACKING, TRACKING), (LOST, SEARCHING)):
+        assert report(before, found, now) == (found, LOST if before is LOST else now)
 
 
 @pytest.mark.parametrize(("lead", "travelled_m"), [(-30.0, 200.0), (0.0, 900.0)])
