@@ -67,6 +67,13 @@ def test_the_alternative_has_terms_of_its_own_where_they_are_given():
     assert other.under_null == pytest.approx(-2.0 - 8.0 - 16.0)
 
 
+def test_no_likelihood_for_the_alternative_is_one_of_its_own():
+    update = EvidenceUpdate(0, (A,), (B,), -2.0, alternative_under_null=0.0)
+    assert not update.disputed
+    assert joined((update,)).under_null == -2.0
+    assert joined((update,), alternative=True).under_null == 0.0
+
+
 def test_a_likelihood_under_the_null_hypothesis_counts_without_terms():
     found = joined((EvidenceUpdate(0, under_null=-3.0), EvidenceUpdate(1, radio=RADIO)))
     assert (found.terms, found.under_null) == ((), pytest.approx(-4.0))
