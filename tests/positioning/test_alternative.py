@@ -1,6 +1,7 @@
 """A belief, its alternative and the null hypothesis: lost, replaced, confirmed, or neither."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import exp, log, nan
 
 import numpy as np
@@ -17,6 +18,7 @@ from mapfilter.positioning.bayes.alternative import (
     Outcome,
     doubted,
     judge,
+    report,
     resolve_alternative,
 )
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -190,6 +192,78 @@ def test_both_at_one_place_confirm_the_belief(null, reset):
     assert now.null.log_odds == pytest.approx(reset)
 
 
+@pytest.mark.parametrize(
+    ("east_m", "north_m", "mass", "outcome"),
+    [
+        (30.0, 40.0, 0.9, Outcome.CONFIRMED),
+        (-30.0, -40.0, 0.9, Outcome.CONFIRMED),
+        (30.0, 40.0, 0.89, Outcome.UNDECIDED),
+        (30.0, 41.0, 0.9, Outcome.UNDECIDED),
+        (-31.0, 40.0, 0.9, Outcome.UNDECIDED),
+        (0.0, -51.0, 0.9, Outcome.UNDECIDED),
+    ],
+)
+def test_one_place_is_fifty_metres_to_all_sides(east_m, north_m, mass, outcome):
+    own, place = at(0.0, 1.0), at(0.0, mass)
+    own.mean[:2] = 400.0, 700.0
+    place.mean[:2] = 400.0 + east_m, 700.0 + north_m
+    other = AlternativeHypothesis(Belief(SEARCHING, 0.0, summary=place), 100.0, 0.0)
+    assert judge(RULES, Belief(TRACKING, summary=own), other, 200.0) is outcome
+
+
+@pytest.mark.parametrize(
+    ("status", "null", "outcome"),
+    [(CONVERGED, -5.0, Outcome.WON), (TRACKING, -5.0, Outcome.WON), (TRACKING, -4.9, Outcome.AHEAD),
+     (SEARCHING, -9.0, Outcome.AHEAD), (SEARCHING, 0.0, Outcome.AHEAD),
+     (SEARCHING, 0.1, Outcome.SUSPECT), (TRACKING, 0.1, Outcome.SUSPECT)],
+)  # fmt: skip
+def test_what_an_alternative_ahead_has_shown(status, null, outcome):
+    other = rival(10.0, status=status, null=null)
+    assert judge(RULES, Belief(TRACKING), other, 200.0) is outcome
+    at_once = replace(RULES, takes_over_searching=True)
+    suspect = Outcome.WON if outcome is Outcome.WON else Outcome.SUSPECT
+    assert judge(at_once, Belief(TRACKING), other, 200.0) is suspect
+
+
+@pytest.mark.parametrize(
+    ("lead", "travelled_m", "outcome"),
+    [(-24.9, 899.9, Outcome.UNDECIDED), (-25.0, 200.0, Outcome.ABANDONED),
+     (0.0, 900.0, Outcome.ABANDONED)],
+)  # fmt: skip
+def test_when_an_alternative_is_given_up(lead, travelled_m, outcome):
+    """It began at 100 m."""
+    assert judge(RULES, Belief(TRACKING), rival(lead), travelled_m) is outcome
+
+
+def test_the_distance_of_agreement_stays_unless_the_search_begins_anew():
+    for lead, status, start_m in ((12.0, CONVERGED, 70.0), (5.0, SEARCHING, nan)):
+        other = rival(lead, status=status, null=-6.0)
+        other = replace(other, belief=replace(other.belief, agreement_start_m=70.0))
+        now = after(Belief(SEARCHING), other)
+        assert now.taken_over
+        assert now.belief.agreement_start_m == pytest.approx(start_m, nan_ok=True)
+
+
+@dataclass(frozen=True)
+class Summed:
+    """A belief that adds itself up when it is asked."""
+
+    status: Status
+
+    @cached_property
+    def summary(self):
+        return at(0.0, 1.0)
+
+
+def test_a_belief_that_is_tracked_keeps_the_sums_it_had():
+    found = Summed(CONVERGED)
+    belief, status = report(CONVERGED, found, CONVERGED)
+    assert (status, belief.status) == (TRACKING, TRACKING)
+    assert belief.summary is found.summary
+    for before, now in ((SEARCHING, CONVERGED), (TRACKING, TRACKING), (LOST, SEARCHING)):
+        assert report(before, found, now) == (found, LOST if before is LOST else now)
+
+
 @pytest.mark.parametrize(("lead", "travelled_m"), [(-30.0, 200.0), (0.0, 900.0)])
 def test_an_alternative_is_abandoned(lead, travelled_m):
     now = after(Belief(TRACKING), rival(lead), null=-2.0, travelled_m=travelled_m)
@@ -200,6 +274,22 @@ def test_an_alternative_is_abandoned(lead, travelled_m):
 def test_the_bayes_factor_of_satellites_counts():
     by_gnss = replace(rival(0.0), gnss_log_bayes_factor=11.0)
     assert after(Belief(TRACKING), by_gnss).status is LOST
+
+
+def test_the_bayes_factor_is_the_lead_in_evidence_since_the_alternative_began():
+    """The belief had lost 10 nats by then and 20 since; the alternative lost 15."""
+    main, belief = Belief(TRACKING, -30.0), Belief(SEARCHING, -15.0)
+    other = AlternativeHypothesis(belief, 100.0, -10.0)
+    assert other.log_bayes_factor(main) == 5.0
+    assert replace(other, gnss_log_bayes_factor=2.0).log_bayes_factor(main) == 7.0
+    # Beside a belief that was improbable beforehand it leads by so much more.
+    for log_prior in (-2.0, 3.0):
+        beside = other.beside(log_prior)
+        assert beside.log_bayes_factor(main) == 5.0 - log_prior
+        assert (beside.start_m, beside.belief) == (100.0, belief)
+    assert (other.step_unit_m, other.gnss_log_bayes_factor, other.sources) == (1.0, 0.0, {})
+    assert other.null == NullHypothesis()
+    assert NullHypothesis().travelled_m == 0.0
 
 
 TABLE = """
@@ -324,6 +414,17 @@ def test_the_log_odds_are_bounded_so_that_a_change_is_seen_in_time():
     assert odds_after(low, reading, -6.0, -18.0) == 0.0
     assert odds_after(high, reading, -18.0, -6.0) == 0.0
     assert exp(-12.0) > 5e-6
+
+
+@pytest.mark.parametrize(
+    ("converge_log_odds", "searching", "least"),
+    [(-12.0, True, -15.0), (-12.0, False, -12.0), (-5.0, True, -12.0), (-20.0, True, -23.0)],
+)
+def test_a_search_has_to_refute_it_by_three_nats_more_than_convergence_asks_for(
+    converge_log_odds, searching, least
+):
+    rules = AlternativeRules(converge_log_odds=converge_log_odds)
+    assert rules.least_log_odds(searching=searching) == least
 
 
 def test_the_null_hypothesis_starts_again_unless_it_is_less_probable():

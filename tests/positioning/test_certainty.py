@@ -10,7 +10,7 @@ from made_town import Town
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, AlternativeRules
-from mapfilter.positioning.bayes.certainty import certainty
+from mapfilter.positioning.bayes.certainty import _share_near, certainty
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.options import BayesFilter
 
@@ -69,6 +69,37 @@ def test_an_alternative_counts_by_the_threshold_at_which_it_takes_over():
     assert certainty(RULES, main, alternative(6.0, 900.0)) == pytest.approx(1 / (1 + exp(-2)))
     assert certainty(RULES, main, alternative(8.0, 530.0)) == pytest.approx(1.0)
     assert certainty(RULES, main, alternative(-5.0, 900.0)) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_rival_counts_from_one_in_eight_thousand_on_and_at_most_by_thirty_nats():
+    main = belief(500.0)
+    for log_odds, odds in ((-8.9, exp(-8.9)), (-9.1, 0.0), (20.0, exp(20.0)), (31.0, exp(30.0))):
+        share = pytest.approx(1 / (1 + odds), rel=1e-6, abs=0.0)
+        assert certainty(RULES, main, held=[turned(log_odds, 700.0)]) == share
+        assert certainty(RULES, main, alternative(8.0 + log_odds, 900.0)) == share
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "east_m", "north_m", "counts"),
+    [(0.0, 30.0, 40.0, False), (0.0, 30.0, 40.1, True), (0.0, -30.1, -40.0, True),
+     (-9.0, 900.0, 0.0, False)],
+)  # fmt: skip
+def test_an_alternative_counts_beyond_fifty_metres(log_odds, east_m, north_m, counts):
+    main = SimpleNamespace(summary=SimpleNamespace(mean=(0.0, 0.0), mass_50m=1.0))
+    there = SimpleNamespace(summary=SimpleNamespace(mean=(east_m, north_m)))
+    other = SimpleNamespace(belief=there, log_bayes_factor=lambda _: 8.0 + log_odds)
+    assert certainty(RULES, main, other) == (0.5 if counts else 1.0)
+
+
+def test_the_share_near_a_place_is_that_within_fifty_metres_to_all_sides():
+    main = SimpleNamespace(summary=SimpleNamespace(mean=np.array([100.0, 200.0, 7.0])))
+    away = [(0, 0), (30, 40), (-30, -40), (40, -30), (30, 41), (-41, 30), (0, -51), (51, 0)]
+    state = np.zeros((3, 8), dtype=np.float32)
+    state[0] = [100 + east_m for east_m, _ in away]
+    state[1] = [200 + north_m for _, north_m in away]
+    weight = 2.0 ** -np.arange(1, 9)
+    one = SimpleNamespace(state=state, weight=weight)
+    assert _share_near(one, main) == 1 / 2 + 1 / 4 + 1 / 8 + 1 / 16
 
 
 def test_masses_on_a_grid_are_not_compared_with_turned_phones():

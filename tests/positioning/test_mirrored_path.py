@@ -74,6 +74,30 @@ def test_a_belief_that_fits_has_to_lead_its_twin(lead, proven):
     assert not MirrorRules().proven(main, twin, 0.9 * pi, PLACES)
 
 
+def test_limits_of_what_is_proven_count_as_proven():
+    """From few places: 500 m at 0.03 nats each, and 4 nats; half a circle; a lead of 6 nats."""
+    rules, turned_rad = MirrorRules(), pi
+    for places in (0, 1):
+        for log_evidence, lead, proven in (
+            (-19.0, 6.0, True), (-19.0, 5.99, False), (-19.1, 6.0, False),
+            # And 0.4 of what the twin has lost: (6 + 0.4 * 19.1) / (1 - 0.4) is 22.73.
+            (-19.1, 22.7, False), (-19.1, 22.8, True),
+        ):  # fmt: skip
+            main = belief(log_evidence)
+            twin = MirroredTwin(belief(log_evidence - lead), 0.0)
+            assert rules.proven(main, twin, turned_rad, places) is proven
+            assert not rules.proven(main, twin, turned_rad - 0.01, places)
+
+
+@pytest.mark.parametrize(("travelled_m", "is_ahead"), [(20.0, False), (20.1, True)])
+def test_a_twin_that_starts_within_twenty_metres_is_as_old(travelled_m, is_ahead):
+    main = belief(-3.0, travelled_m)
+    for places, ahead_nats in ((PLACES, log(PLACES)), (2, log(2)), (1, 0.0), (0, 0.0)):
+        twin = MirroredTwin.beside(main, belief(0.0, 0.0), places)
+        assert twin.ahead_nats == pytest.approx(ahead_nats if is_ahead else 0.0)
+        assert twin.main_log_evidence == -3.0
+
+
 def test_the_lead_of_a_path_that_fits_no_road_has_to_grow_with_the_way():
     """Where both paths fit badly, their log evidences part by chance: 20 nats in 2 km."""
     rules, main = MirrorRules(), belief(usual() - 60.0)

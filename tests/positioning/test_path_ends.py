@@ -11,7 +11,7 @@ from small_area import COLS, DISTANCE_M, PIXEL_M, POINTS, ROWS, make_area
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models.street_motion import MapWeights
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
-from mapfilter.positioning.bayes.path_start import OFF_AT_START, ends_of_path, possible_turns_rad
+from mapfilter.positioning.bayes.path_start import ends_of_path, possible_turns_rad
 
 AREA = make_area()
 WEIGHTS = MapWeights(
@@ -36,7 +36,7 @@ def weighed_by_hand(path, point, turned_rad):
     turn = np.array([[np.cos(turned_rad), -np.sin(turned_rad)],
                      [np.sin(turned_rad), np.cos(turned_rad)]])  # fmt: skip
     here = np.array([path.here.east_m, path.here.north_m])
-    on, off, leg_m = 1 - OFF_AT_START, OFF_AT_START, 5.0
+    on, off, leg_m = 0.95, 0.05, 5.0
     leave, back = 1 - exp(-WEIGHTS.leave_per_m * leg_m), 1 - exp(-WEIGHTS.return_per_m * leg_m)
     for one in (*path.points, path.here):
         x, y = end_m + turn @ (np.array([one.east_m, one.north_m]) - here)
@@ -85,14 +85,35 @@ def test_ends_are_drawn_by_the_root_of_their_likelihood_and_weighed_by_the_rest(
 
 
 def test_ends_that_are_much_less_probable_are_left_out():
-    """Below the best by 14 nats: by a prior of 13 they are there, by one of 40 not."""
+    """Below the best of all by 14 nats."""
     turned, _, width = TURNS
-    path = path_of(0.1, 0.1)
-    for worse, there in ((6.0, True), (40.0, False)):
+    path = path_of(0.1, 0.1, 1.7, 1.7)
+    best, other = (
+        max(weighed_by_hand(path, point, turned[turn])[0] for point in POINTS for turn in turns)
+        for turns in ((0,), (1, 2))
+    )
+    for below, count, there in ((6.0, 4000, True), (13.8, 200_000, True), (14.2, 200_000, False)):
+        worse = other - best + below
         turns = turned, np.array([0.0, -worse, -worse]), width
-        ends = ends_of_path(AREA, WEIGHTS, path, turns, 4000, np.random.default_rng(3))
+        ends = ends_of_path(AREA, WEIGHTS, path, turns, count, np.random.default_rng(3))
         others = np.abs(ends.turned_rad - turned[0]) > width
         assert others.any() == there
+
+
+def test_ends_are_drawn_alike_however_improbable_all_of_them_are():
+    turned, prior, width = TURNS
+    path = path_of(0.1, 0.1, 1.7)
+    found = [
+        ends_of_path(
+            AREA, WEIGHTS, path, (turned, prior - by, width), 500, np.random.default_rng(1)
+        )
+        for by in (0.0, 3000.0)
+    ]
+    for ends in found:
+        assert np.exp(ends.log_weight).sum() == pytest.approx(1.0)
+    same = np.abs(found[0].place_m - found[1].place_m).max(axis=0) < 1e-3
+    assert same.mean() > 0.95
+    np.testing.assert_allclose(found[0].log_weight[same], found[1].log_weight[same], atol=0.01)
 
 
 @pytest.mark.parametrize(

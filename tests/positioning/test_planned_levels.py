@@ -109,6 +109,32 @@ def test_behind_an_assumed_sector_levels_err_by_more():
     assert behind > front + 4
 
 
+def test_behind_an_assumed_sector_two_fifths_of_what_the_pattern_loses_are_added():
+    sector = replace(_cell("c", 0, 0, 800.0, assumed="height_m"), azimuth_deg=90.0, antenna="3gpp")
+    sector = replace(sector, beamwidth_deg=65.0, max_attenuation_db=25.0)
+    behind = np.array([[EAST_M - 500, NORTH_M]])
+    found = level_deviations_db(sector, CRS, behind, 6.0)
+    assert found == pytest.approx(np.sqrt(6.0**2 + 4.0**2 + (0.4 * 25.0) ** 2))
+    turned = replace(sector, assumed="azimuth_deg eirp_dbm")
+    own_db2 = 6.0**2 + 9.0**2 + 4.0**2
+    assert level_deviations_db(turned, CRS, behind, 6.0) == pytest.approx(np.sqrt(own_db2 + 100.0))
+    stated = replace(sector, assumed="")
+    assert level_deviations_db(stated, CRS, behind, 6.0).tolist() == [6.0]
+
+
+def test_the_common_error_is_the_mean_of_what_each_cell_lacks():
+    fields = ("", "eirp_dbm", "height_m", "azimuth_deg", "eirp_dbm height_m")
+    for k, field in enumerate(fields):
+        plan = CellPlan(CRS, (_cell("a", 0, 0, 1800.0, assumed=field),))
+        expected = [0.0, 5.0, 3.0, 0.0, np.sqrt(34.0)][k]
+        assert Planned.of(plan, ("a",)).common_db == pytest.approx(expected)
+    cells = (_cell("a", 0, 0, 1800.0, assumed="eirp_dbm"), _cell("b", 0, 0, 800.0))
+    made = Planned.of(CellPlan(CRS, cells), ("a", "b"))
+    assert made.common_db == pytest.approx(2.5)
+    assert made.step_m == pytest.approx([78.07, 78.07], abs=0.01)
+    assert Planned.of(CellPlan(CRS, cells), ()).common_db == 0.0
+
+
 def _one(plan: CellPlan, names: list[str], level_dbm: list[float], **more: object) -> np.ndarray:
     fitted = fit_locator(_map(plan), "probabilistic", np.random.default_rng(1))
     reports = make_reports(CRS, np.zeros(len(names), int), names, level_dbm, count=1, **more)
@@ -136,6 +162,24 @@ def test_a_timing_advance_counts_by_the_distance_to_the_site():
         for steps in (200 // LTE_STEP_M, 1000 // LTE_STEP_M)
     ]
     assert east_m[1] > east_m[0] + 150
+
+
+@pytest.mark.parametrize("technology", ["LTE", "GSM"])
+def test_a_timing_advance_is_normal_about_the_middle_of_its_step_and_clipped(technology):
+    """Its deviation is 200 m and that of a step's width; beyond three of them all is alike."""
+    bit_m = 299_792_458 * 48e-6 / 13
+    step_m = {"LTE": LTE_STEP_M, "GSM": bit_m / 2}[technology]
+    cell = replace(_cell("a", 0, 0, 1800.0), technology=technology)
+    planned = Planned.of(CellPlan(CRS, (cell,)), ("a",))
+    sd_m = np.sqrt(200.0**2 + step_m**2 / 12)
+    middle_m = 7.5 * step_m
+    off_sd = np.array([0.0, 1.0, -2.0, 2.9, 3.1, 5.0, 9.0])
+    places = AT_M + np.outer(middle_m + off_sd * sd_m, [0.6, 0.8])
+    found = planned.log_timing(places, 0, 7.0)
+    expected = [0.0, -0.5, -2.0, -0.5 * 2.9**2, -4.5, -4.5, -4.5]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    for serving, steps in ((-1, 7.0), (0, np.nan)):
+        assert planned.log_timing(places, serving, steps).tolist() == [0.0] * 7
 
 
 def test_a_database_keeps_what_its_plan_assumes(tmp_path):

@@ -35,32 +35,6 @@ from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 
 def test_the_usual_options():
-    assert asdict(GnssOptions()) == {
-        "zenith_m": 2.0, "echo_m": 4.0, "echo_memory_m": 100.0, "echo_memory_s": 120.0,
-        "reflection_m": 4.0, "reflection_times": 2.0, "lateness": 1.0, "fix_memory_m": 20.0,
-        "spacing_m": 10.0, "pause_s": 10.0, "mask_deg": 5.0, "height_m": 100.0,
-        "height_sd_m": 200.0, "slope": 0.3, "clock_sd_m": 3e5, "drift_sd_mps": 100.0,
-        "outliers": 0.05, "gate": 8.0, "search_gate": 16.0, "probation_s": 5.0, "trust": 3.0,
-        "trust_grows_s": 120.0, "dispute_s": 10.0,
-    }  # fmt: skip
-    assert asdict(TimingOptions()) == {
-        "step_m": pytest.approx(553.46, abs=0.01), "advance_sd_m": 200.0,
-        "advance_memory_m": 500.0, "difference_memory_m": 20.0, "difference_sd_m": 30.0,
-        "clip_sd": 3.0, "height_m": 1.5,
-    }  # fmt: skip
-    assert asdict(AlternativeRules()) == {
-        "start_log_odds": -1.0,
-        "search_threshold": 4.0,
-        "lost_threshold": 8.0,
-        "confirm_mass": 0.9,
-        "abandon_threshold": -25.0,
-        "abandon_after_m": 800.0,
-        "converge_log_odds": -12.0,
-        "converge_threshold": 2.0,
-        "map_nats_per_m": 0.04,
-        "claimed_from": 0.95,
-        "takes_over_searching": False,
-    }
     evidence = EvidenceOptions()
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)
     assert (evidence.serving, evidence.levels) == (ServingWeights(), LevelErrors())

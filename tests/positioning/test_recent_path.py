@@ -48,6 +48,18 @@ def test_a_path_of_fifty_metres_is_whole(steps, whole):
     assert after(*[(1.0, 0.3)] * steps).whole == whole
 
 
+def test_a_path_is_as_long_as_the_way_from_its_first_point():
+    path = RecentPath(DeadReckoning(60.0), (DeadReckoning(20.0),))
+    assert not path.whole
+    assert RecentPath(DeadReckoning(70.0), path.points).whole
+
+
+def test_points_are_relative_to_the_end_in_both_directions():
+    path = after((6.0, 0.0), (8.0, pi / 2), (1.0, pi / 2))
+    expected = [[-6.0, -9.0], [0.0, -9.0], [0.0, -1.0]]
+    np.testing.assert_allclose(path.earlier_m, expected, atol=1e-6)
+
+
 def test_a_step_of_unknown_length_or_direction_begins_another_path():
     path = after(*[(1.0, 0.0)] * 30)
     assert path.moved(MotionStep(0.0, nan)) is path
@@ -73,6 +85,7 @@ def test_bends_add_up_without_the_first_three_degrees_of_each():
 
 
 def test_three_right_angles_are_distinctive():
+    assert RecentPath(turned_rad=radians(270.0)).is_distinctive
     assert not legs(90.0, 90.0, 90.0).is_distinctive
     assert not legs(93.0, 93.0, 92.9).is_distinctive
     assert legs(93.0, -93.0, 93.1).is_distinctive

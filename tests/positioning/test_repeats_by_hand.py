@@ -42,7 +42,8 @@ def test_the_way_of_a_run_is_in_metres_and_counts_backward_steps():
 
 
 @pytest.mark.parametrize(
-    ("turn_rad", "run"), [(nan, 1), (0.0, 1), (1e-10, 1), (1e-8, 0), (-1e-8, 0)]
+    ("turn_rad", "run"),
+    [(nan, 1), (0.0, 1), (1e-9, 1), (1.1e-9, 0), (-9e-10, 1), (-1.1e-9, 0)],
 )
 def test_a_gyroscope_that_turns_ends_a_run(turn_rad, run):
     assert after((0.0, 1.0, FINE, 0.0), (1.0, 1.5, FINE, turn_rad)).run == run
@@ -51,7 +52,10 @@ def test_a_gyroscope_that_turns_ends_a_run(turn_rad, run):
 @pytest.mark.parametrize(
     ("heading_rad", "fine"),
     [(FINE, 1), (radians(12.34), 0), (radians(12.345), 1), (0.123, 0), (0.1235, 1), (nan, 0),
-     (0.0, 0), (-radians(7.0), 0)],
+     (0.0, 0), (-radians(7.0), 0),
+     # What is left by rounding, in hundredths of a degree and thousandths of a radian.
+     (radians(12.34 + 0.9e-6), 0), (radians(12.34 + 1.1e-6), 1), (0.123 + 0.9e-7, 0),
+     (0.123 + 1.1e-7, 1)],
 )  # fmt: skip
 def test_headings_of_hundredths_and_thousandths_are_coarse(heading_rad, fine):
     assert after((0.0, 1.0, heading_rad)).fine == fine
@@ -79,6 +83,30 @@ def test_eight_pairs_that_come_sooner_are_deliveries():
     assert known.come_twice
     assert not replace(known, pairs=7).come_twice
     assert not replace(known, within_s=0.8).come_twice
+    assert replace(known, within_s=1.59, between_s=2.0).come_twice
+
+
+def test_second_deliveries_are_dropped_and_other_rows_stay():
+    known = MotionRepeats(last=(1.0, FINE, 0.0), pairs=8, within_s=0.1, between_s=1.0, time_s=4.0)
+    again, other = MotionStep(1.0, FINE, 0.0), MotionStep(1.2, FINE, 0.1)
+    found, kept, why = without_repeats(known, 4.1, (again, other))
+    assert (kept, why) == ((other,), Reason.DELIVERED_TWICE)
+    assert (found.pairs, found.was_equal, found.last) == (9, False, (1.2, FINE, 0.1))
+    assert without_repeats(known, 4.1, (other,))[1:] == ((other,), Reason.USED)
+
+
+def test_nothing_repeats_before_the_first_row_and_lengths_are_metres_unless_stated():
+    known = MotionRepeats()
+    assert (known.rows, known.repeats, known.run, known.nats) == (50.0, 49.0, 0, 0.0)
+    assert (known.pairs, known.was_equal, known.still_m, known.fine) == (0, False, 0.0, 0)
+    known = replace(known, last=(1.0, FINE, nan))
+    assert without_repeats(known, 1.0, (MotionStep(2.5, FINE),))[0].run_m == 2.5
+
+
+def test_a_short_way_without_direction_spreads_by_its_length():
+    stuck = MotionRepeats(last=(0.5, FINE, nan), rows=60.0, nats=12.0, fine=30)
+    _, (step,), _ = without_repeats(stuck, 1.0, (MotionStep(0.5, FINE),))
+    assert step.spread_m == pytest.approx(0.5, rel=0.01)
 
 
 def test_pairs_are_counted_with_their_intervals():

@@ -49,7 +49,7 @@ def test_likelihoods_of_ways_and_rests_are_those_of_normal_vectors(changes, way_
 
 
 def test_levels_elsewhere_differ_by_nine_decibels_and_by_less_along_the_way_measured():
-    first, now = {"A": (-80.0, 1), "B": (-90.0, 1)}, {"A": (-146.0, 2), "B": (-98.0, 1)}
+    first, now = {"A": (-240.0, 3), "B": (-90.0, 1)}, {"A": (-146.0, 2), "B": (-98.0, 1)}
     changes = (7.0, -8.0)
     for measured_m in (0.0, 20.0, 60.0, 900.0):
         as_measured = 4.0**2 + 10.5**2 * (1 - exp(-measured_m / 60)) / 2
@@ -58,6 +58,8 @@ def test_levels_elsewhere_differ_by_nine_decibels_and_by_less_along_the_way_meas
             for own in (81.0, as_measured)
         )
         assert _carried(first, now, measured_m) == pytest.approx(one - other)
+    # Other cells say nothing.
+    assert _carried(first, {"C": (-50.0, 1)}, 0.0) == 0.0
 
 
 def test_what_is_measured_is_added_up_and_no_doubt():
@@ -152,6 +154,44 @@ def test_when_a_rest_is_in_doubt(time_s, left, still, doubtful, expected):
     assert rest.heard(time_s, ()).is_doubtful == expected
     carried = replace(rest, carried_nats=5.9, served=dict.fromkeys("ABC", time_s))
     assert not carried.heard(time_s, serving("D")).is_doubtful
+
+
+def test_a_rest_lasts_since_the_last_step():
+    rest = Rest(100.0, pace_mps=1.0, left_nats=-0.9, still_nats=-2.5)
+    assert not rest.heard(144.9, ()).is_doubtful
+    assert rest.heard(145.0, ()).is_doubtful
+
+
+def test_without_a_pace_before_nothing_is_in_doubt_and_nothing_is_at_first():
+    known = {"left_nats": -0.9, "still_nats": -2.5}
+    assert not Rest(0.0, **known).heard(1e4, ()).is_doubtful
+    assert not Rest(0.0, pace_mps=1.0, left_nats=-1.0, still_nats=-2.5).heard(45.0, ()).is_doubtful
+
+
+@pytest.mark.parametrize(
+    ("measured_m", "usual"), [(29.9, 3), (30.0, 4), (59.9, 4), (60.0, 5), (90.0, 6)]
+)
+def test_along_a_way_one_more_cell_serves_for_each_thirty_metres(measured_m, usual):
+    rest, found = Rest(0.0, measured_m=measured_m), []
+    for cell in "ABCDEFG"[: usual + 1]:
+        rest = rest.heard(0.0, serving(cell))
+        found.append(rest.carried_nats)
+    assert found == [0.0] * usual + [2.5]
+
+
+@pytest.mark.parametrize(
+    ("before", "change_db", "bounds"),
+    [(1.0, 8.0, None), (1.0, 0.0, None), (0.1, 0.0, 0.0), (1.0, 60.0, 6.0), (0.0, 14.0, None)],
+)
+def test_half_of_what_a_block_says_of_being_elsewhere_counts(before, change_db, bounds):
+    """Within the sum's bounds: 0, and 6 from which on the phone is carried."""
+    elsewhere, at_rest = (
+        multivariate_normal.logpdf(change_db, 0.0, sd_db**2 + 6.0**2) for sd_db in (9.0, 4.0)
+    )
+    levels = {"first": {"A": (-80.0, 1)}, "present": {"A": (-80.0 + change_db, 1)}}
+    rest = Rest(0.0, block_s=10.0, began_s=0.0, heard_s=20.0, carried_nats=before, **levels)
+    expected = before + (elsewhere - at_rest) / 2 if bounds is None else bounds
+    assert rest.heard(20.0, ()).carried_nats == pytest.approx(expected)
 
 
 def test_the_probability_of_having_left():

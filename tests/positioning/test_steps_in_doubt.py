@@ -296,6 +296,15 @@ def test_which_unit_the_next_alternative_reads():
     assert [unit_of_next_m(unit_state(1.0, k), FOUND, FOOT_M) for k in range(3)] == [1, 1, FOOT_M]
     found = [unit_of_next_m(unit_state(FOOT_M, k), FOUND, FOOT_M) for k in range(3)]
     assert found == [FOOT_M, FOOT_M, 1.0]
+    # Beside a search every other one, beside a position every third, however many there were.
+    for unit_m, main, units in (
+        (1.0, SEARCH, [FOOT_M, 1.0] * 4),
+        (FOOT_M, SEARCH, [1.0] * 8),
+        (1.0, FOUND, [1.0, 1.0, FOOT_M] * 3),
+        (FOOT_M, FOUND, [FOOT_M, FOOT_M, 1.0] * 3),
+    ):
+        states = [unit_state(unit_m, k) for k in range(len(units))]
+        assert [unit_of_next_m(state, main, FOOT_M) for state in states] == units
 
 
 def test_when_an_alternative_in_another_unit_starts_and_holds_a_belief_back():
@@ -305,8 +314,9 @@ def test_when_an_alternative_in_another_unit_starts_and_holds_a_belief_back():
     assert not asks_for_unit(unit_state(alternatives=1), SEARCH, FOOT_M)
     assert asks_for_unit(unit_state(FOOT_M, 1), SEARCH, 1.0)
     assert log_odds_of_unit(1.0) == 0.0
-    assert log_odds_of_unit(FOOT_M) < 0
-    for nats, unit_m, is_open in ((-9.0, FOOT_M, True), (-11.0, FOOT_M, False), (-1.0, 1.0, False)):
+    assert log_odds_of_unit(FOOT_M) == log_odds_of_unit(3.0) == -4.0
+    leads = (-9.0, FOOT_M, True), (-10.0, FOOT_M, False), (-11.0, FOOT_M, False), (-1.0, 1.0, False)
+    for nats, unit_m, is_open in leads:
         other = SimpleNamespace(step_unit_m=unit_m, log_bayes_factor=lambda _, nats=nats: nats)
         state = unit_state(alternative=other)
         assert is_unit_open(state, SEARCH, FOOT_M) == is_open

@@ -109,6 +109,21 @@ def every_level(tiled):
     return level_dbm, tiled.looked_up(every_pixel(tiled), bands[:-2])[1]
 
 
+def test_predicted_levels_come_with_their_roughness_unless_it_is_not_wanted(database, whole):
+    tiled = TiledArea.of_database(database, side=40)
+    pixel, bands = every_pixel(tiled)[::5], np.array([3, 1], dtype=np.int32)
+    by_pixel = whole.flat_rough_db.reshape(pixel.size * 5, -1)[::5][:, bands]
+    assert by_pixel.any()
+    found, own, columns = tiled.predicted(pixel, bands, 0.5)
+    np.testing.assert_array_equal(found.rough_db.reshape(-1, 2), by_pixel)
+    assert (own.tolist(), columns.tolist()) == (list(range(pixel.size)), [0, 1])
+    level_dbm = whole.level_dbm.reshape(pixel.size * 5, -1)[::5][:, bands]
+    np.testing.assert_array_equal(found.level_dbm.reshape(-1, 2), level_dbm)
+    without, _, _ = tiled.predicted(pixel, bands, 0.5, rough=False)
+    assert without.rough_db.size == 0
+    np.testing.assert_array_equal(without.level_dbm, found.level_dbm)
+
+
 def places(area, count=5000, beyond_m=120.0):
     rng, state = np.random.default_rng(1), np.zeros((STATES, count), dtype=np.float32)
     for axis, size_m in enumerate(area.size_m):

@@ -63,6 +63,50 @@ def test_errors_that_last_count_once(area):
     assert still.state == (0.0, -inf)
 
 
+def timed(cell, steps):
+    return ReportRow("serving", cell, None, None, nan, 0, steps)
+
+
+def test_advances_of_one_report_are_one_term_beside_rows_without_any(area):
+    epoch = Epoch(0.0, radio=(timed("W", nan), timed("E", 2.0), timed(None, 3.0), timed("W", 1.0)))
+    update = read(area, epoch, (10.0, 20.0), 20.0)
+    assert (update.state, update.unused) == ((20.0, 20.0), [])
+    (term,) = update.terms
+    # The middles of their steps; what is new of them after 10 m.
+    np.testing.assert_allclose(term.reading_m, [2.5 * 78.1, 1.5 * 78.1])
+    assert term.weight == pytest.approx(1 - np.exp(-2 * 10.0 / 50.0))
+    # Two readings: half as bad again as is expected at the true position.
+    assert update.under_null == pytest.approx(-0.5 * 1.5 * 2 * term.weight)
+    assert TimingSource(area, LTE).first(epoch).state == (0.0, -inf)
+    # A measured map of timing advances stands in for distances.
+    without = TimingSource(area, LTE, advances=False).read(TimingState(), epoch, 20.0)
+    assert (without.terms, without.state) == ((), TimingState())
+
+
+def test_differences_count_by_what_is_new_of_them(area):
+    rows = (Difference("E", "W", 120.0, 5.0, 8.0), Difference("W", "E", -115.0, 5.0, 8.0))
+    options = replace(LTE, difference_memory_m=20.0)
+    update = read(area, Epoch(0.0, differences=rows), (7.0, 30.0), 34.0, options)
+    assert update.state == (7.0, 34.0)
+    share = 1 - np.exp(-2 * 4.0 / 20.0)
+    assert [term.weight for term in update.terms] == pytest.approx([share] * 2)
+    assert [term.reading_m.tolist() for term in update.terms] == [[120.0], [-115.0]]
+    assert update.under_null == pytest.approx(-0.5 * 1.5 * 2 * share)
+    # Nothing of them is new where they were used.
+    same = read(area, Epoch(0.0, differences=rows), (7.0, 34.0), 34.0, options)
+    assert (same.terms, same.state) == ((), (7.0, 34.0))
+
+
+def test_deviations_that_are_not_stated_are_the_usual_ones(area):
+    """30 m of each time of arrival, as a distance."""
+    options = replace(LTE, difference_sd_m=30.0)
+    usual = read(area, Epoch(0.0, differences=(Difference("E", "W", 120.0),)), options=options)
+    np.testing.assert_allclose(usual.terms[0].model.noise, [[2 * 30.0**2]])
+    stated = Difference("E", "W", 120.0, 5.0, 8.0)
+    found = read(area, Epoch(0.0, differences=(stated,)), options=options)
+    np.testing.assert_allclose(found.terms[0].model.noise, [[5.0**2 + 8.0**2]])
+
+
 def test_differences_share_the_error_of_their_reference(area):
     rows = (Difference("E", "W", 120.0, 5.0, 8.0), Difference("NW", "W", -40.0, 12.0, 8.0))
     update = read(area, Epoch(0.0, differences=rows))

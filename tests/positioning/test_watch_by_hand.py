@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from math import exp, nan, sqrt
+from math import exp, isnan, nan, sqrt
 
 import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.pace import Pace
+from mapfilter.positioning.bayes.repeats import MotionRepeats
 from mapfilter.positioning.bayes.rest import Rest
 from mapfilter.positioning.bayes.sensors import SensorWatch, spread_m2, watched
 from mapfilter.positioning.epochs import Epoch, ReportRow
@@ -139,6 +140,38 @@ def test_a_stroll_of_60_m_that_levels_do_not_contradict_is_learnt():
     assert watch.pace.speed_mps == pytest.approx((4.5 + 60.0 / 0.25 / 101.0) / 2)
 
 
+def test_the_speed_of_a_stroll_is_that_since_the_last_usual_step():
+    watch = after(epoch(102.0, 0.7), watch=strolling()._replace(moving_s=40.0))
+    assert watch.pace.speed_mps == pytest.approx((1.5 + 60.2 / 62.0) / 2)
+
+
+def test_steps_without_a_length_are_a_way_since_the_last_that_is_known():
+    watch = begun(rows=10, interval_s=1.0)._replace(known_s=3.0, unmeasured_s=2.0)
+    watch, seen, (why, _) = watched(watch, epoch(5.0, nan))
+    assert why is Reason.NO_STEP
+    assert (watch.known_s, watch.unmeasured_s) == (5.0, 4.0)
+    *_, way = seen.motion
+    assert way.step_m == pytest.approx(1.4 * 2.0)
+    assert way.spread_m == pytest.approx(sqrt(spread_m2(1.4, 4.0) - spread_m2(1.4, 2.0)))
+
+
+@pytest.mark.parametrize("gone_s", [0.0, 0.5, 61.0])
+def test_who_is_found_to_be_carried_was_so_since_the_last_usual_step(gone_s):
+    served = dict.fromkeys("ABCDE", 100.0)
+    rest = Rest(101.0 - gone_s, pace_mps=1.5, carried_nats=5.9, served=served, measured_m=0.3)
+    watch = strolling()._replace(moving_s=101.0 - gone_s, rest=rest)
+    radio = (ReportRow("serving", "F", None, None, nan, 0),)
+    watch, seen, (why, _) = watched(watch, epoch(101.0, 0.0, radio=radio))
+    assert why is Reason.MOTION_STUCK
+    assert watch.unmeasured_s == gone_s
+    *_, way = seen.motion
+    assert way.step_m == pytest.approx(max(1.5 * gone_s - 0.3, 0.0))
+    # Carried on, it goes on from there.
+    watch, seen, _ = watched(watch, epoch(103.0, 0.0))
+    assert watch.unmeasured_s == gone_s + 2.0
+    assert seen.motion[-1].step_m == pytest.approx(1.5 * 2.0)
+
+
 def test_a_stroll_in_doubt_is_not_learnt():
     still = dict.fromkeys("ABCDE", (-700.0, 10))
     now = {cell: (-700.0 + 120.0 * (-1) ** k, 10) for k, cell in enumerate(still)}
@@ -170,6 +203,7 @@ def test_what_the_counter_did_not_miss_is_no_unmeasured_way():
 def test_a_position_shows_a_stroll_but_no_counter_that_stands_still():
     watch = strolling(30.0).positioned(101.0)
     assert (watch.moving_s, watch.known_s, watch.rest) == (101.0, 101.0, None)
+    assert strolling(0.5).positioned(101.0).moving_s == 101.0
     still = strolling(0.0)
     assert still.positioned(101.0) is still
     assert begun().positioned(101.0).moving_s == 0.0
@@ -241,6 +275,46 @@ def test_rows_are_missing_after_five_seconds_and_three_intervals(interval_s, gon
     assert step.spread_m == pytest.approx(sqrt(spread_m2(1.4, gone_s)))
 
 
+def test_rows_are_missing_by_the_time_since_the_last_one_where_they_come_at_rest_too():
+    pace = Pace(1000.0, 1000.0, 10, 1.0, rests=True)
+    watch = SensorWatch(pace, moving_s=1000.0, known_s=1000.0)
+    for time_s, why in ((1005.0, Reason.USED), (1005.1, Reason.MOTION_MISSING)):
+        assert watched(watch, epoch(time_s))[2][0] is why
+    never = watch._replace(pace=replace(pace, rests=False, irregular_s=1.0))
+    assert watched(never, epoch(1100.0))[2][0] is Reason.USED
+
+
+def test_nothing_is_known_before_the_first_row():
+    watch = SensorWatch()
+    assert (watch.unmeasured_s, watch.moved_m, watch.repeated_nats) == (0.0, 0.0, 0.0)
+    assert (watch.rest, watch.report) == (None, ())
+    before, seen, why = watched(watch, epoch(3.0))
+    assert before == watch
+    assert (seen, why) == (epoch(3.0), (Reason.USED, Reason.USED))
+    # The first row may be one of a rest.
+    rests = after(epoch(3.0, 0.0), watch=watch)
+    assert (rests.moving_s, rests.known_s, rests.rest.since_s) == (3.0, 3.0, 3.0)
+
+
+def test_a_step_ends_what_was_not_measured():
+    watch = begun(rows=10, interval_s=1.0)._replace(unmeasured_s=9.0, rest=Rest(0.0))
+    watch = after(epoch(1.0, 1.0), watch=watch)
+    assert (watch.unmeasured_s, watch.rest, watch.known_s) == (0.0, None, 1.0)
+
+
+def test_a_heading_that_stands_still_is_replaced_by_a_way_to_all_sides():
+    stuck = MotionRepeats(last=(1.0, 0.02, nan), rows=60.0, nats=12.0, fine=30)
+    watch, seen, (why, _) = watched(begun(rows=1)._replace(repeats=stuck), epoch(2.0, 1.1))
+    assert why is Reason.HEADING_STUCK
+    (step,) = seen.motion
+    assert step.step_m == 1.1
+    assert isnan(step.heading_rad)
+    assert step.spread_m == pytest.approx(1.1, rel=0.01)
+    assert watch.repeats.still_m == 1.1
+    usual = epoch(2.0, 1.1)
+    assert watched(begun(rows=1), usual)[1] is usual
+
+
 def test_the_spread_of_a_way_that_forgets_its_direction_within_a_minute():
     for time_s in (0.0, 1.0, 60.0, 600.0):
         expected = 2 * 1.5**2 * 60 * (time_s - 60 * (1 - exp(-time_s / 60)))
@@ -280,6 +354,12 @@ def test_a_repeated_report_gains_by_levels_and_metres(levels, way_m, nats):
     assert feet.repeated_nats == pytest.approx(min(0.25 * 0.12 * min(levels, 3) * way_m, nats))
 
 
+def test_a_repeated_report_without_levels_ends_the_sum():
+    rows = (ReportRow("serving", "A", None, None, nan, 0),)
+    heard = SensorWatch(report=rows, repeated_nats=3.0, moved_m=5.0)
+    assert after(epoch(1.0, radio=rows), watch=heard).repeated_nats == 0.0
+
+
 def test_any_difference_makes_a_report_another():
     rows = report(-70.0, -80.0)
     others = [
@@ -295,7 +375,7 @@ def test_any_difference_makes_a_report_another():
     assert again.repeated_nats == pytest.approx(3.0 + 2 * 0.12 * 5.0)
 
 
-@pytest.mark.parametrize(("before", "stale"), [(6.7, False), (6.9, True)])
+@pytest.mark.parametrize(("before", "stale"), [(6.7, False), (6.8, True), (6.9, True)])
 def test_eight_nats_make_a_radio_stale(before, stale):
     rows = report(-70.0)
     heard = SensorWatch(report=rows, repeated_nats=before, moved_m=10.0)
