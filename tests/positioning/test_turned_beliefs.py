@@ -210,7 +210,9 @@ def test_lengths_are_read_in_their_unit_and_turns_by_the_sign():
         (0.0, radians(60.1), 1.0, True), (0.0, radians(59.9), 1.0, False),
         (0.0, -radians(60.1), 3.0, True), (0.0, radians(60.1), 3.1, False),
         (0.0, radians(60.1), 0.0, False), (0.0, radians(60.1), -1.0, False),
-        (3.0, -3.0, 1.0, False), (nan, 2.0, 1.0, False), (2.0, nan, 1.0, False),
+        (0.0, radians(60.0), 1.0, False), (1.0, 1.0 - radians(60.1), 1.0, True),
+        (1.0, 1.0 + radians(59.9), 1.0, False), (3.0, -3.0, 1.0, False),
+        (nan, 2.0, 1.0, False), (2.0, nan, 1.0, False),
     ],
 )  # fmt: skip
 def test_what_a_jump_is(before_rad, heading_rad, step_m, found):
@@ -247,6 +249,7 @@ MAIN = SimpleNamespace(log_evidence=-50.0, summary=SimpleNamespace(mean=(0.0, 0.
 )
 def test_when_a_turned_phone_is_refuted_or_undecided_for_too_long(one, travelled_m, is_open):
     assert len(still_open(HoldRules(), [one], MAIN, travelled_m)) == is_open
+    assert not still_open(HoldRules(abandon_after_m=0.0), [beside(0.0, log_prior=-5.0)], MAIN, 0.5)
 
 
 def test_the_most_likely_turned_phones_are_kept_with_the_distance_since_which_they_lead():
