@@ -89,6 +89,14 @@ def test_levels_are_raised_until_left_out_blocks_are_covered():
     assert not np.array_equal(three, LEVELS)
 
 
+def test_where_no_share_covers_left_out_blocks_all_errors_are_covered():
+    """Errors of the third of three blocks are larger than all others'."""
+    ratio, block = np.concatenate([np.ones(20), np.arange(2.0, 12.0)]), np.repeat([0, 1, 2], 10)
+    found = regions._raised(ratio, np.zeros(30, dtype=int), block, 1)
+    assert found[2] == 1.0
+    assert found[0] == 0.3
+
+
 def test_the_nominal_shares_hold_the_levels_themselves():
     shares = regions._NOMINAL
     assert np.isin(LEVELS, shares).all()
