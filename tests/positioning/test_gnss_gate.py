@@ -157,6 +157,33 @@ def test_a_fix_is_widened_by_its_variance():
         assert widened(missing, 3.0) == GnssFix(3.0, 4.0, 300.0, 300.0, 0.0)
 
 
+def test_before_the_first_comparison_one_is_due_and_nothing_was_met():
+    state = GnssState()
+    assert (state.compared_at_m, state.compared_at_s, state.fix_used_at_m) == (-inf, -inf, -inf)
+    assert state.due(OPTIONS, 0.0, 0.0)
+    assert not state.met
+    assert state.used_at_m == -inf
+
+
+def test_a_probation_ends_at_its_time():
+    belief = belief_at()
+    for until_s, is_used in ((10.0, True), (10.1, False)):
+        found = compared(belief, GnssState(probation_until_s=until_s), fix=fix_at(3.0))
+        assert (found.unused == ()) == is_used
+        assert bool(np.ptp(sum_of(found.terms, belief)) > 0.1) == is_used
+        assert found.state.was_used(10.0) == is_used
+
+
+def test_a_fix_weighs_a_belief_whatever_its_weights_sum_to():
+    belief = belief_at()
+    found, again = (
+        compared(replace(belief, log_weight=belief.log_weight - by), fix=fix_at(3.0))
+        for by in (0.0, 40.0)
+    )
+    np.testing.assert_allclose(sum_of(found.terms, belief), sum_of(again.terms, belief), atol=1e-9)
+    assert found.under_null == pytest.approx(again.under_null)
+
+
 def test_without_readings_nothing_was_compared():
     found = compared(belief_at())
     assert not found.compared
