@@ -5,6 +5,7 @@ from math import inf, isnan, log, nan
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import Bins
@@ -113,6 +114,74 @@ def test_a_fix_that_no_hypothesis_explains_is_rejected_for_a_while(status, limit
     ended = compared(belief, state, time_s=15.0, fix=fix_at(), gate=gate)
     assert not ended.state.rejecting
     assert ended.unused == ()
+
+
+@pytest.mark.parametrize(
+    ("given", "used"),
+    [
+        ((36.0, 9.0, 0.0), (36.0, 9.0, 0.0)),
+        ((36.0, 9.0, 10.0), (36.0, 9.0, 10.0)),
+        ((16.0, 25.0, -12.0), (16.0, 25.0, -12.0)),
+        # Errors of less than a metre, and errors that lie on a line, are none that fixes have.
+        ((0.01, 0.5, 0.0), (1.0, 1.0, 0.0)),
+        ((36.0, 9.0, 18.0), (36.0, 9.0, 0.99 * 18.0)),
+        ((36.0, 9.0, -50.0), (36.0, 9.0, -0.99 * 18.0)),
+        ((36.0, 9.0, nan), (36.0, 9.0, 0.0)),
+        ((nan, nan, nan), (100.0, 100.0, 0.0)),
+        ((36.0, nan, 5.0), (100.0, 100.0, 0.0)),
+    ],
+)
+def test_the_likelihood_of_a_fix_is_normal_about_its_place_and_clipped(given, used):
+    fix = GnssFix(EAST_M + 7.0, NORTH_M - 4.0, *given)
+    term = FixTerm(fix, ORIGIN_M)
+    middle = PLACE_M[0] + 7.0, PLACE_M[1] - 4.0
+    assert term.place_m == pytest.approx(middle)
+    east_m2, north_m2, cross_m2 = used
+    law = multivariate_normal(middle, [[east_m2, cross_m2], [cross_m2, north_m2]])
+    spread = np.random.default_rng(2).standard_normal((2, 60)) * [[east_m2**0.5], [north_m2**0.5]]
+    state = np.zeros((STATES, 60), dtype=np.float32)
+    state[EAST], state[NORTH] = np.array(middle)[:, None] + 2.0 * spread
+    places = state[[EAST, NORTH]].T.astype(float)
+    # Five standard deviations are the most that it is off.
+    expected = np.maximum(law.logpdf(places) - law.logpdf(middle), -12.5)
+    assert (expected > -12.0).any()
+    np.testing.assert_allclose(term.log_likelihood(state), expected, rtol=2e-3, atol=2e-3)
+    state[EAST] += 1000.0
+    np.testing.assert_array_equal(term.log_likelihood(state), np.full(60, -12.5))
+
+
+def test_a_fix_is_widened_by_its_variance():
+    fix = GnssFix(3.0, 4.0, 36.0, 9.0, -5.0)
+    assert widened(fix, 2.0) == GnssFix(3.0, 4.0, 72.0, 18.0, -10.0)
+    for missing in (replace(fix, var_east_m2=nan), replace(fix, var_north_m2=inf)):
+        assert widened(missing, 3.0) == GnssFix(3.0, 4.0, 300.0, 300.0, 0.0)
+
+
+def test_before_the_first_comparison_one_is_due_and_nothing_was_met():
+    state = GnssState()
+    assert (state.compared_at_m, state.compared_at_s, state.fix_used_at_m) == (-inf, -inf, -inf)
+    assert state.due(OPTIONS, 0.0, 0.0)
+    assert not state.met
+    assert state.used_at_m == -inf
+
+
+def test_a_probation_ends_at_its_time():
+    belief = belief_at()
+    for until_s, is_used in ((10.0, True), (10.1, False)):
+        found = compared(belief, GnssState(probation_until_s=until_s), fix=fix_at(3.0))
+        assert (found.unused == ()) == is_used
+        assert bool(np.ptp(sum_of(found.terms, belief)) > 0.1) == is_used
+        assert found.state.was_used(10.0) == is_used
+
+
+def test_a_fix_weighs_a_belief_whatever_its_weights_sum_to():
+    belief = belief_at()
+    found, again = (
+        compared(replace(belief, log_weight=belief.log_weight - by), fix=fix_at(3.0))
+        for by in (0.0, 40.0)
+    )
+    np.testing.assert_allclose(sum_of(found.terms, belief), sum_of(again.terms, belief), atol=1e-9)
+    assert found.under_null == pytest.approx(again.under_null)
 
 
 def test_without_readings_nothing_was_compared():

@@ -129,6 +129,11 @@ def test_the_path_of_mirrored_steps_is_the_mirrored_path(steps):
     assert other.turned_rad == pytest.approx(path.turned_rad)
 
 
+def test_left_and_right_of_a_step_are_exchanged_and_nothing_else():
+    step = MotionStep(1.5, 0.5, -0.1, 2.0, 0.3)
+    assert mirrored_step(step) == MotionStep(1.5, -0.5, 0.1, 2.0, 0.3)
+
+
 def stepped(filter_, log, until_m, seed=1):
     """Yield the state after each epoch."""
     state, rng = filter_.begin(), np.random.default_rng(seed)

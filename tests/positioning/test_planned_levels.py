@@ -1,6 +1,7 @@
 """Single reports over levels that were predicted with a plan that lacks powers and heights."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -180,6 +181,34 @@ def test_a_timing_advance_is_normal_about_the_middle_of_its_step_and_clipped(tec
     np.testing.assert_allclose(found, expected, atol=1e-6)
     for serving, steps in ((-1, 7.0), (0, np.nan)):
         assert planned.log_timing(places, serving, steps).tolist() == [0.0] * 7
+
+
+def test_cells_of_one_carrier_are_measured_with_each_other_and_others_always():
+    """In GSM, and where the technology is unknown, every cell may be measured."""
+    kinds = [("LTE", 1800.0), ("LTE", 1800.0), ("NR", 800.0), ("GSM", 800.0), (None, 1800.0),
+             ("UMTS", 2100.0)]  # fmt: skip
+    cells = tuple(
+        replace(_cell(f"c{k}", 0, 0, mhz), technology=technology)
+        for k, (technology, mhz) in enumerate(kinds)
+    )
+    made = Planned.of(CellPlan(CRS, cells), tuple(cell.id for cell in cells))
+    for reported, alike in (([0], [0, 1]), ([2], [2]), ([5], [5]), ([1, 2], [0, 1, 2]), ([3], [])):
+        found = np.flatnonzero(made.measured_with(np.array(reported)))
+        assert found.tolist() == sorted({*alike, 3, 4})
+    np.testing.assert_array_equal(np.isnan(made.step_m), [False, False, True, False, True, True])
+    kept = made.some(np.array([3, 0]))
+    assert kept.carrier.tolist() == [made.carrier[3], made.carrier[0]]
+    assert kept.common_db == made.common_db
+
+
+def test_drawn_timing_advances_are_whole_steps_of_distances_with_their_error():
+    cells = (_cell("a", 0, 0, 1800.0), _cell("b", 3000, 0, 1800.0))
+    made = Planned.of(CellPlan(CRS, cells), ("a", "b"))
+    places = AT_M + np.array([[600.0, 800.0], [600.0, 800.0], [60.0, 80.0], [3000.0, 500.0]])
+    given = SimpleNamespace(standard_normal=lambda count: np.array([1.0, -2.0, -1.0, 0.5])[:count])
+    found = made.drawn_timing(places, np.array([0, 0, 0, 1]), given)
+    # Of 1200, 600, no and 600 m; none is negative.
+    assert found.tolist() == [1200 // LTE_STEP_M, 600 // LTE_STEP_M, 0.0, 600 // LTE_STEP_M]
 
 
 def test_a_database_keeps_what_its_plan_assumes(tmp_path):

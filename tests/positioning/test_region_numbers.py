@@ -7,7 +7,7 @@ import pytest
 
 from mapfilter.positioning.fingerprints import regions
 from mapfilter.positioning.fingerprints.cross_validation import folds_of, positions_of
-from mapfilter.positioning.fingerprints.regions import LEVELS, Errors, Regions, calibrate
+from mapfilter.positioning.fingerprints.regions import LEVELS, Errors, Regions, calibrate, coverage
 
 
 def conformal(ratios, share):
@@ -89,12 +89,52 @@ def test_levels_are_raised_until_left_out_blocks_are_covered():
     assert not np.array_equal(three, LEVELS)
 
 
+def test_where_no_share_covers_left_out_blocks_all_errors_are_covered():
+    """Errors of the third of three blocks are larger than all others'."""
+    ratio, block = np.concatenate([np.ones(20), np.arange(2.0, 12.0)]), np.repeat([0, 1, 2], 10)
+    found = regions._raised(ratio, np.zeros(30, dtype=int), block, 1)
+    assert found[2] == 1.0
+    assert found[0] == 0.3
+
+
 def test_the_nominal_shares_hold_the_levels_themselves():
     shares = regions._NOMINAL
     assert np.isin(LEVELS, shares).all()
     assert (shares[0], shares[-1]) == (0.3, 1.0)
     assert np.diff(shares).max() < 0.0101
     assert np.all(np.diff(shares) > 0)
+    # Hundredths, and thousandths from 0.98 on.
+    shares = np.unique(shares.round(9))
+    coarse, fine = shares[shares < 0.9801], shares[shares > 0.9799]
+    np.testing.assert_allclose(coarse, np.arange(30, 99) / 100)
+    np.testing.assert_allclose(fine, np.arange(980, 1001) / 1000)
+
+
+def test_positions_without_any_error_have_radii_of_a_millimetre_at_least():
+    none = np.zeros(6)
+    found = calibrate(Errors(none, none, none, np.arange(6) % 2))
+    assert found.added_m == 1e-3
+    np.testing.assert_array_equal(found.factor, np.zeros((1, 3)))
+
+
+def test_two_blocks_are_enough_for_a_coverage():
+    """Each by the other's errors: ten of 1 to 10 m, and ten of a little more than twice as much."""
+    short, long = np.arange(1.0, 11.0), 2.1 * np.arange(1.0, 11.0)
+    block = np.repeat([4, 7], 10)
+    given = Errors(np.concatenate([short, long]), np.zeros(20), np.zeros(20), block)
+    held = [
+        np.mean(
+            [
+                np.mean(own <= conformal(other, level))
+                for own, other in ((short, long), (long, short))
+            ]
+        )
+        for level in LEVELS
+    ]
+    assert coverage(given) == pytest.approx(tuple(held))
+    one = given.where(block == 4)
+    assert len(coverage(one)) == 3
+    assert all(np.isnan(share) for share in coverage(one))
 
 
 def test_some_errors_keep_their_columns():

@@ -1,19 +1,30 @@
 """Beliefs with a turned phone as they begin: their odds, their hypotheses and their draws."""
 
 from dataclasses import replace
-from math import log, pi
+from math import isnan, log, nan, pi, radians
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.alternative import NullHypothesis
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold, as_measured, forked, own_rng
+from mapfilter.positioning.bayes.held import (
+    HeldOtherwise,
+    Hold,
+    after_takeover,
+    as_measured,
+    forked,
+    is_ahead,
+    jumps,
+    own_rng,
+    still_open,
+    winner,
+)
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 
 RULES = HoldRules(
@@ -179,3 +190,109 @@ def test_a_position_is_another_one_from_fifty_metres_on(other_m, elsewhere):
 
 def replace_evidence(belief, log_evidence):
     return SimpleNamespace(summary=belief.summary, log_evidence=log_evidence)
+
+
+def test_lengths_are_read_in_their_unit_and_turns_by_the_sign():
+    step = MotionStep(10.0, 0.5, 0.1, 4.0, 2.0)
+    assert Hold().read(step) is step
+    found = Hold(step_unit_m=0.25).read(step)
+    assert found == MotionStep(2.5, 0.5, 0.1, 1.0, 0.5)
+    found = Hold(-1.0, 2.0, 0.25).read(step)
+    assert found == MotionStep(2.5, 1.5, -0.1, 1.0, 0.5)
+    # Both ways in which the phone may be held since are in the same unit.
+    for one in (*Hold(step_unit_m=0.25).straight_on(0.5, 2.0), Hold(1.0, 0.0, 0.25).mirrored_at(1)):
+        assert one.step_unit_m == 0.25
+
+
+@pytest.mark.parametrize(
+    ("before_rad", "heading_rad", "step_m", "found"),
+    [
+        (0.0, radians(60.1), 1.0, True), (0.0, radians(59.9), 1.0, False),
+        (0.0, -radians(60.1), 3.0, True), (0.0, radians(60.1), 3.1, False),
+        (0.0, radians(60.1), 0.0, False), (0.0, radians(60.1), -1.0, False),
+        (0.0, radians(60.0), 1.0, False), (1.0, 1.0 - radians(60.1), 1.0, True),
+        (1.0, 1.0 + radians(59.9), 1.0, False), (3.0, -3.0, 1.0, False),
+        (nan, 2.0, 1.0, False), (2.0, nan, 1.0, False),
+    ],
+)  # fmt: skip
+def test_what_a_jump_is(before_rad, heading_rad, step_m, found):
+    """Sixty degrees from one row of up to 3 m to the next."""
+    step = MotionStep(step_m, heading_rad)
+    assert jumps(before_rad, step, HoldRules()) == found
+    assert not jumps(before_rad, step, HoldRules(watched=False))
+
+
+def beside(log_bayes_factor, *, log_prior=0.0, east_m=100.0, start_m=0.0, ahead_m=nan, **more):
+    """A belief beside one at 0 m with a log evidence of -50."""
+    status, null = more.get("status", Status.TRACKING), NullHypothesis(more.get("null", -12.0))
+    summary = SimpleNamespace(mean=(east_m, 0.0))
+    own = SimpleNamespace(log_evidence=log_bayes_factor - 50.0, summary=summary, status=status)
+    return HeldOtherwise(own, Hold(-1.0), log_prior, start_m, null, ahead_m)
+
+
+MAIN = SimpleNamespace(log_evidence=-50.0, summary=SimpleNamespace(mean=(0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("one", "travelled_m", "is_open"),
+    [
+        (beside(-3.9, log_prior=-5.0), 100.0, True),
+        (beside(-4.0, log_prior=-5.0), 100.0, False),
+        (beside(0.0, log_prior=-5.0, start_m=30.0), 429.9, True),
+        (beside(0.0, log_prior=-5.0, start_m=30.0), 430.0, False),
+        # Likely enough, and elsewhere, it may stay undecided for longer.
+        (beside(4.1, log_prior=-5.0, start_m=30.0), 1229.9, True),
+        (beside(4.1, log_prior=-5.0, start_m=30.0), 1230.0, False),
+        (beside(4.0, log_prior=-5.0, start_m=30.0), 430.0, False),
+        (beside(4.1, log_prior=-5.0, start_m=30.0, east_m=50.0), 430.0, False),
+    ],
+)
+def test_when_a_turned_phone_is_refuted_or_undecided_for_too_long(one, travelled_m, is_open):
+    assert len(still_open(HoldRules(), [one], MAIN, travelled_m)) == is_open
+    assert not still_open(HoldRules(abandon_after_m=0.0), [beside(0.0, log_prior=-5.0)], MAIN, 0.5)
+
+
+def test_the_most_likely_turned_phones_are_kept_with_the_distance_since_which_they_lead():
+    leads = [beside(nats, log_prior=-1.0, ahead_m=20.0 if nats == 3.0 else nan)
+             for nats in (1.0, 3.0, -2.0, 2.0, 0.1)]  # fmt: skip
+    kept = still_open(HoldRules(max_beliefs=4), leads, MAIN, 70.0)
+    assert [one.log_bayes_factor(MAIN) for one in kept] == pytest.approx([3.0, 2.0, 1.0, 0.1])
+    assert [one.ahead_m for one in kept] == [20.0, 70.0, 70.0, 70.0]
+    # Who has fallen back, or is at the same place, leads no longer.
+    for one in (beside(0.0, log_prior=-1.0, ahead_m=20.0), beside(9.0, east_m=50.0, ahead_m=20.0)):
+        (found,) = still_open(HoldRules(), [one], MAIN, 70.0)
+        assert isnan(found.ahead_m)
+
+
+@pytest.mark.parametrize(
+    ("one", "ahead"),
+    [
+        (beside(0.1, log_prior=-1.0, ahead_m=63.0), True),
+        (beside(0.1, log_prior=-1.0, ahead_m=63.1), False),
+        (beside(0.0, log_prior=-1.0, ahead_m=0.0), False),
+        (beside(9.0, ahead_m=0.0, east_m=50.0), False),
+        (beside(9.0), False),
+    ],
+)
+def test_a_turned_phone_is_ahead_after_seven_metres(one, ahead):
+    assert is_ahead(HoldRules(), [beside(-9.0), one], MAIN, 70.0) == ahead
+
+
+def test_which_turned_phone_takes_over():
+    rules, most = HoldRules(), -5.0
+    assert winner(rules, [], MAIN, most) is None
+    able = beside(9.0, log_prior=-1.0, null=-5.0)
+    for other in (
+        beside(8.9, log_prior=-1.0),
+        beside(30.0, status=Status.SEARCHING),
+        beside(30.0, null=-4.9),
+    ):
+        assert winner(rules, [other], MAIN, most) is None
+        assert winner(rules, [other, able], MAIN, most) is able
+    better = beside(9.5, log_prior=-1.0)
+    assert winner(rules, [able, better], MAIN, most) is better
+    # The others then have odds against it, and none is ahead of it yet.
+    (left,) = after_takeover([replace(able, ahead_m=3.0), better], better)
+    assert left.belief is able.belief
+    assert left.log_prior == 0.0
+    assert isnan(left.ahead_m)
