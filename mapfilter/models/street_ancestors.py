@@ -1,7 +1,8 @@
 """Ancestors of hypotheses over a map of streets, for smoothing by backward simulation.
 
 Earlier hypotheses, led on by their own errors, are compared with later ones (Godsill, Doucet & West
-2004); the motion is that of :mod:`mapfilter.models.street_motion`.
+2004), most of them by rejection sampling (Douc, Garivier, Moulines & Olsson 2011); the motion is
+that of :mod:`mapfilter.models.street_motion`.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mapfilter._kernels import cos_sin32, exp32, hashed, uniforms, wrap32
+from mapfilter._kernels import cos_sin32, exp32, hashed, wrap32
 from mapfilter._types import Floats, Floats32, Ints32
 
 _F = np.float32
@@ -20,7 +21,9 @@ _PARTS = 4
 _MOST_NATS = 14.0
 """Hypotheses that are less likely than by this many nats are not compared."""
 _PAIRS_A_TRY, _MOST_TRIES = 16, 256
-"""Number of hypotheses that are compared in about the time of one draw, and the most draws."""
+"""One candidate is drawn for so many hypotheses nearby, as it takes about as long as to compare 10
+to 20 of them; and the most candidates."""
+_UNIT = 2.0**-53
 
 
 class _Led(NamedTuple):
@@ -34,10 +37,12 @@ class _Led(NamedTuple):
 
 
 class _Near(NamedTuple):
-    """The squares around a later hypothesis: rows and columns, and where its own ones begin.
+    """The squares around a later hypothesis, of all that have ``cols`` columns.
 
-    ``masses`` are the weights in a square times the most that they can be likely (``most``), summed
-    over all squares so far.
+    Rows are from ``first`` to before ``last``, columns from ``left`` to before ``right``. Those in
+    square (r, c) lie in order from ``start[r * cols + c]``. Its entry of ``most``, an upper bound
+    of their likelihood, and of ``masses``, the sum of weights times bounds up to it, is
+    ``corner + r * across + c``.
     """
 
     first: int
@@ -66,9 +71,9 @@ def draw_ancestors(
 
     An earlier hypothesis is weighed by how well its own errors of heading and scale lead it, over
     the displacement by dead reckoning, to the later one. Hypotheses are sorted by place, and only
-    those nearby are compared. Some of them are drawn by their weights first, and taken by their
-    likelihood (rejection sampling, Douc et al. 2011); where none is taken, all nearby are weighed,
-    which draws from the same distribution.
+    those nearby are compared: a candidate is drawn by its weight times an upper bound of its
+    likelihood, and taken by the ratio of its likelihood to that bound. Where a limited number of
+    candidates is refused, all nearby are weighed. Both draw from the same distribution.
 
     Parameters
     ----------
@@ -131,9 +136,11 @@ def draw_ancestors(
         mass, nearby = _summed(near, before)
         chosen[j] = -1
         for t in range(min(nearby // _PAIRS_A_TRY, _MOST_TRIES)):
-            one, other = uniforms(hashed(key, np.uint64(later.shape[1] + j * _MOST_TRIES + t)))
-            goal, accept = np.float64(one) * (mass + jumped * total), np.float64(other)
-            if goal >= mass:
+            at = np.uint64(later.shape[1] + 2 * (j * _MOST_TRIES + t))
+            goal = _uniform(hashed(key, at)) * (mass + jumped * total)
+            accept = _uniform(hashed(key, at + np.uint64(1)))
+            # Also where a weight is no number.
+            if not goal < mass:
                 chosen[j] = min(np.searchsorted(passed, accept * total), count - 1)
                 break
             i, most_likely = _drawn(near, before, goal)
@@ -151,12 +158,18 @@ def draw_ancestors(
                     gone += led.weight[i] * (np.float64(exp32(log_led)) - jumped)
                     near_by[found], reached[found] = i, gone
                     found += 1
-        goal = np.float64(uniforms(hashed(key, np.uint64(j)))[0]) * (gone + jumped * total)
+        goal = _uniform(hashed(key, np.uint64(j))) * (gone + jumped * total)
         if goal < gone:
             chosen[j] = order[near_by[np.searchsorted(reached[:found], goal)]]
         else:
             chosen[j] = min(np.searchsorted(passed, (goal - gone) / jumped), count - 1)
     return chosen
+
+
+@njit(inline="always")
+def _uniform(bits: np.uint64) -> float:
+    """Return a number from 0 to below 1, of 53 bits."""
+    return np.float64(bits >> np.uint64(11)) * _UNIT
 
 
 @njit(inline="always")

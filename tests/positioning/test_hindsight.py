@@ -90,6 +90,14 @@ def test_what_comes_later_moves_the_epochs_in_between():
     np.testing.assert_allclose(one - other, shares[:, None] * apart, atol=1e-3)
 
 
+def test_at_the_epoch_of_each_belief_that_is_kept_a_path_is_where_it_was():
+    ways = [START, (30.0, 20.0, 0.4, 0.0), (60.0, 30.0, 0.2, 0.0), (70.0, 40.0, 0.1, 0.0)]
+    found = places(
+        hindsight(*(kept(k, cloud(way)) for k, way in zip((0, 1, 3, 4), ways, strict=True)))
+    )
+    np.testing.assert_allclose(found[[0, 1, 3, 4]], [way[:2] for way in ways], atol=1e-3)
+
+
 def test_epochs_before_the_first_belief_stay_those_of_the_forward_pass():
     first, last = kept(2, cloud(START)), kept(4, cloud((*ENDS[0], 0.1, 0.0)))
     found = places(hindsight(first, last))

@@ -185,7 +185,7 @@ class BayesSmoother:
         weight = np.full(paths, 1 / paths, dtype=np.float32)
         new = {name: getattr(estimate, name).copy() for name in _SMOOTHED}
         indices = range(kept[0].epoch, len(estimate))
-        # The first belief at each epoch or after it; none is kept after the last one.
+        # The first belief at each epoch or after it: they are kept in the order of time.
         following = np.searchsorted([one.epoch for one in kept], indices)
         for index, after in zip(indices, np.minimum(following, len(kept) - 1), strict=True):
             place = _between(kept, states, moved, index, int(after))
@@ -253,7 +253,10 @@ def _new_share(length_m: float, correlation_m: float) -> float:
 def _between(
     kept: list[Kept], states: list[Floats32], moved: Floats, index: int, after: int
 ) -> Floats32:
-    """Return where all paths are at an epoch, ``after`` which the next belief is kept."""
+    """Return where all paths are at an epoch.
+
+    ``after`` is the index of the first belief that is kept at it or later, or that of the last one.
+    """
     if kept[after].epoch == index or after == 0:
         return states[after]
     first, last = kept[after - 1], kept[after]
