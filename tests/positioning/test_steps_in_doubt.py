@@ -220,6 +220,19 @@ def test_as_many_hypotheses_are_carried_on_as_the_levels_of_the_rest_say(left_na
     assert share == pytest.approx(1 / (1 + np.exp(-left_nats)), abs=0.04)
 
 
+def test_hypotheses_are_carried_on_as_far_as_a_walk_of_the_missed_pace_spreads():
+    rng = np.random.default_rng(2)
+    state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
+    # 40 of 140 m were measured, so 1 m/s is missed; all have left, by their levels.
+    rest = replace(Rest(1.0, pace_mps=1.4), left_nats=50.0, measured_m=40.0)
+    state = replace(state, watch=state.watch._replace(rest=rest))
+    after = AREA.beliefs.carried_on(state, state.belief, 100.0, rng)
+    moved_m = (after.state - state.belief.state)[:2]
+    # A direction that lasts for 60 s: 2 * 60 * (100 - 60 * (1 - exp(-100 / 60))) m² on the whole.
+    assert (moved_m**2).mean() == pytest.approx(6159.9 / 2, rel=4 / np.sqrt(state.belief.count))
+    assert moved_m.mean() == pytest.approx(0.0, abs=5.0)
+
+
 def test_the_pace_before_a_rest_is_in_metres():
     rng = np.random.default_rng(1)
     state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
