@@ -275,6 +275,18 @@ def test_own_settings_stay(surveyed):
     assert isinstance(GridFilter().over(database).model, MeasuredMapModel)
 
 
+@pytest.mark.parametrize(
+    ("roles", "sd_m"),
+    [(("tracks",), 16.0), (("tracks", "map"), 3.0), (("roads", "tracks"), 3.0), (("map",), 3.0)],
+)
+def test_where_tracks_alone_are_the_ways_they_are_wider(surveyed, roles, sd_m):
+    database, _, _ = surveyed
+    database.manifest["inputs"] = [{"role": role} for role in roles]
+    assert BayesFilter().over(database).model.weights.sd_m == sd_m
+    # As they were asked for.
+    assert BayesFilter(map_sd_m=5.0).over(database).model.weights.sd_m == 5.0
+
+
 def test_without_serving_cells_the_levels_remain(tmp_path):
     levels, deviation = rasters(tmp_path, filled=True)
     plan = CellPlan(CRS, tuple(map(cell, CELLS)))
