@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mapfilter._kernels import cos_sin32, exp32, hashed, wrap32
+from mapfilter._kernels import cos_sin32, exp32, hashed, uniforms, wrap32
 from mapfilter._types import Floats, Floats32, Ints32
 
 _F = np.float32
@@ -23,7 +23,6 @@ _MOST_NATS = 14.0
 _PAIRS_A_TRY, _MOST_TRIES = 16, 256
 """One candidate is drawn for so many hypotheses nearby, as it takes about as long as to compare 10
 to 20 of them; and the most candidates."""
-_UNIT = 2.0**-53
 
 
 class _Led(NamedTuple):
@@ -136,9 +135,9 @@ def draw_ancestors(
         mass, nearby = _summed(near, before)
         chosen[j] = -1
         for t in range(min(nearby // _PAIRS_A_TRY, _MOST_TRIES)):
-            at = np.uint64(later.shape[1] + 2 * (j * _MOST_TRIES + t))
-            goal = _uniform(hashed(key, at)) * (mass + jumped * total)
-            accept = _uniform(hashed(key, at + np.uint64(1)))
+            one, other = uniforms(hashed(key, np.uint64(later.shape[1] + j * _MOST_TRIES + t)))
+            # Of 24 bits each: probabilities are resolved to 2**-24 over the share that is accepted.
+            goal, accept = np.float64(one) * (mass + jumped * total), np.float64(other)
             # Also where a weight is no number.
             if not goal < mass:
                 chosen[j] = min(np.searchsorted(passed, accept * total), count - 1)
@@ -158,18 +157,12 @@ def draw_ancestors(
                     gone += led.weight[i] * (np.float64(exp32(log_led)) - jumped)
                     near_by[found], reached[found] = i, gone
                     found += 1
-        goal = _uniform(hashed(key, np.uint64(j))) * (gone + jumped * total)
+        goal = np.float64(uniforms(hashed(key, np.uint64(j)))[0]) * (gone + jumped * total)
         if goal < gone:
             chosen[j] = order[near_by[np.searchsorted(reached[:found], goal)]]
         else:
             chosen[j] = min(np.searchsorted(passed, (goal - gone) / jumped), count - 1)
     return chosen
-
-
-@njit(inline="always")
-def _uniform(bits: np.uint64) -> float:
-    """Return a number from 0 to below 1, of 53 bits."""
-    return np.float64(bits >> np.uint64(11)) * _UNIT
 
 
 @njit(inline="always")
