@@ -180,7 +180,7 @@ def _log_led(
 
 @njit(error_model="numpy", cache=True)
 def _most_likely(around: int, per_square: float) -> Floats:
-    """Return the most that places in each of the squares around one are likely for one in it."""
+    """Return upper bounds of the likelihood of places in the squares around that of a place."""
     across = 2 * around + 1
     most = np.empty(across * across)
     for r in range(across):
@@ -206,7 +206,7 @@ def _summed(near: _Near, before: Floats) -> tuple[float, int]:
 
 @njit(inline="always")
 def _drawn(near: _Near, before: Floats, goal: float) -> tuple[int, float]:
-    """Return the hypothesis at which the masses exceed a number, and the most it can be likely."""
+    """Return the hypothesis at which the masses exceed a number, and its likelihood's bound."""
     r = near.first
     while near.masses[near.corner + r * near.across + near.right - 1] <= goal:
         r += 1
