@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning import epochs as tested
 from mapfilter.positioning.epochs import (
     Difference,
@@ -148,7 +147,7 @@ def test_a_fix_repeats_another_to_the_last_digit(last, repeats):
     ("given", "measured"),
     [
         ({}, False),
-        ({"motion": (MotionStep(1.0, 0.0),)}, False),
+        ({"motion": (tested.MotionStep(1.0, 0.0),)}, False),
         ({"radio": (ReportRow("serving", "A", None, None, nan, 0),)}, True),
         ({"fix": GnssFix(1.0, 2.0)}, True),
         ({"fix": nan}, False),
@@ -164,15 +163,15 @@ def test_motion_alone_is_no_measurement(given, measured):
     ("step", "before_rad", "heading_rad", "after_rad"),
     [
         # A compass; turns from what was known, or from 0; a first step without a turn.
-        (MotionStep(1.0, 0.7, 0.2), 2.0, 0.7, 0.7),
-        (MotionStep(1.0, nan, 0.2), 2.0, 2.2, 2.2),
-        (MotionStep(1.0, nan, 0.2), nan, 0.2, 0.2),
-        (MotionStep(1.0, nan), nan, 0.0, 0.0),
-        (MotionStep(1.0, inf, inf), nan, 0.0, 0.0),
+        (tested.MotionStep(1.0, 0.7, 0.2), 2.0, 0.7, 0.7),
+        (tested.MotionStep(1.0, nan, 0.2), 2.0, 2.2, 2.2),
+        (tested.MotionStep(1.0, nan, 0.2), nan, 0.2, 0.2),
+        (tested.MotionStep(1.0, nan), nan, 0.0, 0.0),
+        (tested.MotionStep(1.0, inf, inf), nan, 0.0, 0.0),
         # Neither heading nor turn, or a displacement to all sides: the heading stays as it was.
-        (MotionStep(1.0, nan), 2.0, nan, 2.0),
-        (MotionStep(1.0, nan, 0.2, 5.0), 2.0, nan, 2.0),
-        (MotionStep(1.0, nan, nan, 5.0), nan, nan, nan),
+        (tested.MotionStep(1.0, nan), 2.0, nan, 2.0),
+        (tested.MotionStep(1.0, nan, 0.2, 5.0), 2.0, nan, 2.0),
+        (tested.MotionStep(1.0, nan, nan, 5.0), nan, nan, nan),
     ],
 )
 def test_turns_add_up_to_a_heading(step, before_rad, heading_rad, after_rad):
