@@ -1,0 +1,67 @@
+"""Radio reports over the made area of 9 x 7 pixels, read as a source of evidence reads them."""
+
+from math import nan
+
+import numpy as np
+from small_area import BANDS, COLS, OPTIONS, PIXEL_M, ROWS, make_area
+
+from mapfilter.filters.contract import Reason
+from mapfilter.models.street_motion import STATES
+from mapfilter.positioning.bayes.radio import RadioSource, name_of
+from mapfilter.positioning.bayes.state import DeadReckoning
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.estimate import UnusedReading
+
+AREA = make_area()
+A, B, C, D = BANDS.values()
+SPACING_M = 3.0
+
+
+def serving(cell, level_dbm=nan, censored=0, timing_advance=nan):
+    return ReportRow("serving", cell, None, None, level_dbm, censored, timing_advance)
+
+
+def named(cell, level_dbm, censored=0):
+    return ReportRow("neighbour", cell, None, None, level_dbm, censored)
+
+
+def carrier(arfcn, bsic, level_dbm, censored=0):
+    return ReportRow("neighbour", None, arfcn, bsic, level_dbm, censored)
+
+
+START = DeadReckoning()
+
+
+def read(*rows, used=None, moved=START, options=OPTIONS):
+    """Read a report after the last one that was used, and as many metres as were moved."""
+    source = RadioSource(AREA, options)
+    update = source.read(used, moved, Epoch(0.0, radio=rows), SPACING_M)
+    return update.state, update.radio, update.reason, update.unused
+
+
+def unknown_cells(*rows, why=Reason.UNKNOWN_CELL):
+    return [UnusedReading(0.0, row.role, name_of(row), why) for row in rows]
+
+
+def inside(reading):
+    """Band and level of the levels within the scale."""
+    return dict(zip(reading.levels.cell.tolist(), reading.levels.level_dbm.tolist(), strict=True))
+
+
+def absent(reading):
+    """Bands of absent cells, and what they are weaker than."""
+    return reading.levels.absent.tolist(), reading.levels.limit_dbm
+
+
+def others(reading):
+    return [(b.cells.tolist(), b.level_dbm, b.censored) for b in reading.bounds]
+
+
+def hypotheses(count=500, seed=21):
+    """Places within the area, a little inside their pixels."""
+    rng = np.random.default_rng(seed)
+    state = np.zeros((STATES, count), dtype=np.float32)
+    col, row = rng.integers(COLS, size=count), rng.integers(ROWS, size=count)
+    state[0] = PIXEL_M * (col + rng.uniform(0.01, 0.99, count))
+    state[1] = PIXEL_M * (row + rng.uniform(0.01, 0.99, count))
+    return state
