@@ -40,6 +40,18 @@ def test_the_usual_options():
     assert asdict(GridFilter()) == asdict(BayesFilter()) | {"device": "cpu"}
 
 
+def test_the_usual_motion_of_vehicles():
+    model = BayesFilter(vehicle=True).over_area(Town.of(1).area()).model
+    motion = model.motion
+    assert motion.heading_sd_rad == pytest.approx(np.radians(1.5))
+    assert motion.bias_drift_rad_per_sqrt_m == pytest.approx(np.radians(0.25))
+    assert motion.rate_rad_per_m == pytest.approx(np.radians(0.01))
+    assert (motion.scale_sd, motion.stretch_sd) == (0.02, 0.02)
+    # No steel beside a compass, and no phone that is put into another pocket.
+    assert (motion.disturbances_per_m, motion.remounts_per_m) == (0.0, 0.0)
+    assert (model.weights.leave_per_m, model.weights.off_cost_per_m) == (3e-4, 0.15)
+
+
 def test_the_usual_errors_of_vehicles_take_the_place_of_defaults_only():
     found = BayesFilter(vehicle=True, scale=0.05).resolved
     assert (found.step_sd_m, found.heading_sd_deg, found.drift_deg_per_sqrt_m) == (0.05, 1.5, 0.25)
@@ -181,6 +193,8 @@ def test_which_areas_are_held_by_tiles(monkeypatch, rows, cells, whole, tiled):
     monkeypatch.setattr(tested, "AreaMap", held)
     expected = ("tiles", database) if tiled else ("field", "plan", FLOOR_DBM)
     assert tested.open_area(database, whole=whole) == expected
+    if not whole:
+        assert tested.open_area(database) == expected
     # So it is at the front door; an exact grid needs the whole of it.
     given = SimpleNamespace(**vars(database), measured=lambda: None)
     opened = []

@@ -2,14 +2,11 @@
 
 from dataclasses import asdict
 
-import numpy as np
 import pytest
-from made_town import Town
 
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.mirrored import MirrorRules
-from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.fingerprints.options import (
     CANDIDATES,
     Centroid,
@@ -20,18 +17,6 @@ from mapfilter.positioning.fingerprints.options import (
     method_options,
 )
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
-
-
-def test_the_usual_motion_of_vehicles():
-    model = BayesFilter(vehicle=True).over_area(Town.of(1).area()).model
-    motion = model.motion
-    assert motion.heading_sd_rad == pytest.approx(np.radians(1.5))
-    assert motion.bias_drift_rad_per_sqrt_m == pytest.approx(np.radians(0.25))
-    assert motion.rate_rad_per_m == pytest.approx(np.radians(0.01))
-    assert (motion.scale_sd, motion.stretch_sd) == (0.02, 0.02)
-    # No steel beside a compass, and no phone that is put into another pocket.
-    assert (motion.disturbances_per_m, motion.remounts_per_m) == (0.0, 0.0)
-    assert (model.weights.leave_per_m, model.weights.off_cost_per_m) == (3e-4, 0.15)
 
 
 def test_the_usual_options_of_satellites_and_timing():
