@@ -1,5 +1,6 @@
 """A log's tables merged into epochs, row by row, and the headings that turns add up to."""
 
+from dataclasses import replace
 from math import inf, isnan, nan
 
 import numpy as np
@@ -31,7 +32,8 @@ def table(columns, *rows):
 
 TABLES = {
     "motion": table(
-        "time_s step_m heading_rad", (2.0, 1.5, 0.1), (1.0, 1.25, nan), (2.0, 2.0, 0.2)
+        "time_s step_m heading_rad turn_rad",
+        (2.0, 1.5, 0.1, 0.3), (1.0, 1.25, nan, 0.4), (2.0, 2.0, 0.2, nan),
     ),
     "radio": table(
         "time_s role cell arfcn bsic level_dbm censored timing_advance",
@@ -41,7 +43,8 @@ TABLES = {
     ),
     "gnss": table(
         "time_s east_m north_m var_east_m2 var_north_m2 cov_east_north_m2",
-        (2.0, 4e5, 5e6, 9.0, 16.0, 1.0), (2.0, 4.1e5, 5.1e6, nan, nan, nan),
+        (2.0, 4e5, 5e6, 9.0, 16.0, 1.0), (2.0, 4.2e5, 5e6, 9.0, 16.0, 1.0),
+        (2.0, 4.1e5, 5.1e6, nan, nan, nan),
     ),
     "pseudoranges": table(
         "time_s satellite pseudorange_m sigma_m x_m y_m z_m",
@@ -69,21 +72,35 @@ def test_rows_of_one_time_are_one_epoch_in_the_order_of_the_file(monkeypatch, at
     first, second, third, fourth = epochs(make_log(CRS, **TABLES))
     assert [one.time_s for one in (first, second, third, fourth)] == [1.0, 2.0, 3.0, 4.0]
     (step,) = first.motion
-    assert step.step_m == 1.25
+    assert (step.step_m, step.turn_rad) == (1.25, 0.4)
     assert isnan(step.heading_rad)
     assert first.differences == (Difference("A", "B", 120.0, 30.0, 20.0),)
     assert (first.radio, first.fix, first.ranges) == ((), None, ())
     assert [one.step_m for one in second.motion] == [1.5, 2.0]
+    assert [one.heading_rad for one in second.motion] == pytest.approx([0.1, 0.2])
+    assert second.motion[0].turn_rad == 0.3
     assert [one.sampling_sd_m for one in second.motion] == [0.0, 0.0]
     serving, neighbour = second.radio
     assert serving == ReportRow("serving", "A", None, None, -70.0, 0, 3.0)
     same(neighbour, ReportRow("neighbour", None, 61, 5, -110.0, -1, nan))
-    # Of two fixes of one time the last counts.
+    # Of several fixes of one time the last counts.
     same(second.fix, GnssFix(4.1e5, 5.1e6))
     same(third.ranges[0], Pseudorange("G01", 2.1e7, 3.0, (1e7, 2e7, 3e6)))
     same(third.ranges[1], Pseudorange("G02", 2.2e7, nan, (2e7, 1e7, 4e6)))
     assert third.motion == second.differences == ()
     same(fourth.radio[0], ReportRow("serving", "A", None, None, nan, 0, nan))
+
+
+def test_rows_out_of_order_and_what_a_table_may_lack():
+    log = make_log(CRS, motion=TABLES["motion"].assign(sampling_sd_m=[0.25, 0.5, nan]))
+    first, second = epochs(log)
+    assert [one.sampling_sd_m for one in (*first.motion, *second.motion)] == [0.5, 0.25, 0.0]
+    # Tables of a log are in order; those of one that was changed may not be.
+    turned = replace(log, motion=log.motion.iloc[[2, 0, 1]].reset_index(drop=True))
+    found = epochs(turned)
+    assert [one.time_s for one in found] == [1.0, 2.0]
+    assert [one.step_m for one in found[0].motion] == [1.25]
+    assert [one.step_m for one in found[1].motion] == [2.0, 1.5]
 
 
 def test_rows_that_repeat_themselves_are_one_object():
