@@ -46,7 +46,8 @@ def tracker(given=None, **more):
     lattice = Lattice("EPSG:32632", 0.0, 50.0, 10.0, 5, 5)
     database = SimpleNamespace(lattice=lattice, points=lambda: POINTS)
     known = {"A": Reason.USED, "B": Reason.USED}
-    options = {"ways": False} | more
+    options = {} if more.pop("usual", False) else {"ways": False}
+    options |= more
     return BeliefTracker(
         given or Listing(), database, lambda cell: known.get(cell, Reason.UNKNOWN_CELL),
         lambda epoch: epoch.radio[0].cell if epoch.radio else None, "listing", **options,
@@ -105,6 +106,8 @@ def test_it_starts_by_a_fix_where_that_is_asked_for(by_fix, starts):
     given = epoch("X", fix=GnssFix(1.0, 2.0))
     state, _ = tracker(start_by_fix=by_fix).step(TrackState(), given, RNG)
     assert (state.belief is not None) is starts
+    usual, _ = tracker().step(TrackState(), given, RNG)
+    assert usual.belief is None
     alone, _ = tracker(start_by_fix=True).step(TrackState(), epoch("X"), RNG)
     assert alone.belief is None
 
@@ -172,7 +175,7 @@ def test_what_breaks_the_contract_is_a_type_error(given, fault):
 @pytest.mark.parametrize(("at_m", "way_id"), [((6.0, 44.0), 11), ((41.0, 12.0), 22)])
 def test_positions_are_matched_to_the_way_of_the_nearest_point(at_m, way_id):
     """Points at the north-west corner of 50 m, and 40 m east and 30 m south of it."""
-    found = tracker(Listing(at_m=at_m), ways=True)
+    found = tracker(Listing(at_m=at_m), usual=True)
     found.warm_up(())
     assert "_points" in found.__dict__
     _, output = found.step(TrackState([]), epoch("A"), RNG)
