@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_fingerprints import CRS
 
-from mapfilter.errors import ConfigError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.positioning.fingerprints import locating as tested
 from mapfilter.positioning.fingerprints.censoring import Bounds
 from mapfilter.positioning.fingerprints.locating import (
@@ -131,7 +131,7 @@ def test_predicted_levels_are_calibrated_by_reports_that_are_drawn(monkeypatch):
     assert given[1] == (-70.0, -1)
     assert fitted.validations[0].blocks == "reports drawn with the stated errors"
     fit_locator(known, Probabilistic(), np.random.default_rng(5))
-    assert given[2][3] == np.random.default_rng(5).random()
+    assert given[2][3:] == (np.random.default_rng(5).random(), 0.0)
     with pytest.raises(ConfigError, match="gp"):
         fit_locator(known, "gp")
     with pytest.raises(ConfigError, match="knn, probabilistic, gp"):
@@ -183,6 +183,8 @@ def test_each_report_has_its_position_and_its_radii_or_a_reason():
     assert found.reason == ("", nothing, unknown, "")
     assert found.time_s.tolist() == [5.0, 6.0, 7.0, 8.0]
     assert found.notes == ("a note",)
+    with pytest.raises(InputError, match="EPSG:32636"):
+        locate_by(fitted, replace(asked, crs="EPSG:32636"))
     bare = locate_by(replace(fitted, regions=None), asked)
     assert np.isnan(bare.radii_m).all()
     assert bare.radii_m.shape == (4, 3)

@@ -167,7 +167,17 @@ def test_the_centroid_is_that_of_the_serving_cell_or_of_the_strongest():
 
 def test_without_levels_all_cells_count_alike():
     given = make_reports(CRS, [0, 1], ["a", "b"], [nan, nan], count=2, places=PLACES[:2])
-    match = locator(options(outliers=0.0), given).matcher(received(nan))
-    # A level of 0 dBm is assumed of each, 30 dB above the floor: 6 nats for a, and 6 for b.
-    np.testing.assert_allclose(weights(match, 2), [1.0, 0.0], atol=1e-5)
-    assert match.mismatch == pytest.approx(0.0, abs=1e-4)
+    by = locator(options(outliers=0.0, absence_per_db=0.05), given)
+    # A level of 0 dBm is assumed of each, 30 dB above the floor: 1.5 nats for a, and 1.5 for b.
+    likelihood = np.array([1.0, exp(-3.0)])
+    match = by.matcher(received(nan))
+    np.testing.assert_allclose(weights(match, 2), likelihood / likelihood.sum())
+
+
+@pytest.mark.parametrize(("count", "kept"), [(4000, 4000), (4001, 4000)])
+def test_no_more_than_four_thousand_places_are_kept(count, kept):
+    given = make_reports(
+        CRS, np.arange(count), ["a"] * count, np.full(count, -60.0), count=count,
+        places=np.zeros((count, 2)),
+    )  # fmt: skip
+    assert len(locator(options(), given).matcher(received(-60.0)).reports) == kept
