@@ -7,6 +7,7 @@ import pytest
 from made_fingerprints import CRS
 from scipy.optimize import minimize
 
+from mapfilter.errors import InputError
 from mapfilter.positioning.fingerprints import matches as tested
 from mapfilter.positioning.fingerprints.matches import Received, locator
 from mapfilter.positioning.fingerprints.options import Centroid, Neighbours, Probabilistic
@@ -73,6 +74,17 @@ def test_a_cell_that_one_report_lacks_counts_by_its_level_above_the_floor():
     )
     likelihood = np.array([exp(-0.2 * 1.0), 1.0])
     np.testing.assert_allclose(weights(match, 2), likelihood / likelihood.sum(), rtol=1e-6)
+
+
+def test_a_reading_without_a_level_is_received_and_ends_no_scale():
+    """The floor is 1 dB below the weakest level that is known: -71 dBm."""
+    given = make_reports(
+        CRS, [0, 0, 1, 2], ["a", "b", "a", "a"], [-60.0, -70.0, -60.0, nan], count=3,
+        places=PLACES,
+    )  # fmt: skip
+    match = locator(options(outliers=0.0), given).matcher(received(-60.0))
+    likelihood = np.array([exp(-0.2), 1.0, 1.0])
+    np.testing.assert_allclose(weights(match), likelihood / likelihood.sum())
 
 
 def test_a_timing_advance_counts_where_the_same_cell_serves():
@@ -142,9 +154,26 @@ def test_neighbours_weigh_by_powers_of_their_distances():
     assert (found.east_m, found.north_m) == pytest.approx((100 * match.weight.min(), 0.0))
     few = locator(Neighbours(k=7, weight_power=0.0), database([[-60.0], [-70.0]]))
     assert weights(few.matcher(received(-60.0)), 2).tolist() == [0.5, 0.5]
+    # The nearest ones, in whatever order they are.
+    far = make_reports(
+        CRS, range(5), ["a"] * 5, [-72.0, -71.0, -70.0, -64.0, -62.0], count=5,
+        places=np.zeros((5, 2)),
+    )  # fmt: skip
+    match = locator(method, far).matcher(received(-61.0))
+    assert sorted(match.reports.tolist()) == [3, 4]
     # Equal reports: one part in a million of the scale is the least distance.
     near = locator(method, database([[-60.0], [-80.0]])).matcher(received(-60.0))
     assert near.weight.min() == pytest.approx((1e-6 / (20 / 81)) ** 2, rel=1e-3)
+
+
+def test_the_highest_power_of_the_least_and_a_large_distance():
+    """1e-6 to the power of -50 is 1e300: relative to it what is far away weighs nothing."""
+    method = Neighbours(k=2, metric="manhattan", representation="positive", weight_power=50.0)
+    strong, weak = [-60.0] * 8, [-120.0] * 8
+    match = locator(method, database([strong, weak], "abcdefgh")).matcher(received(*strong))
+    # 60 of 121 dB, eight times.
+    assert match.mismatch == pytest.approx(0.5 * 8 * 60 / 121)
+    assert weights(match, 2).tolist() == [1.0, 0.0]
 
 
 def test_the_centroid_is_that_of_the_serving_cell_or_of_the_strongest():
@@ -163,6 +192,14 @@ def test_the_centroid_is_that_of_the_serving_cell_or_of_the_strongest():
         assert (found.east_m, found.north_m) == pytest.approx(at)
         assert found.mismatch == 0.0
     assert by(received(-50.0, -60.0)).spread_m == pytest.approx(100.0)
+    # The mean of all places, not the one with the least distances.
+    found = locator(Centroid(), database([[-60.0], [-70.0], [-80.0]]))(received(-50.0))
+    assert (found.east_m, found.north_m) == pytest.approx((100 / 3, 200 / 3))
+
+
+def test_a_database_without_reports_is_refused():
+    with pytest.raises(InputError, match="database"):
+        locator(Centroid(), database(np.empty((0, 2))))
 
 
 def test_without_levels_all_cells_count_alike():
