@@ -265,6 +265,14 @@ def test_satellites_that_agree_lead_to_their_place(status, fresh):
     assert np.sqrt(receiver.covariance[0, 0]) < 200.0
 
 
+def test_a_first_receiver_is_at_the_stated_height():
+    """Where that is known, neither it nor its rate of change is found anew."""
+    sure = replace(OPTIONS, height_sd_m=0.0, drift_sd_mps=0.0)
+    found = compared(belief_at(), ranges=ranges(), gate=replace(GATE, options=sure))
+    np.testing.assert_allclose(found.state.receiver.mean[1:3], 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.belief.state[STATES + 1 : STATES + 3], 0.0, atol=1e-6)
+
+
 def test_no_share_of_faulty_readings_leaves_likelihoods_as_they_are():
     gate = replace(GATE, options=replace(OPTIONS, outliers=0.0))
     belief = belief_at(sd_m=30.0)
