@@ -309,6 +309,28 @@ def test_a_satellite_that_is_far_off_is_left_out_alone(known):
     assert len(two.unused) == 2
 
 
+@pytest.mark.parametrize(
+    ("status", "used"), [(Status.TRACKING, False), (Status.LOST, False), (Status.SEARCHING, True)]
+)
+def test_a_tracked_belief_is_compared_as_a_whole(status, used):
+    """One hypothesis in a hundred lies where the satellites say: that is enough for a search."""
+    belief = belief_at(status=status)
+    belief = replace(belief, log_weight=np.full(400, -np.log(400.0)))
+    belief.state[EAST, :4] += 300.0
+    found = compared(belief, ranges=ranges(off_m=(300.0, 0.0)))
+    assert (found.unused == ()) is used
+    if used:
+        assert weighted_mean(belief, sum_of(found.terms, belief))[0] > PLACE_M[0] + 200.0
+
+
+@pytest.mark.parametrize("off_m", [0.0, 150.0])
+def test_particles_far_apart_do_not_hide_that_a_belief_is_elsewhere(off_m):
+    """Their distance widens what hypotheses are weighed by, not what the belief is compared by."""
+    epoch = Epoch(10.0, (), ranges=ranges(off_m=(off_m, 0.0)))
+    found = GATE.compare(belief_at(), GnssState(), epoch, 100.0, 100.0)
+    assert (found.unused == ()) is (off_m == 0.0)
+
+
 def clock_of(found):
     rows = found.belief.state[STATES].astype(float)
     return found.state.receiver.mean[0] + float(found.belief.weight @ rows)
