@@ -341,6 +341,9 @@ def test_a_clock_that_jumps_is_found_anew_and_known_from_then_on(known):
     found = compared(belief, state, 11.0, 101.0, ranges=ranges(clock_m=52_000.0))
     assert found.unused == ()
     assert clock_of(found) == pytest.approx(52_000.0, abs=60.0)
+    # So it is with errors of twice the stated deviation.
+    usual = ranges(clock_m=52_000.0, errors=(6.0, -6.0, 6.0, -6.0, 6.0, -6.0))
+    assert compared(belief, state, 11.0, 101.0, ranges=usual).unused == ()
     # Another jump is found from there; without one the clock stays.
     for clock_m in (52_000.0, -300_000.0):
         later = compared(found.belief, found.state, 12.0, 131.0, ranges=ranges(clock_m=clock_m))
