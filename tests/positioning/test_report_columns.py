@@ -65,6 +65,8 @@ def test_of_several_readings_of_a_cell_the_strongest_counts():
     assert found.places.tolist() == [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]
     assert repr(found) == "Reports(3, 3 with position; 4 readings of 4 transmitters)"
     assert found.cell.dtype == found.serving.dtype == found.block.dtype == np.int32
+    own = [[one.tolist() for one in found.readings(k)] for k in range(3)]
+    assert own == [[[0, 2], [-75.0, -80.0]], [[], []], [[0, 1], [-90.0, -65.0]]]
 
 
 def test_what_is_not_given():
