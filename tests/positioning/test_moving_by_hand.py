@@ -131,6 +131,8 @@ def test_the_sampling_of_steps_counts_once_a_position_is_tracked():
     for status, sd_m in ((TRACKING, 0.25), (SEARCHING, 0.0), (Status.CONVERGED, 0.0)):
         _, _, asked = move(walking(belief(status)), STEP)
         assert steps_of(asked) == [replace(STEP, sampling_sd_m=sd_m)]
+    rough = replace(STEP, sampling_sd_m=1.0)
+    assert steps_of(move(walking(belief(SEARCHING)), rough)[2]) == [replace(STEP, sampling_sd_m=0)]
 
 
 @pytest.mark.parametrize(

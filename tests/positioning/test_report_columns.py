@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from made_fingerprints import CRS
 
+from mapfilter.errors import InputError
 from mapfilter.positioning.fingerprints.reports import joined_reports, make_reports
 
 READINGS = [
@@ -140,5 +141,10 @@ def test_joined_reports_have_blocks_of_their_own():
     assert found.notes == (
         "one", "10 rows left out: odd", "4 readings left out: a cell twice in one report", "two",
     )  # fmt: skip
+    assert columns(joined_reports([made()]))[0][:-1] == FIRST[:-1]
+    with pytest.raises(InputError, match="at least one log"):
+        joined_reports([])
+    with pytest.raises(InputError, match="EPSG:32636"):
+        joined_reports([made(), other, replace(other, crs="EPSG:32636")])
     plain = make_reports(CRS, [], [], [], count=0)
     assert joined_reports([plain, made()]).block.tolist() == [4, 5, -1]

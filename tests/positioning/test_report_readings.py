@@ -1,6 +1,6 @@
 """Radio reports made ready for the model: serving cells, levels, bounds and absent cells."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from math import exp, isnan, nan, sqrt
 
 import numpy as np
@@ -220,3 +220,12 @@ def test_levels_and_what_they_are_compared_with():
     assert reading.levels.offset_db == pytest.approx(beside_db)
     assert EvidenceOptions(beside_db=0.0).offset_db(100.0) == 0.0
     assert EvidenceOptions(beside_db=6.0).offset_db(1e9) == pytest.approx(6.0 * sqrt(2))
+
+
+def test_the_usual_weights_of_reports():
+    usual = asdict(EvidenceOptions())
+    del usual["serving"], usual["levels"]
+    assert usual == {
+        "spacing_m": 5.0, "first_m": 25.0, "use_levels": True, "serving_with_levels": 1.0,
+        "full_list": 6, "bound_weight": 0.5, "beside_db": 6.0, "beside_m": 50.0,
+    }  # fmt: skip

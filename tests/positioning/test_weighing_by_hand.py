@@ -1,6 +1,7 @@
 """A belief and its alternative weighed by one epoch's evidence, with made filters."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,9 +22,11 @@ from made_filters import (
 )
 
 from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.grid import GridBelief
+from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
+from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm, RadioReading
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.weighing import Weighing
@@ -166,6 +169,44 @@ def test_when_an_alternative_starts(changes, state, disputed, starts):
         # One in another unit is improbable beforehand.
         assert other.main_log_evidence == -12.0 + (0.0 if unit == 1.0 else -4.0)
         assert (other.step_unit_m, other.null.log_odds) == (unit, pytest.approx(np.log(1 / 19)))
+
+
+def test_one_source_is_enough_to_dispute_a_belief():
+    updates = [UPDATES[0]._replace(disputed=True), EvidenceUpdate(None), EvidenceUpdate(None)]
+    assert weighed(updates=updates)[0].alternative is not None
+
+
+@pytest.mark.parametrize(("shared", "other"), [(None, 0.0), (-6.0, -6.0)])
+def test_levels_count_under_the_null_hypothesis_as_no_prediction_has_them(shared, other):
+    kept = None if shared is None else SimpleNamespace(other_log_likelihood=shared)
+    given = replace(STATE, belief=replace(belief(), shared=kept))
+    none = np.zeros(0, dtype=np.int32)
+    levels = LevelReport(none, none.astype(np.float32), none, -110.0, 0.0)
+    found, _ = weighed(
+        state=given, updates=[EvidenceUpdate(None, radio=RadioReading(levels=levels))]
+    )
+    assert found.null.log_odds == pytest.approx(-6.0 + other - 1.0 + 2.0)
+    # Without levels there is nothing to compare.
+    found, _ = weighed(state=given)
+    assert found.null.log_odds == pytest.approx(-6.0 - 1.5 - 1.0 + 2.0)
+
+
+@pytest.mark.parametrize(("count", "status"), [(1, TRACKING), (0, Status.OUTSIDE)])
+def test_masses_on_a_grid_lie_in_the_area(count, status):
+    mass = np.zeros((1, 2, 2), dtype=np.float32)
+    mass[0, 0, :count] = 1.0
+    model = SimpleNamespace(bias_rad=np.zeros(1), states=lambda row, *_: np.zeros((8, row.size)))
+    grid = GridBelief(mass, np.zeros_like(mass), model, status=TRACKING, travelled_m=40.0)
+    grid.__dict__["summary"] = belief().summary
+    found = weighed(Beliefs(with_summary(grid)), replace(STATE, belief=grid))[0]
+    assert found.status is status
+
+
+def with_summary(grid):
+    """A filter that leaves masses as they are."""
+    return SimpleNamespace(
+        update=lambda *_: (grid, SimpleNamespace(reason=Reason.USED)), init=gaining(0.0).init
+    )
 
 
 def test_a_turned_phone_that_is_ahead_starts_an_alternative_that_is_not_counted():
