@@ -6,6 +6,7 @@ from math import exp, isnan, nan, sqrt
 import numpy as np
 import pytest
 from made_radio import (
+    AREA,
     START,
     A,
     B,
@@ -23,8 +24,9 @@ from made_radio import (
 from small_area import FLOOR_DBM, OPTIONS
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.radio import EvidenceOptions
-from mapfilter.positioning.epochs import ReportRow
+from mapfilter.positioning.bayes.path import DeadReckoning
+from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioSource, name_of
+from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
 
 
@@ -229,3 +231,25 @@ def test_the_usual_weights_of_reports():
         "spacing_m": 5.0, "first_m": 25.0, "use_levels": True, "serving_with_levels": 1.0,
         "full_list": 6, "bound_weight": 0.5, "beside_db": 6.0, "beside_m": 50.0,
     }  # fmt: skip
+
+
+def test_a_report_is_due_after_its_spacing_since_the_last_one():
+    source, used = RadioSource(AREA, OPTIONS), DeadReckoning(travelled_m=100.0)
+    assert [source.due(used, m) for m in (100.0, 105.9, 106.0, 200.0)] == [False, False, True, True]
+    assert source.due(None, 0.0)
+
+
+def test_a_serving_cell_is_as_probable_as_the_model_says_under_the_null_hypothesis():
+    source = RadioSource(AREA, OPTIONS, lambda band, advance: -10.0 * band - advance)
+    for cell, steps, nats in (("A", 3.0, -3.0), ("C", 4.0, -24.0), ("X", 3.0, nan)):
+        rows = (serving(cell, -70.0, 0, steps), named("D", -80.0))
+        reading = source.read(None, START, Epoch(0.0, radio=rows), 3.0).radio
+        assert reading.serving_under_null == pytest.approx(nats, nan_ok=True)
+    assert read(serving("A", -70.0))[1].serving_under_null == -0.7
+
+
+def test_names_of_cells_in_messages():
+    assert name_of(named("B", -80.0)) == "B"
+    assert name_of(carrier(61, 2, -80.0)) == "ARFCN 61, BSIC 2"
+    assert name_of(carrier(61, None, -80.0)) == "ARFCN 61, BSIC unknown"
+    assert name_of(carrier(None, 2, -80.0)) == ""
