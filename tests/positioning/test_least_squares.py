@@ -6,9 +6,19 @@ from fusion_world import CASES
 
 from mapfilter.errors import InputError
 from mapfilter.models.gaussian import stack
-from mapfilter.models.ranging import pseudoranges, range_differences, timing_advances
+from mapfilter.models.ranging import (
+    position_fix,
+    pseudoranges,
+    range_differences,
+    timing_advances,
+)
 from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
-from mapfilter.positioning.kalman.static_fix import BAD_GEOMETRY, TOO_FEW, static_fix
+from mapfilter.positioning.kalman.static_fix import (
+    BAD_GEOMETRY,
+    NOT_CONVERGED,
+    TOO_FEW,
+    static_fix,
+)
 
 CASE = CASES["gauss_newton"]
 GNSS = pseudoranges(POSITION_CLOCK_3D, CASE["sats"], CASE["s_pr"])
@@ -114,3 +124,40 @@ def test_what_is_wrong_is_said():
 def test_readings_of_another_length_are_refused(count):
     with pytest.raises(InputError, match=rf"reading: expected shape \(5,\), found \({count},\)"):
         static_fix(GNSS, np.resize(Y, count), START)
+
+
+def test_steps_are_counted_until_one_changes_nothing():
+    """A plain position is found by the first step; the second shows it."""
+    model = position_fix(POSITION, np.diag([4.0, 9.0]))
+    fix = static_fix(model, [3.0, 4.0], [3.0, 0.0])
+    np.testing.assert_allclose(fix.state, [3.0, 4.0])
+    np.testing.assert_allclose(fix.covariance, np.diag([4.0, 9.0]))
+    assert (fix.ok, fix.iterations, fix.problem) == (True, 2, "")
+    few = static_fix(model, [3.0, np.nan], [3.0, 0.0])
+    assert (few.iterations, few.problem, few.covariance.shape) == (0, TOO_FEW, (2, 2))
+
+
+class Backwards:
+    """A measurement whose derivative has the wrong sign: each step leads away."""
+
+    def mean(self, state):
+        return np.asarray(state)
+
+    def jacobian(self, state):
+        return -np.eye(len(state))
+
+    def covariance(self):
+        return np.eye(2)
+
+
+def test_steps_that_never_end_are_given_up():
+    fix = static_fix(Backwards(), [3.0, 4.0], [0.0, 0.0])
+    assert (fix.ok, fix.problem, fix.iterations) == (False, NOT_CONVERGED, 50)
+    assert np.isnan(fix.state).all()
+
+
+def test_nearly_in_a_line_is_bad_geometry_too():
+    """A millionth of a metre beside the line: the sides differ by some 1e-9 of the way along it."""
+    model = timing_advances(POSITION, [[0.0, 0.0], [1000.0, 0.0], [2000.0, 0.0]], 10.0)
+    fix = static_fix(model, model.mean(np.array([500.0, 400.0])), [500.0, 1e-6])
+    assert (fix.problem, fix.iterations) == (BAD_GEOMETRY, 1)

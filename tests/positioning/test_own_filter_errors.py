@@ -1,11 +1,13 @@
 """Errors in a custom filter: which are named with file and line, and which are passed on."""
 
 import json
+from hashlib import sha256
 
 import pytest
 
 from mapfilter.errors import ConfigError, InputError, StoreError, fail
-from mapfilter.positioning.custom_filter import wrap_user_errors
+from mapfilter.positioning.custom_filter import CustomEpochFilter, custom_filter, wrap_user_errors
+from mapfilter.positioning.estimate import StepOutput
 
 
 class Own:
@@ -69,3 +71,69 @@ def test_without_lines_of_its_own_the_last_of_all_is_named():
         json.loads("{")
     assert ", decoder.py line " in caught.value.faults[0].where
     assert "in raw_decode" in caught.value.faults[0].where
+
+
+def test_a_name_whose_module_has_no_file_has_an_empty_text():
+    assert custom_filter("time:time").source_sha256 == sha256(b"").hexdigest()
+
+
+class Plain:
+    """A filter over epochs, which cannot be prepared, and shows nothing but its outputs."""
+
+    def begin(self, kinds):
+        return f"begun with {len(kinds)}"
+
+    def step(self, state, epoch, rng):
+        assert (epoch, rng) == ("epoch", "rng")
+        return f"{state}, stepped", OUTPUT
+
+
+class Whole(Plain):
+    """One that has all that a filter may have."""
+
+    uses = ("motion",)
+    prepared = None
+
+    def warm_up(self, merged):
+        self.prepared = merged
+
+    def smoother(self):
+        return "smoother"
+
+    def hypotheses(self, state):
+        return f"hypotheses of {state}"
+
+
+OUTPUT = StepOutput("fix")
+
+
+def test_a_filter_over_epochs_is_asked_for_what_it_has():
+    plain, whole = (CustomEpochFilter(one(), "package:Own", "EPSG:32632") for one in (Plain, Whole))
+    assert (plain.name, plain.crs) == ("package:Own", "EPSG:32632")
+    assert (whole.uses, set(plain.uses) > {"motion", "serving"}) == (("motion",), True)
+    for one in (plain, whole):
+        one.warm_up(["merged"])
+        assert one.begin(("motion", "gnss")) == "begun with 2"
+        assert one.step("state", "epoch", "rng") == ("state, stepped", OUTPUT)
+    assert whole.filter.prepared == ["merged"]
+    assert (plain.smoother(), whole.smoother()) == (None, "smoother")
+    assert (plain.hypotheses("state"), whole.hypotheses("state")) == (None, "hypotheses of state")
+
+
+def test_a_step_without_an_output_breaks_the_contract():
+    own = Plain()
+    own.step = lambda *_: ("state", "no output")
+    with pytest.raises(ConfigError, match=r"TypeError: step returns \(state, StepOutput\)"):
+        CustomEpochFilter(own, "package:Own", "EPSG:32632").step("state", "epoch", "rng")
+
+
+@pytest.mark.parametrize("name", ["warm_up", "smoother", "hypotheses", "begin"])
+def test_errors_in_any_part_of_a_filter_are_named(name):
+    def failing(*_):
+        raise ValueError("no luck")
+
+    own = Whole()
+    setattr(own, name, failing)
+    given = () if name == "smoother" else ("given",)
+    with pytest.raises(ConfigError, match="no luck"):
+        getattr(CustomEpochFilter(own, "package:Own", "EPSG:32632"), name)(*given)

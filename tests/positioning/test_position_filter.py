@@ -94,3 +94,8 @@ def test_what_does_not_fit_is_told():
     with pytest.raises(InputError, match="components of the position"):
         filter_fixes(MOVING_UP, constant_velocity(1.0, 1.0, 3), np.zeros(6), np.eye(6), [fix])
     assert filter_fixes(MOVING, motion, np.zeros(4), np.eye(4), []).means.shape == (0, 4)
+    for state, covariance in ((np.zeros(3), np.eye(2)), (np.zeros(2), np.eye(3))):
+        part = StaticFix(state, covariance, True, 1)
+        with pytest.raises(InputError, match="components of the position"):
+            filter_fixes(MOVING_UP, constant_velocity(1.0, 1.0, 3), np.zeros(6), np.eye(6), [part])
+    assert filter_fixes(MOVING, motion, np.zeros(4), np.eye(4), [fix]).used.tolist() == [True]
