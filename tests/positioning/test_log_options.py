@@ -297,6 +297,35 @@ def test_a_log_that_states_no_drift_leaves_the_assumed_one():
 
 
 @pytest.mark.parametrize(
+    ("speeds_mps", "usual_mps"),
+    # Rows of less than 0.2 m/s stand; what stands always has no speed.
+    [((0.8,), 0.8), ((0.3, 0.3, 4.0), 0.3), ((0.1, 0.1, 4.0), 4.0), ((0.1,), None)],
+)
+def test_a_drift_by_time_is_one_by_distance_at_the_usual_speed(speeds_mps, usual_mps):
+    rows = {"time_s": np.arange(90.0), "step_m": np.resize(speeds_mps, 90), "heading_rad": 0.0}
+    given = make_log(CRS, motion=pd.DataFrame(rows), imu=ImuNoise(drift_deg_per_sqrt_s=0.4))
+    expected = 0.3 if usual_mps is None else 0.4 / usual_mps**0.5
+    found, _ = fitted_to_log(BayesFilter(), given)
+    assert found.drift_deg_per_sqrt_m == pytest.approx(expected)
+    # Two rows of one time have no speed.
+    rows["time_s"] = np.repeat(np.arange(45.0), 2)
+    twice = make_log(CRS, motion=pd.DataFrame(rows), imu=ImuNoise(drift_deg_per_sqrt_s=0.4))
+    assert np.isfinite(fitted_to_log(BayesFilter(), twice)[0].drift_deg_per_sqrt_m)
+    assert fitted_to_log(BayesFilter(), twice)[0].drift_deg_per_sqrt_m > 0.15
+
+
+def test_fine_steps_of_levels_count_too():
+    fitted, _ = fitted_to_log(BayesFilter(), log(level_step_db=0.6))
+    assert fitted.level_error_db == pytest.approx((8.7**2 + 0.36 / 12) ** 0.5)
+
+
+def test_rows_of_more_than_fifteen_metres_are_no_steps():
+    fitted, _ = fitted_to_log(BayesFilter(), rows_of(16.0, 10.0))
+    assert fitted.step_sd_m == pytest.approx(9.0 * (1.4 / 16.0) ** 0.5)
+    assert fitted_to_log(BayesFilter(), rows_of(14.9, 10.0))[0].step_sd_m == 9.0
+
+
+@pytest.mark.parametrize(
     ("cells", "step_m", "alone"), [(("A",), 1.4, True), ((), 1.4, False), (("A",), np.nan, False)]
 )
 def test_streets_alone_start_the_filter_where_a_log_of_a_radio_map_has_but_motion(
