@@ -69,3 +69,20 @@ def test_every_set_of_carriers_has_its_sums_and_none_is_kept_by_itself(carrier):
             np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
     # A client that asks for all sets of carriers must not fill the memory with them.
     assert len(likelihoods._prepared) <= len(set(CARRIER.tolist()))
+
+
+@pytest.mark.parametrize(
+    "asked_dbm", [-75.2, -71.0, -70.8, -70.6, -70.0, -60.5, -60.0, -59.2, -40.0]
+)
+def test_what_is_weaker_than_a_report_is_no_evidence(asked_dbm):
+    """At each fraction of a dB; a and b at one place, b alone at another."""
+    reports = make_reports(
+        CRS, [0, 0, 1], ["a", "b", "b"], [-60.6, -70.7, -65.0], count=2, places=np.zeros((2, 2))
+    )
+    found, _ = Likelihoods.at(replace(reports, predicted=True), ERRORS).of(
+        np.array([0], dtype=np.int32), np.array([asked_dbm])
+    )
+    missed_db = [max(dbm - asked_dbm, 0.0) for dbm in (-70.7, -65.0)]
+    # Where a itself is missing, it is by its own level above the floor.
+    expected = -0.2 * np.array([missed_db[0], missed_db[1] + asked_dbm + 120.0])
+    np.testing.assert_allclose(found, expected, atol=1e-9)
