@@ -1,11 +1,13 @@
 """Fingerprints of a radio-route database, thinned, and reports drawn from predicted levels."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from cross_world import CRS, LATTICE, levels_dbm, make_database, make_plan
 
+from mapfilter.database.measured import Readings
 from mapfilter.positioning.fingerprints import sources
 from mapfilter.positioning.fingerprints.planned import Planned
 from mapfilter.positioning.fingerprints.reports import make_reports
@@ -168,3 +170,61 @@ def test_what_may_be_a_table(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     assert not is_table(tmp_path / "folder.csv")
     assert not is_table(tmp_path / "none.csv")
+
+
+def surveyed(count=3):
+    """Readings of a survey: two of the first report, of which the second serves, and so on."""
+    report = np.repeat(np.arange(5, 5 + count, dtype=np.int32), 2)
+    cell = np.resize(np.array([1, 0], dtype=np.int32), 2 * count)
+    serving = np.resize([False, True], 2 * count)
+    return Readings(
+        ("A", "B"), cell, report, np.asarray(report // 6, np.int32),
+        531_000.0 + report, 4_555_900.0 - report, -60.0 - np.arange(2.0 * count),
+        np.where(serving, 3.0 + report, 99.0), serving,
+    )  # fmt: skip
+
+
+def survey_of(readings):
+    return SimpleNamespace(
+        measured=lambda: SimpleNamespace(readings=readings),
+        lattice=SimpleNamespace(crs=CRS),
+    )
+
+
+def test_the_readings_of_a_survey_are_reports_themselves():
+    found = reports_of_database(survey_of(surveyed()))
+    assert by_place(found) == {
+        (531_000.0 + k, 4_555_900.0 - k): {"B": -60.0 - 2 * (k - 5), "A": -61.0 - 2 * (k - 5)}
+        for k in (5, 6, 7)
+    }
+    assert [found.cell_ids[n] for n in found.serving] == ["A", "A", "A"]
+    # The timing advance is that of the serving cell; each session is a block of its own.
+    assert found.timing_advance.tolist() == [8.0, 9.0, 10.0]
+    assert found.block.tolist() == [0, 1, 1]
+    assert (found.predicted, found.notes, found.planned) == (False, (), None)
+    alone = surveyed()
+    alone.serving[:] = False
+    without = reports_of_database(survey_of(alone))
+    assert without.serving.tolist() == [-1, -1, -1]
+    assert np.isnan(without.timing_advance).all()
+
+
+@pytest.mark.parametrize(("most", "kept"), [(5, [0, 1, 2, 3, 4]), (3, [0, 2, 4]), (2, [0, 4])])
+def test_a_large_survey_is_thinned_evenly(monkeypatch, most, kept):
+    monkeypatch.setattr(sources, "MOST_POINTS", most)
+    found = reports_of_database(survey_of(surveyed(5)))
+    assert (found.east_m - 531_005.0).tolist() == kept
+    assert found.notes == (() if most == 5 else (f"{most} of 5 reports taken, evenly",))
+
+
+def test_a_cell_whose_plan_lacks_a_value_errs_by_more(database):
+    """By 4 dB for an assumed power besides the 3 dB of all levels: 5 dB."""
+    cells = tuple(
+        replace(cell, assumed="eirp_dbm" if cell.id == "E" else "") for cell in make_plan().cells
+    )
+    known = replace(database, plan=replace(make_plan(), cells=cells))
+    found = reports_of_database(known, 3.0)
+    of_cell = np.array(found.cell_ids)[found.cell]
+    np.testing.assert_allclose(found.sd_db[of_cell == "W"], 3.0)
+    np.testing.assert_allclose(found.sd_db[of_cell == "E"], 5.0)
+    assert found.planned is not None
