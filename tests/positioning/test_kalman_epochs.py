@@ -1,0 +1,158 @@
+"""Whole epochs of a Kalman-type filter, with numbers by hand."""
+
+from dataclasses import replace
+from math import cos, hypot, inf, nan, sin
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.gaussian import EKF
+from mapfilter.models.state import MOVING, POSITION
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.lasting import extended_layout
+from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
+from mapfilter.positioning.kalman.step import KalmanState, KalmanStep, belief_tail, place_of
+from mapfilter.radio.cells import Cell, CellPlan
+
+CRS, EAST, NORTH = "EPSG:32629", 500_000.0, 4_600_000.0
+PLAN = CellPlan(CRS, (Cell("A", "A", EAST, NORTH, 30.0, None, 50.0, 1800.0, "omni"),))
+OPTIONS = KalmanOptions(timing_step_m=100.0, timing_sd_m=1.0)
+
+
+def begun(options=OPTIONS, *, sd_m=50.0, east_m=2000.0, layout=POSITION, **more):
+    """A filter whose belief lies east of the site, at 10 s."""
+    place = {POSITION: (EAST + east_m, NORTH), MOVING: (EAST + east_m, 3.0, NORTH, 4.0)}[layout]
+    belief = SumBelief.start(place, np.diag(np.full(layout.size, sd_m**2)))
+    given = {"belief": belief, "time_s": 10.0, "moved_m": inf} | more
+    return KalmanStep(SiteModels(PLAN, options), EKF, KalmanState(layout, **given))
+
+
+def timed(steps, level_dbm=nan):
+    return (ReportRow("serving", "A", None, None, level_dbm, 0, steps),)
+
+
+@pytest.mark.parametrize(("steps", "measured_m"), [(17.0, 1750.0), (20.0, 2050.0)])
+def test_a_timing_advance_stands_for_the_middle_of_its_step(steps, measured_m):
+    work = begun()
+    fix = work.take(Epoch(10.0, radio=timed(steps)))
+    noise = 1.0 + 100.0**2 / 12
+    gain = 2500.0 / (2500.0 + noise)
+    assert fix.east_m - EAST == pytest.approx(2000.0 + gain * (measured_m - 2000.0))
+    assert fix.north_m == pytest.approx(NORTH)
+    assert (fix.reason, work.moved_m) == (Reason.USED, 0.0)
+    assert fix.covariance_m2[0, 0] == pytest.approx((1 - gain) * 2500.0)
+
+
+def test_a_start_by_a_timing_advance_lies_all_around_the_site():
+    work = KalmanStep(SiteModels(PLAN, OPTIONS), EKF, KalmanState(POSITION))
+    fix = work.take(Epoch(0.0, radio=timed(17.0)))
+    assert (fix.east_m, fix.north_m) == pytest.approx((EAST, NORTH), abs=1.0)
+    # Of 18 parts, as 11 km are cut into pieces of 600 m; half of a circle's square on each axis.
+    assert fix.hypotheses == 18
+    assert np.diag(fix.covariance_m2) == pytest.approx([1750.0**2 / 2] * 2, rel=0.15)
+    assert fix.mass_50m < 1 / 18
+
+
+def test_reports_in_a_row_count_as_one():
+    """An error lasts for 500 m: after 20 m the variance is 25 times as large."""
+    work = begun(moved_m=20.0)
+    work.take(Epoch(10.0, radio=timed(17.0)))
+    gain = 2500.0 / (2500.0 + 25 * (1.0 + 100.0**2 / 12))
+    assert work.belief.moments.mean[0] - EAST == pytest.approx(2000.0 - gain * 250.0)
+
+
+@pytest.mark.parametrize(("step_m", "sampling_m2"), [(4.0, 9.0), (-4.0, 9.0), (0.0, 0.0)])
+def test_the_sampling_of_steps_widens_a_belief(step_m, sampling_m2):
+    work = begun()
+    work.take(Epoch(10.0, (MotionStep(step_m, 0.5, sampling_sd_m=3.0),)))
+    along, across = np.array([cos(0.5), sin(0.5)]), np.array([-sin(0.5), cos(0.5)])
+    expected = (2500.0 + sampling_m2) * np.eye(2) + 0.09 * np.outer(along, along)
+    expected += (0.2 * step_m) ** 2 * np.outer(across, across)
+    np.testing.assert_allclose(work.belief.covariances[0], expected)
+    np.testing.assert_allclose(work.belief.means[0], [EAST + 2000.0, NORTH] + step_m * along)
+
+
+def test_where_errors_of_fixes_last_their_place_is_a_part_of_the_state():
+    lasting = replace(OPTIONS, fix_lasting_m=6.0, start_sd_m=100.0)
+    state = KalmanState(extended_layout(POSITION))
+    work = KalmanStep(SiteModels(PLAN, lasting), EKF, state)
+    fix = work.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
+    assert work.belief.means.shape == (1, 4)
+    # 64 of the fix's 100 m² are white, the rest lasts; a start is known to 100 m.
+    place_m2 = 10_000.0 + 36.0
+    gain = 10_000.0 / (place_m2 + 64.0)
+    assert fix.covariance_m2[0, 0] == pytest.approx(10_000.0 - gain * 10_000.0)
+    # It is white with a time of 30 s: 15 s later a part of exp(-1/2) is left.
+    work.take(Epoch(15.0))
+    kept = np.exp(-0.5)
+    before = KalmanStep(SiteModels(PLAN, lasting), EKF, state)
+    before.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
+    old = before.belief.covariances[0]
+    off_m2 = old[2, 2] - 2 * old[0, 2] + old[0, 0]
+    new = work.belief.covariances[0]
+    assert new[2, 2] - 2 * new[0, 2] + new[0, 0] == pytest.approx(
+        kept**2 * off_m2 + (1 - kept**2) * 36.0
+    )
+
+
+@pytest.mark.parametrize("seconds", [0.0, -4.0, 4.0])
+def test_without_dead_reckoning_a_belief_goes_on_at_its_speed(seconds):
+    work = begun(layout=MOVING, moved_m=7.0)
+    fix = work.take(Epoch(10.0 + seconds))
+    gone_s = max(seconds, 0.0)
+    assert fix.east_m - EAST == pytest.approx(2000.0 + 3.0 * gone_s)
+    assert fix.north_m - NORTH == pytest.approx(4.0 * gone_s)
+    assert (work.moved_m, work.time_s) == (pytest.approx(7.0 + 5.0 * gone_s), 10.0 + seconds)
+    assert fix.reason is Reason.NO_READING
+    assert work.motion[0].shape == (4, 4)
+
+
+def test_with_a_velocity_a_fix_that_repeats_itself_shows_a_standstill():
+    same = GnssFix(EAST + 2000.0, NORTH, 25.0, 25.0, 0.0)
+    for layout, used in ((MOVING, True), (POSITION, False)):
+        work = begun(layout=layout, last_fix=same)
+        fix = work.take(Epoch(10.0, fix=same))
+        assert (fix.reason is Reason.USED) is used
+        assert [one.reason for one in work.unused] == ([] if used else [Reason.REPEATED_FIX])
+        assert work.last_fix is same
+
+
+@pytest.mark.parametrize(
+    ("radio", "reason"),
+    [((), Reason.NO_READING), (timed(nan), Reason.UNKNOWN_CELL),
+     ((ReportRow("serving", "Z", None, None, -70.0, 0),), Reason.UNKNOWN_CELL)],
+)  # fmt: skip
+def test_epochs_without_a_measurement(radio, reason):
+    work = begun()
+    assert work.take(Epoch(10.0, radio=radio)).reason is reason
+    assert work.moved_m == inf
+
+
+@pytest.mark.parametrize(("before", "status"), [(Status.SEARCHING, Status.CONVERGED),
+                                               (Status.CONVERGED, Status.TRACKING)])  # fmt: skip
+def test_a_narrow_belief_has_converged(before, status):
+    work = begun(status=before)
+    fix = work.take(Epoch(10.0))
+    assert (fix.status, work.state.status, fix.hypotheses) == (status, status, 1)
+    wide = begun(sd_m=500.0, status=before).take(Epoch(10.0))
+    assert wide.status is (Status.SEARCHING if before is Status.SEARCHING else Status.TRACKING)
+
+
+def test_place_and_tail_are_those_of_east_and_north():
+    covariance = np.diag([100.0, 1.0, 100.0, 1.0])
+    means = np.array([[10.0, 1.0, 20.0, 2.0], [30.0, 1.0, 40.0, 2.0]])
+    belief = SumBelief(np.array([0.75, 0.25]), means, np.array([covariance] * 2), np.arange(2))
+    tail = belief_tail(belief, [0, 2])
+    np.testing.assert_allclose(tail.offsets_m, [[-5.0, -5.0], [15.0, 15.0]])
+    np.testing.assert_allclose(tail.covariances_m2, [100.0 * np.eye(2)] * 2)
+    found = place_of(belief.leading, [0, 2])
+    assert (found["east_m"], found["north_m"]) == (10.0, 20.0)
+    np.testing.assert_allclose(found["radii_m"], 10.0 * np.sqrt(-2 * np.log([0.5, 0.33, 0.05])))
+    assert found["mass_50m"] == pytest.approx(1 - np.exp(-12.5))
+    # Of several parts it is that about the leading one.
+    work = begun(belief=replace(belief, means=means[:, [0, 2]], covariances=np.tile(
+        100.0 * np.eye(2), (2, 1, 1))))  # fmt: skip
+    assert work.take(Epoch(10.0)).mass_50m == pytest.approx(0.75 * (1 - np.exp(-12.5)))
+    assert hypot(*work.belief.moments.mean) == pytest.approx(hypot(15.0, 25.0))
