@@ -81,6 +81,8 @@ def chosen(beliefs, given):
 def test_the_evidence_decides_over_an_area_without_cells(given, most, odds):
     beliefs = filters()
     assert chosen(beliefs, given) == (most, odds)
+    alone = {-1.0: MAP_ALONE, -2.0: POSITIONED, -3.0: ON_LANES}[odds]
+    assert beliefs.options_of(given) is alone
     assert beliefs.by_map_alone(given) == (odds != -2.0)
     assert (beliefs.by_carriageways(given) is beliefs.carriageways) == (odds == -3.0)
 
