@@ -57,6 +57,7 @@ def test_a_known_start_is_tracked_where_it_is_one_place(split_mass, sd_m, status
     given = replace(POSITIONER, options=replace(FEW, split_mass=split_mass))
     state = at_start(sd_m, given)
     assert state.status is state.belief.status is status
+    assert state.belief.count == 300
 
 
 def test_a_known_start_lies_about_its_place():
@@ -82,14 +83,19 @@ class Silent(EvidenceSource):
         return EvidenceUpdate(7, (FixedTerm(np.full(1, -3.0)),))
 
 
+def without_cells():
+    """The same over an area of streets alone."""
+    area = replace(
+        make_area(), cell_ids=(), level_dbm=np.zeros((7, 9, 2), dtype=np.float32), carriers={}
+    )
+    return BayesPositioner(BayesModel(area), FEW)
+
+
 def test_sources_stand_in_the_order_of_their_reports():
     names = ["gnss", "timing", "first fix", "radio"]
     assert [one.name for one in POSITIONER.sources] == names
     assert POSITIONER.sources[0].clock
-    area = replace(
-        make_area(), cell_ids=(), level_dbm=np.zeros((7, 9, 2), dtype=np.float32), carriers={}
-    )
-    streets = BayesPositioner(BayesModel(area), FEW)
+    streets = without_cells()
     assert [one.name for one in streets.sources] == [*names, "map"]
     on_grid = replace(streets, grid=True)
     assert [one.name for one in on_grid.sources] == names
@@ -235,7 +241,7 @@ def test_what_is_weighed_at_an_epoch_may_be_asked_for():
 
 def test_kernels_are_loaded_before_particles_move_and_for_no_grid():
     warmed, on_grid = replace(POSITIONER), replace(POSITIONER, grid=True)
-    for one in (warmed, on_grid):
+    for one in (warmed, on_grid, without_cells()):
         one.warm_up(())
     assert "_is_warm" in warmed.__dict__
     assert "_is_warm" not in on_grid.__dict__

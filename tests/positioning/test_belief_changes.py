@@ -58,7 +58,7 @@ def carried(gone_s, *, left=1.0, pace_mps=1.5, measured_m=0.0):
 @pytest.mark.parametrize(
     ("gone_s", "measured_m", "missed_mps"),
     [(40.0, 0.0, 1.5), (40.0, 20.0, 1.0), (200.0, 100.0, 1.0), (40.0, 60.0, 0.0),
-     (40.0, 90.0, 0.0), (0.0, 0.0, 0.0)],
+     (40.0, 90.0, 0.0), (0.0, 0.0, 0.0), (0.5, 0.0, 1.5)],
 )  # fmt: skip
 def test_a_rest_that_was_a_way_spreads_hypotheses_over_it(gone_s, measured_m, missed_mps):
     """A way that forgets its direction after 60 s: 2 v² T (t - T (1 - exp(-t/T))), half an axis."""

@@ -125,6 +125,7 @@ def test_points_are_those_of_the_epochs_with_a_position():
     points = replace(two(), east_m=np.array([nan, 2.0])).to_geodataframe()
     assert (points.crs, list(points.index), list(points["time_s"])) == ("EPSG:32629", [0], [16.0])
     assert (points.geometry[0].x, np.isnan(points.geometry[0].y)) == (2.0, True)
+    assert list(points.columns) == [*two().to_dataframe().columns, "geometry"]
     (point,) = two().to_geodataframe().geometry
     assert (point.x, point.y) == (2.0, 3.0)
 

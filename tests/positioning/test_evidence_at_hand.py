@@ -132,7 +132,7 @@ def test_a_belief_that_loses_its_compass_has_all_headings():
     )  # fmt: skip
     found = filters(cells=True).without_compass(belief, np.random.default_rng(1))
     assert found.state.shape == (STATES, 6 * count)
-    np.testing.assert_array_equal(found.kept[0], np.tile(np.arange(count), 6))
+    np.testing.assert_array_equal(found.kept, np.tile(np.arange(count), 6)[None])
     np.testing.assert_allclose(np.exp(found.log_weight), np.tile(weight / weight.sum(), 6) / 6)
     bias = found.state[BIAS]
     assert np.abs(bias).max() <= np.pi

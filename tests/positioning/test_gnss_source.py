@@ -67,7 +67,9 @@ def test_first_pseudoranges_weigh_places_by_their_differences():
     np.testing.assert_allclose(term.sigma_m, np.hypot(4.0, 8.6602540), rtol=1e-6)
     assert term.sky.origin_m == (400.0, 300.0)
     # 20 m east one range is 17.3 m shorter, the other as much longer. North nothing changes.
-    state = np.array([[400.0, 420.0, 400.0, 390.0], [300.0, 300.0, 330.0, 300.0]], "f4")
+    # Further rows of hypotheses are their errors of motion.
+    state = np.full((8, 4), 7.0, dtype=np.float32)
+    state[:2] = [400.0, 420.0, 400.0, 390.0], [300.0, 300.0, 330.0, 300.0]
     off_m = 6.0 + 2 * np.cos(np.radians(30.0)) * (state[0].astype(float) - 400.0)
     nats = -0.5 * off_m**2 / (2 * (16.0 + 75.0))
     gain = nats - np.log(np.mean(np.exp(nats)))
