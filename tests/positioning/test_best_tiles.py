@@ -10,6 +10,7 @@ import pytest
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelErrors, LevelReport
+from mapfilter.positioning.bayes import tile_search
 from mapfilter.positioning.bayes.area_tiles import LevelRange
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.tile_search import SearchedTiles, places_of, searched_tiles
@@ -66,7 +67,7 @@ def box_m(number):
     return PIXEL_M * SIDE * col, south, east, PIXEL_M * (LATTICE.rows - SIDE * row)
 
 
-def expected_tiles(area, reported, fix=None):
+def expected_tiles(area, reported, fix=None, *, placed=True):
     """Tiles by the definition: one after the other, one row of the report after the other."""
     scored, near_count = [], 0
     for number in range(area.count):
@@ -87,7 +88,7 @@ def expected_tiles(area, reported, fix=None):
             west, south, east, north = box_m(number)
             off = np.hypot(x - np.clip(x, west, east), y - np.clip(y, south, north)) / sd_m
             score += -0.5 * min(off, 5.0) ** 2
-            near = bool(off < 3)
+            near = bool(off < 3) and placed
         near_count += near
         if near or (2 * received >= len(reported) and received > 0):
             scored.append((near, score, strongest, number))
@@ -127,6 +128,7 @@ def test_reports_of_levels_are_searched_for_in_the_best_tiles(seed):
         (RadioReading(0, 1.0, report, (several, bound)), [*own, two]),
         (RadioReading(4, 1.0, None, (several,)), [([4], np.nan), two]),
         (RadioReading(3, 1.0), [([3], np.nan)]),
+        (RadioReading(0, 1.0, levels([1], levels_dbm[1:2])), [own[1], ([0], np.nan)]),
         (RadioReading(-1, 0.0, None, (several,)), [two]),
     ):
         found = searched_tiles(area, reading, ERRORS)
@@ -149,6 +151,42 @@ def test_tiles_near_a_fix_are_searched_whatever_is_received_there(seed, place_m,
     reported = [([0], -70.0), ([1], -85.0)]
     found = searched_tiles(area, reading, ERRORS)
     assert numbers_of(found) == expected_tiles(area, reported, (place_m, sd_m))
+
+
+class Narrow:
+    """A term that is largest at a place, which it does not tell."""
+
+    def __init__(self, place_m, sd_m):
+        self._place_m, self._sd_m = place_m, sd_m
+
+    def log_likelihood(self, state):
+        off = np.hypot(state[0] - self._place_m[0], state[1] - self._place_m[1]) / self._sd_m
+        return -0.5 * np.minimum(off, 5.0) ** 2
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("place_m", "sd_m"), [((61.0, 243.0), 8.0), ((282.0, 38.0), 8.0), ((61.0, 243.0), 40.0)]
+)
+def test_terms_without_a_place_are_compared_where_they_are_largest(seed, place_m, sd_m):
+    """Nothing is searched for their sake alone."""
+    area = made_area(seed)
+    reading = RadioReading(0, 1.0, levels([0, 1], [-70.0, -85.0]), terms=(Narrow(place_m, sd_m),))
+    reported = [([0], -70.0), ([1], -85.0)]
+    found = searched_tiles(area, reading, ERRORS)
+    assert numbers_of(found) == expected_tiles(area, reported, (place_m, sd_m), placed=False)
+    assert searched_tiles(area, RadioReading(terms=reading.terms), ERRORS) is None
+
+
+@pytest.mark.parametrize(("most", "kept"), [(3, [0, 1, 2]), (2, [0, 2]), (1, [0])])
+def test_many_points_of_a_large_area_are_thinned(monkeypatch, most, kept):
+    """Those at the first three pixels of the diagonal."""
+    monkeypatch.setattr(tile_search, "_MOST_POINTS", most)
+    area = made_area(1)
+    area.tiles.every_point = lambda: np.array([0, 65, 130])
+    found = tile_search.points_everywhere(area)
+    middle = PIXEL_M * (np.array(kept) + 0.5)
+    np.testing.assert_allclose(found, [middle, PIXEL_M * LATTICE.rows - middle])
 
 
 def test_a_fix_alone_is_searched_for_where_it_is_narrow_enough():
@@ -214,6 +252,9 @@ def test_places_beyond_an_area_lie_beside_tiles_at_its_edge():
     assert (west | east | south | north).all()
     for some, share in ((west, 0.2), (east, 0.2), (south, 0.2), (north, 0.4)):
         assert some.mean() == pytest.approx(share, abs=5 * (share * (1 - share) / 6000) ** 0.5)
+    for axis, low, high in ((x[west], -50.0, 0.0), (x[east], 1000.0, 1050.0),
+                            (y[south], -50.0, 0.0), (y[north], 800.0, 850.0)):  # fmt: skip
+        assert (axis.min(), axis.max()) == pytest.approx((low, high), abs=0.5)
     assert x[north].std() == pytest.approx(200 / 12**0.5, rel=0.05)
     assert y[north].std() == pytest.approx(50 / 12**0.5, rel=0.05)
 

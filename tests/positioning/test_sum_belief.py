@@ -2,11 +2,17 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from mapfilter.filters.gaussian import EKF
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import POSITION
-from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.belief import (
+    FusionHistory,
+    SumBelief,
+    gaussian_radii_m,
+    share_within,
+)
 from mapfilter.positioning.kalman.models import compiled
 
 COVARIANCE = np.array([[25.0, 6.0], [6.0, 16.0]])
@@ -129,3 +135,80 @@ def test_a_reading_that_no_part_can_take_changes_nothing():
     belief = parts((0.0, 0.0), (30.0, 0.0))
     found, taken = updated(belief, (np.nan, np.nan), 5.0)
     assert not taken.used or np.array_equal(found.weights, belief.weights)
+
+
+def test_a_part_that_cannot_be_updated_loses_its_weight():
+    belief = parts((0.0, 0.0), (np.nan, 0.0), (30.0, 0.0), weights=(0.2, 0.7, 0.1))
+    found, taken = updated(belief)
+    assert taken.used
+    assert found.parts.tolist() == [10, 12]
+    np.testing.assert_allclose(found.weights, [2 / 3, 1 / 3], rtol=1e-6)
+
+
+def test_evidence_that_is_far_apart_overflows_nothing():
+    found, taken = updated(parts((0.0, 0.0), (1e5, 0.0)), sd_m=5.0)
+    np.testing.assert_allclose(found.means, [[0.0, 0.0]])
+    assert np.isfinite(taken.evidence)
+    still = parts((1.0, 2.0)).predict(np.eye(2), np.zeros((2, 2)))
+    np.testing.assert_array_equal(still.means, [[1.0, 2.0]])
+
+
+SHARES = np.array([0.50, 0.67, 0.95])
+
+
+@pytest.mark.parametrize("angle_rad", [0.0, 0.6])
+@pytest.mark.parametrize("short_m", [1e-4, 0.5, 4.0, 12.0, 20.0])
+def test_radii_hold_their_shares_of_a_normal_belief(short_m, angle_rad):
+    """By the distribution of a weighted sum of two squares, as draws from it have it."""
+    turn = np.array([[np.cos(angle_rad), -np.sin(angle_rad)],
+                     [np.sin(angle_rad), np.cos(angle_rad)]])  # fmt: skip
+    covariance = turn @ np.diag([400.0, short_m**2]) @ turn.T
+    radii_m, share = gaussian_radii_m(covariance, 25.0)
+    drawn = np.random.default_rng(1).standard_normal((400_000, 2)) * [20.0, short_m]
+    away_m = np.hypot(*drawn.T)
+    assert [np.mean(away_m <= one) for one in radii_m] == pytest.approx(SHARES, abs=4e-3)
+    assert share == pytest.approx(np.mean(away_m <= 25.0), abs=4e-3)
+    assert share_within(covariance, 25.0) == share
+
+
+def test_radii_of_round_beliefs_and_of_lines():
+    radii_m, share = gaussian_radii_m(100.0 * np.eye(2), 25.0)
+    np.testing.assert_allclose(radii_m, 10.0 * np.sqrt(-2 * np.log(1 - SHARES)), rtol=1e-12)
+    assert share == pytest.approx(1 - np.exp(-3.125))
+    radii_m, share = gaussian_radii_m(np.diag([100.0, 1e-6]), 25.0)
+    np.testing.assert_allclose(radii_m, 10.0 * norm.ppf(0.5 + SHARES / 2), rtol=1e-4)
+    assert share == pytest.approx(2 * norm.cdf(2.5) - 1, abs=1e-4)
+
+
+def test_smoothed_parts_are_those_of_rauch_tung_and_striebel():
+    """Each by itself, with the weights that they have at the end, and with the shifts."""
+    transition, process = np.array([[1.0, 0.2], [0.0, 0.9]]), np.array([[3.0, 1.0], [1.0, 2.0]])
+    shifts = [np.array([500.0, 9.0]), np.array([7.0, -3.0]), np.array([-4.0, 6.0])]
+    belief, history = parts((0.0, 0.0), (40.0, 10.0), weights=(0.9, 0.1)), FusionHistory()
+    history.add(belief, np.eye(2), np.zeros((2, 2)), shifts[0])
+    for shift, place_m in zip(shifts[1:], ((44.0, 2.0), (38.0, 8.0)), strict=True):
+        belief, _ = updated(belief.predict(transition, process, shift), place_m, 6.0)
+        history.add(belief, transition, process, shift)
+    last = history.beliefs[-1]
+    assert last.parts.tolist() == [11, 10]
+    of_part = {part: (last.means[k], last.covariances[k]) for k, part in enumerate(last.parts)}
+    later = [of_part]
+    for before, shift in zip(history.beliefs[1::-1], shifts[:0:-1], strict=True):
+        smoothed = {}
+        for part, (mean, covariance) in later[-1].items():
+            k = int(np.flatnonzero(before.parts == part)[0])
+            own, spread = before.means[k], before.covariances[k]
+            predicted = transition @ spread @ transition.T + process
+            gain = spread @ transition.T @ np.linalg.inv(predicted)
+            off = mean - (transition @ own + shift)
+            smoothed[part] = own + gain @ off, spread + gain @ (covariance - predicted) @ gain.T
+        later.append(smoothed)
+    found = history.smoothed()
+    assert len(found) == 3
+    for one, expected in zip(found, later[::-1], strict=True):
+        means = np.array([expected[part][0] for part in last.parts])
+        spreads = np.array([expected[part][1] for part in last.parts])
+        whole = SumBelief(last.weights, means, spreads, last.parts).moments
+        np.testing.assert_allclose(one.mean, whole.mean, rtol=1e-8)
+        np.testing.assert_allclose(one.covariance, whole.covariance, rtol=1e-7)
+    assert FusionHistory().smoothed() == []
