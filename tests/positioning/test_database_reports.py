@@ -217,6 +217,12 @@ def test_a_large_survey_is_thinned_evenly(monkeypatch, most, kept):
     assert found.notes == (() if most == 5 else (f"{most} of 5 reports taken, evenly",))
 
 
+def test_twenty_thousand_reports_of_a_survey_are_enough():
+    found = reports_of_database(survey_of(surveyed(20_001)))
+    assert len(found) == 20_000
+    assert (found.east_m[0], found.east_m[-1]) == (531_005.0, 551_005.0)
+
+
 def test_a_cell_whose_plan_lacks_a_value_errs_by_more(database):
     """By 4 dB for an assumed power besides the 3 dB of all levels: 5 dB."""
     cells = tuple(
