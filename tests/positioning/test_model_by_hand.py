@@ -1,0 +1,231 @@
+"""The map filter's model over the small area: what each part of a reading adds to the weights."""
+
+from dataclasses import replace
+from math import inf, log, nan
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from made_radio import AREA, hypotheses, named, read, serving
+from small_area import HEIGHT_M, LEVEL_DBM, OPTIONS, WIDTH_M
+
+from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.filters.hypotheses import BeliefSummary
+from mapfilter.filters.particle import Cloud
+from mapfilter.models.level_errors import LevelReport
+from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MapWeights
+from mapfilter.positioning.bayes.evidence import FixedTerm, RadioReading
+from mapfilter.positioning.bayes.first_hypotheses import Start, first_hypotheses
+from mapfilter.positioning.bayes.model import BayesModel, expected_absent, mean_rough_db2
+
+MODEL = BayesModel(AREA, evidence=OPTIONS)
+TERM = FixedTerm(np.array([-1.5]))
+
+
+def cloud_of(state):
+    return Cloud(state, np.empty((0, state.shape[1]), dtype=np.float32))
+
+
+def gain_of(reading, state=None, model=MODEL, before=-2.0):
+    """What a reading adds to weights, and the hypotheses afterwards."""
+    state = hypotheses(60) if state is None else state
+    log_weight = np.full(state.shape[1], before)
+    cloud, reason = model.weigh(cloud_of(state), log_weight, reading)
+    return log_weight - before, cloud, reason
+
+
+def at_places(*places_m):
+    state = np.zeros((STATES, len(places_m)), dtype=np.float32)
+    state[EAST], state[NORTH] = np.transpose(places_m)
+    return state
+
+
+def test_what_models_of_predicted_levels_have():
+    assert MODEL.timed_by_sites
+    assert not MODEL.serving_is_measured
+    assert MODEL.usual_serving(3, nan) == -0.7
+    with pytest.raises(NotImplementedError):
+        MODEL.log_serving_at(np.zeros(1, np.int32), RadioReading())
+
+
+def test_without_a_reading_nothing_is_added():
+    gain, cloud, reason = gain_of(RadioReading())
+    assert (gain.tolist(), reason, cloud.shared) == ([0.0] * 60, Reason.NO_READING, None)
+    # Terms alone need no memory of levels.
+    gain, cloud, reason = gain_of(RadioReading(terms=(TERM, TERM)))
+    assert (gain.tolist(), reason, cloud.shared) == ([-3.0] * 60, Reason.USED, None)
+    assert cloud.withheld == 0.0
+
+
+def test_the_parts_of_a_report_are_added_up():
+    whole = read(serving("A", -70.25), named("C", -82.0), named("D", -110.5, -1))[1]
+    assert whole.levels is not None
+    assert len(whole.bounds) == 1
+    served = replace(whole, levels=None, bounds=())
+    levels = replace(whole, serving=-1, serving_weight=0.0, bounds=())
+    bounds = replace(whole, serving=-1, serving_weight=0.0, levels=None)
+    parts = [gain_of(one) for one in (served, levels, bounds)]
+    assert all(reason is Reason.USED for *_, reason in parts)
+    assert all(np.ptp(gain) > 0.1 for gain, *_ in parts)
+    total, _, _ = gain_of(replace(whole, terms=(TERM,)))
+    np.testing.assert_allclose(total, sum(gain for gain, *_ in parts) - 1.5, atol=1e-4)
+    # A band without a weight is looked up, and says nothing.
+    silent, cloud, reason = gain_of(replace(served, serving_weight=0.0))
+    assert (np.abs(silent).max(), reason) == (0.0, Reason.USED)
+    assert cloud.shared is not None
+
+
+def test_of_a_tracked_belief_a_part_of_the_levels_is_withheld():
+    """Three tenths count; the rest is evidence, and not in the weights."""
+    whole = read(serving("A", -70.25), named("C", -82.0))[1]
+    served, _, _ = gain_of(replace(whole, levels=None))
+    levels, _, _ = gain_of(replace(whole, serving=-1, serving_weight=0.0))
+    tracked = replace(whole, tracked=True, terms=(TERM,))
+    found, cloud, _ = gain_of(tracked)
+    share = OPTIONS.levels.tracking_share
+    assert share == 0.3
+    np.testing.assert_allclose(found, served + share * levels - 1.5, atol=1e-4)
+    full = served + levels - 1.5
+    withheld = np.logaddexp.reduce(full) - np.logaddexp.reduce(found)
+    assert cloud.withheld == pytest.approx(withheld, abs=1e-4)
+    # Where errors of levels are not remembered nothing is withheld.
+    plain, cloud, _ = gain_of(tracked, model=replace(MODEL, remember=False))
+    np.testing.assert_allclose(plain, full, atol=1e-4)
+    assert cloud.withheld == 0.0
+
+
+@pytest.mark.parametrize("tracked", [False, True])
+def test_beyond_the_edge_nothing_that_is_predicted_may_hold(tracked):
+    """Even odds at first: the mean of what the pixel at the edge says, and of no prediction."""
+    reading = read(serving("A", -70.25), named("C", -82.0))[1]
+    inside, beyond = (1.0, 35.0), (-30.0, 35.0)
+    gain, cloud, _ = gain_of(reading, at_places(inside, beyond))
+    unknown = reading.radio_under_null(cloud.shared.other_log_likelihood)
+    assert gain[1] == pytest.approx(np.logaddexp(gain[0], unknown) - log(2.0), abs=1e-4)
+    if tracked:
+        part, after, _ = gain_of(replace(reading, tracked=True), at_places(inside, beyond))
+        levels, _, _ = gain_of(replace(reading, serving=-1, serving_weight=0.0),
+                               at_places(inside))  # fmt: skip
+        held = gain[0] - 0.7 * levels[0]
+        assert part[0] == pytest.approx(held, abs=1e-4)
+        counted = reading.radio_under_null(0.3 * cloud.shared.other_log_likelihood)
+        assert part[1] == pytest.approx(np.logaddexp(held, counted) - log(2.0), abs=1e-4)
+        withheld = np.logaddexp.reduce(gain) - np.logaddexp.reduce(part)
+        assert after.withheld == pytest.approx(withheld, abs=1e-4)
+    # By the next report it is known better which of both holds.
+    again, weight = replace(reading, length_m=1e-6), np.zeros(2)
+    MODEL.weigh(cloud, weight, again)
+    odds = unknown - gain[0]
+    expected = np.logaddexp(weight[0], odds + again.radio_under_null(0.0)) - np.logaddexp(0.0, odds)
+    assert np.isfinite(expected)
+    assert weight[1] != pytest.approx(weight[0], abs=1e-3)
+
+
+@pytest.mark.parametrize("length_m", [10.0, -4.0])
+@pytest.mark.parametrize("per_m", [1 / 12, 0.3])
+def test_each_metre_beyond_the_area_costs_as_much(length_m, per_m):
+    """0.03 nats among cells; without them what hypotheses off the map lose."""
+    weights = MapWeights(weight_per_m=per_m, off_cost_per_m=0.2, leave_per_m=0.0)
+    streets = replace(
+        AREA, cell_ids=(), level_dbm=np.zeros((7, 9, 2), dtype=np.float32), carriers={}
+    )
+    state = at_places((-500.0, -500.0), (WIDTH_M + 500.0, HEIGHT_M + 500.0))
+    for area, cost in ((AREA, 0.03), (streets, 0.2)):
+        model, before = BayesModel(area, weights=weights), np.array([-1.0, -2.0])
+        motion = MotionStep(length_m, 0.3)
+        moved, weighed = model.move(state, before, motion, np.uint64(7))
+        np.testing.assert_allclose(weighed - before, -cost * abs(length_m), rtol=1e-5)
+        assert np.hypot(*(moved - state)[:2].mean(axis=1)) == pytest.approx(abs(length_m), rel=0.5)
+    # Where the map weighs nothing, hypotheses beyond it lose nothing either.
+    model = BayesModel(AREA, weights=replace(weights, weight_per_m=0.0))
+    _, weighed = model.move(state, np.zeros(2), MotionStep(length_m, 0.3), np.uint64(7))
+    np.testing.assert_allclose(weighed, 0.0, atol=1e-6)
+
+
+def test_a_step_without_a_heading_leads_to_all_sides():
+    state = at_places(*[(45.0, 35.0)] * 20_000)
+    moved, _ = MODEL.move(state, np.zeros(20_000), MotionStep(6.0, nan), np.uint64(3))
+    off_m = (moved - state)[:2]
+    assert np.mean(np.sum(off_m**2, axis=0)) == pytest.approx(36.0, rel=0.03)
+    assert off_m.std(axis=1) == pytest.approx([6 / 2**0.5] * 2, rel=0.03)
+    spread, _ = MODEL.move(
+        state, np.zeros(20_000), MotionStep(6.0, nan, spread_m=2.0), np.uint64(3)
+    )
+    assert (spread - state)[:2].std(axis=1) == pytest.approx([2**0.5] * 2, rel=0.03)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_what_starts_a_belief_is_in_its_weights_once(known):
+    """About a known start a reading weighs hypotheses; else they are drawn by it."""
+    reading = read(serving("A", -70.25), named("C", -82.0))[1]
+    place = {"east_m": 500_045.0, "north_m": 4_500_035.0, "sd_m": 15.0} if known else {}
+    prior = Start(reading, True, **place)
+    cloud, log_weight = MODEL.start(prior, 300, np.random.default_rng(1))
+    plain, before = first_hypotheses(MODEL, prior, 300, np.random.default_rng(1))
+    np.testing.assert_array_equal(cloud.state, plain.state)
+    gain, weighed, _ = gain_of(reading, cloud.state)
+    assert np.ptp(gain) > 1.0
+    np.testing.assert_allclose(log_weight - before, gain if known else 0.0, atol=1e-4)
+    # Either way hypotheses keep what it says of the errors of levels.
+    np.testing.assert_allclose(cloud.kept, weighed.kept)
+
+
+@pytest.mark.parametrize(
+    ("off", "doubted", "edge", "expected"),
+    [(0.4, False, False, True), (0.5, False, False, False), (nan, False, False, False),
+     (0.4, True, False, False), (0.4, False, True, False)],
+)  # fmt: skip
+def test_when_a_belief_may_converge(off, doubted, edge, expected):
+    mean = np.zeros(STATES)
+    mean[OFF] = off
+    summary = BeliefSummary(mean, np.eye(2), np.ones(3), 1.0, np.empty((0, 3)), 0.0)
+    place = np.array([1.0 if edge else 45.0, 35.0, *[0.0] * 6])
+    own = SimpleNamespace(summary=summary._replace(mean=place))
+    reading = RadioReading(doubted=doubted, belief=own)
+    assert MODEL.can_converge(summary, reading) is expected
+    assert MODEL.can_converge(summary, RadioReading(doubted=doubted)) is (expected or edge)
+
+
+@pytest.mark.parametrize(("length_m", "share"), [(0.0, 1.0), (25.0, 1 - np.exp(-1.0)), (inf, 1.0)])
+def test_the_weight_of_levels_that_are_not_remembered(length_m, share):
+    reading = RadioReading(length_m=length_m)
+    assert MODEL.level_weight(reading) == 0.6
+    assert replace(MODEL, remember=False).level_weight(reading) == pytest.approx(0.6 * share)
+
+
+def test_levels_that_no_prediction_has_count_by_the_weight_of_levels():
+    reading = read(serving("A", -70.25), named("B", -80.0), named("X", -90.0))[1]
+    light = replace(OPTIONS, levels=replace(OPTIONS.levels, weight=0.3))
+    _, heavy, _ = gain_of(reading)
+    _, other, _ = gain_of(reading, model=BayesModel(AREA, evidence=light))
+    assert heavy.shared.other_log_likelihood < -1.0
+    assert heavy.shared.other_log_likelihood == pytest.approx(
+        2 * other.shared.other_log_likelihood, rel=1e-6
+    )
+
+
+def test_the_mean_roughness_of_predicted_levels():
+    """Of all pixels, where they are few; half of its variance is added."""
+    rough = replace(OPTIONS, levels=replace(OPTIONS.levels, roughness=0.5))
+    predicted = BayesModel(AREA, evidence=rough).prediction
+    pixel, cell = np.arange(63, dtype=np.int32), np.array([2, 0], dtype=np.int32)
+    squares = (AREA.flat_rough_db.reshape(63, 6)[:, cell] / 10.0) ** 2
+    found = mean_rough_db2(predicted, pixel, cell)
+    np.testing.assert_allclose(found, 0.5 * squares.mean(axis=0), rtol=1e-5)
+    # 600 hypotheses are looked at by every second.
+    many = np.resize(pixel, 600)
+    squares = (AREA.flat_rough_db.reshape(63, 6)[many[::2]][:, cell] / 10.0) ** 2
+    found = mean_rough_db2(predicted, many, cell)
+    np.testing.assert_allclose(found, 0.5 * squares.mean(axis=0), rtol=1e-5)
+
+
+@pytest.mark.parametrize("limit_dbm", [-101.0, -80.0, -63.0, -50.0])
+def test_absent_cells_that_hypotheses_expect_come_by_how_many_do(limit_dbm):
+    pixel, absent = np.arange(63, dtype=np.int32), np.array([0, 1, 2, 3], dtype=np.int32)
+    none = np.zeros(0, dtype=np.int32)
+    report = LevelReport(none, none.astype(np.float32), absent, limit_dbm, 0.0)
+    share = (LEVEL_DBM.reshape(63, 4) > limit_dbm).mean(axis=0)
+    order = [k for k in np.argsort(-share, kind="stable").tolist() if share[k] > 0.02]
+    assert expected_absent(MODEL.prediction, pixel, report).tolist() == order
+    nothing = report._replace(absent=none)
+    assert expected_absent(MODEL.prediction, pixel, nothing).tolist() == []
