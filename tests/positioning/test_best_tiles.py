@@ -166,7 +166,14 @@ class Narrow:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
-    ("place_m", "sd_m"), [((61.0, 243.0), 8.0), ((282.0, 38.0), 8.0), ((61.0, 243.0), 40.0)]
+    ("place_m", "sd_m"),
+    [
+        ((61.0, 243.0), 8.0),
+        ((282.0, 38.0), 8.0),
+        ((61.0, 243.0), 40.0),
+        ((76.0, 260.0), 5.0),
+        ((226.0, 111.0), 5.0),
+    ],
 )
 def test_terms_without_a_place_are_compared_where_they_are_largest(seed, place_m, sd_m):
     """Nothing is searched for their sake alone."""

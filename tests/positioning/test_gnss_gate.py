@@ -304,7 +304,9 @@ def test_a_satellite_that_is_far_off_is_left_out_alone(known):
     assert half.state.rejecting
     assert half.state.probation_until_s == 16.0
     assert half.state.receiver.used_at_m == 100.0
-    # Of two satellites none is left out alone.
+    # Of three one, of two satellites none is left out alone.
+    three = compared(belief, state, 11.0, 101.0, ranges=ranges(errors=(1.0, 900.0, 0.5), count=3))
+    assert [name for _, name, _ in three.unused] == ["G01"]
     two = compared(belief, state, 11.0, 101.0, ranges=ranges(errors=(900.0, 0.0), count=2))
     assert len(two.unused) == 2
 

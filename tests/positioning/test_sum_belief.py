@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.stats import norm
 
 from mapfilter.filters.gaussian import EKF
@@ -169,6 +170,14 @@ def test_radii_hold_their_shares_of_a_normal_belief(short_m, angle_rad):
     assert [np.mean(away_m <= one) for one in radii_m] == pytest.approx(SHARES, abs=4e-3)
     assert share == pytest.approx(np.mean(away_m <= 25.0), abs=4e-3)
     assert share_within(covariance, 25.0) == share
+    if short_m < 1.0:
+        return
+    for radius_m, held in zip((*radii_m, 25.0), (*SHARES, share), strict=True):
+        # Along each direction it is normal: v = a cos² + b sin².
+        beyond, _ = quad(lambda angle, r=radius_m: np.exp(
+            -0.5 * r**2 / (400.0 * np.cos(angle) ** 2 + short_m**2 * np.sin(angle) ** 2)),
+            0.0, np.pi / 2)  # fmt: skip
+        assert 1 - beyond * 2 / np.pi == pytest.approx(held, abs=1e-7)
 
 
 def test_radii_of_round_beliefs_and_of_lines():
@@ -212,3 +221,7 @@ def test_smoothed_parts_are_those_of_rauch_tung_and_striebel():
         np.testing.assert_allclose(one.mean, whole.mean, rtol=1e-8)
         np.testing.assert_allclose(one.covariance, whole.covariance, rtol=1e-7)
     assert FusionHistory().smoothed() == []
+    alone = FusionHistory()
+    alone.add(belief, np.eye(2), np.zeros((2, 2)), shifts[0])
+    (one,) = alone.smoothed()
+    np.testing.assert_allclose(one.mean, belief.moments.mean)
