@@ -101,6 +101,10 @@ def test_rows_out_of_order_and_what_a_table_may_lack():
     assert [one.time_s for one in found] == [1.0, 2.0]
     assert [one.step_m for one in found[0].motion] == [1.25]
     assert [one.step_m for one in found[1].motion] == [2.0, 1.5]
+    backwards = replace(log, motion=log.motion.iloc[[1, 0]].reset_index(drop=True))
+    assert [(one.time_s, one.motion[0].step_m) for one in epochs(backwards)] == [
+        (1.0, 1.25), (2.0, 1.5),
+    ]  # fmt: skip
 
 
 def test_rows_that_repeat_themselves_are_one_object():
