@@ -1,6 +1,6 @@
 """The map filter's model over the small area: what each part of a reading adds to the weights."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import inf, log, nan
 from types import SimpleNamespace
 
@@ -13,10 +13,12 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.filters.particle import Cloud
 from mapfilter.models.level_errors import LevelReport
+from mapfilter.models.level_kernels import Prediction
 from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MapWeights
 from mapfilter.positioning.bayes.evidence import FixedTerm, RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, first_hypotheses
 from mapfilter.positioning.bayes.model import BayesModel, expected_absent, mean_rough_db2
+from mapfilter.positioning.bayes.tiled_area import TiledArea
 
 MODEL = BayesModel(AREA, evidence=OPTIONS)
 TERM = FixedTerm(np.array([-1.5]))
@@ -229,3 +231,38 @@ def test_absent_cells_that_hypotheses_expect_come_by_how_many_do(limit_dbm):
     assert expected_absent(MODEL.prediction, pixel, report).tolist() == order
     nothing = report._replace(absent=none)
     assert expected_absent(MODEL.prediction, pixel, nothing).tolist() == []
+
+
+@dataclass(frozen=True, eq=False)
+class Tiled(TiledArea):
+    """An area by tiles that looks up what the whole one has, and notes what it is asked for."""
+
+    asked: list = field(default_factory=list)
+
+    def predicted(self, pixel, cell, share, *, rough=True):
+        self.asked.append((cell.tolist(), rough))
+        level_dbm = AREA.level_dbm.reshape(63, 6)[pixel][:, cell].ravel()
+        rough_db = AREA.flat_rough_db.reshape(63, 6)[pixel][:, cell].ravel()
+        found = Prediction(level_dbm, rough_db if rough else rough_db[:0], cell.size, share)
+        own = np.arange(pixel.size, dtype=np.int32)
+        return found, own, np.arange(cell.size, dtype=np.int32)
+
+    def shares_above(self, pixel, cell, limit_dbm):
+        return (AREA.level_dbm.reshape(63, 6)[pixel][:, cell] > limit_dbm).mean(axis=0)
+
+
+def test_over_an_area_by_tiles_the_cells_of_a_reading_alone_are_looked_up():
+    """The serving cell with the two strongest of all; levels with their roughness."""
+    rough = replace(OPTIONS, levels=replace(OPTIONS.levels, roughness=0.5))
+    names = ("lattice", "cell_ids", "known_ids", "carriers", "floor_dbm", "sites")
+    tiled = Tiled(*(getattr(AREA, name) for name in names), tiles=None)
+    whole = read(
+        serving("B", -70.25), named("C", -82.0), named("A", -99.0), named("D", -110.5, -1)
+    )[1]
+    expected, _, _ = gain_of(whole, model=BayesModel(AREA, evidence=rough))
+    found, _, _ = gain_of(whole, model=BayesModel(tiled, evidence=rough))
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+    assert np.ptp(expected) > 5.0
+    assert tiled.asked[0] == ([1, 4, 5], False)
+    assert ([1, 2, 0], True) in tiled.asked
+    assert tiled.asked[-1] == ([3], False)
