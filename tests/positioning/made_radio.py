@@ -6,7 +6,9 @@ import numpy as np
 from small_area import BANDS, COLS, OPTIONS, PIXEL_M, ROWS, make_area
 
 from mapfilter.filters.contract import Reason
-from mapfilter.models.street_motion import STATES
+from mapfilter.filters.particle import Cloud
+from mapfilter.models.street_motion import EAST, NORTH, STATES
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.radio import RadioSource, name_of
 from mapfilter.positioning.bayes.state import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, ReportRow
@@ -64,4 +66,25 @@ def hypotheses(count=500, seed=21):
     col, row = rng.integers(COLS, size=count), rng.integers(ROWS, size=count)
     state[0] = PIXEL_M * (col + rng.uniform(0.01, 0.99, count))
     state[1] = PIXEL_M * (row + rng.uniform(0.01, 0.99, count))
+    return state
+
+
+MODEL = BayesModel(AREA, evidence=OPTIONS)
+
+
+def cloud_of(state):
+    return Cloud(state, np.empty((0, state.shape[1]), dtype=np.float32))
+
+
+def gain_of(reading, state=None, model=MODEL, before=-2.0):
+    """What a reading adds to weights, and the hypotheses afterwards."""
+    state = hypotheses(60) if state is None else state
+    log_weight = np.full(state.shape[1], before)
+    cloud, reason = model.weigh(cloud_of(state), log_weight, reading)
+    return log_weight - before, cloud, reason
+
+
+def at_places(*places_m):
+    state = np.zeros((STATES, len(places_m)), dtype=np.float32)
+    state[EAST], state[NORTH] = np.transpose(places_m)
     return state
