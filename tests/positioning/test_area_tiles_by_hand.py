@@ -15,12 +15,13 @@ ROWS, COLS, SIDE = 5, 7, 3
 LATTICE = Lattice("EPSG:32632", 0.0, 100.0, 20.0, ROWS, COLS)
 """2 x 3 tiles of 3 pixels; the roughness of 20 m pixels is that of 3 x 3 of them."""
 PARTS = {
-    # Points and levels by part; A has two parts, B one, C none.
+    # Points and levels by part; A has two parts, B and C have one.
     "A west": ([0, 1, 8, 14], [-60.0, -70.0, -65.0, -90.0]),
     "A east": ([20, 26, 27], [-80.0, -75.0, -85.0]),
     "B": ([3, 33, 34], [-55.0, -95.0, -99.0]),
+    "C": ([0], [-101.0]),
 }
-BANDS = {"A west": 0, "A east": 0, "B": 1}
+BANDS = {"A west": 0, "A east": 0, "B": 1, "C": 2}
 QUIET_DBM = -116.0
 
 
@@ -50,7 +51,7 @@ class Reader:
 
 @pytest.fixture
 def tiles(monkeypatch):
-    made, read = AreaTiles(Database(), ("A", "B"), SIDE), []
+    made, read = AreaTiles(Database(), ("A", "B", "C"), SIDE), []
 
     def levels_of(part, lattice):
         assert lattice is LATTICE
@@ -106,7 +107,7 @@ def test_windows_and_points_of_tiles(tiles, number, window, own):
 @pytest.mark.parametrize("number", range(6))
 def test_levels_are_those_of_all_parts_of_a_cell(tiles, number):
     point = tiles.tile(number).points.point
-    for band in (0, 1):
+    for band in (0, 1, 2):
         expected = np.array([level_at(band, one) for one in point.tolist()], dtype=np.float32)
         found = tiles.levels(number, band)
         if (expected == QUIET_DBM).all():
@@ -117,9 +118,9 @@ def test_levels_are_those_of_all_parts_of_a_cell(tiles, number):
             assert tiles.rough_db(number, band).shape == tiles.tile(number).points.near.shape
     # The strongest and the second strongest of all cells; a level for no cell where none is.
     best = np.where(point % 5 == 0, QUIET_DBM, -50.0 - point)
-    np.testing.assert_array_equal(tiles.levels(number, 2), best.astype(np.float32))
+    np.testing.assert_array_equal(tiles.levels(number, 3), best.astype(np.float32))
     second = np.where(point % 5 == 0, QUIET_DBM, -57.0 - point)
-    np.testing.assert_array_equal(tiles.levels(number, 3), second.astype(np.float32))
+    np.testing.assert_array_equal(tiles.levels(number, 4), second.astype(np.float32))
 
 
 def test_parts_that_do_not_reach_a_tile_are_not_read(tiles):
