@@ -156,3 +156,14 @@ def test_logs_with_headings_or_without_turns_have_no_signs():
     none = vehicle_signs(make_log(CRS, motion=rows.assign(step_m=np.nan)))
     assert (none.top_mps, none.gains, none.sharpest_rad) == (0.0, 0, 0.0)
     assert np.isnan(none.sway_radps)
+
+
+@pytest.mark.parametrize("at_rest_radps", [0.0, 1.0])
+def test_the_sway_is_that_of_motion_alone(at_rest_radps):
+    """Two seconds each of straight motion and of rest, at which a gyroscope may turn anything.
+
+    Of a row at the ends of motion a fifth of half a second is at rest.
+    """
+    moves = np.arange(2000) // 20 % 2 == 0
+    found = signs_of(np.where(moves, 5.0, 0.0), np.where(moves, 0.0, at_rest_radps))
+    assert 0.0 <= found.sway_radps < 0.1
