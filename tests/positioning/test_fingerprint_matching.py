@@ -53,6 +53,20 @@ def test_distances_are_those_of_sklearn(metric, representation, seed):
     np.testing.assert_allclose(own, expected, atol=2e-7)
 
 
+def test_what_is_weaker_than_the_database_is_received_by_half_a_db():
+    """Of 100 dB between the floor and 0 dBm."""
+    weak_dbm = np.array([-130.0, -100.0, -99.8, -99.5, -99.0, 0.0])
+    above = np.array([0.005, 0.005, 0.005, 0.005, 0.01, 1.0])
+    np.testing.assert_allclose(Scale("positive", -100.0, 1.7)(weak_dbm), above)
+    np.testing.assert_allclose(Scale("powed", -100.0, 1.7)(weak_dbm), above**1.7)
+    exponential = Scale("exponential", -100.0, 1.7)
+    expected = np.exp((100 * above - 100) / 24) - np.exp(-100 / 24)
+    np.testing.assert_allclose(exponential(weak_dbm), expected)
+    assert exponential.absent == pytest.approx(np.exp(-100 / 24))
+    # A floor above 0 dBm has a span of 1 dB.
+    np.testing.assert_allclose(Scale("positive", 5.0, 1.0)(np.array([7.0])), [2.0])
+
+
 @pytest.mark.parametrize("k", [1, 4, 25, 99])
 def test_a_position_is_the_weighted_mean_of_sklearns_neighbours(k):
     places, level, names = made(3)
