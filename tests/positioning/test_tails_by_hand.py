@@ -143,8 +143,10 @@ def test_a_gaussian_without_numbers_has_no_radius():
     assert isnan(tail.radius_m(0.5))
     assert isnan(tail.protection_m(0.5))
     sure = GaussianTail(np.ones(1), np.array([[3.0, 4.0]]), np.zeros((1, 2, 2)))
-    # A place that is known to a millimetre.
+    # A place that is known to a millimetre along a line.
     assert sure.radius_m(0.99) == pytest.approx(5.0, abs=0.01)
+    here = GaussianTail(np.ones(1), np.zeros((1, 2)), np.zeros((1, 2, 2)))
+    assert here.radius_m(0.95) == pytest.approx(1.96e-3, rel=0.01)
 
 
 @pytest.mark.parametrize("angle_rad", [0.0, 0.7, 2.0])
