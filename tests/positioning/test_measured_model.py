@@ -1,0 +1,75 @@
+"""Measured maps in the map filter's model: deviations of levels, and serving cells by place."""
+
+from dataclasses import dataclass, field, replace
+from math import log, nan
+
+import numpy as np
+import pytest
+from small_area import ON_WAY, OPTIONS, make_area
+
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
+
+AREA = make_area()
+
+
+@dataclass
+class Statistics:
+    """Served the less the farther back a pixel comes; each step of timing costs 2 nats."""
+
+    asked: list = field(default_factory=list)
+
+    def log_serving(self, serving, pixel):
+        self.asked.append(pixel.tolist())
+        return -(serving + 1) * pixel / 10.0
+
+    def log_advance(self, serving, pixel, steps):
+        return np.full(pixel.size, -2.0 * steps)
+
+
+def model(**more):
+    return MeasuredMapModel(AREA, evidence=OPTIONS, **more)
+
+
+def test_what_a_measured_map_adds_to_the_deviation_of_levels():
+    """8 dB are in the options: 10 dB are 6 more, less are none, and 25.5 dB are the most."""
+    sd_db = np.full((4, 7, 9), 8.0, dtype=np.float32)
+    sd_db[0, 2, 3], sd_db[1, 6, 8], sd_db[3, 0, 0] = 10.0, 5.0, 60.0
+    found = model(level_sd_db=sd_db).rough_db()
+    assert found.dtype == np.uint8
+    expected = np.zeros((7, 9, 6))
+    expected[2, 3, 0], expected[0, 0, 3] = 60, 255
+    np.testing.assert_array_equal(found.reshape(7, 9, 6), expected)
+    plain = model()
+    np.testing.assert_array_equal(plain.rough_db(), AREA.flat_rough_db)
+
+
+def test_serving_cells_are_compared_by_their_statistics():
+    pixel = np.array([0, 10, 30], dtype=np.int32)
+    found = model(serving_model=Statistics())
+    assert found.serving_is_measured
+    assert not found.timed_by_sites
+    reading = RadioReading(1, 0.5, timing_advance=3.0)
+    np.testing.assert_allclose(found.log_serving_at(pixel, reading), [-3.0, -4.0, -6.0])
+    untimed = replace(reading, timing_advance=nan)
+    np.testing.assert_allclose(found.log_serving_at(pixel, untimed), [0.0, -1.0, -3.0])
+    assert model().timed_by_sites
+    assert not model().serving_is_measured
+
+
+@pytest.mark.parametrize("steps", [nan, 2.0])
+def test_the_usual_probability_of_a_serving_cell_is_the_mean_over_all_ways(steps):
+    """Found once for each cell and timing advance."""
+    statistics = Statistics()
+    found = model(serving_model=statistics)
+    ways = np.flatnonzero(ON_WAY)
+    expected = log(np.mean(np.exp(-(2 + 1) * ways / 10.0))) - (4.0 if steps == 2.0 else 0.0)
+    for _ in range(2):
+        assert found.usual_serving(2, steps) == pytest.approx(expected)
+    assert statistics.asked == [ways.tolist()]
+    assert found.usual_serving(1, steps) > expected
+    assert len(statistics.asked) == 2
+    assert model().usual_serving(2, steps) == -0.7
+    nowhere = replace(AREA, on_way=np.zeros_like(AREA.on_way))
+    without = MeasuredMapModel(nowhere, evidence=OPTIONS, serving_model=Statistics())
+    assert without.usual_serving(2, steps) == -0.7
