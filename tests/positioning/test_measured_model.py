@@ -23,7 +23,7 @@ class Statistics:
         self.asked.append(pixel.tolist())
         return -(serving + 1) * pixel / 10.0
 
-    def log_advance(self, serving, pixel, steps):
+    def log_advance(self, _, pixel, steps):
         return np.full(pixel.size, -2.0 * steps)
 
 
