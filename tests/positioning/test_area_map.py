@@ -1,0 +1,101 @@
+"""An area that is held whole: its levels with the two strongest, its ways and carriageways."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mapfilter.database.radioroutes import RadioField
+from mapfilter.geodesy import Lattice
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.radio.cells import CellPlan
+
+LATTICE = Lattice("EPSG:32632", 0.0, 20.0, 10.0, 2, 3)
+LEVELS_DBM = np.array([
+    [[-60.0, -70.0, -65.0], [-90.0, np.nan, -80.0], [np.nan, np.nan, np.nan]],
+    [[-50.0, -50.0, -99.0], [np.nan, -88.0, np.nan], [-75.0, -70.0, np.nan]],
+])  # fmt: skip
+TO_WAY_M = np.array([[0.0, 4.0, 12.0], [1.0, 3.0, 30.0]], dtype=np.float32)
+HALF_WIDTH_M = np.array([[5.0, 5.0, 10.0], [1.0, 12.0, 4.0]], dtype=np.float32)
+WAY = np.array([[7, 7, 0], [9, 9, 7]])
+QUIET_DBM = -116.0
+
+
+def area(cells=3):
+    level_dbm = LEVELS_DBM[..., :cells].astype(np.float32)
+    names, on_way = ("A", "B", "C")[:cells], TO_WAY_M < 4.5
+    field = RadioField(LATTICE, names, level_dbm, TO_WAY_M, HALF_WIDTH_M, WAY, on_way)
+    return AreaMap.of_field(field, CellPlan(LATTICE.crs, ()), -110.0)
+
+
+@pytest.mark.parametrize("cells", [0, 1, 2, 3])
+def test_levels_and_the_two_strongest_of_them(cells):
+    """Where a cell is below the floor a level 6 dB below it is assumed."""
+    found = area(cells)
+    known = np.where(np.isnan(LEVELS_DBM), QUIET_DBM, LEVELS_DBM)[..., :cells]
+    np.testing.assert_array_equal(found.level_dbm[..., :cells], known)
+    assert found.level_dbm.shape == (2, 3, cells + 2)
+    for row, col in np.ndindex(2, 3):
+        best = [*sorted(known[row, col].tolist(), reverse=True), QUIET_DBM, QUIET_DBM]
+        assert found.level_dbm[row, col, cells:].tolist() == best[:2]
+    pixel, band = np.array([0, 3, 4]), np.array([cells, cells, cells + 1])
+    expected = found.level_dbm.reshape(6, -1)[pixel, band]
+    np.testing.assert_array_equal(found.levels_at(pixel, band), expected)
+    assert found.flat_level_dbm.shape == (6 * (cells + 2),)
+
+
+def test_distances_are_to_the_edges_of_ways():
+    found = area()
+    np.testing.assert_array_equal(found.distance_m, [[0.0, 0.0, 2.0], [0.0, 0.0, 26.0]])
+    assert found.carriageway_m is None
+    assert found.of_carriageways() is None
+
+
+def test_carriageways_are_narrower_than_their_streets():
+    """Three tenths of half the width, at least 2 m, and no more than that half."""
+    found = area(0)
+    np.testing.assert_array_equal(found.distance_m, [[0.0, 0.0, 2.0], [0.0, 0.0, 26.0]])
+    expected = [[0.0, 2.0, 9.0], [0.0, 0.0, 28.0]]
+    np.testing.assert_allclose(found.carriageway_m, expected)
+    lanes = found.of_carriageways()
+    np.testing.assert_allclose(lanes.distance_m, expected)
+    assert lanes.lattice is found.lattice
+
+
+def test_points_are_the_middles_of_pixels_on_ways():
+    found = area()
+    np.testing.assert_array_equal(found.points, [[5.0, 15.0, 5.0, 15.0], [15.0, 15.0, 5.0, 5.0]])
+    assert found.points.dtype == np.float32
+    assert found.way_ids.tolist() == [0, 7, 9]
+    np.testing.assert_array_equal(found.way_rank, [[1, 1, 0], [2, 2, 1]])
+    # 5 m beside an edge at a deviation of 5 m, as the docstring of the model has it.
+    beside = replace(found, distance_m=np.array([[0.0, 5.0, 60.0]], dtype=np.float32))
+    np.testing.assert_allclose(beside.log_map(5.0), [[0.0, -0.49, -5.51]], atol=0.005)
+
+
+@pytest.mark.parametrize(
+    ("places", "weights", "way", "share"),
+    [
+        ([(5.0, 15.0), (25.0, 5.0), (5.0, 5.0)], [0.3, 0.2, 0.5], 7, 0.5),
+        ([(5.0, 15.0), (15.0, 5.0), (5.0, 5.0)], [0.3, 0.2, 0.5], 9, 0.7),
+        ([(25.0, 15.0), (15.0, 5.0)], [0.6, 0.4], 0, 0.6),
+        # Beyond the area the pixel at its edge counts.
+        ([(-30.0, 35.0), (35.0, -20.0), (15.0, 5.0)], [0.3, 0.3, 0.4], 7, 0.6),
+        ([(9.99, 9.99), (10.01, 10.01)], [0.4, 0.6], 7, 0.6),
+    ],
+)
+def test_the_way_that_holds_the_most_of_a_belief(places, weights, way, share):
+    east_m, north_m = np.array(places, dtype=np.float32).T
+    found = area().matched_way(east_m, north_m, np.array(weights, dtype=np.float32))
+    assert found == (way, pytest.approx(share))
+
+
+def test_roughness_is_the_deviation_of_levels_about_a_pixel():
+    """Pixels of 50 m: of three by three, in tenths of a dB, and no more than a byte holds."""
+    coarse = replace(area(), lattice=Lattice("EPSG:32632", 0.0, 100.0, 50.0, 2, 3))
+    found = coarse.flat_rough_db.reshape(2, 3, 5)
+    assert found.dtype == np.uint8
+    padded = np.pad(coarse.level_dbm, ((1, 1), (1, 1), (0, 0)), "symmetric")
+    for row, col in np.ndindex(2, 3):
+        deviation_db = padded[row : row + 3, col : col + 3].std(axis=(0, 1))
+        np.testing.assert_allclose(found[row, col], np.minimum(10 * deviation_db, 255), atol=1.01)
