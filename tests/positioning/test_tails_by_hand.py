@@ -114,6 +114,15 @@ def test_the_level_of_several_places_is_that_of_their_kernels(risk, scale_m):
     assert tail.protection_m(risk) == pytest.approx(expected, rel=1.1e-3)
 
 
+def test_levels_are_never_too_small_and_at_most_a_part_in_a_thousand_too_large():
+    tail, over = SampleTail(np.array([20.0]), np.array([1.0]), 3.0, 4000.0), []
+    for risk in np.geomspace(1e-6, 0.3, 60):
+        share = bounded(risk, 4000.0)
+        over.append(tail.protection_m(risk) / (20.0 + 3.0 * log((1 - share) / share)) - 1)
+    assert min(over) > -1e-9
+    assert max(over) <= 1e-3
+
+
 def test_a_risk_that_no_hypothesis_leaves_has_no_level():
     tail = SampleTail(np.array([20.0]), np.array([1.0]), 3.0, 50.0, 0.01)
     assert tail.protection_m(0.01) == tail.protection_m(0.005) == inf
@@ -136,6 +145,15 @@ def test_radii_of_gaussians_that_lie_on_one_another(share):
     assert tail.outside(12.0) == pytest.approx(
         0.7 * exp(-144 / 50.0) + 0.3 * exp(-144 / 800.0), rel=1e-6
     )
+
+
+def test_radii_are_never_too_small_and_at_most_a_part_in_a_hundred_thousand_too_large():
+    tail = GaussianTail(np.ones(1), np.zeros((1, 2)), 49.0 * np.eye(2)[None])
+    shares = np.linspace(0.3, 0.999, 40)
+    exact_m = 7.0 * np.sqrt(-2 * np.log(1 - shares))
+    over = np.array([tail.radius_m(share) for share in shares]) / exact_m - 1
+    assert over.min() > -1e-9
+    assert over.max() <= 1e-5
 
 
 def test_a_gaussian_without_numbers_has_no_radius():
