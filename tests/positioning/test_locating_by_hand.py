@@ -99,6 +99,12 @@ def test_the_method_with_the_least_median_error_is_taken(monkeypatch):
     assert {one.blocks for one in fitted.validations} == {"logs"}
     # Two folds of each of the three.
     assert done == [(k, 6) for k in range(1, 7)]
+    # Two thousand reports are left out where no number is given, over any scale.
+    usual = []
+    monkeypatch.setattr(tested, "cross_validate", lambda *given: usual.append(given[4:]) or Errors(
+        *(np.arange(30.0),) * 3, np.arange(30)))  # fmt: skip
+    fit_locator(survey(30), "knn")
+    assert usual == [(2000, Bounds())]
     # One that locates nothing is the last.
     medians[str(tested.CANDIDATES[1])] = 1e9
     monkeypatch.setattr(tested, "cross_validate", lambda _, one, *__: Errors(

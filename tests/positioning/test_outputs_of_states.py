@@ -8,7 +8,7 @@ import pytest
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import BeliefSummary
-from mapfilter.positioning.bayes.state import step_output
+from mapfilter.positioning.bayes.state import BayesState, step_output
 
 AREA = SimpleNamespace(origin_m=(1000.0, 2000.0), matched_way=lambda *_: (7, 0.75))
 PLACES = np.array([[30.0, 31.0, 29.0], [40.0, 40.0, 41.0]], dtype=np.float32)
@@ -93,3 +93,12 @@ def test_what_was_summarised_is_not_summarised_again():
     for other in (state(belief(), reported=reported), state(held, Status.LOST, reported)):
         changed, _ = output_of(other)
         assert changed is not other
+
+
+def test_a_state_before_the_first_epoch_has_nothing():
+    state = BayesState()
+    assert (state.belief, state.alternative, state.reported, state.twin) == (None,) * 4
+    assert (state.alternatives, state.takeovers, state.held) == (0, 0, ())
+    assert (state.status, state.contested, state.compass) == (Status.SEARCHING, False, True)
+    assert np.isnan([state.heading_rad, state.walking_rad]).all()
+    assert state.particle_spacing_m == 5.0

@@ -1,5 +1,6 @@
 """Tails of samples and of Gaussians by hand: rings, kernels, and levels in closed form."""
 
+from dataclasses import replace
 from math import exp, inf, isnan, log, nan, pi, sqrt
 
 import numpy as np
@@ -119,6 +120,8 @@ def test_levels_are_never_too_small_and_at_most_a_part_in_a_thousand_too_large()
     for risk in np.geomspace(1e-6, 0.3, 60):
         share = bounded(risk, 4000.0)
         over.append(tail.protection_m(risk) / (20.0 + 3.0 * log((1 - share) / share)) - 1)
+        near = replace(tail, distance_m=np.array([0.01]), scale_m=0.002)
+        over.append(near.protection_m(risk) / (0.01 + 0.002 * log((1 - share) / share)) - 1)
     assert min(over) > -1e-9
     assert max(over) <= 1e-3
 
