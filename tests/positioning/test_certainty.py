@@ -1,6 +1,6 @@
 """How certain a position is, with all that competes with it, against sums by hand."""
 
-from math import exp
+from math import exp, log
 from types import SimpleNamespace
 
 import numpy as np
@@ -55,6 +55,15 @@ def test_improbable_rivals_make_no_difference():
     improbable = [turned(-12.0, 700.0)]
     assert certainty(RULES, belief(500.0), held=improbable) == pytest.approx(1.0, abs=1e-5)
     assert certainty(RULES, belief(500.0), held=[turned(900.0, 700.0)]) < 1e-9
+
+
+@pytest.mark.parametrize(("enough", "looked_at"), [(0.9, False), (0.95, True), (1.0, True)])
+def test_where_a_rival_lies_is_looked_at_only_where_it_may_matter(enough, looked_at):
+    """Odds of 0.06 leave 0.94 wherever the rival is; with half of it near there are 0.97."""
+    rival, odds = turned(log(0.06), 520.0, 600.0), 0.06
+    found = certainty(RULES, belief(500.0), held=[rival], enough=enough)
+    assert found == pytest.approx((1 + looked_at * odds / 2) / (1 + odds))
+    assert ("weight" in rival.belief.__dict__) == looked_at
 
 
 def alternative(log_bayes_factor, *places):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import exp, hypot, isfinite, nan
+from math import exp, hypot, inf, isfinite, nan
 
 import numpy as np
 
@@ -62,6 +62,7 @@ def certainty(
     main: MapBelief,
     alternative: AlternativeHypothesis | None = None,
     held: Iterable[HeldOtherwise] = (),
+    enough: float = inf,
 ) -> float:
     """Return the probability that the position lies within 50 m of a belief's leading hypothesis.
 
@@ -73,20 +74,23 @@ def certainty(
     alternative : AlternativeHypothesis or None
     held : iterable of HeldOtherwise
         Beliefs in which the phone was turned.
+    enough : float
+        Where even a bound from below is so large, that is returned: where rivals lie takes longer
+        than how probable they are.
     """
     near, total = main.summary.mass_50m, 1.0
     if alternative is not None:
         log_odds = alternative.log_bayes_factor(main) - rules.lost_threshold
         if log_odds > _NEGLIGIBLE and _apart_m(alternative.belief, main) > NEAR_M:
             total += exp(min(log_odds, _CERTAIN))
+    rivals: list[tuple[float, ParticleBelief]] = []
     if isinstance(main, ParticleBelief):
-        for one in held:
-            log_odds = one.log_odds(main)
-            if log_odds > _NEGLIGIBLE:
-                odds = exp(min(log_odds, _CERTAIN))
-                total += odds
-                near += odds * _share_near(one.belief, main)
-    return near / total
+        by_log_odds = ((one.log_odds(main), one.belief) for one in held)
+        rivals = [(exp(min(k, _CERTAIN)), one) for k, one in by_log_odds if k > _NEGLIGIBLE]
+        total += sum(odds for odds, _ in rivals)
+    if near / total >= enough:
+        return near / total
+    return (near + sum(odds * _share_near(one, main) for odds, one in rivals)) / total
 
 
 def _apart_m(one: MapBelief, other: MapBelief) -> float:
@@ -95,7 +99,7 @@ def _apart_m(one: MapBelief, other: MapBelief) -> float:
     return hypot(own[0] - mean[0], own[1] - mean[1])
 
 
-def _share_near(one: ParticleBelief, main: ParticleBelief) -> float:
+def _share_near(one: ParticleBelief, main: MapBelief) -> float:
     """Return the share of a belief within 50 m of the leading hypothesis of another."""
     east_m, north_m = main.summary.mean[:2]
     gone_east_m, gone_north_m = one.state[0] - east_m, one.state[1] - north_m

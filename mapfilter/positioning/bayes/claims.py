@@ -37,10 +37,13 @@ def judged(
     elif _contradicted(beliefs, state):
         recovery = Recovery()
     if belief is not None and state.status is Status.TRACKING:
-        probability = certainty(rules, belief, state.alternative, state.held)
+        options, enough = beliefs.options_of(state), rules.claimed_from
+        if recovery is not None:
+            enough = max(enough, options.switch_mass)
+        probability = certainty(rules, belief, state.alternative, state.held, enough)
         uncertain = probability < rules.claimed_from
         if recovery is not None and weighed:
-            options, travelled_m = beliefs.options_of(state), state.reckoning.travelled_m
+            travelled_m = state.reckoning.travelled_m
             agrees = probability >= options.switch_mass
             agrees = agrees and not doubted(rules, belief, state.null, state.alternative)
             recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
