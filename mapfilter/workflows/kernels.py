@@ -33,6 +33,7 @@ from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.estimate import protected_m
+from mapfilter.positioning.fingerprints.likelihood_kernel import add_reading
 from mapfilter.positioning.integrity import sample_tail
 
 WORKERS = 2
@@ -97,7 +98,7 @@ def compile_summaries() -> None:
 
 
 def compile_resampling() -> None:
-    """Compile resampling, the protection level, and the way that a belief lies on."""
+    """Compile resampling, the protection level, the way that a belief lies on, single reports."""
     model, cloud, log_weight = _made()
     weight, chosen = np.empty(_PARTICLES, dtype=np.float32), np.empty(_PARTICLES, dtype=np.int32)
     normalise(log_weight, weight)
@@ -108,6 +109,10 @@ def compile_resampling() -> None:
     jitter, copies = np.ones(STATES, dtype=np.float32), np.empty_like(cloud.state)
     key = draw_key(np.random.default_rng(0))
     copy_with_jitter(0, _PARTICLES, cloud.state, chosen, jitter, key, copies)
+    # Not of the filter: a replay locates single reports beside it.
+    one, number = np.zeros(1), np.zeros(1, dtype=np.int64)
+    reading = (-60.0, 0.0, 0.0)
+    add_reading(number, one, one, one + 1.0, one, reading, np.zeros(1), np.zeros((4, 1)))
     systematic(weight, 0.5, chosen)
 
 

@@ -271,3 +271,27 @@ def test_equal_reports_are_located_once():
             copy = one._replace(cell=one.cell.copy(), level_dbm=one.level_dbm.copy())
             assert once(copy) == plain(one)
     assert len(asked) == len(different)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_weights_are_those_of_all_places_above_a_ten_thousandth_of_the_largest(seed):
+    """Places that cannot have so much are not looked at more closely."""
+    method = Probabilistic()
+    places, level_dbm, names = made(seed, count=300)
+    database = reports_at(places, level_dbm, names=names)
+    received = Received(np.array([0, 2, 4], np.int32), np.array([-71.0, -64.0, -90.0]), -1, np.nan)
+    floor_dbm = float(np.nanmin(database.level_dbm)) - 1.0
+    errors = LevelErrors(method.level_db, method.shared_db, method.absence_per_db, floor_dbm)
+    cells, levels = Likelihoods.at(database, errors).of(received.cell, received.level_dbm)
+    effective = min(3, method.effective_readings)
+    share, inlier = effective / 3, np.log(1 - method.outliers)
+    outlier = np.log(method.outliers) - effective / 2
+    log_weight = share * cells + np.logaddexp(inlier + share * levels, outlier)
+    expected = np.exp(log_weight - log_weight.max())
+    kept = expected > 1e-4
+    assert 1 < kept.sum() < 300
+    found = locator(method, database).matcher(received)
+    assert found.reports.tolist() == np.flatnonzero(kept).tolist()
+    assert found.weight == pytest.approx(expected[kept] / expected[kept].sum(), rel=1e-12)
+    total = float(log_weight.max() + np.log(expected[kept].sum()))
+    assert found.mismatch == pytest.approx(-total, rel=1e-12)

@@ -9,6 +9,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Ints, Ints8, Ints32
 from mapfilter.positioning.fingerprints.censoring import likely
+from mapfilter.positioning.fingerprints.likelihood_kernel import add_reading
 from mapfilter.positioning.fingerprints.matching import ByCell, sums_by_report, usual_levels
 from mapfilter.positioning.fingerprints.planned import Planned
 from mapfilter.positioning.fingerprints.reports import Reports
@@ -183,10 +184,6 @@ class Likelihoods:
     def _log_variance(self) -> Floats:
         return np.asarray(np.log(self.variance_db2 / self.least_db2))
 
-    @cached_property
-    def _is_whole(self) -> bool:
-        return bool(np.isfinite(self.level_dbm).all())
-
     def of(
         self, cell: Ints32, level_dbm: Floats, censored: Ints8 | None = None
     ) -> tuple[Floats, Floats]:
@@ -208,27 +205,22 @@ class Likelihoods:
             errors = replace(self.errors, floor_dbm=least_dbm)
             absence = self.errors.absence_per_db * self._above(cell, least_dbm)
         received = -absence - own.sum()
-        s0, s1, s2, logs = np.zeros((4, count))
+        sums = np.zeros((4, count))
         readings = zip(cell.tolist(), level_dbm.tolist(), ends, own.tolist(), strict=True)
         for one, dbm, end, own_loss in readings:
             where = self.by_cell.of_cell(one)
-            report = self.by_cell.report[where]
-            own_lost = _absence(self.level_dbm[where], errors) if self.predicted else lost[where]
-            received[report] += own_lost + own_loss
-            if np.isnan(dbm):
-                continue
-            apart_db, variance_db2 = dbm - self.level_dbm[where], self.variance_db2[where]
-            log_variance = self._log_variance[where]
-            if end or not self._is_whole:
-                known = np.isfinite(apart_db)
-                if end:
-                    known &= apart_db * end > 0
-                report, apart_db, log_variance = report[known], apart_db[known], log_variance[known]
-                variance_db2 = variance_db2[known]
-            s0[report] += 1 / variance_db2
-            s1[report] += apart_db / variance_db2
-            s2[report] += apart_db**2 / variance_db2
-            logs[report] += log_variance
+            known_dbm = self.level_dbm[where]
+            add_reading(
+                self.by_cell.report[where],
+                _absence(known_dbm, errors) if self.predicted else lost[where],
+                known_dbm,
+                self.variance_db2[where],
+                self._log_variance[where],
+                (float(dbm), float(end), own_loss),
+                received,
+                sums,
+            )
+        s0, s1, s2, logs = sums
         shared_db2 = self.errors.shared_db**2
         explained = s1**2 * shared_db2 / (1 + shared_db2 * s0)
         return received, -0.5 * (s2 - explained + np.log1p(shared_db2 * s0) + logs)

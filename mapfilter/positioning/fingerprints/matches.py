@@ -26,6 +26,7 @@ from mapfilter.positioning.fingerprints.survey_levels import surveyed_levels
 
 _NO_LEVEL_DBM = -30.0
 _NEGLIGIBLE = 1e-4
+_LOG_NEGLIGIBLE = float(np.log(_NEGLIGIBLE / 2)) - 1e-9
 _MOST = 4000
 _TINY = 1e-6
 _ROUNDS = 60
@@ -200,14 +201,19 @@ def _posterior(database: Reports, method: Probabilistic | SurveyMaps, floor_dbm:
         share = effective / len(received.cell)
         levels = share * levels + _timing(database, received, method.timing_sd_steps)
         # An outlier goes by its cells alone; the levels of others are -n/2 on average.
-        log_weight = share * cells + np.logaddexp(inlier + levels, out - effective / 2)
+        by_cells, by_levels, outlier = share * cells, inlier + levels, out - effective / 2
+        # The sum of two is at most twice the larger one: most places need no closer look.
+        least = by_cells + np.maximum(by_levels, outlier)
+        index = np.flatnonzero(least >= least.max() + _LOG_NEGLIGIBLE)
+        log_weight = by_cells[index] + np.logaddexp(by_levels[index], outlier)
         best = float(log_weight.max())
         weight = np.exp(log_weight - best)
-        index = np.flatnonzero(weight > _NEGLIGIBLE)
-        if len(index) > _MOST:
-            index = index[np.argpartition(-weight[index], _MOST)[:_MOST]]
-        mismatch = -(best + float(np.log(weight[index].sum())))
-        return Match(index, weight[index] / weight[index].sum(), mismatch)
+        some = np.flatnonzero(weight > _NEGLIGIBLE)
+        if len(some) > _MOST:
+            some = some[np.argpartition(-weight[some], _MOST)[:_MOST]]
+        index, weight = index[some], weight[some]
+        total = float(weight.sum())
+        return Match(index, weight / total, -(best + float(np.log(total))))
 
     return match
 
