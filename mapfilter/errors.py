@@ -60,7 +60,8 @@ class MapfilterError(Exception):
         shown = 0
         for faults in alike.values():
             if len(lines) + min(len(faults), _MAX_ALIKE) > _MAX_SHOWN:
-                lines.append(f"… and {len(self.faults) - shown} more faults")
+                left = len(self.faults) - shown
+                lines.append(f"… and {left} more {'fault' if left == 1 else 'faults'}")
                 break
             lines += [str(fault) for fault in faults[:_MAX_ALIKE]]
             shown += len(faults)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
 from mapfilter.radio.cell_rules import TECHNOLOGIES, technology_faults
 from mapfilter.radio.headings import (
@@ -195,14 +196,12 @@ def arrange(
     )
     if lowered:
         shares = ", ".join(f"{name} {REPORTED_SHARE_DB[name]:g} dB" for name in sorted(lowered))
-        notes += (
-            f"eirp_dbm of {lowered.total()} cells is lowered to the reported power ({shares})",
-        )
+        some = number_of(lowered.total(), "cell")
+        notes += (f"eirp_dbm of {some} is lowered to the reported power ({shares})",)
     if beyond:
-        notes += (
-            f"technology of {len(beyond)} cells left out, as their identities are beyond its "
-            f"limits, such as {beyond[0]}",
-        )
+        one, many = "cell left out, as its identity is", "cells left out, as their identities are"
+        some = number_of(len(beyond), one, many)
+        notes += (f"technology of {some} beyond its limits, such as {beyond[0]}",)
     notes += tuple(filter(None, (doubtful_units(headings, picked), unused)))
     shown = {
         name: f"{header[at[0]]} ({name})" for name, at in picked.items() if header[at[0]] != name

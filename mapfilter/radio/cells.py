@@ -11,6 +11,7 @@ from pathlib import Path
 
 from mapfilter._arguments import check_path
 from mapfilter._io import atomic_file
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, short_crs, unproject
 from mapfilter.radio.cell_layouts import COLUMNS, SELDOM, Layout
@@ -140,7 +141,8 @@ class CellPlan:
     def __repr__(self) -> str:
         """Return the numbers of cells and sites, and the CRS, in one line."""
         sites = len({cell.site for cell in self.cells})
-        return f"<CellPlan: {len(self.cells)} cells at {sites} sites, {short_crs(self.crs)}>"
+        held = f"{number_of(len(self.cells), 'cell')} at {number_of(sites, 'site')}"
+        return f"<CellPlan: {held}, {short_crs(self.crs)}>"
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -283,13 +285,15 @@ def read_cell_plan(
     whole = [row for row in rows if not row.faulty]
     if layout == "opencellid" and whole:
         if faults.found:
-            notes += (f"{len(faults.found)} faulty rows left out, such as {faults.found[0]}",)
+            notes += (
+                f"{number_of(len(faults.found), 'faulty row')} left out, such as {faults.found[0]}",
+            )
             faults = Faults()
         first = {row.values["id"]: row for row in reversed(whole)}
         repeated = len(whole) - len(first)
         whole = [row for row in whole if first[row.values["id"]] is row]
         if repeated:
-            notes += (f"{repeated} rows left out: cells listed already",)
+            notes += (f"{number_of(repeated, 'row')} left out: cells listed already",)
     if bounds_m is not None:
         west, south, east, north = bounds_m
         inside = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
+from mapfilter._words import number_of
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.reported_power import MOST_SUBCARRIER_DBM
 
@@ -30,7 +31,7 @@ def carrier_notes(plan: CellPlan) -> tuple[str, ...]:
     if not carriers:
         return ()
     return (
-        f"eirp_dbm of {len(carriers)} cells is that of a carrier: more than "
+        f"eirp_dbm of {number_of(len(carriers), 'cell')} is that of a carrier: more than "
         f"{MOST_SUBCARRIER_DBM:g} dBm. Phones report one subcarrier of LTE and NR, "
         "28 to 35 dB less, and predicted levels are too high by that",
     )

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from mapfilter._types import Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.roads.corridor_net import grown_lines
 from mapfilter.roads.ways import Ways
@@ -127,7 +128,7 @@ def corridors(
         (alone, f"more than max_gap_m = {max_gap_m:g} m from the others, or standing"),
     ):
         if count:
-            notes.append(f"{count} positions left out: {why}")
+            notes.append(f"{number_of(count, 'position')} left out: {why}")
     notes += _gap_notes(sessions, max_accuracy_m, max_gap_m, step_m)
     if not pieces:
         hint = "tracks with gaps: raise max_gap_m"

@@ -20,6 +20,7 @@ from rasterio.windows import Window
 from mapfilter._gdal import open_raster
 from mapfilter._inputs import read_input
 from mapfilter._types import Bools
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 
@@ -107,10 +108,15 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
         shown = f"value {code}"
         if is_colour:
             shown = f"colour {code >> 16},{code >> 8 & 255},{code & 255}"
-        faults.add(str(path), expected, f"{shown} at {count} points", hint)
+        faults.add(str(path), expected, f"{shown} at {number_of(count, 'point')}", hint)
     if rest := unknown[_MOST_SHOWN:]:
         points = sum(count for _, count in rest)
-        faults.add(str(path), expected, f"{len(rest)} others at {points} points", hint)
+        faults.add(
+            str(path),
+            expected,
+            f"{number_of(len(rest), 'other')} at {number_of(points, 'point')}",
+            hint,
+        )
     faults.raise_if_any(InputError)
     index = np.full(codes.shape, -1, dtype=np.min_scalar_type(-len(keys)))
     rank = {code: number for number, code in enumerate(keys)}

@@ -25,6 +25,7 @@ from shapely.errors import GEOSException
 from mapfilter._inputs import open_input
 from mapfilter._ogr import PARQUET, VectorSource, sealed_gdal, vector_source
 from mapfilter._types import Ints
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import known_crs
 from mapfilter.roads.maps import box_deg, boxes_overlap
@@ -138,14 +139,18 @@ def _features(
     notes = []
     has_shape = (~frame.geometry.isna()).to_numpy()
     if not has_shape.all():
-        notes.append(f"{name}: {(~has_shape).sum()} features without geometry left out")
+        notes.append(
+            f"{name}: {number_of(int((~has_shape).sum()), 'feature')} without geometry left out"
+        )
         frame = frame[has_shape]
     number = frame.index.to_numpy().astype(np.int64) + 1
     frame = _guarded(name, lambda: frame.to_crs(crs))
     geometry = shapely.force_2d(frame.geometry.to_numpy())
     kept = on_earth(geometry)
     if not kept.all():
-        notes.append(f"{name}: {(~kept).sum()} features left out: {crs} has no such places")
+        notes.append(
+            f"{name}: {number_of(int((~kept).sum()), 'feature')} left out: {crs} has no such places"
+        )
     kept[kept] = shapely.intersects(shapely.box(*bounds_m), geometry[kept])
     values = {column: frame[column].to_numpy(dtype=object)[kept] for column in columns}
     return Features(name, geometry[kept], number[kept], values, tuple(notes))

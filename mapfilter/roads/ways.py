@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import short_crs
 
@@ -207,7 +208,7 @@ class Buildings(_Layer):
     def height_sources(self) -> str:
         """One sentence on the sources of the heights."""
         return (
-            f"{len(self)} buildings: height from the map for {self.from_height}, "
+            f"{number_of(len(self), 'building')}: height from the map for {self.from_height}, "
             f"from storeys for {self.from_levels}, the default for {self.from_default}"
         )
 

@@ -17,6 +17,7 @@ from annotated_types import Ge, Le
 from threadpoolctl import ThreadpoolController
 
 from mapfilter._types import Floats
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.options import Options
 from mapfilter.radio.cells import CellPlan
@@ -179,7 +180,7 @@ def fit_survey(
     if predicted is not None:
         strange = [cell_id for cell_id in found if cell_id not in predicted]
         if strange:
-            notes.append(f"{len(strange)} cells left out: not in the prediction")
+            notes.append(f"{number_of(len(strange), 'cell')} left out: not in the prediction")
         found = {
             cell_id: some.some(np.isfinite(predicted[cell_id](some.east_m, some.north_m)))
             for cell_id, some in found.items()
@@ -190,11 +191,18 @@ def fit_survey(
     points = [some for some in found.values() if len(some) >= options.min_points]
     if len(points) < len(found):
         few = len(found) - len(points)
-        notes.append(f"{few} cells left out: received in fewer than {options.min_points} squares")
+        left = number_of(few, "cell")
+        notes.append(f"{left} left out: received in fewer than {options.min_points} squares")
     if not points:
         hint = "cells named differently than in the prediction" if predicted else ""
         expected = f"a cell received in at least {options.min_points} squares"
-        raise fail(InputError, "measurements", expected, f"{len(found)} cells, none of them", hint)
+        raise fail(
+            InputError,
+            "measurements",
+            expected,
+            f"{number_of(len(found), 'cell')}, none of them",
+            hint,
+        )
     level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
     plan = plan.to_crs(measurements.crs) if plan is not None else None
     shadowing = Shadowing()
@@ -240,11 +248,11 @@ def fit_survey(
             )
     located = sum(cell.estimated for cell in cells.values())
     if located:
-        notes.append(f"{located} antennas located from their levels")
+        notes.append(f"{number_of(located, 'antenna')} located from their levels")
     unknown = sum(cell.antenna is None for cell in cells.values())
     if unknown and predicted is None and options.trend == "path_loss":
         notes.append(
-            f"{unknown} antennas not located (fewer than {options.min_points_to_locate} squares): "
-            "the trend is their mean level"
+            f"{number_of(unknown, 'antenna')} not located (fewer than "
+            f"{options.min_points_to_locate} squares): the trend is their mean level"
         )
     return Survey(measurements.crs, options, shadowing, cells, tuple(notes))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints32
+from mapfilter._words import number_of
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.measurement_rows import Identity
 
@@ -73,7 +74,8 @@ class Measurements:
             return self
         count = int((~kept).sum())
         return self.where(
-            kept, f"{count} rows left out: positions less accurate than {accuracy_m:g} m"
+            kept,
+            f"{number_of(count, 'row')} left out: positions less accurate than {accuracy_m:g} m",
         )
 
 

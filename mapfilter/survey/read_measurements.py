@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints, Ints32
+from mapfilter._words import number_of
 from mapfilter.errors import Fault, InputError, fail, listed
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.survey.measurement_files import (
@@ -79,7 +80,7 @@ def read_measurements(
         tables.append(table)
         if not table.cell:
             aside = "; ".join(f"{count} {what}" for what, count in table.aside.items())
-            got = f"{table.read} rows" + (f": {aside}" if aside else "")
+            got = number_of(table.read, "row") + (f": {aside}" if aside else "")
             expected = "at least one level with cell and position"
             faults.extend(table.faults or (Fault(str(path), expected, got),))
     if faults:
@@ -190,7 +191,9 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
             got = f"{lat_deg[0]:g}, {lon_deg[0]:g} and {count - 1} more"
             hint = "latitude and longitude swapped, or another area"
             raise fail(InputError, "measurements", f"places where {crs} is used", got, hint)
-        joined = joined.where(placed, f"{count} rows left out: {crs} has no such places")
+        joined = joined.where(
+            placed, f"{number_of(count, 'row')} left out: {crs} has no such places"
+        )
     return _once(joined)
 
 
@@ -247,4 +250,4 @@ def _once(rows: Measurements) -> Measurements:
         return rows
     kept = np.zeros(len(rows), dtype=np.bool_)
     kept[first] = True
-    return rows.where(kept, f"{len(rows) - len(first)} rows left out: given twice")
+    return rows.where(kept, f"{number_of(len(rows) - len(first), 'row')} left out: given twice")

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import (
     heading_from_azimuth_rad,
@@ -101,7 +102,9 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     for recording in recordings:
         if "cells" in recording.tables:
             count = len(recording.tables["cells"])
-            notes.append(f"{recording.path.name}: a list of {count} cells; {_CELLS_HINT}")
+            notes.append(
+                f"{recording.path.name}: a list of {number_of(count, 'cell')}; {_CELLS_HINT}"
+            )
     true_alone = set(options.truth) - set(options.measured)
     measured = [r for r in shifted if r.path not in true_alone]
     sensors = _sensors(measured, frame, options.truth, notes)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mapfilter._words import number_of
 from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.identities import parse_cgi
@@ -99,11 +100,13 @@ class _Counts:
     def notes(self) -> Iterable[str]:
         if self.named:
             rows, cells = sum(self.named.values()), len(self.named)
-            yield f"radio: {rows} rows of {cells} cells named by the plan's identities"
+            held = f"{number_of(rows, 'row')} of {number_of(cells, 'cell')}"
+            yield f"radio: {held} named by the plan's identities"
         if self.lost:
             often = sorted(self.lost, key=lambda name: (-self.lost[name], name))
             rows, some = sum(self.lost.values()), listed(often)
-            yield f"radio: {rows} rows of {len(self.lost)} cells that the plan lacks ({some})"
+            lost = f"{number_of(rows, 'row')} of {number_of(len(self.lost), 'cell')}"
+            yield f"radio: {lost} that the plan lacks ({some})"
 
 
 class PlanNames:

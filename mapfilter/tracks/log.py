@@ -17,6 +17,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mapfilter._html import html_table, shortened
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.almanacs import Almanac
@@ -90,7 +91,7 @@ class TrackLog:
             began = f" from {start.isoformat(' ', 'seconds').removesuffix('+00:00')} UTC"
         rows = [f"{table} {n}" for table in TABLES if (n := len(getattr(self, table)))]
         held = f"rows: {', '.join(rows) or 'none'}"
-        notes = f"; {len(self.notes)} notes" if self.notes else ""
+        notes = f"; {number_of(len(self.notes), 'note')}" if self.notes else ""
         crs = short_crs(self.crs)
         return f"TrackLog({crs}, {self.duration_s:.1f} s{began}; {held}{notes})"
 
@@ -216,7 +217,7 @@ def make_log(
     >>> log.motion["step_m"].tolist(), log.duration_s
     ([1.4, 1.5], 1.0)
     >>> print(*log.notes, sep="; ")
-    motion: 1 exact duplicate rows dropped; motion: out of order in 1 places, sorted by time
+    motion: 1 exact duplicate row dropped; motion: out of order in 1 place, sorted by time
     >>> seen = pd.to_datetime(["2026-05-01 12:00:00+02:00", "2026-05-01 12:00:30+02:00"])
     >>> make_log("EPSG:32629", motion=pd.DataFrame({"time": seen, "step_m": [30.0, 33.0]}))
     TrackLog(EPSG:32629, 30.0 s from 2026-05-01 10:00:00 UTC; rows: motion 2)
@@ -252,7 +253,7 @@ def make_log(
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless and not any(UNPLACED in note for note in every_note):
         why = "without the place of their satellite: give the day's navigation file (RINEX), too"
-        every_note += (f"pseudoranges: {placeless} rows {why}",)
+        every_note += (f"pseudoranges: {number_of(placeless, 'row')} {why}",)
     if almanac is not None:
         where, rows = called.get("pseudoranges", "pseudoranges"), tables["pseudoranges"]
         tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
+from mapfilter._words import number_of
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.atmosphere import directions, ionosphere_m, receiver_m, troposphere_m
 from mapfilter.gnss.broadcast import gps_from_utc_s, place_by_broadcast
@@ -74,7 +75,10 @@ def _sane_places(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
     bad = np.isfinite(place).any(axis=1) & ~((away_m >= LOWEST_M) & (away_m <= HIGHEST_M))
     if not bad.any():
         return rows
-    notes.append(f"pseudoranges: {int(bad.sum())} places of satellites are none, left out")
+    some = number_of(
+        int(bad.sum()), "place of a satellite is none", "places of satellites are none"
+    )
+    notes.append(f"pseudoranges: {some}, left out")
     return rows.assign(**{name: np.where(bad, np.nan, rows[name]) for name in PLACE})
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.earth_rotation import LIGHT_MPS, in_frame_of_reception
@@ -72,7 +73,7 @@ def place_satellites(
         of = np.flatnonzero(unplaced & (names == name))
         if name not in index or not known.healthy[index[name]]:
             why = "not healthy" if name in index else "not in the almanac"
-            notes.append(f"{where}: {name} is {why}, {len(of)} rows without a place")
+            notes.append(f"{where}: {name} is {why}, {number_of(len(of), 'row')} without a place")
             continue
         since_s = time_s[of] - time_s[unplaced][0]
         one = known.only(np.array([index[name]]))

@@ -16,6 +16,7 @@ import pyarrow.compute as pc
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.identities import LIMITS
@@ -63,7 +64,7 @@ class _Door:
         for row in rows[:_SHOWN_ROWS]:
             self.add(f" row {self.row_numbers[row]}, {field}", expected, got(row), hint(row))
         if len(rows) > _SHOWN_ROWS:
-            more = f"{len(rows) - _SHOWN_ROWS} more rows like these"
+            more = f"{number_of(len(rows) - _SHOWN_ROWS, 'more row')} like these"
             self.add(f", {field}", expected, more, hint(rows[-1]))
 
 
@@ -336,12 +337,12 @@ def _sorted_unique(
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     duplicate = _repeated(table)
     if duplicate.any():
-        notes += (f"{where}: {int(duplicate.sum())} exact duplicate rows dropped",)
+        notes += (f"{where}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped",)
         table = table[~duplicate]
     time_s = table["time_s"].to_numpy()
     backwards = int(np.sum(np.diff(time_s) < 0))
     if backwards:
-        notes += (f"{where}: out of order in {backwards} places, sorted by time",)
+        notes += (f"{where}: out of order in {number_of(backwards, 'place')}, sorted by time",)
         table = table.sort_values("time_s", kind="stable")
     return table.reset_index(drop=True), notes
 

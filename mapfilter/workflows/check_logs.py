@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from mapfilter._words import number_of
 from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
@@ -93,14 +94,14 @@ def _check_cells(path: Path, log: TrackLog, plan: CellPlan, findings: Findings) 
     """Report serving cells that the plan lacks, and logs without serving cells."""
     serving = log.radio["cell"][(log.radio["role"] == SERVING).to_numpy()].dropna()
     if serving.empty:
-        evidence = f"No serving cell is named in {len(log.radio)} rows of reports."
+        evidence = f"No serving cell is named in {number_of(len(log.radio), 'row')} of reports."
         findings.add("log-cells-unknown", str(path), evidence, "warning")
         return
     unknown = ~serving.isin(plan.ids).to_numpy()
     if unknown.any():
         # The most frequent first.
         ids = serving[unknown].value_counts().index.astype(str).tolist()
-        evidence = f"{int(unknown.sum())} of {len(serving)} reports are of {len(ids)} serving "
-        evidence += f"cells that the plan lacks: {listed(ids)}."
+        evidence = f"{int(unknown.sum())} of {number_of(len(serving), 'report')} are of "
+        evidence += f"{number_of(len(ids), 'serving cell')} that the plan lacks: {listed(ids)}."
         severity: Severity = "error" if unknown.all() else "warning"
         findings.add("log-cells-unknown", str(path), evidence, severity)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mapfilter._words import number_of
 from mapfilter.errors import ConfigError, OutputError, fail
 from mapfilter.geodesy import short_crs
 from mapfilter.tracks.combine import combine
@@ -148,9 +149,12 @@ def report_lines(result: Converted) -> list[str]:
         lines.append(f"{Path(file.file).name}: {file.program or file.format}, {file.clock}")
         for table in file.used:
             rate = "" if np.isnan(table.rate_hz) else f", {_rate(table.rate_hz)}"
-            many = f"{table.gaps} gap{'s' if table.gaps > 1 else ''}"
-            gaps = f", {many}, longest {table.longest_gap_s:.1f} s" if table.gaps else ""
-            lines.append(f"  {table.table}: {table.rows} rows{rate}{gaps}")
+            gaps = (
+                f", {number_of(table.gaps, 'gap')}, longest {table.longest_gap_s:.1f} s"
+                if table.gaps
+                else ""
+            )
+            lines.append(f"  {table.table}: {number_of(table.rows, 'row')}{rate}{gaps}")
         lines += [f"  not used: {text}" for text in file.where]
         lines += [f"  note: {text}" for text in file.notes]
     lines += [f"note: {note}" for note in result.notes]

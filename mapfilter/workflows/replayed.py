@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._words import number_of
 from mapfilter.evaluation.accuracy import Accuracy, Outcome
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
@@ -101,10 +102,10 @@ class ReplayResult:
         found = []
         unknown = _most_frequent(log.outcome.unknown_cells for log in self.logs)
         if unknown:
-            verb = "cell is" if len(unknown) == 1 else "cells are"
+            some = number_of(len(unknown), "cell is", "cells are")
             where = _named([log.name for log in self.logs if log.outcome.unknown_cells])
             found.append(
-                f"{len(unknown)} {verb} unknown to the database ({_named(list(unknown))}; in "
+                f"{some} unknown to the database ({_named(list(unknown))}; in "
                 f"{where}); their readings are labelled {Reason.UNKNOWN_CELL}"
             )
             found += sorted({f"unknown cells: {log.foreign}" for log in self.logs if log.foreign})

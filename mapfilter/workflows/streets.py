@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mapfilter._words import number_of
 from mapfilter.config.fields import SYNTHETIC_MAP, SYNTHETIC_MAPS
 from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
@@ -126,9 +127,9 @@ class Streets:
         if self.gaps:
             notes.append(self.gaps)
         if roads.cut_buildings and len(self.buildings):
-            notes.append(f"{len(self.buildings)} buildings cut out")
+            notes.append(f"{number_of(len(self.buildings), 'building')} cut out")
         if self._water is not None:
-            notes.append(f"{len(self._water)} waters cut out, save under bridges")
+            notes.append(f"{number_of(len(self._water), 'water')} cut out, save under bridges")
         return tuple(notes)
 
     @property

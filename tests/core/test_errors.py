@@ -53,7 +53,7 @@ def test_twenty_faults_are_shown_and_the_rest_are_counted(count, lines):
     assert len(shown) == lines
     assert shown[min(count, 20) - 1].startswith(names[min(count, 20) - 1])
     if count > 20:
-        assert shown[-1] == f"… and {count - 20} more faults"
+        assert shown[-1] == f"… and {count - 20} more {'fault' if count == 21 else 'faults'}"
 
 
 def test_of_faults_that_differ_in_their_numbers_three_are_shown():

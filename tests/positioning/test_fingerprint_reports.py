@@ -71,7 +71,7 @@ def test_a_log_becomes_a_report_for_each_time():
     # Between two known positions; not after the last.
     np.testing.assert_allclose(reports.east_m, [500_000, 500_010, np.nan])
     assert (reports.block == 4).all()
-    assert "1 readings left out: cell unknown" in reports.notes
+    assert "1 reading left out: cell unknown" in reports.notes
 
 
 def radio_rows(*rows, technology=None):

@@ -77,8 +77,8 @@ def test_bad_rows_and_levels_are_counted_and_lose_nothing_else(tmp_path):
     reports = read(tmp_path, text)
     assert len(reports) == 4
     assert [reports.cell_ids[c] for c in reports.readings(3)[0]] == ["WAP002"]
-    assert any("1 rows left out: too many fields" in note for note in reports.notes)
-    assert any("1 levels left out: not in -200..0 dBm" in note for note in reports.notes)
+    assert any("1 row left out: too many fields" in note for note in reports.notes)
+    assert any("1 level left out: not in -200..0 dBm" in note for note in reports.notes)
 
 
 def test_damaged_tables_are_read_or_refused(tmp_path, mutation_count):

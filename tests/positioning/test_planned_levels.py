@@ -227,4 +227,4 @@ def test_a_database_keeps_what_its_plan_assumes(tmp_path):
     assert found.sd_db[of_a] == pytest.approx(np.hypot(6.0, OWN_DB["eirp_dbm"]))
     assert found.sd_db[~of_a].tolist() == [6.0] * int((~of_a).sum())
     assert "usual values for what the plan lacks" in found.notes[0]
-    assert "eirp_dbm of 1 cells is that of a carrier" in found.notes[1]
+    assert "eirp_dbm of 1 cell is that of a carrier" in found.notes[1]

@@ -121,7 +121,7 @@ def test_bad_rows_of_public_lists_are_told_and_lose_nothing_else(tmp_path: Path)
     plan = _read(tmp_path, MLS + bad + again, layout="opencellid")
     assert plan.ids == ("244-91-801-1001", "244-5-33-70657")
     assert "3 faulty rows left out, such as" in plan.notes[-2]
-    assert plan.notes[-1] == "1 rows left out: cells listed already"
+    assert plan.notes[-1] == "1 row left out: cells listed already"
     said = _complaint(tmp_path, MLS.splitlines()[0] + "\n" + bad, layout="opencellid")
     assert "cell (ci): expected a whole number" in said
 
@@ -137,7 +137,7 @@ def test_one_identity_beyond_its_technology_costs_no_list(tmp_path: Path) -> Non
     assert (odd.technology, odd.ci, odd.eirp_dbm) == (None, 123456, 52.0)
     assert {cell.technology for cell in plan.cells} == {"LTE", None}
     assert any(
-        note.startswith("technology of 1 cells left out")
+        note.startswith("technology of 1 cell left out")
         and note.endswith("such as row 52, ci: expected 0..65535 in GSM, found 123456")
         for note in plan.notes
     )
@@ -182,7 +182,7 @@ def test_usual_values_of_public_lists_are_marked(tmp_path: Path) -> None:
     # RSRP is the power of one subcarrier.
     assert (gsm.eirp_dbm, lte.eirp_dbm) == (52.0, 22.5)
     assert gsm.assumes == lte.assumes == {"height_m", "azimuth_deg", "eirp_dbm"}
-    assert "eirp_dbm of 1 cells is lowered to the reported power (LTE 29.5 dB)" in plan.notes
+    assert "eirp_dbm of 1 cell is lowered to the reported power (LTE 29.5 dB)" in plan.notes
     write_cell_plan(plan, tmp_path / "again.csv")
     assert read_cell_plan(tmp_path / "again.csv", CRS).cells[1].assumes == lte.assumes
 

@@ -316,4 +316,4 @@ def test_a_set_and_a_plan_are_printed_in_one_line(written: Path) -> None:
     held = "level of 3 cells, 300 x 280 pixels of 5 m (1.4 x 1.5 km), EPSG:32635"
     assert repr(open_rasters(written)) == f"<RxLevRasters rxlev.tif: {held}>"
     cells = tuple(Cell(i, "S", 0.0, 0.0, 30.0, 0.0, 50.0, 1800.0) for i in IDS)
-    assert repr(CellPlan(LATTICE.crs, cells)) == "<CellPlan: 3 cells at 1 sites, EPSG:32635>"
+    assert repr(CellPlan(LATTICE.crs, cells)) == "<CellPlan: 3 cells at 1 site, EPSG:32635>"

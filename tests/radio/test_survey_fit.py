@@ -127,7 +127,7 @@ def test_an_antenna_is_located_where_it_is():
     assert cell.estimated
     assert np.hypot(*(np.array(cell.antenna) - ANTENNA)) < 25
     assert cell.trend.slope == pytest.approx(EXPONENT, abs=0.25)
-    assert survey.notes == ("1 antennas located from their levels",)
+    assert survey.notes == ("1 antenna located from their levels",)
 
 
 def test_an_antenna_of_the_plan_stays_where_it_is():
@@ -261,8 +261,8 @@ def test_few_points_are_left_out_or_take_the_mean():
     survey = fit_survey(rows, SurveyOptions())
     assert list(survey.cells) == ["B"]
     assert survey.cells["B"].antenna is None
-    assert survey.notes[0] == "1 cells left out: received in fewer than 3 squares"
-    assert "1 antennas not located (fewer than 15 squares)" in survey.notes[1]
+    assert survey.notes[0] == "1 cell left out: received in fewer than 3 squares"
+    assert "1 antenna not located (fewer than 15 squares)" in survey.notes[1]
     with pytest.raises(InputError, match="received in at least 9 squares, found 2 cells, none"):
         fit_survey(rows, SurveyOptions(min_points=9))
 

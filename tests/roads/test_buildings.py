@@ -44,7 +44,7 @@ def test_height_of_a_building(make_map, tags, height_m, source):
         "default": buildings.from_default,
     }
     assert counts == {**dict.fromkeys(counts, 0), source: 1}
-    assert "1 buildings" in buildings.height_sources
+    assert "1 building:" in buildings.height_sources
 
 
 @pytest.mark.parametrize(

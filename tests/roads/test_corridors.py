@@ -109,7 +109,7 @@ def test_standing_still_gaps_and_poor_positions():
     found = corridors(CRS, [Positions(east + jitter, north, accuracy_m)], 10.0)
     assert len(found.ways) == 2
     assert shapely.bounds(found.ways.geometry)[:, 3].max() < 5
-    assert found.notes[1:] == ("1 positions left out: less accurate than max_accuracy_m = 50 m",)
+    assert found.notes[1:] == ("1 position left out: less accurate than max_accuracy_m = 50 m",)
 
 
 def test_positions_that_are_left_out_are_counted_by_their_cause():

@@ -103,7 +103,7 @@ def test_a_raster_of_a_part_of_the_area_is_told(write):
 def test_a_value_below_zero_is_unknown_and_not_outside(write):
     values = VALUES.astype(np.int16)
     values[0, 0] = -1
-    with pytest.raises(InputError, match="value -1 at 1 points"):
+    with pytest.raises(InputError, match="value -1 at 1 point"):
         read_landuse(*write(values), LATTICE)
 
 
@@ -139,10 +139,10 @@ def test_unknown_values_and_colours_are_listed_with_their_counts(write):
     with pytest.raises(InputError) as caught:
         read_landuse(*write(odd), LATTICE)
     assert "value 9 at 3 points" in str(caught.value)
-    assert "value 77 at 1 points" in str(caught.value)
+    assert "value 77 at 1 point" in str(caught.value)
     bands = np.moveaxis(COLOURS[VALUES], -1, 0)
     bands[:, 0, 0] = 201, 11, 30
-    with pytest.raises(InputError, match="colour 201,11,30 at 1 points"):
+    with pytest.raises(InputError, match="colour 201,11,30 at 1 point"):
         read_landuse(*write(bands, table=COLOUR_TABLE), LATTICE)
 
 

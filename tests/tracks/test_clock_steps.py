@@ -215,7 +215,7 @@ def test_two_rows_out_of_order_are_no_clock():
     time_s[[60, 61]] = time_s[[61, 60]]
     log = make_log(CRS, motion=motion(time_s))
     assert notes_of(log) == []
-    assert any("out of order in 1 places, sorted by time" in note for note in log.notes)
+    assert any("out of order in 1 place, sorted by time" in note for note in log.notes)
     np.testing.assert_allclose(log.motion["time_s"], np.arange(120.0))
 
 

@@ -195,7 +195,7 @@ def test_motion_after_a_pause_is_unknown():
     assert np.isnan(motion["step_m"][20])
     assert motion["step_m"].sum() == pytest.approx(38 * 0.8)
     assert imu.sigma_trans_m < 0.5
-    assert any("unknown in 1 rows" in note for note in notes)
+    assert any("unknown in 1 row:" in note for note in notes)
 
 
 def test_a_step_after_standing_goes_where_the_compass_last_pointed():

@@ -144,7 +144,7 @@ def test_a_turn_that_is_missing_is_unknown_and_told():
     turn[9] = np.nan
     motion, _, notes = reckon_counted({"steps": STEPS, "turns": turns(turn)})
     assert np.flatnonzero(motion["turn_rad"].isna()).tolist() == [0, 9]
-    assert any("no turn known in 1 rows" in note for note in notes)
+    assert any("no turn known in 1 row with steps" in note for note in notes)
 
 
 def test_rows_of_reports_between_rows_of_motion_have_no_turn(tmp_path):

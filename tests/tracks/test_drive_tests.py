@@ -117,9 +117,9 @@ def test_bad_nemo_lines_are_counted_and_located(read):
 def test_what_nemo_events_are_not_read_is_told(read):
     other = "OFDMSCAN,13:00:00.000,,7,1\nCELLMEAS,13:00:00.000,,9,0,1,9\nRRCSM,13:00:00.000,,7\n"
     notes = read(START + LTE.format(at="13:00:00.000") + other).notes
-    assert "1 rows of scanners are not read" in notes
-    assert "1 CELLMEAS of other systems (NR, CDMA, …) are not read" in notes
-    assert "1 events of 1 other kinds are not used" in notes
+    assert "1 row of scanners is not read" in notes
+    assert "1 CELLMEAS of other systems (NR, CDMA, …) is not read" in notes
+    assert "1 event of 1 other kind is not used" in notes
 
 
 @pytest.mark.parametrize("name", ["nemo", "tems", "tems/lte"])

@@ -99,7 +99,7 @@ def test_notes_count_what_was_named_and_what_the_plan_lacks():
     assert again.radio["cell"].tolist() == ["gsm", "gsm", "lte", "lte", "244-91-1-2"]
     assert again.notes[-2:] == (
         "radio: 3 rows of 2 cells named by the plan's identities",
-        "radio: 1 rows of 1 cells that the plan lacks (244-91-1-2)",
+        "radio: 1 row of 1 cell that the plan lacks (244-91-1-2)",
     )
     assert log.radio["cell"].iloc[0] == "244-91-3021-117"
 

@@ -158,7 +158,7 @@ def test_unknown_and_unhealthy_satellites_are_noted():
     log = make_log(CRS, pseudoranges=bare, almanac=sick, start_utc_s=START)
     assert log.pseudoranges[PLACE].isna().all(axis=None)
     assert [note.partition(": ")[2] for note in log.notes] == [
-        "E19 is not in the almanac, 1 rows without a place",
+        "E19 is not in the almanac, 1 row without a place",
         "G07 is not healthy, 2 rows without a place",
     ]
 

@@ -84,7 +84,7 @@ def test_what_is_no_table_is_refused():
 
 def test_a_log_shows_itself_in_a_line():
     log = make_log(CRS, motion=pd.DataFrame({"time_s": [2.0, 1.0], **STEPS}))
-    assert repr(log) == "TrackLog(EPSG:32635, 1.0 s; rows: motion 2; 1 notes)"
+    assert repr(log) == "TrackLog(EPSG:32635, 1.0 s; rows: motion 2; 1 note)"
     assert repr(make_log(CRS)) == "TrackLog(EPSG:32635, 0.0 s; rows: none)"
 
 

@@ -82,12 +82,12 @@ def test_a_few_levels_out_of_range_and_bad_rows_are_notes_of_the_log(walk, read)
     table = pd.concat([table, table.iloc[[20]]]).assign(mood=7)
     notes = read(table).notes
     for told in (
-        "phone.csv: not used: 1 rows: lat_deg: not degrees in -90..90",
-        "phone.csv: radio, level_dbm: 1 values are not dBm in -200..0, ignored (first in line 5)",
-        "phone.csv: compass_deg: 1 values are no numbers, taken as missing",
+        "phone.csv: not used: 1 row: lat_deg: not degrees in -90..90",
+        "phone.csv: radio, level_dbm: 1 value is not dBm in -200..0, ignored (first in line 5)",
+        "phone.csv: compass_deg: 1 value is no number, taken as missing",
         "phone.csv: columns not used: mood; see --column",
-        "phone.csv: radio: times go backwards in 1 places; sorted",
-        "phone.csv: radio: 1 exact duplicate rows dropped",
+        "phone.csv: radio: times go backwards in 1 place; sorted",
+        "phone.csv: radio: 1 exact duplicate row dropped",
     ):
         assert any(note.startswith(told) for note in notes), told
     assert not any(note.startswith("phone.csv: ") for note in read(walk).notes)

@@ -127,7 +127,7 @@ def test_ephemerides_of_all_constellations_are_on_one_time(written):
     assert rows["toc_s"].tolist() == [2416 * 604_800 + 468_000.0] * 3
     recording = read_recording(written("rinex-nav/3"))
     assert recording.tables["ionosphere"].iloc[0].tolist()[:2] == [4.657e-9, 1.49e-8]
-    assert recording.notes == ("1 messages of GLONASS, SBAS or NavIC are not used",)
+    assert recording.notes == ("1 message of GLONASS, SBAS or NavIC is not used",)
 
 
 def test_what_is_no_whole_number_is_missing(written):

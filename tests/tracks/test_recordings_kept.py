@@ -58,7 +58,7 @@ def test_a_stray_value_among_units_costs_its_level_only(stray, low, upload):
     level_dbm = found.tables["radio"]["level_dbm"]
     assert level_dbm.isna().sum() == 1
     assert (level_dbm.dropna() == np.delete(levels, 17) - 140).all()
-    assert any("1 levels as ASU" in note for note in found.ignored)
+    assert any("1 level as ASU" in note for note in found.ignored)
 
 
 def test_weak_units_with_many_odd_ones_are_no_levels_without_sign(upload):

@@ -90,8 +90,8 @@ def test_unsorted_rows_are_sorted_and_duplicates_counted():
     assert log.motion.index.tolist() == [0, 1, 2]
     assert log.notes == (
         "read from a file",
-        "motion: 1 exact duplicate rows dropped",
-        "motion: out of order in 1 places, sorted by time",
+        "motion: 1 exact duplicate row dropped",
+        "motion: out of order in 1 place, sorted by time",
     )
 
 
@@ -248,7 +248,7 @@ def test_rows_out_of_order_are_no_clock():
     time_s = np.arange(100.0)
     time_s[[40, 41]] = time_s[[41, 40]]
     swapped = make_log(CRS, motion=pd.DataFrame({"time_s": time_s, "step_m": 1.0}))
-    assert swapped.notes == ("motion: out of order in 1 places, sorted by time",)
+    assert swapped.notes == ("motion: out of order in 1 place, sorted by time",)
     shuffled = np.random.default_rng(0).permutation(100).astype(float)
     log = make_log(CRS, motion=pd.DataFrame({"time_s": shuffled, "step_m": 1.0}))
     assert "out of order" in log.notes[0]

@@ -102,7 +102,7 @@ def test_a_hand_made_folder_needs_only_the_crs(tmp_path):
     log = read_log(tmp_path)
     assert log.motion["step_m"].tolist() == [1.4, 1.5]
     assert len(log.radio) == 0
-    assert log.notes == (f"{tmp_path / 'motion.csv'}: out of order in 1 places, sorted by time",)
+    assert log.notes == (f"{tmp_path / 'motion.csv'}: out of order in 1 place, sorted by time",)
 
 
 @pytest.mark.parametrize("form", ["parquet", "csv"])

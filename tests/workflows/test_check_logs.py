@@ -32,7 +32,7 @@ def test_cells_that_the_plan_lacks(check, log):
     change(log / "radio.csv", cell=lambda c: c.where(c != "A", "X"))
     found = check(log)["log-cells-unknown"]
     assert found["severity"] == "warning"
-    assert "1 serving cells that the plan lacks: X." in found["evidence"]
+    assert "1 serving cell that the plan lacks: X." in found["evidence"]
     change(log / "radio.csv", cell=lambda c: c.where(c.isna(), "X"))
     assert check(log)["log-cells-unknown"]["severity"] == "error"
     change(log / "radio.csv", cell=lambda c: c.where(c.isna()), arfcn=lambda n: n.where(n.isna()))

@@ -54,9 +54,9 @@ def test_rows_and_values_that_are_not_used_are_told(phone, replay, tmp_path):
     done = replay(phone)
     assert done.code == 0, done.err
     told = (
-        "phone.csv: not used: 1 rows: lat_deg: not degrees in -90..90 (likely: latitude and "
+        "phone.csv: not used: 1 row: lat_deg: not degrees in -90..90 (likely: latitude and "
         "longitude swapped) (line 7)",
-        "phone.csv: radio, level_dbm: 1 values are not dBm in -200..0, ignored (first in line 5)",
+        "phone.csv: radio, level_dbm: 1 value is not dBm in -200..0, ignored (first in line 5)",
     )
     assert done.err.splitlines() == [f"mapfilter: {line}" for line in told]
     figures = json.loads((tmp_path / "out" / "figures.json").read_text())

@@ -177,7 +177,7 @@ def test_notes_of_a_log_are_told(log, replay):
     assert_done(replay(log))
     told = [
         f"{log / 'motion.txt'}: not a table of a log, not read",
-        f"{log / 'motion.csv'}: out of order in 1 places, sorted by time",
+        f"{log / 'motion.csv'}: out of order in 1 place, sorted by time",
     ]
     assert assert_done(replay(log, "--json")).json["notes"] == told
     assert f"notes:\n  {told[0]}\n  {told[1]}\n" in replay(log).out

@@ -281,7 +281,7 @@ def test_places_where_no_satellite_can_be_are_left_out(made, tmp_path):
     text = "\n".join(line for line in text.splitlines() if not line.startswith("point3"))
     (path,) = made("smartloc", smartloc=text.replace("4819715.57", "x", 1))
     result = converted([path], tmp_path / "log")
-    assert "pseudoranges: 1 places of satellites are none, left out" in result.notes
+    assert "pseudoranges: 1 place of a satellite is none, left out" in result.notes
     assert read_log(tmp_path / "log").pseudoranges["x_m"].isna().sum() == 1
 
 

@@ -91,7 +91,7 @@ def test_all_commands_run_without_a_map(town, tmp_path):
     assert predicted["notes"][0].startswith("2 buildings: height from the map for 1")
     built = assert_done(mapfilter("build", *arguments, "--json")).json
     assert "2 buildings cut out" in built["notes"]
-    assert "1 waters cut out, save under bridges" in built["notes"]
+    assert "1 water cut out, save under bridges" in built["notes"]
     database = open_database(tmp_path / "database")
     roles = [entry["role"] for entry in database.manifest["inputs"]]
     assert roles.count("roads") == 1

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.scans import SCAN_S, advertised, scan_of_rows
@@ -31,7 +32,7 @@ def reports_of_log(log: TrackLog, block: int = -1) -> Reports:
     if count < log.radio["time_s"].nunique():
         notes.append(f"readings of one scan, less than {SCAN_S:g} s apart, are one report")
     if not known.all():
-        notes.append(f"{int((~known).sum())} readings left out: cell unknown")
+        notes.append(f"{number_of(int((~known).sum()), 'reading')} left out: cell unknown")
     cell = radio["cell"].to_numpy(object)
     is_serving = known & (radio["role"] == SERVING).to_numpy(np.bool_)
     serving = np.full(count, "", dtype=object)

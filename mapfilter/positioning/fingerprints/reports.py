@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints, Ints8, Ints32
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import same_crs
 from mapfilter.positioning.fingerprints.planned import Planned
@@ -132,7 +133,7 @@ class Reports:
         if kept.all():
             return self.compact()
         count = int((~kept).sum())
-        note = f"{count} reports left out: no position, or nothing received"
+        note = f"{number_of(count, 'report')} left out: no position, or nothing received"
         return self.some(kept, note).compact()
 
     def compact(self) -> Reports:
@@ -236,7 +237,9 @@ def make_reports(
     again[1:] = (which[1:] == which[:-1]) & (index[1:] == index[:-1])
     found = list(notes)
     if again.any():
-        found.append(f"{int(again.sum())} readings left out: a cell twice in one report")
+        found.append(
+            f"{number_of(int(again.sum()), 'reading')} left out: a cell twice in one report"
+        )
         which, index = which[~again], index[~again]
         level, error, bound = level[~again], error[~again], bound[~again]
     served_index = np.where(served == "", -1, np.searchsorted(cell_ids, served))

@@ -18,6 +18,7 @@ import pandas as pd
 from mapfilter._arguments import check_path
 from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
@@ -82,7 +83,9 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
     levels, received, odd = _checked(levels, received)
     if odd:
         low, high = _LEVEL_DBM
-        notes.append(f"{path.name}: {odd} levels left out: not in {low:g}..{high:g} dBm")
+        notes.append(
+            f"{path.name}: {number_of(odd, 'level')} left out: not in {low:g}..{high:g} dBm"
+        )
     if not received.any():
         expected = f"levels in dBm, {NOT_RECEIVED_DBM:g} where not received"
         raise fail(InputError, str(path), expected, "none", "another kind of table")
@@ -114,7 +117,7 @@ def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     notes = []
     if len(kept) < len(lines) - 1:
         count = len(lines) - 1 - len(kept)
-        notes = [f"{path.name}: {count} rows left out: too many fields"]
+        notes = [f"{path.name}: {number_of(count, 'row')} left out: too many fields"]
     if not kept:
         raise fail(InputError, str(path), f"{expected} and rows", "no rows", "cut off")
     try:

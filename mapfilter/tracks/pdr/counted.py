@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -99,7 +100,7 @@ def reckon_counted(
     counted, how = _counted(time_s, rows["count"].to_numpy(dtype=np.float64))
     unknown = int(np.isnan(counted).sum())
     if not np.nansum(counted) > 0:
-        reason = f"the step counter stands still in {len(rows)} rows: no motion"
+        reason = f"the step counter stands still in {number_of(len(rows), 'row')}: no motion"
         return None, None, (f"{reason} (steps of each row alone are given as step_m)",)
     if "compass" in sensors:
         course, reason = _by_compass(time_s, counted, sensors, options, convergence_rad)
@@ -119,12 +120,13 @@ def reckon_counted(
         f"motion: {np.nansum(counted):.0f} steps of {options.step_m:g} m {how}, {course.source}"
     ]
     if unknown:
-        notes.append(f"motion unknown in {unknown} rows: the counter jumped, or paused for 30 s")
+        some = number_of(unknown, "row")
+        notes.append(f"motion unknown in {some}: the counter jumped, or paused for 30 s")
     aimless = motion["heading_rad"].isna() & motion["turn_rad"].isna() & (motion["step_m"] > 0)
     # Before the first row there is no turn.
     without = int(aimless.iloc[0 if "compass" in sensors else 1 :].sum())
     if without:
-        notes.append(f"{course.unknown} {without} rows with steps")
+        notes.append(f"{course.unknown} {number_of(without, 'row')} with steps")
     return motion, _errors(motion, options, course.walk_rad), (*notes, *course.notes)
 
 

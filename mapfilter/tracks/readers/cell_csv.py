@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter._words import number_of
 from mapfilter.radio.asu import UNKNOWN_ASU
 from mapfilter.radio.identities import technology
 from mapfilter.tracks.readers.columns import (
@@ -154,11 +155,13 @@ def _levels(rows: Columns, reading: Reading, families: np.ndarray, dialect: _Dia
     left = np.isnan(level) & (given > 0) & (given < _UNAVAILABLE) & ~np.isin(given, UNKNOWN_ASU)
     if left.any():
         reading.ignore(
-            f"radio, level_dbm: {int(left.sum())} levels as ASU of an unknown technology, or "
-            f"beyond those of theirs, ignored (first in line {rows.line[left][0]})"
+            f"radio, level_dbm: {number_of(int(left.sum()), 'level')} as ASU of an unknown "
+            f"technology, or beyond those of theirs, ignored (first in line {rows.line[left][0]})"
         )
     if turned:
-        reading.note(f"radio, level_dbm: {turned} levels given as ASU, turned into dBm")
+        reading.note(
+            f"radio, level_dbm: {number_of(turned, 'level')} given as ASU, turned into dBm"
+        )
     return level
 
 

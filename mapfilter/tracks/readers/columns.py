@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, good_lines, parsed
 from mapfilter.tracks.readers.recording import Reading
 from mapfilter.tracks.readers.times import (
@@ -193,7 +194,8 @@ class Columns:
         examples = pc.unique(pc.filter(column, odd))[:2].to_pylist()
         self.reading.tallies.add_texts(name, part, pc.sum(good).as_py() + count, count, examples)
         if bad:
-            self.reading.ignore(f"{name}: {bad} values are no numbers, taken as missing")
+            some = number_of(bad, "value is no number", "values are no numbers")
+            self.reading.ignore(f"{name}: {some}, taken as missing")
         column = pc.replace_substring_regex(column, r"^\+", "")
         return pc.cast(pc.if_else(good, column, None), kind)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.radio.identities import technology
 from mapfilter.tracks.readers.columns import (
     Columns,
@@ -60,7 +61,8 @@ def _add_positions(
     new = np.ones(len(rows), dtype=bool)
     new[1:] = (np.diff(lat) != 0) | (np.diff(lon) != 0)
     if (repeats := int((~new).sum())) > 0:
-        reading.note(f"positions: {repeats} rows repeat the position before, left out")
+        some = number_of(repeats, "row repeats", "rows repeat")
+        reading.note(f"positions: {some} the position before, left out")
     columns = {
         "time_s": time_s,
         "lat_deg": lat,

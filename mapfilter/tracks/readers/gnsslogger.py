@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 
 from mapfilter._types import Ints
+from mapfilter._words import number_of
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.tracks.readers.columns import Columns, line_columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
@@ -83,7 +84,8 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
             if known in tables:
                 _add_sensor(tables[known], reading, sensor, known.lower(), unit, suffix)
     for kind, count in sorted(ignored.items()):
-        reading.note(f"{count} rows of {kind!r} are not used")
+        some = number_of(count, f"row of {kind!r} is", f"rows of {kind!r} are")
+        reading.note(f"{some} not used")
 
 
 def _has(data: bytes, kind: str) -> bool:

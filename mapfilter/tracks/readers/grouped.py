@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from mapfilter._words import number_of
 from mapfilter.tracks.readers.columns import Columns, line_columns
 from mapfilter.tracks.readers.recording import Reading
 
@@ -36,7 +37,7 @@ def group_lines(
         else:
             reading.refuse(number, "no line of this format")
     for kind, count in sorted(others.items())[:20]:
-        reading.note(f"{count} rows of {kind!r} are not used")
+        reading.note(f"{number_of(count, f'row of {kind!r} is', f'rows of {kind!r} are')} not used")
     return groups
 
 

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.radio.identities import LIMITS, parse_cgi
 from mapfilter.tracks.readers.recording import Reading
 
@@ -84,8 +85,9 @@ def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) ->
         for name, most in limits.items():
             bad = of & ~np.isnan(given[name]) & ~((given[name] >= 0) & (given[name] <= most))
             if bad.any():
+                some = number_of(int(bad.sum()), "value is", "values are")
                 reading.ignore(
-                    f"radio, {name}: {int(bad.sum())} values are not 0..{most} as in {family}, "
+                    f"radio, {name}: {some} not 0..{most} as in {family}, "
                     f"ignored (first in line {line[bad][0]})"
                 )
                 given[name] = np.where(bad, np.nan, given[name])

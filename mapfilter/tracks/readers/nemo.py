@@ -35,6 +35,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from mapfilter._types import Ints
+from mapfilter._words import number_of
 from mapfilter.tracks.readers.columns import only
 from mapfilter.tracks.readers.events import Events, read_events
 from mapfilter.tracks.readers.format import Format, ReadOptions
@@ -128,12 +129,16 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         }
         others["CELLMEAS"] = others.get("CELLMEAS", 0) + _add_cells(events, reading, known)
     if count := others.pop("CELLMEAS", 0):
-        reading.note(f"{count} CELLMEAS of other systems (NR, CDMA, …) are not read")
+        verb = "is" if count == 1 else "are"
+        reading.note(f"{count} CELLMEAS of other systems (NR, CDMA, …) {verb} not read")
     if count := sum(others.pop(name, 0) for name in _SCANNERS):
-        reading.note(f"{count} rows of scanners are not read")
+        reading.note(f"{number_of(count, 'row of scanners is', 'rows of scanners are')} not read")
     others = {name: count for name, count in others.items() if not name.startswith("#")}
     if others:
-        reading.note(f"{sum(others.values())} events of {len(others)} other kinds are not used")
+        some = number_of(sum(others.values()), "event")
+        kinds = number_of(len(others), "other kind")
+        verb = "is" if some == "1 event" else "are"
+        reading.note(f"{some} of {kinds} {verb} not used")
 
 
 def _midnight_s(head: str) -> float | None:

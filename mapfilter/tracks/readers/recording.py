@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.tracks.readers.recorded_values import (
     checked_values,
@@ -68,10 +69,9 @@ class Unusable:
 
     def __str__(self) -> str:
         more = ", …" if self.count > len(self.lines) else ""
-        plural = "line" if self.count == 1 else "lines"
-        return (
-            f"{self.count} rows: {self.reason} ({plural} {', '.join(map(str, self.lines))}{more})"
-        )
+        lines = "line" if self.count == 1 else "lines"
+        where = f"{lines} {', '.join(map(str, self.lines))}{more}"
+        return f"{number_of(self.count, 'row')}: {self.reason} ({where})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +205,7 @@ class Reading:
             checked = {name: values[good] for name, values in checked.items()}
         rows = pd.DataFrame(checked, copy=False)
         if "time_s" in rows and (back := int(np.sum(np.diff(rows["time_s"].to_numpy()) < 0))):
-            self.note(f"{table}: times go backwards in {back} places; sorted")
+            self.note(f"{table}: times go backwards in {number_of(back, 'place')}; sorted")
         self.tables.setdefault(table, []).append(rows)
 
     def _check(
@@ -233,10 +233,8 @@ class Reading:
             return ~missing & ~outside
         if (ignored := good & outside).any():
             first = line[ignored][0]
-            self.ignore(
-                f"{label}: {int(ignored.sum())} values are not {known.expected}, ignored "
-                f"(first in line {first})"
-            )
+            some = number_of(int(ignored.sum()), "value is", "values are")
+            self.ignore(f"{label}: {some} not {known.expected}, ignored (first in line {first})")
             checked[known.name] = np.where(outside, np.nan, values)
         return np.ones(len(line), dtype=bool)
 
@@ -247,7 +245,8 @@ class Reading:
         values = self.tallies.winding(table, known).unwound(values, outside)
         left = outside & ~(np.abs(values) <= known.high)
         if count := int(np.count_nonzero(outside & ~left)):
-            self.note(f"{table}, {known.name}: {count} values beyond a turn, wrapped (unwrapped)")
+            some = number_of(count, "value")
+            self.note(f"{table}, {known.name}: {some} beyond a turn, wrapped (unwrapped)")
         return values, left
 
     def _in_era(self, time_s: Floats, line: Ints, good: Bools) -> Bools:
@@ -314,7 +313,9 @@ class Reading:
         if (np.diff(time) == 0).any():
             duplicate = duplicates(rows)
             if duplicate.any():
-                self.note(f"{table}: {int(duplicate.sum())} exact duplicate rows dropped")
+                self.note(
+                    f"{table}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped"
+                )
                 rows = rows[~duplicate].reset_index(drop=True)
         return rows
 
@@ -324,5 +325,5 @@ def nothing_usable(
 ) -> MapfilterError:
     """Return the error for a file of which no row can be used, with the main reasons."""
     reasons = "; ".join(str(found) for found in list(refused)[:3])
-    got = f"none in {rows} rows" + (f": {reasons}" if reasons else "")
+    got = f"none in {number_of(rows, 'row')}" + (f": {reasons}" if reasons else "")
     return fail(InputError, str(path), f"a usable {rows_word} of {name}", got)

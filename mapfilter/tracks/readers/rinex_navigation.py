@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._words import number_of
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.rinex import (
@@ -69,7 +70,8 @@ def _read_navigation(text: Text, reading: Reading, options: ReadOptions) -> None
         rows.append(row)
         numbers.append(number)
     if other:
-        reading.note(f"{other} messages of GLONASS, SBAS or NavIC are not used")
+        some, verb = number_of(other, "message"), "is" if other == 1 else "are"
+        reading.note(f"{some} of GLONASS, SBAS or NavIC {verb} not used")
     if rows:
         columns: dict[str, Any] = {name: [row[name] for row in rows] for name in rows[0]}
         reading.add("ephemerides", columns, numbers)
