@@ -130,6 +130,21 @@ def test_more_levels_than_slots_are_left_out():
     np.testing.assert_allclose(found, expected, rtol=0, atol=5e-5)
 
 
+def test_a_serving_cell_of_little_weight_and_hypotheses_on_the_edge():
+    state, log_weight = particles()
+    model = BayesModel(make_area())
+    east_m, north_m = model.area.size_m
+    state[:2, :4] = [[0.0, east_m, 30.0, 30.0], [30.0, 30.0, 0.0, north_m]]
+    step, nothing = DeviceStep(model, DEVICE), Cloud(state, np.empty((0, COUNT), np.float32))
+    reading = RadioReading(1, 0.4)
+    expected, found = log_weight.copy(), log_weight.copy()
+    model.weigh(nothing, expected, reading)
+    _, reason = step.weigh(nothing, found, reading)
+    assert reason is Reason.USED
+    assert np.ptp(expected - log_weight) > 0.1
+    np.testing.assert_allclose(found, expected, rtol=0, atol=5e-5)
+
+
 def test_bounds_and_ambiguous_levels():
     state, log_weight = particles()
     model = BayesModel(make_area())

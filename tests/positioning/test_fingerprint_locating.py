@@ -79,6 +79,19 @@ def test_a_report_without_evidence_has_a_reason_and_no_position(floor):
     assert "error_mean_m" not in figures
 
 
+def test_figures_tell_how_often_radii_hold_the_true_position(floor):
+    found = mf.locate_reports(floor[1], floor[0], "knn")
+    error_m = np.linspace(0.0, 8.0, len(found))
+    radii_m = np.tile([1.0, 2.0, 6.0], (len(found), 1))
+    figures = figures_of(replace(found, error_m=error_m, radii_m=radii_m))
+    shares = [float(np.mean(error_m <= radius_m)) for radius_m in (1.0, 2.0, 6.0)]
+    assert [figures[f"within_{level}"] for level in (50, 67, 95)] == pytest.approx(shares)
+    assert 0 < shares[0] < shares[1] < shares[2] < 1
+    radii_m[3] = np.nan
+    unknown = figures_of(replace(found, error_m=error_m, radii_m=radii_m))
+    assert np.isnan([unknown[f"within_{level}"] for level in (50, 67, 95)]).all()
+
+
 def test_cross_validation_is_leaving_out_by_hand(floor):
     known = floor[0].placed()
     fold, _ = folds_of(known)

@@ -140,10 +140,14 @@ def test_steps_are_counted_until_one_changes_nothing():
 class Backwards:
     """A measurement whose derivative has the wrong sign: each step leads away."""
 
+    def __init__(self):
+        self.derivatives = 0
+
     def mean(self, state):
         return np.asarray(state)
 
     def jacobian(self, state):
+        self.derivatives += 1
         return -np.eye(len(state))
 
     def covariance(self):
@@ -151,8 +155,10 @@ class Backwards:
 
 
 def test_steps_that_never_end_are_given_up():
-    fix = static_fix(Backwards(), [3.0, 4.0], [0.0, 0.0])
+    backwards = Backwards()
+    fix = static_fix(backwards, [3.0, 4.0], [0.0, 0.0])
     assert (fix.ok, fix.problem, fix.iterations) == (False, NOT_CONVERGED, 50)
+    assert backwards.derivatives == 50
     assert np.isnan(fix.state).all()
 
 
