@@ -135,10 +135,9 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         reading.note(f"{number_of(count, 'row of scanners is', 'rows of scanners are')} not read")
     others = {name: count for name, count in others.items() if not name.startswith("#")}
     if others:
-        some = number_of(sum(others.values()), "event")
-        kinds = number_of(len(others), "other kind")
-        verb = "is" if some == "1 event" else "are"
-        reading.note(f"{some} of {kinds} {verb} not used")
+        count, kinds = sum(others.values()), number_of(len(others), "other kind")
+        some = number_of(count, f"event of {kinds} is", f"events of {kinds} are")
+        reading.note(f"{some} not used")
 
 
 def _midnight_s(head: str) -> float | None:
