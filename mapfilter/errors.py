@@ -21,6 +21,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
+from mapfilter._words import number_of
+
 _MAX_SHOWN = 20
 _MAX_ALIKE = 3
 _NUMBER = re.compile(r"[0-9]+")
@@ -60,8 +62,8 @@ class MapfilterError(Exception):
         shown = 0
         for faults in alike.values():
             if len(lines) + min(len(faults), _MAX_ALIKE) > _MAX_SHOWN:
-                left = len(self.faults) - shown
-                lines.append(f"… and {left} more {'fault' if left == 1 else 'faults'}")
+                left = number_of(len(self.faults) - shown, "more fault")
+                lines.append(f"… and {left}")
                 break
             lines += [str(fault) for fault in faults[:_MAX_ALIKE]]
             shown += len(faults)

@@ -98,7 +98,7 @@ def compile_summaries() -> None:
 
 
 def compile_resampling() -> None:
-    """Compile resampling, the protection level, the way that a belief lies on, single reports."""
+    """Compile resampling, the protection level, and the way that a belief lies on."""
     model, cloud, log_weight = _made()
     weight, chosen = np.empty(_PARTICLES, dtype=np.float32), np.empty(_PARTICLES, dtype=np.int32)
     normalise(log_weight, weight)
@@ -109,11 +109,13 @@ def compile_resampling() -> None:
     jitter, copies = np.ones(STATES, dtype=np.float32), np.empty_like(cloud.state)
     key = draw_key(np.random.default_rng(0))
     copy_with_jitter(0, _PARTICLES, cloud.state, chosen, jitter, key, copies)
-    # Not of the filter: a replay locates single reports beside it.
-    one, number = np.zeros(1), np.zeros(1, dtype=np.int64)
-    reading = (-60.0, 0.0, 0.0)
-    add_reading(number, one, one, one + 1.0, one, reading, np.zeros(1), np.zeros((4, 1)))
     systematic(weight, 0.5, chosen)
+
+
+def compile_reports() -> None:
+    """Compile the location of single reports, which a replay does beside the filter."""
+    one, number, reading = np.ones(1), np.zeros(1, dtype=np.int64), (-60.0, 0.0, 0.0)
+    add_reading(number, one, one, one, one, reading, np.zeros(1), np.zeros((4, 1)))
 
 
 def compile_gaussian() -> None:
@@ -146,8 +148,8 @@ def compile_all() -> None:
 
 
 # The longest first; what each compiles last shows that it has ended.
-_TASKS = (compile_motion, compile_evidence, compile_summaries, compile_resampling)
-_LAST: tuple[Any, ...] = (all_inside, weigh_by_bound, flattened, systematic)
+_TASKS = (compile_motion, compile_evidence, compile_summaries, compile_resampling, compile_reports)
+_LAST: tuple[Any, ...] = (all_inside, weigh_by_bound, flattened, systematic, add_reading)
 
 
 def _is_kept(kernel: Any) -> bool:

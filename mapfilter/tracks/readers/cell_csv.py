@@ -156,7 +156,7 @@ def _levels(rows: Columns, reading: Reading, families: np.ndarray, dialect: _Dia
     if left.any():
         reading.ignore(
             f"radio, level_dbm: {number_of(int(left.sum()), 'level')} as ASU of an unknown "
-            f"technology, or beyond those of theirs, ignored (first in line {rows.line[left][0]})"
+            f"technology, or beyond its scale, ignored (first in line {rows.line[left][0]})"
         )
     if turned:
         reading.note(

@@ -129,8 +129,8 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         }
         others["CELLMEAS"] = others.get("CELLMEAS", 0) + _add_cells(events, reading, known)
     if count := others.pop("CELLMEAS", 0):
-        verb = "is" if count == 1 else "are"
-        reading.note(f"{count} CELLMEAS of other systems (NR, CDMA, …) {verb} not read")
+        what = "CELLMEAS of other systems (NR, CDMA, …)"
+        reading.note(f"{number_of(count, f'{what} is', f'{what} are')} not read")
     if count := sum(others.pop(name, 0) for name in _SCANNERS):
         reading.note(f"{number_of(count, 'row of scanners is', 'rows of scanners are')} not read")
     others = {name: count for name, count in others.items() if not name.startswith("#")}

@@ -70,8 +70,9 @@ def _read_navigation(text: Text, reading: Reading, options: ReadOptions) -> None
         rows.append(row)
         numbers.append(number)
     if other:
-        some, verb = number_of(other, "message"), "is" if other == 1 else "are"
-        reading.note(f"{some} of GLONASS, SBAS or NavIC {verb} not used")
+        systems = "GLONASS, SBAS or NavIC"
+        some = number_of(other, f"message of {systems} is", f"messages of {systems} are")
+        reading.note(f"{some} not used")
     if rows:
         columns: dict[str, Any] = {name: [row[name] for row in rows] for name in rows[0]}
         reading.add("ephemerides", columns, numbers)
