@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import open_database
-from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.errors import Faults, InputError, MapfilterError, fail
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import (
     is_table,
@@ -42,6 +42,9 @@ def read_database(
     MapfilterError
         There is none of these, or it is damaged.
     """
+    if not path.exists():
+        expected = "a radio-route database, or logs or a table of reports whose places are known"
+        raise fail(InputError, str(path), expected, "nothing", "a mistyped path")
     if (path / MANIFEST).is_file():
         opened = open_database(path)
         return reports_of_database(opened, level_error_db), opened.plan

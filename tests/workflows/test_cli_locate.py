@@ -155,6 +155,12 @@ def test_faults_of_both_inputs_are_reported_together(tmp_path):
     assert_refused(outcome, "no-db", "no-log")
 
 
+def test_a_database_that_does_not_exist_is_told_as_one(folder, tmp_path):
+    told = f"{tmp_path / 'none'}: expected a radio-route database, or logs or a table of reports"
+    options = ("--db", str(tmp_path / "none"), "--log", str(folder / "walk"))
+    assert_refused(mapfilter("locate", *options, "--out", str(tmp_path / "out")), told)
+
+
 def test_a_log_without_truth_is_no_database(folder):
     outcome = mapfilter("locate", "--db", folder / "blind", "--log", folder / "walk")
     assert_refused(outcome, "reports with positions")
