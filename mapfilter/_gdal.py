@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -57,17 +58,42 @@ def open_raster(path: Path, *, quiet: bool = True) -> Iterator[Any]:
     """
     _check_sidecars(path)
     try:
-        with warnings.catch_warnings():
-            if quiet:
-                warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            # The absolute path, as GDAL takes a name such as "GTIFF_DIR:1:a.tif" for a command.
-            source = rasterio.open(path.absolute(), driver="GTiff")
-        with source:
-            _check_inside(path, source)
-            check_blocks(path, source)
-            yield source
+        with _unreadable_messages_unheard():
+            with warnings.catch_warnings():
+                if quiet:
+                    warnings.simplefilter("ignore", NotGeoreferencedWarning)
+                # The absolute path, as GDAL takes a name such as "GTIFF_DIR:1:a.tif" for a command.
+                source = rasterio.open(path.absolute(), driver="GTiff")
+            with source:
+                _check_inside(path, source)
+                check_blocks(path, source)
+                yield source
     except UnicodeDecodeError as error:
         raise RasterioError(f"names or notes in no UTF-8 ({error.reason})") from error
+
+
+@contextmanager
+def _unreadable_messages_unheard() -> Iterator[None]:
+    """Let nothing be printed where GDAL complains in bytes that are no text.
+
+    Rasterio hands on GDAL's messages. Where one quotes such bytes of the file, it can raise nothing
+    and has Python print a traceback of its own, through both hooks.
+    """
+    before = sys.excepthook, sys.unraisablehook
+
+    def raised(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        if not issubclass(kind, UnicodeDecodeError):
+            before[0](kind, error, trace)
+
+    def unraisable(found: Any) -> None:
+        if not isinstance(found.exc_value, UnicodeDecodeError):
+            before[1](found)
+
+    sys.excepthook, sys.unraisablehook = raised, unraisable
+    try:
+        yield
+    finally:
+        sys.excepthook, sys.unraisablehook = before
 
 
 def _check_sidecars(path: Path) -> None:

@@ -188,11 +188,17 @@ def _swap_lines(data: bytearray, rng: np.random.Generator) -> None:
 
 if __name__ == "__main__":
     import sys
+    import warnings
+    from itertools import chain
     from pathlib import Path
 
     _OWN = Path(__file__).parent
-    sys.path[:0] = [str(_OWN), str(_OWN / "roads")]
+    _ROOMS = ("roads", "positioning", "experiments")
+    sys.path[:0] = [str(_OWN), *(str(_OWN / room) for room in _ROOMS)]
     from fuzz_command import main
     from fuzz_readers import targets
+    from fuzz_stored import stored
 
-    sys.exit(main(targets))
+    # A warning says of no file what is wrong with it: it is a fault, too.
+    warnings.simplefilter("error")
+    sys.exit(main(lambda folder: chain(targets(folder), stored(folder))))

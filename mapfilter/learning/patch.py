@@ -191,7 +191,7 @@ def read_patch(path: Path) -> Patch:
     data = read_input(path, _LARGEST_BYTES, "a patch")
     try:
         found = tomllib.loads(data.decode())
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise fail(InputError, str(path), "a patch in TOML", error, "edited, or cut off") from error
     if found.get("format") != FORMAT:
         hint = "another file"

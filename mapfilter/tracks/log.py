@@ -247,7 +247,9 @@ def make_log(
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
         places = next((tables[name] for name in ("truth", "gnss") if len(tables[name]) > 1), None)
-        if places is not None and (wrong := heading_fault(tables["motion"], places)):
+        # Of values that are refused nothing is told besides.
+        of_headings = places is not None and not faults.found
+        if of_headings and (wrong := heading_fault(tables["motion"], places)):
             every_note += (f"{called.get('motion', 'motion')}, heading_rad: {wrong}",)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())

@@ -127,9 +127,9 @@ TABLES: dict[str, Table] = {
             _TIME,
             _EAST,
             _NORTH,
-            Column("var_east_m2", low=0, expected="square metres >= 0"),
-            Column("var_north_m2", low=0, expected="square metres >= 0"),
-            Column("cov_east_north_m2", expected="square metres"),
+            Column("var_east_m2", 0, 1e16, "square metres in 0..1e16"),
+            Column("var_north_m2", 0, 1e16, "square metres in 0..1e16"),
+            Column("cov_east_north_m2", -1e16, 1e16, "square metres"),
         ),
     ),
     "pseudoranges": Table(

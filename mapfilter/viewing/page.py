@@ -7,6 +7,7 @@ import io
 import json
 import math
 import re
+import zlib
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from html import escape
@@ -120,7 +121,7 @@ def read_page(path: Path) -> dict[str, Any]:
     try:
         packed = b64decode(rest.partition("<")[0].strip(), validate=True)
         bundle = json_value(_unzipped(packed))
-    except (ValueError, OSError, EOFError) as error:
+    except (ValueError, OSError, EOFError, zlib.error) as error:
         raise fail(StoreError, where, what, f"{error}", "cut off") from error
     if not isinstance(bundle, dict) or bundle.get("format") != FORMAT:
         raise fail(StoreError, where, what, "another format")

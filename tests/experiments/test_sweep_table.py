@@ -3,6 +3,8 @@
 from dataclasses import replace
 from math import nan
 
+import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -51,6 +53,15 @@ def test_parts_join_to_the_whole(tmp_path):
     found = read_runs(tmp_path / "runs.parquet")
     assert found["draw"].tolist() == list(range(25))
     assert found["success"].all()
+
+
+def test_what_pandas_notes_of_columns_may_be_damaged(tmp_path):
+    frame, path = rows(0, 5).to_pandas(), tmp_path / "runs.parquet"
+    table = pa.Table.from_pandas(frame, schema=SCHEMA)
+    noted = table.schema.metadata[b"pandas"]
+    for damage in (b"", noted[:-40], noted.replace(b'"name"', b'"nome"'), b"\xff\xfe"):
+        pq.write_table(table.replace_schema_metadata({b"pandas": damage}), path)
+        pd.testing.assert_frame_equal(read_runs(path), frame)
 
 
 def test_a_part_that_is_cut_off_is_none(tmp_path):

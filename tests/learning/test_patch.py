@@ -124,6 +124,15 @@ def test_a_patch_that_is_no_text_is_refused(tmp_path):
         read_patch(tmp_path / "none.toml")
 
 
+@pytest.mark.parametrize("number", ["9" * 5000, "[" * 5000])
+def test_numbers_and_lists_that_no_one_writes_are_refused(tmp_path, number):
+    file = tmp_path / "patch.toml"
+    file.write_text(HEAD.replace("version = 1", f"version = {number}"))
+    assert number in file.read_text()
+    with pytest.raises(InputError, match="a patch in TOML"):
+        read_patch(file)
+
+
 def test_unknown_cells_and_another_crs_are_refused_together(database, tmp_path):
     patch = Patch("EPSG:32633", SHA, 1, (Change("dead", ("nobody",)),))
     with pytest.raises(InputError, match=r"(?s)crs.*nobody"):

@@ -192,6 +192,26 @@ def test_covariance_must_be_one():
     assert "gnss row 1, var_east_m2" in faults_of(gnss=truth(var_east_m2=[-1.0, 1.0, 1.0]))
 
 
+@pytest.mark.parametrize("name", ["var_east_m2", "var_north_m2", "cov_east_north_m2"])
+def test_variances_are_those_of_places(name):
+    variances = {"var_east_m2": [1.0] * 3, "var_north_m2": [1.0] * 3, "cov_east_north_m2": [0] * 3}
+    for value in (1.1e16, 1e300):
+        table = truth(**(variances | {name: [0.0, value, 0.0]}))
+        assert f"gnss row 2, {name}" in faults_of(gnss=table)
+    unknown = truth(var_east_m2=[1e16] * 3, var_north_m2=[1e16] * 3, cov_east_north_m2=[1e16] * 3)
+    assert len(make_log(CRS, gnss=unknown).gnss) == 3
+
+
+def test_of_places_that_are_refused_no_heading_is_compared():
+    time_s = np.arange(1.0, 60.0)
+    walk = pd.DataFrame({"time_s": time_s, "step_m": 1.4, "heading_rad": 0.02 * time_s})
+    places = pd.DataFrame({"time_s": time_s, "east_m": 531000.0 + time_s, "north_m": 4555000.0})
+    places.loc[30, "east_m"] = 1e300
+    told = faults_of(motion=walk, truth=places)
+    assert told.startswith("truth row 31, east_m: expected metres east")
+    assert told.count("expected") == 1
+
+
 @pytest.mark.parametrize(
     ("column", "bad"), [("bsic", 2000), ("arfcn", 12.5), ("censored", 2), ("timing_advance", -1)]
 )

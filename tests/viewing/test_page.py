@@ -1,6 +1,7 @@
 """The page: self-contained, and nothing in it that a user's text could start."""
 
 import re
+from base64 import b64decode, b64encode
 from html.parser import HTMLParser
 
 import pytest
@@ -100,6 +101,18 @@ def test_damaged_pages_are_named(tmp_path, damage, told):
     file = tmp_path / "replay.html"
     file.write_text(damage(page_html(view_of())), encoding="utf-8")
     with pytest.raises(StoreError, match=told):
+        read_page(file)
+
+
+@pytest.mark.parametrize("place", [0, 3, 12, 40, -9, -1])
+def test_changed_bytes_of_a_bundle_are_named(tmp_path, place):
+    html, file = page_html(view_of()), tmp_path / "replay.html"
+    start = html.index(OPENING) + len(OPENING)
+    end = html.index("<", start)
+    packed = bytearray(b64decode(html[start:end]))
+    packed[place] ^= 0x15
+    file.write_text(html[:start] + b64encode(packed).decode() + html[end:], encoding="utf-8")
+    with pytest.raises(StoreError, match="a page that mapfilter wrote"):
         read_page(file)
 
 

@@ -152,9 +152,10 @@ def read_runs(path: Path) -> pd.DataFrame:
                 raise fail(StoreError, str(path), f"the table of {HEAD}", "another", hint)
             table = pq.read_table(stream)
             table.validate(full=True)
-    except (OSError, pa.ArrowInvalid) as error:
+    except (OSError, ValueError, pa.ArrowException) as error:
         raise fail(StoreError, str(path), "the table of a sweep", error, "cut off") from error
     lacking = set(SCHEMA.names) - set(table.column_names)
     if lacking:
         raise fail(StoreError, str(path), "all columns of a sweep", f"none of {sorted(lacking)}")
-    return table.to_pandas()
+    # What pandas noted about columns may be damaged, and is needed for none of them.
+    return table.replace_schema_metadata(None).to_pandas()

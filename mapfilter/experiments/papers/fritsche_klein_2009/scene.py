@@ -115,7 +115,7 @@ def read_layout(path: Path) -> Layout:
     """
     try:
         given: dict[str, Any] = tomllib.loads(read_input(path, _LARGEST_BYTES, "TOML").decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise fail(InputError, str(path), "TOML", error) from error
     known = [field.name for field in fields(Layout)]
     if unknown := sorted(set(given) - set(known)):
