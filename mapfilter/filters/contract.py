@@ -59,6 +59,7 @@ class Reason(StrEnum):
     MOTION_MISSING = "motion_missing"
     MOTION_STUCK = "motion_stuck"
     HEADING_STUCK = "heading_stuck"
+    IMPOSSIBLE_STEP = "impossible_step"
     PHONE_TURNED = "phone_turned"
     OTHER_UNIT = "other_unit"
     DELIVERED_TWICE = "delivered_twice"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import cos, inf, isfinite, nan, sin
+from math import cos, isfinite, nan, sin
 from typing import Any, Generic, Protocol, Self
 
 import numpy as np
@@ -266,12 +266,14 @@ class GridFilter(Generic[PriorT, ReadingT]):
         """Move the mass by what waits, weigh it, and apply the switch rule."""
         arrays, before = self.device.arrays, belief.placed(self.device).moved
         at, mass, state = before.above(_LEAST_MASS, of_highest=True)
+        if not mass.size:
+            return belief, UpdateInfo(Reason.NO_CANDIDATES_LEFT, belief.status, 0)
         log_weight = arrays.zeros(mass.size)
         nothing = arrays.empty((0, mass.size), dtype=np.float32)
         cloud, reason = self.model.weigh(Cloud(state, nothing), log_weight, reading)
         if reason is not Reason.USED:
             return belief, UpdateInfo(reason, belief.status, int(mass.size))
-        highest = float(log_weight.max()) if log_weight.size else -inf
+        highest = float(log_weight.max())
         likelihood = arrays.exp(log_weight - highest).astype(np.float32)
         on, off = arrays.zeros_like(before.on), arrays.zeros_like(before.off)
         on[at] = before.on[at] * likelihood

@@ -43,8 +43,10 @@ def shifted(mass: Floats32, first: int, taps: Floats32, *, axis: int) -> Floats3
     """Spread mass along an axis; what leaves the lattice is lost."""
     spread: Floats32 = arrays_of(mass).zeros_like(mass)
     size = mass.shape[axis]
-    for k, tap in enumerate(taps, start=first):
-        if abs(k) >= size or tap < 1e-7:
+    # What goes farther than the lattice reaches is lost.
+    for k in range(max(first, 1 - size), min(first + taps.size, size)):
+        tap = taps[k - first]
+        if tap < 1e-7:
             continue
         target, source = [slice(None)] * mass.ndim, [slice(None)] * mass.ndim
         target[axis] = slice(max(k, 0), size + min(k, 0))
@@ -59,6 +61,9 @@ def turned(mass: Floats32, first: int, taps: Floats32, *, circular: bool) -> Flo
         return shifted(mass, first, taps, axis=0)
     arrays = arrays_of(mass)
     spread: Floats32 = arrays.zeros_like(mass)
-    for k, tap in enumerate(taps, start=first):
-        spread += arrays.roll(mass, k, axis=0) * float(tap)
+    # A wide spread goes around several times; each bin is reached once.
+    count = mass.shape[0]
+    share = np.bincount((first + np.arange(taps.size)) % count, taps, minlength=count)
+    for k in np.flatnonzero(share):
+        spread += arrays.roll(mass, int(k), axis=0) * float(share[k])
     return spread

@@ -140,4 +140,6 @@ def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float)
     every = (tables[table] for table in ("truth", "gnss"))
     within = (places[places["time_s"].between(first_s, last_s)] for places in every)
     extents = (np.hypot(np.ptp(p["east_m"]), np.ptp(p["north_m"])) for p in within if len(p))
-    return float(max(extents, default=0.0))
+    # Infinite places are a fault of their own.
+    with np.errstate(invalid="ignore", over="ignore"):
+        return float(max(extents, default=0.0))

@@ -21,6 +21,7 @@ REASONS: Mapping[Reason, str] = {
     Reason.MOTION_MISSING: "motion is missing for a while",
     Reason.MOTION_STUCK: "the motion sensor repeats itself",
     Reason.HEADING_STUCK: "the heading repeats itself while one walks",
+    Reason.IMPOSSIBLE_STEP: "a step is longer than anything can go in that time",
     Reason.PHONE_TURNED: "the heading has jumped as that of a phone that is turned",
     Reason.OTHER_UNIT: "lengths of steps are read in another unit from here on",
     Reason.DELIVERED_TWICE: "the same rows of motion were delivered again",

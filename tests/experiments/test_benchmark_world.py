@@ -9,9 +9,10 @@ from grid_town import CRS, SOUTH_M, WEST_M, network, plan
 
 from mapfilter.database.build import build
 from mapfilter.database.sources import LatticeRoutes
+from mapfilter.errors import StoreError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildings
-from mapfilter.experiments.sweep.world import SweepWorld, write_world
+from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_world
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
@@ -169,3 +170,15 @@ def test_another_world_in_the_same_folder_is_read_anew(tmp_path, monkeypatch):
     world.filter(CandidateFilter(), thinned=True)
     assert len(opened) == 4
     assert world.skyline(CASES["satellites-2"]) is not skyline
+
+
+@pytest.mark.parametrize("value", ["Infinity", "NaN", "null", '"many"', "[1]"])
+def test_a_world_of_no_size_is_refused(tmp_path, value):
+    write_world(SweepWorld(network(), PLAN, LATTICE, {}), tmp_path / "world")
+    assert open_world(tmp_path / "world").lattice == LATTICE
+    head = tmp_path / "world" / "world.json"
+    text = head.read_text()
+    assert '"rows": 60' in text
+    head.write_text(text.replace('"rows": 60', f'"rows": {value}'))
+    with pytest.raises(StoreError, match="world of a sweep"):
+        open_world(tmp_path / "world")

@@ -247,6 +247,9 @@ def test_turning_goes_around_or_ends():
     mass = np.arange(1.0, 9.0, dtype=np.float32).reshape(4, 2)
     share = np.array([0.25, 0.5, 0.125], dtype=np.float32)
     around = turned(mass, -1, share, circular=True)
+    wide = np.random.default_rng(3).random(2 * len(mass) + 5).astype(np.float32)
+    by_hand = sum(np.roll(mass, k - 7, axis=0) * tap for k, tap in enumerate(wide))
+    np.testing.assert_allclose(turned(mass, -7, wide, circular=True), by_hand, rtol=1e-5)
     assert around.dtype == np.float32
     for b in range(4):
         from_ahead, own, from_behind = mass[(b + 1) % 4], mass[b], mass[b - 1]

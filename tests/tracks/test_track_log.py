@@ -202,11 +202,12 @@ def test_variances_are_those_of_places(name):
     assert len(make_log(CRS, gnss=unknown).gnss) == 3
 
 
-def test_of_places_that_are_refused_no_heading_is_compared():
+@pytest.mark.parametrize("value", [1e300, np.inf, -np.inf])
+def test_of_places_that_are_refused_no_heading_is_compared(value):
     time_s = np.arange(1.0, 60.0)
     walk = pd.DataFrame({"time_s": time_s, "step_m": 1.4, "heading_rad": 0.02 * time_s})
     places = pd.DataFrame({"time_s": time_s, "east_m": 531000.0 + time_s, "north_m": 4555000.0})
-    places.loc[30, "east_m"] = 1e300
+    places.loc[30, "east_m"] = value
     told = faults_of(motion=walk, truth=places)
     assert told.startswith("truth row 31, east_m: expected metres east")
     assert told.count("expected") == 1

@@ -133,7 +133,7 @@ def open_world(folder: Path) -> SweepWorld:
         heights_m = None
         if _HEIGHTS in head["sha256"]:
             heights_m = np.load(folder / _HEIGHTS, mmap_mode="r", allow_pickle=False)
-    except (OSError, KeyError, TypeError, ValueError) as error:
+    except (OSError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise fail(StoreError, str(folder), "the world of a sweep", error, "cut off") from error
     cells = read_cells(folder / _CELLS, lattice.crs)
     return SweepWorld(network, cells, lattice, levels, heights_m)

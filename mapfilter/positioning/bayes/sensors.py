@@ -1,10 +1,11 @@
 """Sensors that no longer measure what they seem to: dead, stuck or stale.
 
-A log goes on after a sensor has died. Motion rows end, steps lack a length, or a counter stands
-still, or misses most steps, while the phone is carried on; a modem repeats its last report.
-:func:`watched` looks at an epoch before any evidence is taken from it. For motion that was not
-measured it puts a step to all sides into the epoch, as long as one goes in that time, so the belief
-grows as it must; a report that stands still while the phone moves is taken out.
+A log goes on after a sensor has died. Motion rows end, steps lack a length or have one that nothing
+can have gone, or a counter stands still, or misses most steps, while the phone is carried on; a
+modem repeats its last report. :func:`watched` looks at an epoch before any evidence is taken from
+it. For motion that was not measured it puts a step to all sides into the epoch, as long as one goes
+in that time, so the belief grows as it must; a report that stands still while the phone moves is
+taken out.
 
 Rows that are missing, or lengths of zero, can also be those of a phone that rests, and short ones
 those of a stroll, so levels decide (:mod:`mapfilter.positioning.bayes.rest`).
@@ -17,6 +18,7 @@ from math import exp, isfinite, nan, sqrt
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.positioning.bayes.impossible_steps import without_impossible
 from mapfilter.positioning.bayes.pace import GAP_INTERVALS, Pace
 from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
 from mapfilter.positioning.bayes.rest import Rest
@@ -84,7 +86,13 @@ class SensorWatch(NamedTuple):
 
 
 UNMEASURED = frozenset(
-    {Reason.NO_STEP, Reason.MOTION_MISSING, Reason.MOTION_STUCK, Reason.HEADING_STUCK}
+    {
+        Reason.NO_STEP,
+        Reason.IMPOSSIBLE_STEP,
+        Reason.MOTION_MISSING,
+        Reason.MOTION_STUCK,
+        Reason.HEADING_STUCK,
+    }
 )
 """Reasons for which the way of an epoch is not known."""
 
@@ -100,16 +108,22 @@ def watched(
     epoch : Epoch
         With a step to all sides for motion that was not measured, without a report that is stale.
     reasons : tuple of Reason
-        Of motion and of the report: ``USED``, or ``NO_STEP``, ``MOTION_MISSING``,
-        ``MOTION_STUCK``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``, and ``STALE_RADIO``.
+        Of motion and of the report: ``USED``, or ``NO_STEP``, ``IMPOSSIBLE_STEP``,
+        ``MOTION_MISSING``, ``MOTION_STUCK``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``, and
+        ``STALE_RADIO``.
     """
     repeats, motion, repeated = without_repeats(
         watch.repeats, epoch.time_s, epoch.motion, step_unit_m
     )
     if motion is not epoch.motion:
         epoch = replace(epoch, motion=motion)
-    before = watch
+    before, given = watch, epoch.motion
+    motion = without_impossible(watch.pace, epoch.time_s, given, step_unit_m)
+    if motion is not given:
+        epoch = replace(epoch, motion=motion)
     watch, epoch, why = _followed(watch, epoch, step_unit_m)
+    if motion is not given and why in (Reason.USED, Reason.NO_STEP):
+        why = Reason.IMPOSSIBLE_STEP
     why = repeated if why is Reason.USED else why
     report, moved_m, nats = before.report, watch.moved_m, before.repeated_nats
     if epoch.radio:

@@ -142,6 +142,8 @@ class Weighing:
         tracked = measured and before.status is Status.TRACKING
         reading = evidence.weighing(before, tracked=tracked, doubted=doubt)
         belief, info = update(before, reading, rng)
+        if info.reason is Reason.NO_CANDIDATES_LEFT and not belief.count:
+            return _begun_anew(state), info.reason
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
         null = _challenged(rules, state.null, reading, before, belief)
@@ -323,6 +325,13 @@ def _holds(area: AreaFrame, belief: MapBelief) -> bool:
     if east_m.size and area.holds_all(east_m, north_m):
         return True
     return area.holds(east_m, north_m, belief.weight)
+
+
+def _begun_anew(state: BayesState) -> BayesState:
+    """Return a state without its belief, of which nothing is left in the area."""
+    found = state.status in (Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN)
+    status = Status.LOST if found else state.status
+    return replace(state, belief=None, alternative=None, status=status)
 
 
 def _challenged(
