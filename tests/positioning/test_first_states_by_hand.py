@@ -143,6 +143,13 @@ def test_shares_on_ways_off_them_and_around():
     assert beyond(around).all()
 
 
+def test_places_on_ways_lie_beside_their_points_by_a_number_each():
+    state, _ = spread(model_of(), 4, Known())
+    points = np.array([[5.0, 5.0, 15.0, 15.0], [5.0, 5.0, 25.0, 25.0]])
+    beside = 0.3 + 0.001 * np.arange(8).reshape(2, 4) - 0.5
+    np.testing.assert_allclose(state[EAST : NORTH + 1], points + 10.0 * beside, rtol=1e-5)
+
+
 def test_a_few_hypotheses_are_all_on_ways():
     """Of 4 no whole one is off them or around; of 5 one is off them, of 7 another one around."""
     for most, (off, around) in ((4, (0, 0)), (5, (1, 0)), (7, (1, 1))):

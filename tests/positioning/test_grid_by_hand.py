@@ -55,7 +55,8 @@ def test_bins_of_headings_reach_three_deviations_to_both_sides():
     np.testing.assert_allclose(grid_over().bias_rad, 0.3 * np.arange(-3, 4))
     np.testing.assert_allclose(grid_over(bin_rad=0.29).bias_rad, 0.29 * np.arange(-4, 5))
     assert grid_over(bias_sd_rad=0.0).bias_rad.tolist() == [0.0]
-    assert StreetGrid(grid_over().model).bin_rad == 0.04
+    usual = StreetGrid(grid_over().model)
+    assert (usual.compass, usual.bin_rad) == (True, 0.04)
     around = grid_over(compass=False)
     assert around.circular
     assert not grid_over().circular
