@@ -106,6 +106,13 @@ def test_first_evidence_weighs_every_pixel(below_nats):
     assert not cloud.state[2:].any()
 
 
+def test_pixels_that_are_out_of_the_question_hold_nothing():
+    gains = np.array([-900.0, 0.0, -900.0, 0.0, 0.0, -900.0])
+    on, off = grid_over(ON_WAY, gains, bias_sd_rad=0.0).start(prior("report"))
+    assert not on.any()
+    np.testing.assert_allclose(off.ravel(), np.array([0, 1, 0, 1, 1, 0]) / 3, rtol=1e-6)
+
+
 def test_about_a_known_start_ways_make_no_difference():
     """15 m east and 5 m north of the corner, to 10 m."""
     on, off = grid_over(bias_sd_rad=0.0).start(prior(None, 1015.0, 2005.0, 10.0))
