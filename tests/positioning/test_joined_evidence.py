@@ -99,6 +99,7 @@ def test_terms_of_one_beliefs_hypotheses_hold_for_no_other():
 def test_nothing_is_read_unless_it_is_given():
     reading = RadioReading()
     assert (reading.length_m, reading.under_null, reading.serving_under_null) == (0.0, 0.0, -0.7)
+    assert (reading.serving, reading.serving_weight) == (-1, 0.0)
     assert (reading.doubted, reading.tracked, reading.belief) == (False, False, None)
 
 

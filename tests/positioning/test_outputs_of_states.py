@@ -51,6 +51,18 @@ def test_a_position_is_that_of_the_belief_in_the_areas_system():
     assert found.evidence == (1070.0, 2080.0, 0.08, 1.5, -4.0)
 
 
+def test_a_way_is_that_of_the_places_by_their_weights():
+    asked = []
+    area = SimpleNamespace(
+        origin_m=(0.0, 0.0), matched_way=lambda *given: asked.append(given) or (7, 0.75)
+    )
+    held = belief()
+    step_output(area, state(held), 5.0, Reason.USED, ())
+    ((east_m, north_m, weight),) = asked
+    np.testing.assert_array_equal([east_m, north_m], PLACES)
+    assert weight is held.weight
+
+
 @pytest.mark.parametrize("given", [state(belief(), Status.OUTSIDE), state(None, Status.SEARCHING)])
 def test_outside_and_before_the_start_there_is_no_position(given):
     _, found = output_of(given)
