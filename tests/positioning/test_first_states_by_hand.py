@@ -164,6 +164,8 @@ def test_without_ways_no_hypothesis_is_on_them():
     assert np.isneginf(log_weight[:26]).all()
     assert np.isfinite(log_weight[26:]).all()
     assert not state[:, :26].any()
+    cloud, _ = first.first_hypotheses(model_of(()), first.Start(None), 40, Known())
+    assert not cloud.state[[EAST, NORTH, OFF], :26].any()
 
 
 class Tiles:
@@ -225,6 +227,10 @@ def test_a_search_of_some_tiles(monkeypatch, tiled, at_edge):
     assert (state[OFF] == 1.0).sum() == 4
     assert [places for places, _ in noted][:2] == [points.tolist(), anywhere.tolist()]
     assert len(noted) == (3 if at_edge else 2)
+    # Places off the map and around the area are taken as they are.
+    for part, places in ((state[OFF] == 1.0, anywhere), (state[OFF] == np.float32(0.05), around)):
+        found_at = set(zip(*state[:2, part].tolist(), strict=True))
+        assert found_at == set(zip(*places.tolist(), strict=True))
     expected = 1.0 if at_edge else 0.98
     assert np.exp(log_weight).sum() == pytest.approx(np.exp(-1.0) * expected)
 
