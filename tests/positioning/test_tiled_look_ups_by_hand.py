@@ -126,6 +126,26 @@ def test_shares_of_pixels_above_a_level(limit_dbm):
     np.testing.assert_allclose(found, share)
 
 
+def test_a_level_at_the_limit_is_not_above_it_where_quiet_ones_are():
+    tiles = Tiles()
+    tiles.quiet_dbm = -50.0
+    cell = np.array([1, 2, 0], dtype=np.int32)
+    found = area(tiles).shares_above(np.array([9, 8], dtype=np.int32), cell, -79.0)
+    # Of the first cell -79 and -78 dBm; the second one is nowhere received.
+    assert found.tolist() == [0.5, 1.0, 1.0]
+
+
+@pytest.mark.parametrize("rough", [True, False])
+def test_kernels_are_handed_as_many_cells_as_they_fill_in(monkeypatch, rough):
+    shapes = []
+    monkeypatch.setattr(
+        tiled_area, "look_up_levels", lambda *given: shapes.append([one.shape for one in given[5:]])
+    )
+    area().looked_up(PIXELS[:2], np.array([1, 2, 3], np.int32), rough=rough)
+    count = 3 if rough else 0
+    assert shapes == [[(3, 4), (count, 2, 2), (2, 3), (2, count)]]
+
+
 def test_the_maps_likelihood_is_interpolated_between_centres():
     """A plane of 3 for each row to the south and -2 for each column to the east."""
     rng = np.random.default_rng(2)
