@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from small_area import FLOOR_DBM, LEVEL_DBM, make_area
 
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.area_frame import AreaFrame, carriers_of, sites_of
@@ -117,3 +118,9 @@ def test_carriers_have_the_bands_of_their_cells():
         (70, -1): (1, 2, 3, 0), (70, 3): (1, 0), (70, 4): (2,), (71, -1): (4,), (71, 3): (4,),
     }  # fmt: skip
     assert sites_of(CellPlan(CRS, (cell("a", east_m=7.0),))) == {"a": (7.0, 2.0, 30.0)}
+
+
+def test_levels_that_are_not_in_the_database_are_six_decibels_below_its_floor():
+    held = make_area().level_dbm[..., :4]
+    assert (held.min(), FLOOR_DBM) == (-116.0, -110.0)
+    np.testing.assert_array_equal(held, LEVEL_DBM)

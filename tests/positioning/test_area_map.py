@@ -44,6 +44,26 @@ def test_levels_and_the_two_strongest_of_them(cells):
     assert found.flat_level_dbm.shape == (6 * (cells + 2),)
 
 
+def partitioned(values, kth, axis):
+    """Order no more than what is asked for: what is larger comes in descending order."""
+    assert axis == -1
+    found = np.sort(values, axis=-1)
+    found[..., kth + 1 :] = found[..., :kth:-1].copy()
+    return found
+
+
+@pytest.mark.parametrize("partition", [np.partition, partitioned])
+def test_the_two_strongest_of_many_cells(monkeypatch, partition):
+    monkeypatch.setattr(np, "partition", partition)
+    levels_dbm = np.random.default_rng(1).permutation(96).reshape(2, 3, 16) - 120.0
+    names = tuple("ABCDEFGHIJKLMNOP")
+    ways = TO_WAY_M, HALF_WIDTH_M, WAY, TO_WAY_M < 4.5
+    field = RadioField(LATTICE, names, levels_dbm.astype(np.float32), *ways)
+    found = AreaMap.of_field(field, CellPlan(LATTICE.crs, ()), -130.0)
+    strongest = np.sort(levels_dbm, axis=-1)[..., :-3:-1]
+    np.testing.assert_array_equal(found.level_dbm[..., 16:], strongest)
+
+
 def test_distances_are_to_the_edges_of_ways():
     found = area()
     np.testing.assert_array_equal(found.distance_m, [[0.0, 0.0, 2.0], [0.0, 0.0, 26.0]])
@@ -82,6 +102,8 @@ def test_points_are_the_middles_of_pixels_on_ways():
         # Beyond the area the pixel at its edge counts.
         ([(-30.0, 35.0), (35.0, -20.0), (15.0, 5.0)], [0.3, 0.3, 0.4], 7, 0.6),
         ([(9.99, 9.99), (10.01, 10.01)], [0.4, 0.6], 7, 0.6),
+        # Weights that are rounded up are no more than all of the belief.
+        ([(5.0, 5.0)], [1.1], 9, 1.0),
     ],
 )
 def test_the_way_that_holds_the_most_of_a_belief(places, weights, way, share):

@@ -11,6 +11,7 @@ from small_area import FLOOR_DBM, LATTICE, make_area
 
 from mapfilter.errors import ConfigError
 from mapfilter.positioning.bayes import options as tested
+from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 
 TOTAL_DB = 75.89**0.5
@@ -38,6 +39,14 @@ def test_the_usual_options():
         "timing_step_m": 553.5, "timing_sd_m": 200.0, "threads": 1,
     }  # fmt: skip
     assert asdict(GridFilter()) == asdict(BayesFilter()) | {"device": "cpu"}
+
+
+def test_what_options_make_is_a_filter_over_the_area():
+    area = Town.of(1).area()
+    for options, grid in ((BayesFilter(), False), (GridFilter(), True)):
+        found = options.over_area(area)
+        assert isinstance(found, BayesPositioner)
+        assert (found.area, found.beliefs.grid) == (area, grid)
 
 
 def test_the_usual_motion_of_vehicles():

@@ -10,7 +10,7 @@ from made_town import Town
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, AlternativeRules
-from mapfilter.positioning.bayes.certainty import _share_near, certainty
+from mapfilter.positioning.bayes.certainty import Recovery, _share_near, certainty
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.options import BayesFilter
 
@@ -64,6 +64,28 @@ def test_where_a_rival_lies_is_looked_at_only_where_it_may_matter(enough, looked
     found = certainty(RULES, belief(500.0), held=[rival], enough=enough)
     assert found == pytest.approx((1 + looked_at * odds / 2) / (1 + odds))
     assert ("weight" in rival.belief.__dict__) == looked_at
+
+
+def rival(log_odds, *places):
+    """A belief in which the phone was turned, with these log odds to the bit."""
+    return SimpleNamespace(belief=belief(*places), log_odds=lambda _: log_odds)
+
+
+def test_limits_that_are_met_exactly():
+    main = belief(500.0)
+    assert certainty(RULES, main, held=[rival(-9.0, 700.0)]) == main.summary.mass_50m
+    # As probable as what is enough: where the rival lies is not looked at.
+    even, bound = rival(0.0, 500.0), main.summary.mass_50m / 2
+    assert certainty(RULES, main, held=[even], enough=bound) == bound
+    assert certainty(RULES, main, held=[even], enough=bound + 1e-9) == pytest.approx(1.0)
+
+
+def test_a_position_is_claimed_again_after_it_has_agreed_for_some_way():
+    assert Recovery().after(100.0, 20.0, agrees=True) == Recovery(100.0)
+    assert Recovery(100.0).after(119.9, 20.0, agrees=True) == Recovery(100.0)
+    assert Recovery(100.0).after(120.0, 20.0, agrees=True) is None
+    assert Recovery().after(100.0, 0.0, agrees=True) is None
+    assert np.isnan(Recovery(100.0).after(130.0, 20.0, agrees=False).agrees_from_m)
 
 
 def alternative(log_bayes_factor, *places):

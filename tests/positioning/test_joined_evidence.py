@@ -11,7 +11,6 @@ from scipy.stats import norm
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import BoundReading
-from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.evidence import (
     EvidenceUpdate,
     FixedTerm,
@@ -100,15 +99,15 @@ def test_terms_of_one_beliefs_hypotheses_hold_for_no_other():
 def test_nothing_is_read_unless_it_is_given():
     reading = RadioReading()
     assert (reading.length_m, reading.under_null, reading.serving_under_null) == (0.0, 0.0, -0.7)
+    assert (reading.serving, reading.serving_weight) == (-1, 0.0)
     assert (reading.doubted, reading.tracked, reading.belief) == (False, False, None)
 
 
 @pytest.mark.parametrize(("tracked", "doubted"), [(True, False), (False, True)])
 def test_a_reading_keeps_its_numbers_whatever_belief_it_weighs(tracked, doubted):
     bound = BoundReading(np.array([1, 2]), -80.0, 0, 8.0, 0.5)
-    levels = LevelReport(np.zeros(1, "i4"), np.zeros(1, "f4"), np.zeros(0, "i4"), -110.0, 0.0)
     given = RadioReading(
-        2, 0.5, levels, (bound,), (A, B), -3.0, length_m=7.0, timing_advance=4.0,
+        2, 0.5, object(), (bound,), (A, B), -3.0, length_m=7.0, timing_advance=4.0,
         serving_under_null=-0.9,
     )  # fmt: skip
     belief = SimpleNamespace()

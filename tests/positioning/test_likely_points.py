@@ -53,6 +53,22 @@ def test_points_have_shares_by_their_likelihood(monkeypatch, at_once):
     assert shares.dtype == np.float32
 
 
+def test_points_that_are_out_of_the_question_have_no_share(monkeypatch):
+    monkeypatch.setitem(NATS, 30.0, -2000.0)
+    shares, log_mean = likelihoods(Model(), POINTS, "reading")
+    likelihood = np.exp([0.0, -1.0, -1300.0, -2.0, -3.0])
+    np.testing.assert_allclose(shares, likelihood / likelihood.sum(), rtol=1e-6)
+    assert log_mean == pytest.approx(-700.0 + log(likelihood.mean()))
+
+
+def test_fifty_thousand_points_are_weighed_at_a_time():
+    """What a report expects of cells is a mean over those."""
+    sizes = []
+    model = SimpleNamespace(weigh=lambda cloud, *_: sizes.append(cloud.state.shape[1]))
+    likelihoods(model, np.zeros((2, 100_001), dtype=np.float32), "reading")
+    assert sizes == [50_000, 50_000, 1]
+
+
 def test_without_evidence_all_points_are_alike():
     shares, log_mean = likelihoods(Model(), POINTS, None)
     np.testing.assert_allclose(shares, 0.2)

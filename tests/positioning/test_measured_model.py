@@ -44,6 +44,24 @@ def test_what_a_measured_map_adds_to_the_deviation_of_levels():
     np.testing.assert_array_equal(plain.rough_db(), AREA.flat_rough_db)
 
 
+def test_the_strongest_levels_of_a_place_have_no_deviation_of_their_own():
+    """Though the options have less than 1 dB."""
+    small = replace(OPTIONS.levels, slow_db=0.1, fast_db=0.1, white_db=0.5)
+    sd_db = np.ones((4, 7, 9), dtype=np.float32)
+    found = MeasuredMapModel(AREA, evidence=replace(OPTIONS, levels=small), level_sd_db=sd_db)
+    rough_db = found.rough_db().reshape(7, 9, 6)
+    np.testing.assert_array_equal(rough_db[..., :4], round(10 * (1 - 0.27) ** 0.5))
+    assert not rough_db[..., 4:].any()
+
+
+def test_statistics_of_serving_cells_are_all_that_weighs_them():
+    pixel, weight = np.array([0, 10, 30], dtype=np.int32), np.full(3, 7.0)
+    reading = RadioReading(1, 0.5, timing_advance=3.0)
+    found = model(serving_model=Statistics())._serving("memory", "kept", pixel, weight, reading)
+    assert found == ("kept", [])
+    np.testing.assert_allclose(weight, [4.0, 3.0, 1.0])
+
+
 def test_serving_cells_are_compared_by_their_statistics():
     pixel = np.array([0, 10, 30], dtype=np.int32)
     found = model(serving_model=Statistics())
@@ -67,8 +85,17 @@ def test_the_usual_probability_of_a_serving_cell_is_the_mean_over_all_ways(steps
     for _ in range(2):
         assert found.usual_serving(2, steps) == pytest.approx(expected)
     assert statistics.asked == [ways.tolist()]
+    # Another missing advance is the same, and another one is not.
+    assert found.usual_serving(2, float("nan") if steps != 2.0 else 2.0) == pytest.approx(expected)
+    assert len(statistics.asked) == 1
+    for more in (3.0, 4.0):
+        timed = found.usual_serving(2, more)
+        assert timed == pytest.approx(log(np.mean(np.exp(-3.0 * ways / 10.0))) - 2.0 * more)
+    statistics.asked.clear()
+    found.usual_serving(2, steps)
+    assert not statistics.asked
     assert found.usual_serving(1, steps) > expected
-    assert len(statistics.asked) == 2
+    assert len(statistics.asked) == 1
     assert model().usual_serving(2, steps) == -0.7
     nowhere = replace(AREA, on_way=np.zeros_like(AREA.on_way))
     without = MeasuredMapModel(nowhere, evidence=OPTIONS, serving_model=Statistics())

@@ -1,5 +1,6 @@
 """The output of a state: position, way, levels and runner-up, and nothing where there is none."""
 
+from dataclasses import fields
 from math import isnan, nan
 from types import SimpleNamespace
 
@@ -48,6 +49,18 @@ def test_a_position_is_that_of_the_belief_in_the_areas_system():
     assert found.tail.p_none == 0.125
     # The runner-up, in the same system.
     assert found.evidence == (1070.0, 2080.0, 0.08, 1.5, -4.0)
+
+
+def test_a_way_is_that_of_the_places_by_their_weights():
+    asked = []
+    area = SimpleNamespace(
+        origin_m=(0.0, 0.0), matched_way=lambda *given: asked.append(given) or (7, 0.75)
+    )
+    held = belief()
+    step_output(area, state(held), 5.0, Reason.USED, ())
+    ((east_m, north_m, weight),) = asked
+    np.testing.assert_array_equal([east_m, north_m], PLACES)
+    assert weight is held.weight
 
 
 @pytest.mark.parametrize("given", [state(belief(), Status.OUTSIDE), state(None, Status.SEARCHING)])
@@ -102,3 +115,41 @@ def test_a_state_before_the_first_epoch_has_nothing():
     assert (state.status, state.contested, state.compass) == (Status.SEARCHING, False, True)
     assert np.isnan([state.heading_rad, state.walking_rad]).all()
     assert state.particle_spacing_m == 5.0
+
+
+def test_an_output_is_added_to_all_else_that_a_state_has():
+    names = [one.name for one in fields(BayesState) if one.name != "reported"]
+    given = BayesState(**{name: object() for name in names})
+    found = given.with_output("output")
+    assert found.reported == "output"
+    assert all(getattr(found, name) is getattr(given, name) for name in names)
+
+
+@pytest.mark.parametrize(
+    ("count", "bins", "spacing_m"),
+    # Three tenths of 64 bins of 625 m² are streets: 12 000 m².
+    [(100, 64.0, 120.0**0.5), (3000, 64.0, 2.0), (5400, 64.0, 1.5), (9, 1.0, 20.833333**0.5),
+     (0, 64.0, 5.0)],
+)  # fmt: skip
+def test_hypotheses_are_a_few_metres_apart_along_the_streets(count, bins, spacing_m):
+    summary = SimpleNamespace(effective_bins=bins)
+    own = SimpleNamespace(count=count, bins=SimpleNamespace(size_m=25.0), summary=summary)
+    assert BayesState(belief=own).particle_spacing_m == pytest.approx(spacing_m)
+
+
+def test_another_probability_of_no_hypothesis_is_summarised_again():
+    held = belief()
+    reported, _ = output_of(state(held))
+    other = state(held, reported=reported)
+    other.null = SimpleNamespace(probability=0.25)
+    changed, found = output_of(other)
+    assert changed is not other
+    assert found.tail.p_none == 0.25
+
+
+def test_a_belief_without_hypotheses_has_a_way_and_neither_mass_nor_levels():
+    empty = SUMMARY._replace(runners_up=np.empty((0, 3)), entropy_bits=nan)
+    _, found = output_of(state(belief(empty, count=0)))
+    assert (found.fix.way_id, found.fix.hypotheses, found.tail) == (7, 0, None)
+    assert np.isnan([found.fix.mass_50m, found.fix.protection_m, found.evidence[2]]).all()
+    assert found.evidence[4] == -4.0

@@ -101,6 +101,7 @@ def test_it_may_start_from_a_fix(tmp_path):
     log = make_log(log.crs, motion=log.motion, gnss=gnss)
     database = make_database(tmp_path)
     own = adapted(Counting(database), database, "a:b")
+    assert own.ways
     found = locate(log, own, np.random.default_rng(0)).estimate
     assert np.flatnonzero(np.isfinite(found.east_m))[0] == np.searchsorted(found.time_s, 5.0)
 

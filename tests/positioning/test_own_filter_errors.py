@@ -2,6 +2,7 @@
 
 import json
 from hashlib import sha256
+from pathlib import Path
 
 import pytest
 
@@ -75,6 +76,15 @@ def test_without_lines_of_its_own_the_last_of_all_is_named():
 
 def test_a_name_whose_module_has_no_file_has_an_empty_text():
     assert custom_filter("time:time").source_sha256 == sha256(b"").hexdigest()
+
+
+FROM_ELSEWHERE = json.loads
+"""Called with a database, it would make a filter."""
+
+
+def test_the_text_is_that_of_the_module_in_which_a_filter_stands():
+    text = Path(json.__file__).read_bytes()
+    assert custom_filter(f"{__name__}:FROM_ELSEWHERE").source_sha256 == sha256(text).hexdigest()
 
 
 class Plain:

@@ -23,6 +23,7 @@ from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES, interpolate
 from mapfilter.positioning.bayes import options
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area_tiles import HELD_BYTES
 from mapfilter.positioning.bayes.bounded_cache import BoundedCache
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
@@ -158,7 +159,7 @@ def test_every_value_is_that_of_the_whole_area(database, whole, side):
         assert tiled.matched_way(*some) == whole.matched_way(*some)
 
 
-@pytest.mark.parametrize(("side", "largest_bytes"), [(40, 1 << 30), (48, 150_000)])
+@pytest.mark.parametrize(("side", "largest_bytes"), [(40, HELD_BYTES), (48, 150_000)])
 @pytest.mark.parametrize("levels", [True, False])
 def test_a_walk_is_located_alike(database, whole, town, side, largest_bytes, levels):
     """To the last bit, and however little is held."""

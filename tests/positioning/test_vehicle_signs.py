@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.positioning.vehicle_signs import VehicleSigns, vehicle_signs
+from mapfilter.positioning.vehicle_signs import VehicleSigns, _mean_rates, vehicle_signs
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32635"
@@ -167,3 +167,37 @@ def test_the_sway_is_that_of_motion_alone(at_rest_radps):
     moves = np.arange(2000) // 20 % 2 == 0
     found = signs_of(np.where(moves, 5.0, 0.0), np.where(moves, 0.0, at_rest_radps))
     assert 0.0 <= found.sway_radps < 0.1
+
+
+def test_limits_that_are_met_exactly():
+    assert replace(SIGNS, sway_radps=np.radians(1.5)).vehicle
+    # 4 m/s within 3 s are a gain, and gains 3 s apart are one.
+    assert signs_of([5.0] * 9 + [9.0] * 9, 0.0, interval_s=1.0).gains == 1
+    apart = [0.0] * 4 + [4.0, 0.0, 0.0, 8.0] + [0.0] * 9
+    assert signs_of(apart, 0.0, interval_s=1.0).gains == 1
+    assert signs_of([*apart, *apart], 0.0, interval_s=1.0).gains == 2
+    # At 3 m/s nothing sways yet, and a phone of half a metre a second is at rest.
+    for speed_mps, known in ((3.0, False), (3.5, True)):
+        sway = signs_of(np.full(40, speed_mps), 0.1, interval_s=0.5).sway_radps
+        assert np.isfinite(sway) == known
+    assert signs_of(np.full(40, 0.5), 0.3, interval_s=1.0).sharpest_rad == 0.0
+
+
+@pytest.mark.parametrize(
+    ("step_m", "rows", "turned_rad"), [(1.0, 4, 0.0), (1.0, 5, 0.4), (1.1, 5, 0.4), (1.0, 12, 0.5)]
+)
+def test_rows_of_a_metre_turn_within_five_metres(step_m, rows, turned_rad):
+    """By a tenth each; those of the row at which a way begins are behind it."""
+    found = signs_of(np.full(rows, step_m), 0.1, interval_s=1.0).sharpest_rad
+    assert found == pytest.approx(turned_rad)
+
+
+def test_mean_rates_of_spans():
+    found = _mean_rates(np.array([0.0, 4.0, 10.0]), np.array([0.0, 8.0, 14.0]), 2.0)
+    assert found.tolist() == [2.0, 2.0, 1.0, 1.0]
+    assert _mean_rates(np.zeros(0), np.zeros(0), 2.0).size == 0
+    # A log that lasts for years, or has a wrong time, takes no more memory than this.
+    long_s = np.array([0.0, 1000.0, 1e9])
+    rates = _mean_rates(long_s, 3.0 * long_s, 0.5)
+    assert rates.size == 1_000_000 - 1
+    assert rates[-1] == pytest.approx(3.0)
