@@ -95,7 +95,7 @@ def refutation(fix: GnssFix, total: float, area_m2: float) -> float:
     cross = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
     spread_m4 = max(fix.var_east_m2, 1.0) * max(fix.var_north_m2, 1.0) - cross**2
     anywhere = log(2 * pi * sqrt(max(spread_m4, 1.0)) / area_m2)
-    return min(max(min(anywhere, 0.0) - total, -_MOST_REFUTED_NATS), 0.0)
+    return min(max(anywhere - total, -_MOST_REFUTED_NATS), 0.0)
 
 
 def widened(fix: GnssFix, times: float) -> GnssFix:
