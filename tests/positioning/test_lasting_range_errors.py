@@ -231,3 +231,18 @@ def test_a_satellite_that_is_hidden_keeps_the_error_that_it_had_when_it_was_rece
     new_m2 = 9.0 + expected[[0, 2]] ** 2
     np.testing.assert_allclose(found.covariance, np.diag([9.0, 9.0, 9.0, 1.0, 4.0, *new_m2]))
     np.testing.assert_array_equal(carrying, [*rows[[0, 1, 2, 3, 5]], *np.zeros((2, 4))])
+
+
+def test_an_error_is_known_below_95_hundredths_of_its_first_variance():
+    first_m2 = 3.0**2 + np.array([2.0, 4.0, 6.0]) ** 2
+    held = Biases(("G01", "G02", "G03"), np.array([2.0, 4.0, 6.0]))
+    found = held.known(OPTIONS, np.array([0.94, 0.95, 0.96]) * first_m2)
+    assert found.tolist() == [True, False, False]
+    assert Biases().means_m(OPTIONS).size == Biases().variances_m2(OPTIONS).size == 0
+
+
+def test_no_stated_deviation_counts_as_less_than_a_millionth_of_a_millimetre():
+    """The ratio to the least one of 0 would be none: here it is 1.5, of 1e-9 m."""
+    stated = np.array([0.0, 1.5e-9])
+    found = reflection_deviations_m(OPTIONS, np.radians([40.0, 50.0]), stated)
+    np.testing.assert_allclose(found, [0.0, OPTIONS.reflection_times * 1.5e-9 * 1.5])
