@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mapfilter.errors import InputError
 from mapfilter.models.motion import random_walk
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import POSITION
@@ -48,6 +49,23 @@ def test_steps_that_lead_to_and_fro_end_after_fifty():
     better = static_fix(Scalar(np.asarray, lambda _: 1 / 1.6), [1.0], [0.0])
     assert better.ok
     assert 35 < better.iterations < 45
+
+
+@pytest.mark.parametrize(
+    ("share", "iterations", "ok"), [(0.6, 42, True), (0.657, 50, True), (0.658, 50, False)]
+)
+def test_the_last_step_of_fifty_is_still_taken(share, iterations, ok):
+    """The n-th step is (1 + share) share^(n-1): the last one that counts is 2e-9."""
+    found = static_fix(Scalar(np.asarray, lambda _: 1 / (1 + share)), [1.0], [0.0])
+    assert (found.ok, found.iterations) == (ok, iterations)
+
+
+def test_what_cannot_be_solved_is_told_together():
+    model = position_fix(POSITION, np.eye(2))
+    with pytest.raises(InputError, match=r"start[\s\S]*reading"):
+        static_fix(model, [np.inf, 0.0], [np.nan, 0.0])
+    with pytest.raises(InputError, match=r"shape \(2,\)"):
+        static_fix(model, [1.0], [0.0, 0.0])
 
 
 @pytest.mark.parametrize(("power", "ok"), [(19.05, True), (20.05, False)])
