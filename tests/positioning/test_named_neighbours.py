@@ -1,5 +1,6 @@
 """Fingerprints of logs that name cells by carrier and BSIC alone, and of predicted levels."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ from mapfilter.positioning.fingerprints.sources import (
     named_neighbours,
     reports_of_database,
     reports_of_logs,
+    simulated_reports,
 )
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
@@ -122,3 +124,27 @@ def test_a_database_in_which_nothing_is_received_tells_so(points):
 
 def test_a_phone_reports_a_serving_cell_and_six_neighbours():
     assert STRONGEST == 1 + 6
+
+
+def test_drawn_reports_are_served_by_their_strongest_cell_and_have_no_timing_advance_unasked():
+    """Two carriers of LTE, of each place another cell is the strongest."""
+    cells = tuple(
+        replace(cell, technology="LTE", frequency_mhz=mhz)
+        for cell, mhz in zip(PLAN.cells[:3], (800.0, 1800.0, 2600.0), strict=True)
+    )
+    at = [1, 2, 3], [5, 6, 7]
+    levels_dbm = [-60.0, -80.0, -90.0], [-70.0, -61.0, -91.0], [-75.0, -76.0, -62.0]
+    made = database(**{name: (*at, own) for name, own in zip("ABC", levels_dbm, strict=True)})
+    made.plan = CellPlan(CRS, cells)
+    known = reports_of_database(made)
+    assert known.planned.carrier.tolist() == [0, 1, 2]
+    exact = replace(known, sd_db=np.zeros(9), planned=replace(known.planned, common_db=0.0))
+    found = simulated_reports(exact, 3, 7, 0.0, np.random.default_rng(1))
+    assert np.isnan(found.timing_advance).all()
+    strongest = {known.places[k, 0]: "ABC"[k] for k in range(3)}
+    for k in range(3):
+        assert found.cell_ids[found.serving[k]] == strongest[found.places[k, 0]]
+        own = slice(found.first[k], found.first[k + 1])
+        assert found.serving[k] == found.cell[own][np.argmax(found.level_dbm[own])]
+    timed = simulated_reports(exact, 3, 7, 0.0, np.random.default_rng(1), 1.0)
+    assert np.isfinite(timed.timing_advance).all()
