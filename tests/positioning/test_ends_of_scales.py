@@ -82,10 +82,10 @@ def test_reports_as_a_scale_would_have_shown_them():
 def test_missing_levels_and_bounds_are_as_is_usual_where_they_allow_it():
     """Of a cell that is -70 dBm as a rule, and of one of -90."""
     usual_dbm = np.array([-70.0, -90.0])
-    cell = np.array([0, 1, 0, 1, 0, 1, 0], dtype=np.int32)
-    level_dbm = np.array([np.nan, np.nan, -80.0, -80.0, -80.0, -80.0, -60.0])
-    censored = np.array([0, 0, -1, -1, 1, 1, 0], dtype=np.int8)
-    expected = [-70.0, -90.0, -80.0, -90.0, -70.0, -80.0, -60.0]
+    cell = np.array([0, 1, 0, 1, 0, 1, 0, 0], dtype=np.int32)
+    level_dbm = np.array([np.nan, np.nan, -80.0, -80.0, -80.0, -80.0, -60.0, -75.0])
+    censored = np.array([0, 0, -1, -1, 1, 1, 0, 0], dtype=np.int8)
+    expected = [-70.0, -90.0, -80.0, -90.0, -70.0, -80.0, -60.0, -75.0]
     assert likely(level_dbm, censored, cell, usual_dbm).tolist() == expected
-    plain = [-70.0, -90.0, -80.0, -80.0, -80.0, -80.0, -60.0]
+    plain = [-70.0, -90.0, -80.0, -80.0, -80.0, -80.0, -60.0, -75.0]
     assert likely(level_dbm, None, cell, usual_dbm).tolist() == plain
