@@ -69,5 +69,5 @@ def test_points_state_milliseconds_and_centimetres_and_one_alone_is_no_line(tmp_
     (point,) = json.loads(path.read_text())["features"]
     assert point["geometry"]["type"] == "Point"
     assert point["properties"] == {
-        "time_s": 12.346, "status": "tracking", "radius_95_m": 9.26, "protection_m": 21.26,
+        "time_s": 12.346, "status": "TRACKING", "radius_95_m": 9.26, "protection_m": 21.26,
     }  # fmt: skip
