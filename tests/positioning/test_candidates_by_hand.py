@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.candidate import CandidateFilter, CandidateTracker, startable
 from mapfilter.positioning.epochs import Epoch, ReportRow
@@ -85,3 +86,12 @@ def test_a_class_of_options_stands_for_its_defaults():
     found = as_filter(KalmanFilter, DATABASE)
     assert isinstance(found, KalmanTracker)
     assert found.name == "ekf"
+
+
+def test_what_a_function_makes_of_a_database_has_to_be_a_filter():
+    with pytest.raises(ConfigError, match="made"):
+        as_filter(made, DATABASE)
+
+
+def made(_):
+    return 5
