@@ -82,6 +82,14 @@ def test_errors_of_cross_validation_are_of_evenly_taken_reports():
     assert len(cross_validate(database(), NEAREST, np.zeros(120, dtype=int))) == 0
 
 
+def test_two_thousand_reports_are_enough(monkeypatch):
+    asked = []
+    monkeypatch.setattr(cross_validation, "left_out", lambda *given: asked.append(given[3]) or ())
+    cross_validate(at(np.zeros((3000, 2))), NEAREST, np.zeros(3000, dtype=int))
+    (tried,) = asked
+    assert (len(tried), tried[0], tried[-1]) == (2000, 0, 2999)
+
+
 def test_errors_of_drawn_reports_are_of_ten_blocks_in_turn():
     parts = database()
     first, second = parts.some(LOGS == 0), parts.some(LOGS == 1)
