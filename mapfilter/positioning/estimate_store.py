@@ -99,7 +99,7 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
     east, cross, north = (
         column[name] for name in ("var_east_m2", "cov_east_north_m2", "var_north_m2")
     )
-    covariance = np.stack([east, cross, cross, north], axis=-1).reshape(-1, 2, 2)
+    covariance = np.stack([east, cross, cross, north], axis=1).reshape(len(east), 2, 2)
     start = meta["start_utc_s"]
     evidence = None
     if set(_EVIDENCE) <= set(table.column_names):
@@ -112,7 +112,7 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
         column["east_m"],
         column["north_m"],
         covariance,
-        np.stack([column[f"radius_{share}_m"] for share in (50, 67, 95)], axis=-1),
+        np.stack([column[f"radius_{share}_m"] for share in (50, 67, 95)], axis=1),
         tuple(Status(s) for s in column["status"]),
         column["hypotheses"],
         column["mass_50m"],

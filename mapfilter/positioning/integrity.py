@@ -248,10 +248,10 @@ def _kernel_radius(distance: Floats, mass: Floats, scale: float, share: float) -
     """Return the radius beyond which the kernels have a share; one grid for all shares."""
     low, high = 0.0, float(distance[-1] + _REACH * scale)
     nearer = np.empty(mass.size)
-    total = 0.0
+    within = 0.0
     for k in range(mass.size):
-        nearer[k] = total
-        total += mass[k]
+        nearer[k] = within
+        within += mass[k]
     for _ in range(_STEPS):
         middle, beyond = 0.5 * (low + high), 0.0
         for k in range(mass.size - 1, -1, -1):
@@ -319,7 +319,7 @@ def _mixture_radius(share: float, weight: Floats, mean: Floats, deviation: Float
     if not isfinite(weight.sum() + mean.sum() + deviation.sum()):
         return np.nan
     reach = sqrt(2.0 * log(2.0 * weight.size / share)) + 1.0
-    low, high = 0.0, 0.0
+    low = high = 0.0
     for c in range(weight.size):
         high = max(high, sqrt(mean[c, 0] ** 2 + mean[c, 1] ** 2) + reach * deviation[c, 0])
     for _ in range(_STEPS):

@@ -116,6 +116,12 @@ def test_a_fix_that_no_hypothesis_explains_is_rejected_for_a_while(status, limit
     assert ended.unused == ()
 
 
+def test_a_fix_at_the_gate_is_used():
+    """6 m off with a variance of 2 m² it is 9 nats less than at its place."""
+    fix = replace(fix_at(6.0), var_east_m2=2.0, var_north_m2=2.0)
+    assert compared(belief_at(sd_m=0.0, count=1), fix=fix).unused == ()
+
+
 @pytest.mark.parametrize(
     ("given", "used"),
     [
@@ -346,6 +352,10 @@ def test_a_clock_that_jumps_is_found_anew_and_known_from_then_on(known):
     # So it is with errors of twice the stated deviation.
     usual = ranges(clock_m=52_000.0, errors=(6.0, -6.0, 6.0, -6.0, 6.0, -6.0))
     assert compared(belief, state, 11.0, 101.0, ranges=usual).unused == ()
+    # Larger ones, which a clock that is known allows, are too large for one that jumped as well.
+    for clock_m, used in ((2000.0, True), (52_000.0, False)):
+        large = ranges(clock_m=clock_m, errors=(8.0, -8.0, 8.0, -8.0, 8.0, -8.0))
+        assert (compared(belief, state, 11.0, 101.0, ranges=large).unused == ()) is used
     # Another jump is found from there; without one the clock stays.
     for clock_m in (52_000.0, -300_000.0):
         later = compared(found.belief, found.state, 12.0, 131.0, ranges=ranges(clock_m=clock_m))

@@ -81,6 +81,16 @@ def test_first_pseudoranges_weigh_places_by_their_differences():
     np.testing.assert_allclose(term.log_likelihood(far), np.log([1.9, 0.1]), atol=1e-3)
 
 
+def test_first_satellites_take_the_receiver_at_the_stated_height():
+    """So that places to either side are alike; a metre would be 0.6 m of the two's difference."""
+    epoch = Epoch(3.0, (), ranges=ranges([(90.0, 80.0), (270.0, 20.0)], (0.0, 0.0)))
+    (term,) = SOURCE.first(epoch).terms
+    state = np.array([[380.0, 400.0, 420.0], [300.0, 300.0, 300.0]], dtype=np.float32)
+    west, middle, east = term.log_likelihood(state)
+    assert west == pytest.approx(east, abs=1e-3)
+    assert middle > west + 0.5
+
+
 def test_a_first_receiver_that_has_lasting_errors_says_less():
     epoch = Epoch(3.0, (), ranges=ranges([(90.0, 30.0), (270.0, 30.0)], (6.0, 0.0)))
     (term,) = SOURCE.first(epoch).terms

@@ -148,7 +148,7 @@ def test_place_and_tail_are_those_of_east_and_north():
     np.testing.assert_allclose(tail.offsets_m, [[-5.0, -5.0], [15.0, 15.0]])
     np.testing.assert_allclose(tail.covariances_m2, [100.0 * np.eye(2)] * 2)
     found = place_of(belief.leading, [0, 2])
-    assert (found["east_m"], found["north_m"]) == (10.0, 20.0)
+    assert (found["east_m"], found["north_m"], found["way_id"]) == (10.0, 20.0, 0)
     np.testing.assert_allclose(found["radii_m"], 10.0 * np.sqrt(-2 * np.log([0.5, 0.33, 0.05])))
     assert found["mass_50m"] == pytest.approx(1 - np.exp(-12.5))
     # Of several parts it is that about the leading one.
@@ -156,3 +156,62 @@ def test_place_and_tail_are_those_of_east_and_north():
         100.0 * np.eye(2), (2, 1, 1))))  # fmt: skip
     assert work.take(Epoch(10.0)).mass_50m == pytest.approx(0.75 * (1 - np.exp(-12.5)))
     assert hypot(*work.belief.moments.mean) == pytest.approx(hypot(15.0, 25.0))
+
+
+def fixed(fix, **more):
+    """The variances and the covariance of east and north after a fix, of a belief of 50 m."""
+    work = begun(**more)
+    work.take(Epoch(10.0, fix=fix))
+    return work.belief.covariances[0]
+
+
+def joined(noise_m2):
+    """Kalman's: the inverses of the covariances of belief and fix add up."""
+    return np.linalg.inv(np.eye(2) / 2500.0 + np.linalg.inv(noise_m2))
+
+
+def test_errors_of_a_fix_of_less_than_a_metre_are_believed():
+    """Half a metre to each side, whatever the option says of fixes that state nothing."""
+    found = fixed(GnssFix(EAST + 2000.0, NORTH, 0.25, 0.25, 0.0))
+    np.testing.assert_allclose(found, joined(0.25 * np.eye(2)), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [(100.0, 100.0, 100.0), (0.0, 4.0, 0.0), (-4.0, -4.0, 0.0), (4.0, nan, 0.0), (4.0, 1.0, 3.0)],
+)
+def test_errors_of_a_fix_that_no_law_has_are_those_of_one_without(stated):
+    """Such as errors along a line alone: the determinant is 0. The option says 7 m."""
+    options = replace(OPTIONS, fix_sd_m=7.0)
+    found = fixed(GnssFix(EAST + 2000.0, NORTH, *stated), options=options)
+    np.testing.assert_allclose(found, joined(49.0 * np.eye(2)), rtol=1e-6, atol=1e-6)
+
+
+def test_errors_of_fixes_last_however_small_they_are():
+    """Of 4 m², which a fix states, a quarter lasts: 0.5 m on each axis, squared."""
+    options = replace(OPTIONS, fix_lasting_m=0.5)
+    work = KalmanStep(SiteModels(PLAN, options), EKF, KalmanState(extended_layout(POSITION)))
+    work.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 4.0, 4.0, 0.0)))
+    assert work.belief.means.shape == (1, 4)
+
+
+def test_before_the_first_measurement_there_is_no_tail():
+    work = KalmanStep(SiteModels(PLAN, OPTIONS), EKF, KalmanState(POSITION))
+    work.take(Epoch(0.0))
+    assert work.tail is None
+    assert begun().tail is not None
+
+
+def test_without_a_time_before_no_time_has_passed():
+    """So the belief, of 50 m, has not become wider by a random walk."""
+    work = begun(time_s=nan)
+    work.take(Epoch(10.0))
+    np.testing.assert_allclose(work.belief.covariances[0], 2500.0 * np.eye(2))
+
+
+def test_levels_that_are_not_used_are_told():
+    work = begun()
+    work.take(Epoch(10.0, radio=(ReportRow("serving", "Z", None, None, -70.0, 0),)))
+    assert [(one.time_s, one.kind, one.what, one.reason) for one in work.unused] == [
+        (10.0, "serving", "Z", Reason.UNKNOWN_CELL)
+    ]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.gnss.biases import MOST, kept_share, reflection_deviations_m
+from mapfilter.positioning.gnss.biases import MOST, Biases, kept_share, reflection_deviations_m
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
@@ -211,3 +211,38 @@ def test_hypotheses_carry_lasting_errors():
     assert carrying.shape == (STATES + LINEAR + 3, 4)
     np.testing.assert_allclose(carried(carrying, after.mean.size)[LINEAR], [-2, -1, 0, 3])
     assert after.mean[LINEAR] == pytest.approx(receiver.mean[LINEAR] + 3.0)
+
+
+def test_a_satellite_that_is_hidden_keeps_the_error_that_it_had_when_it_was_received():
+    """It is known to 1 m; another one, of which nothing was found out, is left out."""
+    old = Biases(("G07", "G08", "G02"), np.array([31.0, 32.0, 33.0]))
+    receiver = replace(
+        begun(OPTIONS, 0.0, 0.0), mean=np.array([990.0, 2.0, 15.0, 7.0, 8.0, 9.0]), biases=old,
+        covariance=np.diag([9.0, 9.0, 9.0, 1.0, 3.0**2 + 32.0**2, 4.0]),
+    )  # fmt: skip
+    sky, rows = sky_of(), np.arange(24.0).reshape(6, 4)
+    found, carrying = with_satellites(OPTIONS, receiver, rows, sky)
+    assert found.biases.names == ("G07", "G02", "G01", "G03")
+    # Those of the epoch have what it says: 5 m times the cotangent of the elevation.
+    expected = 5.0 / np.tan(sky.elevation_rad)
+    np.testing.assert_allclose(found.biases.reflection_m, [31.0, *expected[[1, 0, 2]]])
+    # The mean of a new one is half of it.
+    np.testing.assert_allclose(found.mean, [990.0, 2.0, 15.0, 7.0, 9.0, *0.5 * expected[[0, 2]]])
+    new_m2 = 9.0 + expected[[0, 2]] ** 2
+    np.testing.assert_allclose(found.covariance, np.diag([9.0, 9.0, 9.0, 1.0, 4.0, *new_m2]))
+    np.testing.assert_array_equal(carrying, [*rows[[0, 1, 2, 3, 5]], *np.zeros((2, 4))])
+
+
+def test_an_error_is_known_below_95_hundredths_of_its_first_variance():
+    first_m2 = 3.0**2 + np.array([2.0, 4.0, 6.0]) ** 2
+    held = Biases(("G01", "G02", "G03"), np.array([2.0, 4.0, 6.0]))
+    found = held.known(OPTIONS, np.array([0.94, 0.95, 0.96]) * first_m2)
+    assert found.tolist() == [True, False, False]
+    assert Biases().means_m(OPTIONS).size == Biases().variances_m2(OPTIONS).size == 0
+
+
+def test_no_stated_deviation_counts_as_less_than_a_millionth_of_a_millimetre():
+    """The ratio to the least one of 0 would be none: here it is 1.5, of 1e-9 m."""
+    stated = np.array([0.0, 1.5e-9])
+    found = reflection_deviations_m(OPTIONS, np.radians([40.0, 50.0]), stated)
+    np.testing.assert_allclose(found, [0.0, OPTIONS.reflection_times * 1.5e-9 * 1.5])

@@ -113,6 +113,29 @@ def test_pseudoranges_that_no_hypothesis_can_have_are_far_below_the_usual():
     assert scores[1] < -100
 
 
+def test_pseudoranges_beyond_all_numbers_are_no_usual_ones():
+    """Their squares are infinite: no hypothesis keeps any weight."""
+    sky = replace(sky_of(), range_m=np.full(4, 1e200))
+    found = weighed(sky, SIGMA_M, receiver_of(), PLACES, np.zeros(4), ROWS)
+    assert found.score == -np.inf
+    np.testing.assert_array_equal(found.gain, 0.0)
+
+
+def test_a_hypothesis_without_weight_counts_as_one_of_700_nats_less():
+    """It is 5 km nearer to where the satellites say than the other, whose weight is all."""
+    places = np.array([[5000.0 + 5.0, 5.0], [-9.0, -9.0]], dtype=np.float32)
+    sky, rows, clock = sky_of(), np.zeros((3, 2)), receiver_of(np.diag([1e4, 1.0, 1e4]))
+    nats = [
+        weighed(sky, np.full(4, 40.0), clock, places[:, [k]], np.zeros(1), rows[:, [k]]).score - 2.0
+        for k in range(2)
+    ]
+    assert nats[0] < -1000
+    assert nats[1] > -10
+    found = weighed(sky, np.full(4, 40.0), clock, places, np.array([0.0, -np.inf]), rows)
+    total = np.logaddexp(nats[0], nats[1] - 700.0)
+    np.testing.assert_allclose(found.gain, np.array(nats) - total, rtol=1e-6)
+
+
 @pytest.mark.parametrize("elapsed_s", [0.5, 4.0])
 @pytest.mark.parametrize("gone_m", [0.0, 30.0])
 def test_clock_and_height_go_on_as_random_walks(elapsed_s, gone_m):
@@ -173,6 +196,13 @@ def test_hypotheses_carry_what_is_left_beside_the_mean():
         np.testing.assert_array_equal(carrying[:STATES], state)
         np.testing.assert_allclose(carrying[STATES:], rows - rows.mean(axis=1)[:, None], atol=1e-6)
         np.testing.assert_allclose(receiver.mean, MEAN + rows.mean(axis=1))
+
+
+def test_a_large_belief_keeps_its_hypotheses():
+    """Of a size at which memory is new, and holds none of them by chance."""
+    state = np.random.default_rng(4).random((STATES, 100_000), dtype=np.float32)
+    _, carrying = centred(receiver_of(), np.zeros((3, 100_000)), state)
+    np.testing.assert_array_equal(carrying[:STATES], state)
 
 
 def test_hypotheses_without_a_receiver_carry_nothing():

@@ -62,6 +62,33 @@ def test_radii_are_the_factor_of_their_class_times_the_spread():
     np.testing.assert_allclose(found, expected)
 
 
+def raised(ratio, block):
+    """The least nominal shares whose quantiles of the other blocks hold as many as they should."""
+    held = []
+    for nominal in regions._NOMINAL:
+        inside = 0
+        for one in np.unique(block):
+            inside += np.sum(ratio[block == one] <= conformal(ratio[block != one], nominal))
+        held.append(inside / len(ratio))
+    reached = np.maximum.accumulate(held)
+    return [
+        next((n for n, r in zip(regions._NOMINAL, reached, strict=True) if r >= level), 1.0)
+        for level in LEVELS
+    ]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_levels_of_a_dozen_errors_are_raised_by_each_of_them(seed):
+    given = errors(12, 4, seed)
+    found = regions._raised(given.error_m, np.zeros(12, dtype=int), given.block, 1)
+    np.testing.assert_allclose(found, raised(given.error_m, given.block))
+
+
+def test_an_error_at_the_radius_is_within_it():
+    """All are of 8 m."""
+    assert coverage(Errors(np.full(6, 8.0), *np.zeros((2, 6)), np.arange(6) % 2)) == (1.0,) * 3
+
+
 def test_levels_are_raised_until_left_out_blocks_are_covered():
     """By hand over all nominal shares; of fewer than three blocks they stay."""
     given = errors(300, 5, seed=3)
@@ -69,18 +96,7 @@ def test_levels_are_raised_until_left_out_blocks_are_covered():
     added_m = float(np.median(given.error_m))
     ratio = given.error_m / (given.spread_m + added_m)
     which = np.zeros(300, dtype=int)
-    held = []
-    for nominal in regions._NOMINAL:
-        inside = 0
-        for block in range(5):
-            out = given.block == block
-            inside += np.sum(ratio[out] <= conformal(ratio[~out], nominal))
-        held.append(inside / 300)
-    reached = np.maximum.accumulate(held)
-    expected = [
-        next((n for n, r in zip(regions._NOMINAL, reached, strict=True) if r >= level), 1.0)
-        for level in LEVELS
-    ]
+    expected = raised(ratio, given.block)
     found = regions._raised(ratio, which, given.block, 1)
     np.testing.assert_allclose(found, expected)
     assert found[2] > 0.95

@@ -78,6 +78,15 @@ def test_what_is_not_given():
     assert found.notes == ()
 
 
+def test_readings_of_cells_that_others_lack_are_left_out_and_counted():
+    cells, level_dbm = list("abxyxa"), [-60.0, -61.0, -62.0, -63.0, -64.0, -65.0]
+    given = make_reports(CRS, [0, 0, 0, 1, 1, 2], cells, level_dbm, count=3)
+    found, unknown = given.named_as(("b", "a"))
+    assert unknown.tolist() == [1, 2, 0]
+    assert found.first.tolist() == [0, 2, 2, 3]
+    assert (found.cell.tolist(), found.level_dbm.tolist()) == ([1, 0, 1], [-60.0, -61.0, -65.0])
+
+
 def test_some_of_the_reports_in_any_order():
     found = made().some(np.array([2, 0]), "thinned")
     assert columns(found) == [THIRD, FIRST]

@@ -104,3 +104,9 @@ def test_without_a_serving_cell_all_of_a_carrier_may_be_meant():
         ("neighbour", "ARFCN 12, BSIC 1", Reason.AMBIGUOUS_CELL), ("serving", "", Reason.NO_CELL),
     ]  # fmt: skip
     assert read(row("neighbour", None, -85.0, 13, 1)).cells == ("G",)
+
+
+def test_the_serving_cell_is_not_the_first_one_that_is_named():
+    """Near the serving cell there is E; near the neighbour that stands before it F's namesake."""
+    found = read(row("neighbour", "F"), row("serving", "A"), row("neighbour", None, -80.0, 12, 1))
+    assert found.cells == ("F", "A", "E")

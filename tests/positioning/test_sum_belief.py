@@ -121,6 +121,21 @@ def test_many_parts_that_lie_on_one_another_become_one():
     assert found.parts.tolist() == [10, 12]
 
 
+def test_a_part_of_one_in_a_million_stays():
+    """The reading is as near to either of them."""
+    belief = parts((-300.0, 0.0), (300.0, 0.0), weights=(1 - 1e-6, 1e-6))
+    found, _ = updated(belief)
+    assert found.weights.tolist() == [1 - 1e-6, 1e-6]
+
+
+def test_a_part_that_was_merged_takes_no_other_one():
+    """The second, at 0.09 of the first, lies as near to the third, which is 0.36 from the first."""
+    step = np.linalg.cholesky(COVARIANCE) @ np.array([0.3, 0.0])
+    found, _ = updated(parts((0.0, 0.0), step, 2 * step, weights=(0.5, 0.3, 0.2)))
+    np.testing.assert_allclose(found.weights, [0.8, 0.2], rtol=1e-6)
+    assert found.parts.tolist() == [10, 12]
+
+
 def test_a_start_around_a_place_has_equal_parts():
     places = {0: np.array([1.0, 2.0, 3.0, 4.0]), 1: np.array([5.0, 6.0, 7.0, 8.0])}
     found = SumBelief.around(np.array([9.0, 9.0]), COVARIANCE, places)
@@ -144,6 +159,15 @@ def test_a_part_that_cannot_be_updated_loses_its_weight():
     assert taken.used
     assert found.parts.tolist() == [10, 12]
     np.testing.assert_allclose(found.weights, [2 / 3, 1 / 3], rtol=1e-6)
+
+
+def test_a_reading_that_only_parts_without_weight_explain_changes_nothing():
+    """To all others it is less likely than any number tells."""
+    belief = parts((0.0, 0.0), (1e5, 0.0), weights=(1.0, 0.0))
+    found, taken = updated(belief, (1e5, 0.0), 5.0)
+    assert found is belief
+    assert not taken.used
+    assert np.isnan(taken.nis)
 
 
 def test_evidence_that_is_far_apart_overflows_nothing():
@@ -187,6 +211,12 @@ def test_radii_of_round_beliefs_and_of_lines():
     radii_m, share = gaussian_radii_m(np.diag([100.0, 1e-6]), 25.0)
     np.testing.assert_allclose(radii_m, 10.0 * norm.ppf(0.5 + SHARES / 2), rtol=1e-4)
     assert share == pytest.approx(2 * norm.cdf(2.5) - 1, abs=1e-4)
+
+
+def test_a_place_that_is_known_exactly_counts_as_known_to_a_millimetre():
+    radii_m, share = gaussian_radii_m(np.zeros((2, 2)), 1e-3)
+    np.testing.assert_allclose(radii_m, 1e-3 * np.sqrt(-2 * np.log(1 - SHARES)))
+    assert share == pytest.approx(1 - np.exp(-0.5))
 
 
 def test_smoothed_parts_are_those_of_rauch_tung_and_striebel():

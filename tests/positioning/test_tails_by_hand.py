@@ -69,7 +69,13 @@ def test_nothing_and_weights_of_nothing_have_no_tail():
         assert found.distance_m.size == found.mass.size == 0
         assert isnan(found.radius_m(0.5))
         assert isnan(found.protection_m(0.5))
-        assert found.effective == 0.0
+        assert found.effective == found.scale_m == 0.0
+
+
+def test_a_single_sample_is_one_not_less():
+    """Its median is its own distance; 1 to the power of -0.2 is 1."""
+    found = tail_of([7.8], [0.3])
+    assert found.scale_m == pytest.approx(1.06 * edge_m(83) / 0.75 * sqrt(3) / pi, rel=1e-6)
 
 
 SAMPLES = SampleTail(np.array([1.0, 4.0, 9.0]), np.array([0.5, 0.3, 0.2]), 0.1, 40.0)
@@ -81,6 +87,33 @@ SAMPLES = SampleTail(np.array([1.0, 4.0, 9.0]), np.array([0.5, 0.3, 0.2]), 0.1, 
 )
 def test_the_radius_that_holds_a_share_of_the_samples(share, radius_m):
     assert SAMPLES.radius_m(share) == radius_m
+
+
+def test_shares_of_samples_are_those_of_their_sum_but_for_rounding():
+    """A part in a thousand million is rounding."""
+    double = replace(SAMPLES, mass=2 * SAMPLES.mass)
+    for share in (0.3, 0.501, 0.9):
+        assert double.radius_m(share) == SAMPLES.radius_m(share)
+    assert SAMPLES.radius_m(0.5 * (1 + 0.5e-9)) == 1.0
+    assert SAMPLES.radius_m(0.5 * (1 + 1.5e-9)) == 4.0
+    least = 0.5 * (1 - 1e-9)
+    assert SampleTail(np.array([1.0, 2.0]), np.array([least, 1 - least]), 0.1, 9.0).radius_m(
+        0.5
+    ) == 1.0  # fmt: skip
+    # More than all are not within any.
+    assert SAMPLES.radius_m(1.1) == 9.0
+
+
+def test_no_level_is_beyond_45_widths():
+    """Of a risk of 1e-40 it would be 92."""
+    tail = SampleTail(np.array([20.0]), np.array([1.0]), 3.0, 1e9)
+    assert tail.protection_m(1e-40) == pytest.approx(20.0 + 45 * 3.0)
+
+
+def test_levels_are_searched_for_by_36_halvings():
+    """Half of it lies within nothing; the rest is as far as a quarter of the Earth's girth."""
+    tail = SampleTail(np.array([0.0, 1e7]), np.array([0.7, 0.3]), 1e-9, 1e9)
+    assert tail.protection_m(0.5) == pytest.approx(1e7 / 2**36)
 
 
 def bounded(risk, effective, p_none=0.0):
@@ -150,6 +183,19 @@ def test_radii_of_gaussians_that_lie_on_one_another(share):
     )
 
 
+def test_many_parts_on_one_another_are_as_one():
+    tail = GaussianTail(np.full(10, 0.1), np.zeros((10, 2)), np.tile(25.0 * np.eye(2), (10, 1, 1)))
+    for share in (0.05, 0.5, 0.999):
+        assert tail.radius_m(share) == pytest.approx(5 * sqrt(-2 * log(1 - share)), rel=2e-5)
+
+
+@pytest.mark.parametrize("offset_m", [(0.9, 0.0), (0.0, 0.9)])
+def test_the_radius_of_a_place_beside_the_reported_one(offset_m):
+    """Known to a centimetre, it is 0.9 m off: half of it lies within that."""
+    tail = GaussianTail(np.ones(1), np.array([offset_m]), 1e-4 * np.eye(2)[None])
+    assert tail.radius_m(0.5) == pytest.approx(0.9, abs=2e-4)
+
+
 def test_radii_are_never_too_small_and_at_most_a_part_in_a_hundred_thousand_too_large():
     tail = GaussianTail(np.ones(1), np.zeros((1, 2)), 49.0 * np.eye(2)[None])
     shares = np.linspace(0.3, 0.999, 40)
@@ -164,6 +210,8 @@ def test_a_gaussian_without_numbers_has_no_radius():
     assert isnan(tail.radius_m(0.5))
     assert isnan(tail.protection_m(0.5))
     sure = GaussianTail(np.ones(1), np.array([[3.0, 4.0]]), np.zeros((1, 2, 2)))
+    # A risk that is used up has no level, whatever the belief.
+    assert replace(tail, p_none=0.01).protection_m(0.01) == inf
     # A place that is known to a millimetre along a line.
     assert sure.radius_m(0.99) == pytest.approx(5.0, abs=0.01)
     here = GaussianTail(np.ones(1), np.zeros((1, 2)), np.zeros((1, 2, 2)))

@@ -37,3 +37,22 @@ def test_thin_beliefs_beside_the_position(radius_m, along_m, across_m, thin):
     tail = GaussianTail(np.ones(1), offset[np.newaxis], covariance[np.newaxis])
     expected = share_beyond(radius_m, along_m, across_m, long_m, short_m)
     assert tail.outside(radius_m) == pytest.approx(expected, abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        # Less than a metre, beside a belief of decimetres.
+        (0.9, 0.6, 0.7, 0.3, 0.003),
+        (0.7, 0.0, 0.5, 0.3, 0.003),
+        # Short beside their distance: all of them lies at a few angles.
+        (67.5, 64.8, 27.4, 5.1, 0.051),
+        (60.6, 48.2, 36.2, 0.5, 0.015),
+    ],
+)
+def test_thin_beliefs_near_the_circle(place):
+    """Radius, mean and deviations along and across."""
+    radius_m, along_m, across_m, long_m, short_m = place
+    covariance = np.diag([long_m**2, short_m**2])
+    tail = GaussianTail(np.ones(1), np.array([[along_m, across_m]]), covariance[np.newaxis])
+    assert tail.outside(radius_m) == pytest.approx(share_beyond(*place), abs=5e-5)

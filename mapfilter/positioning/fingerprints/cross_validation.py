@@ -40,7 +40,7 @@ def cross_validate(
     in the other folds have no error. Their levels end where ``bounds`` does.
     """
     count = min(len(database), most)
-    tried = np.linspace(0, max(len(database) - 1, 0), count).astype(np.int64)
+    tried = np.linspace(0, len(database) - 1, count).astype(np.int64)
     parts = []
     for left in left_out(database, method, fold, tried, progress, bounds):
         block = np.full(len(left.positions), left.fold)

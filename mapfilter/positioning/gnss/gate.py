@@ -26,7 +26,6 @@ from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
-    MIN_MOVED_M,
     Receiver,
     Weighed,
     agreement,
@@ -45,6 +44,7 @@ _RESET_GATE = 0.5
 _F = np.float32
 _FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
+_MIN_MOVED_M = 0.1
 _MOST_REFUTED_NATS = 5.0
 """The most that one fix takes from the null hypothesis."""
 
@@ -95,7 +95,7 @@ def refutation(fix: GnssFix, total: float, area_m2: float) -> float:
     cross = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
     spread_m4 = max(fix.var_east_m2, 1.0) * max(fix.var_north_m2, 1.0) - cross**2
     anywhere = log(2 * pi * sqrt(max(spread_m4, 1.0)) / area_m2)
-    return min(max(min(anywhere, 0.0) - total, -_MOST_REFUTED_NATS), 0.0)
+    return min(max(anywhere - total, -_MOST_REFUTED_NATS), 0.0)
 
 
 def widened(fix: GnssFix, times: float) -> GnssFix:
@@ -231,7 +231,7 @@ class GnssGate:
         if time_s < state.probation_until_s:
             return found.without("gnss", [""], Reason.ON_PROBATION, compared=True)
         gone_m = travelled_m - state.fix_used_at_m
-        times = max(options.fix_memory_m / max(gone_m, MIN_MOVED_M), 1.0)
+        times = max(options.fix_memory_m / max(gone_m, _MIN_MOVED_M), 1.0)
         wide = widened(fix, times)
         term, log_weight = FixTerm(wide, self.origin_m), belief.log_weight
         gain = term.log_likelihood(belief.state)

@@ -34,7 +34,6 @@ LAYOUT = StateLayout(5, 0, 1, clock=2)
 """East and north from the frame's origin, the clock's error and rate, and the height; lasting
 errors of satellites (:mod:`mapfilter.positioning.gnss.biases`) stand behind these."""
 LINEAR = 3
-MIN_MOVED_M = 0.1
 _NO_RESAMPLING = SirOptions(resample_below=0.0)
 
 
@@ -249,7 +248,6 @@ def weighed(
     before = MixedBelief(state, weight, covariance, np.array([0, 1]))
     model = pseudoranges(replace(LAYOUT, size=size), sky.satellites_m, sigma_m)
     slope = receiver.loading(sky)
-    slope[:, 1] = 0.0
     known_m = slope @ receiver.mean
     loading = np.zeros((len(sky.names), size))
     # The model itself adds the clock's error.

@@ -111,7 +111,7 @@ class SumBelief:
             Sizes do not fit or the reading is infinite.
         """
         count, n = self.means.shape
-        given = np.tile(np.asarray(reading, dtype=np.float64), (count, 1, 1))
+        given = np.tile(np.asarray(reading, dtype=np.float64), (count, 1))[:, None]
         still, start = (np.eye(n), np.zeros((n, n))), (self.means, self.covariances)
         run = run_trials(measurement, *still, method, *start, given, covariances=True)
         own = run.evidence[:, 0]
@@ -119,7 +119,7 @@ class SumBelief:
         if not taken.any():
             return self, Taken(float("nan"), float("nan"))
         most = own[taken].max()
-        gained = self.weights * np.where(taken, np.exp(np.where(taken, own - most, 0.0)), 0.0)
+        gained = self.weights * np.where(taken, np.exp(own - most), 0.0)
         total = float(gained.sum())
         if not total > 0:
             return self, Taken(float("nan"), float("nan"))
@@ -172,7 +172,9 @@ class FusionHistory:
         if not self.beliefs:
             return []
         last = self.beliefs[-1]
-        phi = np.array(self.transitions[1:]).reshape(-1, *self.transitions[0].shape)
+        phi = np.array(self.transitions[1:]).reshape(
+            len(self.beliefs) - 1, *self.transitions[0].shape
+        )
         noise = np.array(self.processes[1:]).reshape(phi.shape)
         # Without the shifts, which are given, the motion is linear.
         moved = _moved(self.transitions, self.shifts)

@@ -205,8 +205,7 @@ class KalmanStep:
     def _start(self, fix: GnssFix | None, given: SiteReadings) -> SumBelief:
         """Return the first belief: at a fix, on a timing advance's circle, or about a site."""
         options, east, north = self.options, *self.where
-        mean, deviation = np.zeros(self.own.size), np.zeros(self.own.size)
-        deviation[list(self.own.velocity if self.own is MOVING else ())] = options.speed_sd_mps
+        mean, deviation = np.zeros(self.own.size), np.full(self.own.size, options.speed_sd_mps)
         if fix is not None:
             mean[self.where] = fix.east_m, fix.north_m
             deviation[self.where] = options.start_sd_m

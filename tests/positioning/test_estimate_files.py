@@ -1,0 +1,73 @@
+"""What stands in the files of an estimate, besides what is read back."""
+
+import json
+from math import nan
+
+import geopandas
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate_store import (
+    read_estimate,
+    write_estimate,
+    write_geojson,
+    write_gpx,
+)
+
+
+def fix(time_s, east_m, north_m):
+    covariance, radii_m = np.array([[4.0, 1.0], [1.0, 9.0]]), np.array([3.0, 4.5, 9.25])
+    return Fix(time_s, east_m, north_m, covariance, radii_m, Status.TRACKING, 1, 0.5, 0, nan,
+               Reason.USED)  # fmt: skip
+
+
+@pytest.fixture
+def estimate():
+    """Three epochs, of which one has only its east."""
+    fixes = [fix(0.0, 531_002.123, 4_555_997.567), fix(1.0, 531_004.0, nan),
+             fix(2.0, 531_006.789, 4_555_990.321)]  # fmt: skip
+    return TrackEstimate.of_fixes("EPSG:32629", "made", fixes)
+
+
+def test_a_table_has_its_columns_and_points_where_both_coordinates_are_known(tmp_path, estimate):
+    write_estimate(estimate, tmp_path / "one.parquet")
+    names = pq.read_table(tmp_path / "one.parquet").column_names
+    assert names == [*estimate.to_dataframe(), "geometry"]
+    points = geopandas.read_parquet(tmp_path / "one.parquet").geometry
+    assert points.isna().tolist() == [False, True, False]
+    assert (points[2].x, points[2].y) == (531_006.789, 4_555_990.321)
+    back = read_estimate(tmp_path / "one.parquet")
+    np.testing.assert_array_equal(back.covariance_m2, estimate.covariance_m2)
+    np.testing.assert_array_equal(back.radii_m, estimate.radii_m)
+    assert back.radii_m.shape == (3, 3)
+
+
+def test_a_gpx_file_declares_itself_and_its_namespace(tmp_path, estimate):
+    write_gpx(estimate, tmp_path / "one.gpx")
+    text = (tmp_path / "one.gpx").read_text()
+    assert text.startswith("<?xml version='1.0' encoding='utf-8'?>\n<gpx xmlns=")
+    assert text.count("<trkpt ") == 2
+    assert "ns0" not in text
+
+
+def test_coordinates_have_seven_decimals_which_is_a_centimetre(tmp_path, estimate):
+    write_geojson(estimate, tmp_path / "one.geojson")
+    line, *points = json.loads((tmp_path / "one.geojson").read_text())["features"]
+    assert [one["geometry"]["coordinates"] for one in points] == line["geometry"]["coordinates"]
+    for place in line["geometry"]["coordinates"]:
+        assert [len(str(one).partition(".")[2]) for one in place] == [7, 7]
+
+
+def test_points_state_milliseconds_and_centimetres_and_one_alone_is_no_line(tmp_path):
+    one = Fix(12.34567, 531_002.0, 4_555_997.0, np.eye(2), np.array([3.0, 4.5, 9.2567]),
+              Status.TRACKING, 1, 0.5, 0, nan, Reason.USED, protection_m=21.2567)  # fmt: skip
+    path = tmp_path / "one.geojson"
+    write_geojson(TrackEstimate.of_fixes("EPSG:32629", "made", [one]), path)
+    (point,) = json.loads(path.read_text())["features"]
+    assert point["geometry"]["type"] == "Point"
+    assert point["properties"] == {
+        "time_s": 12.346, "status": "TRACKING", "radius_95_m": 9.26, "protection_m": 21.26,
+    }  # fmt: skip
