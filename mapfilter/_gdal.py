@@ -10,7 +10,7 @@ import os
 import stat
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -58,16 +58,15 @@ def open_raster(path: Path, *, quiet: bool = True) -> Iterator[Any]:
     """
     _check_sidecars(path)
     try:
-        with _unreadable_messages_unheard():
-            with warnings.catch_warnings():
-                if quiet:
-                    warnings.simplefilter("ignore", NotGeoreferencedWarning)
-                # The absolute path, as GDAL takes a name such as "GTIFF_DIR:1:a.tif" for a command.
-                source = rasterio.open(path.absolute(), driver="GTiff")
-            with source:
-                _check_inside(path, source)
-                check_blocks(path, source)
-                yield source
+        with _unreadable_messages_unheard(), warnings.catch_warnings():
+            if quiet:
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            # The absolute path, as GDAL takes a name such as "GTIFF_DIR:1:a.tif" for a command.
+            source = rasterio.open(path.absolute(), driver="GTiff")
+        with source:
+            _check_inside(path, source)
+            check_blocks(path, source)
+            yield source
     except UnicodeDecodeError as error:
         raise RasterioError(f"names or notes in no UTF-8 ({error.reason})") from error
 
@@ -79,21 +78,29 @@ def _unreadable_messages_unheard() -> Iterator[None]:
     Rasterio hands on GDAL's messages. Where one quotes such bytes of the file, it can raise nothing
     and has Python print a traceback of its own, through both hooks.
     """
-    before = sys.excepthook, sys.unraisablehook
-
-    def raised(kind: type[BaseException], error: BaseException, trace: Any) -> None:
-        if not issubclass(kind, UnicodeDecodeError):
-            before[0](kind, error, trace)
-
-    def unraisable(found: Any) -> None:
-        if not isinstance(found.exc_value, UnicodeDecodeError):
-            before[1](found)
-
-    sys.excepthook, sys.unraisablehook = raised, unraisable
+    raised, unraisable = sys.excepthook, sys.unraisablehook
+    # Another thread opens a raster: it puts back what was there before.
+    if isinstance(raised, _Hook):
+        yield
+        return
+    sys.excepthook = _Hook(raised)
+    sys.unraisablehook = _Hook(unraisable)
     try:
         yield
     finally:
-        sys.excepthook, sys.unraisablehook = before
+        sys.excepthook, sys.unraisablehook = raised, unraisable
+
+
+class _Hook:
+    """A hook for exceptions that is not called for bytes that are no text."""
+
+    def __init__(self, before: Callable[..., None]) -> None:
+        self._before = before
+
+    def __call__(self, *given: Any) -> None:
+        error = given[1] if len(given) > 1 else given[0].exc_value
+        if not isinstance(error, UnicodeDecodeError):
+            self._before(*given)
 
 
 def _check_sidecars(path: Path) -> None:

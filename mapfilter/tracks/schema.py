@@ -129,7 +129,7 @@ TABLES: dict[str, Table] = {
             _NORTH,
             Column("var_east_m2", 0, 1e16, "square metres in 0..1e16"),
             Column("var_north_m2", 0, 1e16, "square metres in 0..1e16"),
-            Column("cov_east_north_m2", -1e16, 1e16, "square metres"),
+            Column("cov_east_north_m2", -1e16, 1e16, "square metres in -1e16..1e16"),
         ),
     ),
     "pseudoranges": Table(

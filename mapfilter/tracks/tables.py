@@ -275,9 +275,10 @@ def _check_technologies(radio: pd.DataFrame, door: _Door) -> None:
 
 def _check_covariance(gnss: pd.DataFrame, door: _Door) -> None:
     with np.errstate(invalid="ignore"):  # Variances below 0 are a fault of their own.
-        east_m, north_m = (np.sqrt(gnss[f"var_{name}_m2"].to_numpy()) for name in ("east", "north"))
+        sd_east_m = np.sqrt(gnss["var_east_m2"].to_numpy())
+        sd_north_m = np.sqrt(gnss["var_north_m2"].to_numpy())
     # Squares and products of the largest numbers would be infinite.
-    bad = np.abs(gnss["cov_east_north_m2"].to_numpy()) > east_m * north_m * (1 + 1e-9)
+    bad = np.abs(gnss["cov_east_north_m2"].to_numpy()) > sd_east_m * sd_north_m * (1 + 1e-9)
     column = Column("cov_east_north_m2", expected="a covariance of at most √(var_east·var_north)")
     _add_rows(door, bad, column, gnss["cov_east_north_m2"])
 

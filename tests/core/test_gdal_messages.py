@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -34,7 +35,22 @@ def test_bytes_that_gdal_quotes_print_no_traceback(tmp_path, number):
 
 
 def test_hooks_of_tracebacks_are_as_before(tmp_path):
-    before = sys.excepthook, sys.unraisablehook
-    with open_raster(tiff(tmp_path / "a.tif")):
-        assert sys.unraisablehook is not before[1]
+    before, path = (sys.excepthook, sys.unraisablehook), tiff(tmp_path / "a.tif")
+    first, second = open_raster(path), open_raster(path)
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    second.__exit__(None, None, None)
     assert (sys.excepthook, sys.unraisablehook) == before
+    threads = [Thread(target=_open_often, args=(path,)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert (sys.excepthook, sys.unraisablehook) == before
+
+
+def _open_often(path):
+    for _ in range(20):
+        with open_raster(path):
+            pass

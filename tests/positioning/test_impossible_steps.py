@@ -69,6 +69,51 @@ def test_before_the_pace_is_known_and_where_it_is_no_vehicles_all_stays():
     assert without_impossible(millimetres, 101.0, motion, 0.001) is not motion
 
 
+def through(motion_of, seconds=300, hz=1):
+    """Lengths that reach a belief, of rows at fixed times after 60 s at 20 m/s."""
+    watch, gone_m, reasons = SensorWatch(), 0.0, []
+    for number in range((60 + seconds) * hz):
+        time_s = number / hz
+        step_m = 20.0 / hz if time_s < 60 else motion_of(number - 60 * hz)
+        rows = (MotionStep(step_m, 0.5 + 1e-3 * number),)
+        watch, seen, (why, _) = watched(watch, Epoch(time_s, rows))
+        reasons.append(why)
+        if time_s >= 60:
+            gone_m += sum(step.step_m for step in seen.motion if not isnan(step.step_m))
+    return gone_m, reasons
+
+
+@pytest.mark.parametrize(("hz", "every_m"), [(10, 100.0), (5, 100.0), (1, 500.0), (1, 1000.0)])
+def test_a_coarse_odometer_is_believed(hz, every_m):
+    """Its rows are zero until a whole length has been gone."""
+    rows = round(every_m / 20.0 * hz)
+    gone_m, reasons = through(lambda n: every_m if n % rows == rows - 1 else 0.0, hz=hz)
+    assert Reason.IMPOSSIBLE_STEP not in reasons
+    assert gone_m >= 20.0 * 300 - every_m
+
+
+def test_a_sum_after_rows_without_a_length_is_believed():
+    _, reasons = through(lambda n: 61 * 20.0 if n % 61 == 60 else nan)
+    assert Reason.IMPOSSIBLE_STEP not in reasons
+
+
+def test_headings_beside_a_jump_do_not_become_stuck():
+    """A jump is no way on which headings could have changed."""
+    watch, reasons = SensorWatch(), []
+    for number in range(160):
+        rows = (MotionStep(1e6 if number == 120 else 1.4, 0.5),)
+        watch, _, (why, _) = watched(watch, Epoch(float(number), rows))
+        reasons.append(why)
+    assert reasons[120] is Reason.IMPOSSIBLE_STEP
+    assert set(reasons[:120] + reasons[121:]) == {Reason.USED}
+
+
+def test_before_the_first_step_no_time_is_known():
+    motion = (MotionStep(1e6, 0.0),)
+    standing = Pace(100.0, nan, 100, 1.0, 0.0, True, 1.4, 1.4, 0.0)
+    assert without_impossible(standing, 101.0, motion, 1.0) is motion
+
+
 def test_rows_without_a_length_stay():
     motion = (MotionStep(nan, 0.0),)
     assert without_impossible(WALKER, 101.0, motion, 1.0) is motion
@@ -104,3 +149,19 @@ def test_a_grid_whose_mass_has_left_the_area_begins_anew(database, log):
     assert found.status[5] is Status.SEARCHING
     assert np.isfinite(found.east_m[20:]).all()
     assert found.status[-1] is Status.TRACKING
+
+
+def test_a_grid_that_tracked_and_is_carried_off_is_lost_and_found(database, log):
+    motion = log.motion.copy()
+    # Not beyond 50 m and 150 m/s, so believed, and out of an area of 400 m.
+    motion.loc[300:303, "step_m"] = 190.0
+    carried = walk_log(motion=motion, radio=log.radio)
+    found = locate(carried, database, "grid").estimate
+    assert found.status[299] is Status.TRACKING
+    begun = [i for i, why in enumerate(found.reason) if why is Reason.NO_CANDIDATES_LEFT]
+    assert begun
+    assert np.isnan(found.east_m[begun[0]])
+    assert found.status[begun[0]] in (Status.LOST, Status.OUTSIDE)
+    claimed = {Status.CONVERGED, Status.TRACKING}
+    assert not claimed & set(found.status[begun[0] : begun[0] + 20])
+    assert np.isfinite(found.east_m[begun[0] + 20 :]).any()

@@ -1,6 +1,7 @@
 """Steps that nothing can have gone: a sensor that jumps, or a length in the wrong field.
 
 One such row would put all hypotheses where nobody is. It is read as a row that lacks its length.
+What flies, and passes the limit after it was below, has no length from there on.
 """
 
 from __future__ import annotations
@@ -40,11 +41,15 @@ def without_impossible(
     """
     if not pace.is_known or step_unit_m * pace.speed_mps > _FASTEST_MPS:
         return motion
-    farthest_m = _AT_ONCE_M + _FASTEST_MPS * max(time_s - pace.motion_s, 0.0)
+    # A step may cover the time of rows without one before it, as of a coarse odometer.
+    since_s = time_s - pace.stepped_s
+    if not isfinite(since_s):
+        return motion
+    farthest_m = _AT_ONCE_M + _FASTEST_MPS * max(since_s, 0.0)
     if not any(step_unit_m * abs(step.step_m) > farthest_m for step in motion):
         return motion
     return tuple(
-        replace(step, step_m=nan)
+        replace(step, step_m=nan, spread_m=nan)
         if isfinite(step.step_m) and step_unit_m * abs(step.step_m) > farthest_m
         else step
         for step in motion

@@ -112,17 +112,13 @@ def watched(
         ``MOTION_MISSING``, ``MOTION_STUCK``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``, and
         ``STALE_RADIO``.
     """
-    repeats, motion, repeated = without_repeats(
-        watch.repeats, epoch.time_s, epoch.motion, step_unit_m
-    )
-    if motion is not epoch.motion:
-        epoch = replace(epoch, motion=motion)
     before, given = watch, epoch.motion
-    motion = without_impossible(watch.pace, epoch.time_s, given, step_unit_m)
+    possible = without_impossible(watch.pace, epoch.time_s, given, step_unit_m)
+    repeats, motion, repeated = without_repeats(watch.repeats, epoch.time_s, possible, step_unit_m)
     if motion is not given:
         epoch = replace(epoch, motion=motion)
     watch, epoch, why = _followed(watch, epoch, step_unit_m)
-    if motion is not given and why in (Reason.USED, Reason.NO_STEP):
+    if possible is not given and why in (Reason.USED, Reason.NO_STEP):
         why = Reason.IMPOSSIBLE_STEP
     why = repeated if why is Reason.USED else why
     report, moved_m, nats = before.report, watch.moved_m, before.repeated_nats

@@ -36,7 +36,8 @@ class BayesState:
     Parameters
     ----------
     belief : MapBelief or None
-        None before the first report with a known cell, fix or satellite.
+        None before the first report with a known cell, fix or satellite, and where all mass of a
+        grid has left the area.
     status : Status
         As reported; that of the belief may differ while it is LOST or UNCERTAIN.
     contested : bool

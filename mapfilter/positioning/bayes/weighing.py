@@ -328,10 +328,21 @@ def _holds(area: AreaFrame, belief: MapBelief) -> bool:
 
 
 def _begun_anew(state: BayesState) -> BayesState:
-    """Return a state without its belief, of which nothing is left in the area."""
+    """Return a state without its belief, of which nothing is left in the area.
+
+    What was found out beside it, too, begins with the next one.
+    """
     found = state.status in (Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN)
     status = Status.LOST if found else state.status
-    return replace(state, belief=None, alternative=None, status=status)
+    return replace(
+        state,
+        belief=None,
+        status=status,
+        null=NullHypothesis(),
+        alternative=None,
+        recovery=None,
+        twin=None,
+    )
 
 
 def _challenged(

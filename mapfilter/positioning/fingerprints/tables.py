@@ -7,7 +7,6 @@ levels in dBm in all others, 100 or nothing where a transmitter was not received
 from __future__ import annotations
 
 import csv
-import warnings
 from collections import Counter
 from io import StringIO
 from pathlib import Path
@@ -121,14 +120,8 @@ def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     if not kept:
         raise fail(InputError, str(path), f"{expected} and rows", "no rows", "cut off")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", pd.errors.DtypeWarning)
-            table = pd.read_csv(
-                StringIO("\n".join([lines[0], *kept])),
-                sep=separator,
-                index_col=False,
-                low_memory=False,
-            )
+        rows = StringIO("\n".join([lines[0], *kept]))
+        table = pd.read_csv(rows, sep=separator, index_col=False, low_memory=False)
     except (ValueError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
         got = str(error).splitlines()[0]
         raise fail(InputError, str(path), expected, got, "cut off, or no text") from error
