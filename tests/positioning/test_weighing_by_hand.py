@@ -47,6 +47,34 @@ def test_a_reading_that_is_not_used_changes_the_belief_alone():
     assert found.null is STATE.null
 
 
+def drained(*_):
+    """An update that leaves nothing in the area."""
+    return SimpleNamespace(count=0), SimpleNamespace(reason=Reason.NO_CANDIDATES_LEFT)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [(s, Status.LOST) for s in (CONVERGED, TRACKING, Status.UNCERTAIN)]
+    + [(s, s) for s in (SEARCHING, Status.LOST, Status.OUTSIDE)],
+)
+def test_a_belief_of_which_nothing_is_left_begins_anew(before, after):
+    given = replace(
+        STATE, status=before, alternative=rival(-3.0), recovery=Recovery(3.0), takeovers=4
+    )
+    found, reason = weighed(Beliefs(SimpleNamespace(update=drained)), given)
+    assert reason is Reason.NO_CANDIDATES_LEFT
+    assert (found.belief, found.alternative, found.recovery, found.twin) == (None,) * 4
+    assert (found.status, found.null, found.takeovers) == (after, NullHypothesis(), 4)
+    assert found.sources is STATE.sources
+
+
+def test_a_belief_that_agrees_with_nothing_stays():
+    found, reason = weighed(Beliefs(gaining(-2.0, reason=Reason.NO_CANDIDATES_LEFT)))
+    assert reason is Reason.NO_CANDIDATES_LEFT
+    assert (found.belief.log_evidence, found.status) == (-12.0, TRACKING)
+    assert found.null is STATE.null
+
+
 def test_a_belief_is_weighed_and_the_null_hypothesis_beside_it():
     found, reason = weighed()
     assert (found.status, found.belief.log_evidence, reason) == (TRACKING, -12.0, Reason.USED)
