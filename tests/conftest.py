@@ -18,7 +18,13 @@ settings.register_profile("mapfilter", deadline=None)
 settings.load_profile("mapfilter")
 
 # Commands, with imports from several rooms: python -m tests.fuzz, python -m tests.faults.
-collect_ignore = ["faults.py", "serve_load.py", "fuzz_command.py", "fuzz_readers.py"]
+collect_ignore = [
+    "faults.py",
+    "serve_load.py",
+    "fuzz_command.py",
+    "fuzz_readers.py",
+    "fuzz_stored.py",
+]
 if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1":
     # Each is run by a test in a process of its own.
     collect_ignore += [
