@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from mapfilter.evaluation.accuracy import Truth, position_errors_m
 from mapfilter.experiments.benchmarks.worst_run import WorstEpoch
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import wrap_rad
+from mapfilter.positioning.bayes.sensors import UNMEASURED
 from mapfilter.positioning.estimate import TrackEstimate
 
 OFF_MAP_M = 30.0
@@ -27,13 +28,6 @@ _SHORT_M = 300.0
 _FIX_SHARE, _EARLIER_S = 0.5, 10.0
 _UNKNOWN = (Reason.UNKNOWN_CELL, Reason.NO_CELL, Reason.NO_POINTS_IN_CELL, Reason.AMBIGUOUS_CELL)
 _NO_REPORT = (Reason.NO_READING, Reason.NOT_MOVED_ENOUGH)
-_MOTIONLESS = (
-    Reason.MOTION_MISSING,
-    Reason.MOTION_STUCK,
-    Reason.HEADING_STUCK,
-    Reason.NO_STEP,
-    Reason.IMPOSSIBLE_STEP,
-)
 _REFUSED = (Reason.REJECTED_BY_EVIDENCE, Reason.ON_PROBATION)
 
 
@@ -54,16 +48,16 @@ class _Stretch:
         gone_m = self.truth.distance_at(self.estimate.time_s[self.inside])
         return float(gone_m[-1] - gone_m[0])
 
-    def share(self, reasons: tuple[Reason, ...]) -> float:
+    def share(self, reasons: Collection[Reason]) -> float:
         """Return the share of the stretch's epochs with one of some reasons; 0 without any."""
         return self._share_of(reasons, self.inside)
 
-    def share_of_reports(self, reasons: tuple[Reason, ...]) -> float:
+    def share_of_reports(self, reasons: Collection[Reason]) -> float:
         """Return the share of the stretch's radio reports with one of some reasons."""
         report = np.array([why not in _NO_REPORT for why in self.estimate.reason])
         return self._share_of(reasons, self.inside & report)
 
-    def _share_of(self, reasons: tuple[Reason, ...], which: Bools) -> float:
+    def _share_of(self, reasons: Collection[Reason], which: Bools) -> float:
         found = np.array([why in reasons for why in self.estimate.reason])
         return float(np.mean(found[which])) if which.any() else 0.0
 
@@ -135,7 +129,7 @@ def _silent(stretch: _Stretch) -> str:
 
 
 def _motionless(stretch: _Stretch) -> str:
-    share = stretch.share(_MOTIONLESS)
+    share = stretch.share(UNMEASURED)
     return f"motion missing or stuck in {100 * share:.0f} % of the epochs" if share >= 0.1 else ""
 
 

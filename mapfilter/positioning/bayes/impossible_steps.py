@@ -46,11 +46,10 @@ def without_impossible(
     if not isfinite(since_s):
         return motion
     farthest_m = _AT_ONCE_M + _FASTEST_MPS * max(since_s, 0.0)
-    if not any(step_unit_m * abs(step.step_m) > farthest_m for step in motion):
+    too_far = [step_unit_m * abs(step.step_m) > farthest_m for step in motion]
+    if not any(too_far):
         return motion
     return tuple(
-        replace(step, step_m=nan, spread_m=nan)
-        if isfinite(step.step_m) and step_unit_m * abs(step.step_m) > farthest_m
-        else step
-        for step in motion
+        replace(step, step_m=nan, spread_m=nan) if far else step
+        for step, far in zip(motion, too_far, strict=True)
     )
