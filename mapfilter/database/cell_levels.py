@@ -74,7 +74,7 @@ def part_extents(database: RadioRouteDatabase, cell_ids: tuple[str, ...]) -> Par
         for part in database.level_parts[cell_id]:
             if part.rows:
                 with opened(part) as file:
-                    found = part_ranges(file.metadata, ("row", "col", "level_dbm"))
+                    found = part_ranges(file.footer, ("row", "col", "level_dbm"))
                 parts.append(part)
                 bands.append(band)
                 boxes.append((*found[0], *found[1]))

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pyproj import CRS
 
+from mapfilter._arrow import ParquetReader, open_parquet
 from mapfilter._inputs import json_value
 from mapfilter._types import Floats
 from mapfilter.database.checked import HeldPart, Part
@@ -60,7 +61,7 @@ def open_writer(schema: pa.Schema, where: Path | pa.NativeFile) -> pq.ParquetWri
 
 
 @contextmanager
-def opened(source: Source, footer: pq.FileMetaData | None = None) -> Iterator[pq.ParquetFile]:
+def opened(source: Source, footer: pq.FileMetaData | None = None) -> Iterator[ParquetReader]:
     """Open a part; errors within the block become StoreErrors, as of a damaged part.
 
     ``footer`` is that of the part, where it was read before.
@@ -69,10 +70,9 @@ def opened(source: Source, footer: pq.FileMetaData | None = None) -> Iterator[pq
         with ExitStack() as stack:
             of_path = isinstance(source, Path)
             given = source if of_path else stack.enter_context(source.open())
-            file = pq.ParquetFile(given, metadata=footer, page_checksum_verification=True)
-            stack.enter_context(file)
-            if isinstance(source, Part) and file.metadata.num_rows != source.rows:
-                got = file.metadata.num_rows
+            file = stack.enter_context(open_parquet(given, footer))
+            if isinstance(source, Part) and file.footer.num_rows != source.rows:
+                got = file.footer.num_rows
                 raise fail(StoreError, str(source), f"{source.rows} rows", got, "parts mixed up")
             yield file
     except DAMAGE as error:
@@ -85,7 +85,7 @@ def read_columns(source: Source, columns: Sequence[str], optional: Sequence[str]
     Columns that are ``optional`` may be absent.
     """
     with opened(source) as file:
-        there = file.schema_arrow.names
+        there = file.columns
         columns = [name for name in columns if name in there or name not in optional]
         table = file.read(columns)
         table.validate(full=True)
@@ -106,7 +106,7 @@ def check_places(source: Source, table: pa.Table, lattice: Lattice) -> None:
 def check_extent(source: Source, lattice: Lattice) -> None:
     """Check that CRS and extent of the points' geometry are those of their rows and columns."""
     with opened(source) as file:
-        found = file.metadata
+        found = file.footer
         names = {found.schema.column(i).name: i for i in range(found.num_columns)}
         groups = [found.row_group(i) for i in range(found.num_row_groups)]
         ends = np.array([[_ends(one, names[axis]) for axis in ("row", "col")] for one in groups])
@@ -128,7 +128,7 @@ def check_extent(source: Source, lattice: Lattice) -> None:
 def count_rows(source: Source) -> int:
     """Return the number of rows in a part's footer; raise StoreError where it is damaged."""
     with opened(source) as file:
-        return int(file.metadata.num_rows)
+        return int(file.footer.num_rows)
 
 
 def damaged(source: Source, error: Exception) -> MapfilterError:
@@ -205,7 +205,7 @@ class WindowReader:
         boxes: list[tuple[int, int, int, int]] = []
         for part in parts:
             with opened(part) as file:
-                footer = file.metadata
+                footer = file.footer
                 names = {footer.schema.column(i).name: i for i in range(footer.num_columns)}
                 for group in range(footer.num_row_groups):
                     ends = [_ends(footer.row_group(group), names[axis]) for axis in ("row", "col")]
@@ -236,7 +236,7 @@ class WindowReader:
     def _group(self, number: int) -> pa.Table:
         part, footer, group = self._groups[number]
         with opened(part, footer) as file:
-            table = file.read_row_group(group, columns=["point", *self._columns])
+            table = file.read_group(group, ["point", *self._columns])
             table.validate(full=True)
         check_places(part, table, self._lattice)
         return table

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import shapely
 from pyarrow.lib import ArrowException
 
+from mapfilter._arrow import open_parquet
 from mapfilter._inputs import json_value, open_input
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, StoreError, fail
@@ -51,7 +52,8 @@ def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
     }
     with atomic_file(Path(path)) as temporary:
         frame.to_parquet(temporary, index=False)
-        table = pq.ParquetFile(temporary).read()
+        with open_parquet(temporary) as written:
+            table = written.read()
         known = dict(table.schema.metadata or {})
         known[_META] = json.dumps(meta).encode()
         table = table.replace_schema_metadata(known)
@@ -70,7 +72,7 @@ def read_estimate(path: str | Path) -> TrackEstimate:
     try:
         with (
             open_input(path, StoreError) as stream,
-            pq.ParquetFile(stream, page_checksum_verification=True) as source,
+            open_parquet(stream) as source,
         ):
             table = source.read()
     except OSError as error:

@@ -9,19 +9,20 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, BinaryIO, TypeAlias, TypeVar
 
 import geopandas
 import numpy as np
+import pyarrow as pa
 import pyogrio
 import pyproj
 import shapely
 from geopandas import GeoDataFrame
 from numpy.typing import NDArray
-from pyarrow import ArrowException
 from pyproj.exceptions import CRSError, ProjError
 from shapely.errors import GEOSException
 
+from mapfilter._arrow import arrow_bytes
 from mapfilter._inputs import open_input
 from mapfilter._ogr import PARQUET, VectorSource, sealed_gdal, vector_source
 from mapfilter._types import Ints
@@ -40,7 +41,7 @@ _MOST_DEG = 360.0
 # Raised where a file is not what its format demands; pyogrio raises UnboundLocalError for a CRS
 # that cannot be written out.
 _ANY_DAMAGE = (RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, UnboundLocalError)
-_FILE_DAMAGE = (OSError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error, ArrowException)
+_FILE_DAMAGE = (OSError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error, pa.ArrowException)
 _DAMAGES = (*_ANY_DAMAGE, *_FILE_DAMAGE, GEOSException, CRSError, ProjError)
 
 
@@ -107,7 +108,7 @@ def read_layer(
         place = vector_source(path)
         if path.suffix.lower() in PARQUET:
             with open_input(path) as stream:
-                frame = _guarded(name, lambda: geopandas.read_parquet(stream))
+                frame = _guarded(name, lambda: _parquet_frame(stream))
         elif path.suffix.lower() == ".shp":
             hint = "the .prj file was left behind"
     if frame is not None:
@@ -205,6 +206,10 @@ def _guarded(name: str, read: Callable[[], T]) -> T:
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         hint = "cut off, or another format under this name"
         raise fail(InputError, name, "a vector file that GDAL reads", reason, hint) from error
+
+
+def _parquet_frame(stream: BinaryIO) -> GeoDataFrame:
+    return geopandas.read_parquet(pa.BufferReader(arrow_bytes(stream.read())))
 
 
 def _nothing_there(

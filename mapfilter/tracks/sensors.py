@@ -13,6 +13,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mapfilter._arrow import open_parquet
 from mapfilter._inputs import open_input
 from mapfilter._io import read_json, sha256_file, sha256_of
 from mapfilter.errors import Faults, InputError, StoreError, fail
@@ -99,8 +100,11 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
                 if known is not None and known != sha256_of(stream):
                     hint = "changed or cut off"
                     raise fail(StoreError, str(path), f"SHA-256 {known}", "another", hint)
-                is_csv = path.suffix == ".csv"
-                rows = pd.read_csv(stream) if is_csv else as_frame(pq.read_table(stream))
+                if path.suffix == ".csv":
+                    rows = pd.read_csv(stream)
+                else:
+                    with open_parquet(stream) as source:
+                        rows = as_frame(source.read())
         except (pa.ArrowException, ValueError, OSError) as error:
             got = (str(error).splitlines() or ["nothing"])[0]
             raise fail(InputError, str(path), "a readable table", got, "cut off") from error

@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.csv as arrow_csv
-import pyarrow.parquet as pq
 
+from mapfilter._arrow import arrow_bytes, open_parquet
 from mapfilter._inputs import open_input, read_input, wide_encoding
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail, listed
@@ -54,8 +54,8 @@ def read_table(table: str, path: Path) -> ReadTable:
     try:
         if path.suffix == ".csv":
             return _read_csv(table, path)
-        with open_input(path) as stream, pq.ParquetFile(stream) as source:
-            rows = as_frame(source.read(use_threads=False))
+        with open_input(path) as stream, open_parquet(stream) as source:
+            rows = as_frame(source.read())
         return ReadTable(rows, np.arange(1, len(rows) + 1))
     except pd.errors.EmptyDataError as error:
         raise fail(InputError, str(path), "a header line", "an empty file", "cut off") from error
@@ -144,7 +144,7 @@ def _plain_rows(data: bytes, begin: int, names: list[str], separator: str) -> pd
         return None
     try:
         found = arrow_csv.read_csv(
-            io.BytesIO(memoryview(data)[begin:]) if begin else pa.BufferReader(data),
+            pa.BufferReader(arrow_bytes(memoryview(data)[begin:])),
             arrow_csv.ReadOptions(
                 column_names=names, skip_rows=1, block_size=_BLOCK_BYTES, use_threads=False
             ),

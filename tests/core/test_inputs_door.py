@@ -332,18 +332,18 @@ DOORS = {"_inputs.py", "_gdal.py", "_ogr.py", "roads/vector.py"}
 """Modules that may open what others made, or give GDAL what has passed a door."""
 ALLOWED = {
     # Files that mapfilter wrote itself, listed by a head with their checksums.
-    ("database/", "ParquetFile"), ("database/", "read_metadata"), ("experiments/", "read_metadata"),
-    ("experiments/", "read_table"), ("experiments/", "load"), ("database/export.py", "open"),
-    ("positioning/estimate_store.py", "ParquetFile"), ("learning/tracks.py", "load"),
+    ("database/", "open_parquet"), ("database/", "read_metadata"), ("experiments/", "read_metadata"),
+    ("experiments/", "open_parquet"), ("experiments/", "load"), ("database/export.py", "open"),
+    ("positioning/estimate_store.py", "open_parquet"), ("learning/tracks.py", "load"),
     ("survey/survey_rasters.py", "load"), ("survey/survey_rasters.py", "open"),
     # From files that a door opened, or from bytes that were read.
-    ("tracks/sensors.py", "read_csv"), ("tracks/sensors.py", "read_table"),
-    ("tracks/table_files.py", "read_csv"), ("tracks/table_files.py", "ParquetFile"),
+    ("tracks/sensors.py", "read_csv"), ("tracks/sensors.py", "open_parquet"),
+    ("tracks/table_files.py", "read_csv"), ("tracks/table_files.py", "open_parquet"),
     ("tracks/readers/lines.py", "read_csv"), ("positioning/fingerprints/tables.py", "read_csv"),
     ("experiments/benchmarks/ottawa_sessions.py", "read_csv"), ("radio/tables.py", "ZipFile"),
     ("roads/maps.py", "read_dataframe"), ("roads/maps.py", "GzipFile"), ("roads/maps.py", "open"),
     ("workflows/info.py", "list_layers"), ("workflows/info.py", "read_info"),
-    ("viewing/page.py", "GzipFile"),
+    ("viewing/page.py", "GzipFile"), ("_arrow.py", "ParquetFile"),
     # The null device, in place of an output that the caller closed.
     ("workflows/terminal.py", "open"),
     # Parts of the page that come with the package.
@@ -373,8 +373,8 @@ def openings():
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.Call):
                 continue
-            if isinstance(node.func, ast.Name) and node.func.id == "open":
-                yield place, "open"
+            if isinstance(node.func, ast.Name) and node.func.id in ("open", "open_parquet"):
+                yield place, node.func.id
             if not isinstance(node.func, ast.Attribute) or node.func.attr not in OPENING:
                 continue
             of = node.func.value

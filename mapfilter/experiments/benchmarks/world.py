@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 import shapely
 from shapely import STRtree
 
+from mapfilter._arrow import open_parquet
 from mapfilter._io import atomic_file, sha256_file
 from mapfilter._types import Ints
 from mapfilter.experiments.benchmarks.cases import Case
@@ -115,7 +116,8 @@ def write_buildings(buildings: Buildings, path: Path) -> None:
 # What is read is kept by its checksum: a folder may hold another world by now.
 @lru_cache(maxsize=1)
 def _skyline(path: Path, sha256: str) -> Skyline | None:  # noqa: ARG001
-    table = pq.read_table(path)
+    with open_parquet(path) as source:
+        table = source.read()
     footprints = shapely.from_wkb(table["footprint"].to_numpy())
     return Skyline(footprints, table["height_m"].to_numpy()) if len(footprints) else None
 

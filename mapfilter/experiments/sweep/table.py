@@ -11,6 +11,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mapfilter._arrow import open_parquet
 from mapfilter._inputs import open_input
 from mapfilter._io import atomic_file, read_json, sha256_file, sha256_of, write_json
 from mapfilter._resume import load_part, save_part
@@ -102,7 +103,8 @@ def read_part(path: Path, rows: int, schema: pa.Schema = SCHEMA) -> pa.Table | N
     data = load_part(path)
     if data is None:
         return None
-    table = pq.read_table(pa.BufferReader(data))
+    with open_parquet(pa.BufferReader(data)) as source:
+        table = source.read()
     return table if table.num_rows == rows and table.schema.equals(schema) else None
 
 
@@ -150,7 +152,8 @@ def read_runs(path: Path) -> pd.DataFrame:
                 hint = "changed after it was written, or a sweep that "
                 hint += "is not finished: go on with --resume"
                 raise fail(StoreError, str(path), f"the table of {HEAD}", "another", hint)
-            table = pq.read_table(stream)
+            with open_parquet(stream) as source:
+                table = source.read()
             table.validate(full=True)
     except (OSError, ValueError, pa.ArrowException) as error:
         raise fail(StoreError, str(path), "the table of a sweep", error, "cut off") from error

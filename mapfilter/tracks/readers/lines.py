@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
+from mapfilter._arrow import arrow_bytes
 from mapfilter._types import Bools, Ints
 from mapfilter.tracks.readers.recording import Reading
 
@@ -158,7 +159,7 @@ def parsed(block: bytes, count: int, separator: str) -> pa.Table:
     """Return lines that all have as many fields as columns of texts, c0, c1, …."""
     names = [f"c{i}" for i in range(count)]
     return arrow_csv.read_csv(
-        pa.BufferReader(block),
+        pa.BufferReader(arrow_bytes(block)),
         read_options=arrow_csv.ReadOptions(
             column_names=names, block_size=len(block) + 2, use_threads=False
         ),
