@@ -13,6 +13,7 @@ import os
 import re
 import stat
 import sys
+import tomllib
 from collections import Counter
 from collections.abc import Callable
 from io import BufferedReader
@@ -99,6 +100,25 @@ def read_input(
         size = f"{kib >> 10} MiB" if kib >= 1024 else f"{kib} KiB"
         raise fail(kind, str(path), f"{what} of at most {size}", "a larger file")
     return data
+
+
+def toml_values(text: str) -> dict[str, Any]:
+    """Return the values of a text in TOML.
+
+    Raises
+    ------
+    ValueError
+        It is no TOML, or holds a number of thousands of digits.
+    RecursionError
+        Hundreds of its values lie in each other.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError as error:
+        # Python's own words are advice on a setting of the interpreter.
+        raise ValueError("a number of thousands of digits") from error
 
 
 def path_fault(path: Path) -> str:

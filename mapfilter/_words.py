@@ -3,6 +3,18 @@
 from __future__ import annotations
 
 
+def counted(count: int, what: str) -> str:
+    """Return a number with what it counts, named as several that end with an "s".
+
+    Examples
+    --------
+    >>> counted(1, "rows of a table"), counted(2, "rows of a table")
+    ('1 row of a table', '2 rows of a table')
+    """
+    many, space, rest = what.partition(" ")
+    return number_of(count, many.removesuffix("s"), many) + space + rest
+
+
 def number_of(count: int, one: str, many: str = "") -> str:
     """Return a number with what it counts.
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ValidationError
 
-from mapfilter._inputs import path_fault, read_input, shown
+from mapfilter._inputs import path_fault, read_input, shown, toml_values
 from mapfilter.config.fields import MAP_NAMES, field_annotation, resolve_map, resolve_path
 from mapfilter.config.mistakes import mistake_in_toml, mistake_in_value
 from mapfilter.config.sections import Config
@@ -161,7 +161,7 @@ def _read_toml(file: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise fail(ConfigError, str(file), "TOML", error) from error
     try:
-        values = tomllib.loads(text)
+        values = toml_values(text)
     except ValueError as error:
         hint = mistake_in_toml(text, error)
         raise fail(ConfigError, str(file), "TOML", error, hint) from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
-from mapfilter._inputs import read_input
+from mapfilter._inputs import read_input, toml_values
 from mapfilter._io import atomic_file
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Fault, Faults, InputError, fail
@@ -190,7 +189,7 @@ def read_patch(path: Path) -> Patch:
     """
     data = read_input(path, _LARGEST_BYTES, "a patch")
     try:
-        found = tomllib.loads(data.decode())
+        found = toml_values(data.decode())
     except (ValueError, RecursionError) as error:
         raise fail(InputError, str(path), "a patch in TOML", error, "edited, or cut off") from error
     if found.get("format") != FORMAT:

@@ -266,7 +266,7 @@ def _add_logged(
     if name and level is None:
         rows.refuse(line, "Signal", "a level such as -67dBm", repr(signal[:40]))
     elif name and level is not None and level[1]:
-        rows.aside["levels that are only bounds (>)"] += 1
+        rows.aside["levels given only as bounds (>)"] += 1
     elif name and level is not None:
         neighbour = cell["neighbour"]
         rows.add(line, name, {**found, "level_dbm": level[2], "neighbour": neighbour})

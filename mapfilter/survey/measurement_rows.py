@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter._words import counted, number_of
 from mapfilter.errors import Fault
 from mapfilter.geodesy import degree_fault
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, is_above_asu
@@ -158,11 +159,15 @@ class Rows:
 
     def notes(self) -> list[str]:
         """Return remarks on how many rows were refused or set aside, and where the first are."""
-        found = [f"{count} {what}{self._example(what)}" for what, count in self.aside.items()]
+        found = [
+            f"{counted(count, what)}{self._example(what)}" for what, count in self.aside.items()
+        ]
         if self.refused:
             some = "; ".join(str(fault) for fault in self.faults[:_FAULTS_SHOWN])
             more = "; …" if self.refused > _FAULTS_SHOWN else ""
-            found.insert(0, f"{self.refused} of {self.read} rows left out: {some}{more}")
+            found.insert(
+                0, f"{self.refused} of {number_of(self.read, 'row')} left out: {some}{more}"
+            )
         return [f"{self.path.name}: {note}" for note in (*self.remarks, *found)]
 
     def _example(self, what: str) -> str:

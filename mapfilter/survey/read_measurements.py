@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints, Ints32
-from mapfilter._words import number_of
+from mapfilter._words import counted, number_of
 from mapfilter.errors import Fault, InputError, fail, listed
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.survey.measurement_files import (
@@ -79,7 +79,7 @@ def read_measurements(
             continue
         tables.append(table)
         if not table.cell:
-            aside = "; ".join(f"{count} {what}" for what, count in table.aside.items())
+            aside = "; ".join(counted(count, what) for what, count in table.aside.items())
             got = number_of(table.read, "row") + (f": {aside}" if aside else "")
             expected = "at least one level with cell and position"
             faults.extend(table.faults or (Fault(str(path), expected, got),))
@@ -215,7 +215,7 @@ def _notes(tables: Sequence[Rows]) -> tuple[str, ...]:
     for what in shared:
         of = [table for table in tables if what in table.aside]
         total, names = sum(table.aside[what] for table in of), [table.path.name for table in of]
-        found.append(f"{total} {what} in {len(of)} files ({listed(names)})")
+        found.append(f"{counted(total, what)} in {len(of)} files ({listed(names)})")
         example = next((note for note in of[0].notes() if what in note), "")
         if (at := example.find(", such as ")) >= 0:
             found[-1] += example[at:]

@@ -332,7 +332,8 @@ DOORS = {"_inputs.py", "_gdal.py", "_ogr.py", "roads/vector.py"}
 """Modules that may open what others made, or give GDAL what has passed a door."""
 ALLOWED = {
     # Files that mapfilter wrote itself, listed by a head with their checksums.
-    ("database/", "open_parquet"), ("database/", "read_metadata"), ("experiments/", "read_metadata"),
+    ("database/", "open_parquet"), ("database/", "read_metadata"),
+    ("experiments/", "read_metadata"),
     ("experiments/", "open_parquet"), ("experiments/", "load"), ("database/export.py", "open"),
     ("positioning/estimate_store.py", "open_parquet"), ("learning/tracks.py", "load"),
     ("survey/survey_rasters.py", "load"), ("survey/survey_rasters.py", "open"),

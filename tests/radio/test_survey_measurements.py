@@ -71,7 +71,7 @@ def test_opencellid_upload(tmp_path):
     np.testing.assert_allclose(np.diff(found.time_s), 6)
     assert found.time_s[0] == 1599319703
     assert found.accuracy_m[0] == 50.9
-    assert found.notes == ("drive.csv: 1 levels given as ASU (turned into dBm)",)
+    assert found.notes == ("drive.csv: 1 level given as ASU (turned into dBm)",)
     assert len(found.accurate(50.0)) == 3
 
 
@@ -80,7 +80,7 @@ def test_tower_collector_export(tmp_path):
     assert found.cell_ids == ("260-2-39030-55321", "260-2-39030-55322")
     np.testing.assert_array_equal(found.level_dbm, [-85, -93])
     assert found.time_s[0] == pytest.approx(1599306570.25)
-    assert found.notes == ("drive.csv: 1 rows of cells without identity",)
+    assert found.notes == ("drive.csv: 1 row of cells without identity",)
 
 
 def test_antennas_log(tmp_path):
@@ -89,8 +89,8 @@ def test_antennas_log(tmp_path):
     np.testing.assert_array_equal(found.level_dbm, [-67, -77])
     assert found.time_s[0] == pytest.approx(unix_seconds("2014-09-24T14:00:40.062Z"))
     assert set(found.notes) == {
-        "walk.log: 1 rows of cells without identity",
-        "walk.log: 1 levels that are only bounds (>)",
+        "walk.log: 1 row of cells without identity",
+        "walk.log: 1 level given only as bounds (>)",
     }
 
 

@@ -36,7 +36,7 @@ def test_real_uploads_are_read_whole(walks, rides):
 def test_real_logs_of_neighbours_are_read(shared_data):
     found = read_measurements([shared_data / "gsm-antennas-log"])
     assert len(found) == 38
-    assert found.notes == ("20140924-192136.log: 6 levels that are only bounds (>)",)
+    assert found.notes == ("20140924-192136.log: 6 levels given only as bounds (>)",)
 
 
 @pytest.mark.parametrize("method", ["gp", "knn"])

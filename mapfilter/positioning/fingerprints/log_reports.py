@@ -51,7 +51,7 @@ def reports_of_log(log: TrackLog, block: int = -1) -> Reports:
         block=np.full(count, block),
         serving=serving.astype(str),
         timing_advance=advance,
-        censored=radio["censored"].fillna(0).to_numpy(np.int8)[known],
+        censored=radio["censored"].to_numpy(np.int8)[known],
         notes=notes,
     )
 

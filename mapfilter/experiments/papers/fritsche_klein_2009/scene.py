@@ -6,15 +6,14 @@ paper (Fig. 1), not printed. The default layout is a choice that brings out its 
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from mapfilter._inputs import read_input
+from mapfilter._inputs import read_input, toml_values
 from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.experiments.papers.paper import true_states
@@ -114,7 +113,7 @@ def read_layout(path: Path) -> Layout:
         The file cannot be read, is no TOML, or holds what is no layout.
     """
     try:
-        given: dict[str, Any] = tomllib.loads(read_input(path, _LARGEST_BYTES, "TOML").decode())
+        given = toml_values(read_input(path, _LARGEST_BYTES, "TOML").decode())
     except (ValueError, RecursionError) as error:
         raise fail(InputError, str(path), "TOML", error) from error
     known = [field.name for field in fields(Layout)]
