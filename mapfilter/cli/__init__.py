@@ -14,24 +14,13 @@ from typer.main import get_command
 from mapfilter._io import VERSION
 from mapfilter._kernel_cache import keep_kernels
 from mapfilter._memory import keep_freed_memory, search_cycles_rarely
-from mapfilter.cli.chain import (
-    bound,
-    build,
-    check,
-    demo,
-    export,
-    info,
-    locate,
-    merge,
-    predict,
-    replay,
-    simulate,
-)
 from mapfilter.cli.convert import convert
+from mapfilter.cli.databases import bound, build, check, export, info, merge, predict
 from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
 from mapfilter.cli.learning import learn
 from mapfilter.cli.options import DONE
 from mapfilter.cli.serving import serve
+from mapfilter.cli.tracks import demo, locate, replay, simulate
 from mapfilter.cli.views import film, view
 from mapfilter.workflows.terminal import guarded
 
