@@ -62,13 +62,15 @@ html_show_sphinx = False
 def _sidebar_of_modules(
     _app: Sphinx, page: str, _template: str, context: dict[str, Any], _tree: object
 ) -> None:
-    """List in the sidebar of a module's page its own package alone.
+    """List in the sidebar of a module's page its own package alone, elsewhere no modules.
 
-    The tree of all modules in each of their pages takes longer than all else of a page together.
+    The tree of all modules in each page takes longer than all else of a page together.
     """
     whole = context.get("toctree")
-    if whole is not None and page.startswith("api/"):
-        context["toctree"] = lambda **given: whole(**{**given, "collapse": True})
+    if whole is not None:
+        of_modules = page == "api" or page.startswith("api/")
+        less = {"collapse": True} if of_modules else {"maxdepth": 2}
+        context["toctree"] = lambda **given: whole(**{**given, **less})
 
 
 class _Names(PythonDomain):
