@@ -81,7 +81,7 @@ def test_a_stopped_replay_leaves_no_process(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         _stopped(children := [])
     (child,) = children
-    child.join(20)
+    child.join(120)
     assert not child.is_alive()
 
 
