@@ -30,7 +30,7 @@ from mapfilter.models.street_motion import (
     STRETCH,
     TURN,
 )
-from mapfilter.positioning.bayes.model import expected_absent, mean_rough_db2
+from mapfilter.positioning.bayes.sampled_cells import expected_absent, mean_rough_db2
 from mapfilter.workflows.bench_filter import StepInputs
 
 Step = Callable[[Floats], Floats]

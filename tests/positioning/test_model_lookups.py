@@ -15,7 +15,8 @@ from mapfilter.models.level_kernels import Prediction
 from mapfilter.models.street_motion import OFF, STATES
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, first_hypotheses
-from mapfilter.positioning.bayes.model import BayesModel, expected_absent, mean_rough_db2
+from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.sampled_cells import expected_absent, mean_rough_db2
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 
 

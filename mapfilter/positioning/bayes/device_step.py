@@ -28,12 +28,8 @@ from mapfilter.models.level_kernels import LevelTerms, Prediction
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.beyond_edge import BEYOND_COST_PER_M, beyond_edge
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import (
-    SAMPLE,
-    BayesModel,
-    expected_absent,
-    mean_rough_db2,
-)
+from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.sampled_cells import expected_absent, mean_rough_db2, one_in
 
 
 @dataclass(frozen=True)
@@ -115,7 +111,7 @@ class DeviceStep:
         arrays, model, area = self.device.arrays, self.model, self.model.area
         pixel = arrays.empty(log_weight.size, dtype=np.int32)
         cuda_reports.pixels(cloud.state, area.frame, pixel)
-        every = max(pixel.size // SAMPLE, 1)
+        every = one_in(pixel)
         some = np.ascontiguousarray(on_host(pixel[::every]))
         before = log_weight.copy()
         cloud = self._aged(cloud, reading)

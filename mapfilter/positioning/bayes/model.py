@@ -26,8 +26,6 @@ from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import (
     Prediction,
     gained,
-    rough_squares,
-    shares_above,
     weigh_by_absence,
     weigh_by_levels,
 )
@@ -48,11 +46,15 @@ from mapfilter.positioning.bayes.evidence import SERVING_UNDER_NULL, RadioReadin
 from mapfilter.positioning.bayes.first_hypotheses import BEYOND_M, Start, first_hypotheses
 from mapfilter.positioning.bayes.likely_points import KEPT_REPORTS, KnownReading, likelihoods
 from mapfilter.positioning.bayes.radio import EvidenceOptions
+from mapfilter.positioning.bayes.sampled_cells import (
+    expected_absent,
+    mean_rough_db2,
+    most_expected,
+    one_in,
+)
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 
 _NEW_M = 50.0
-_LEAST_EXPECTED = 0.02
-SAMPLE = 256
 
 
 @dataclass(frozen=True)
@@ -382,37 +384,10 @@ class BayesModel:
     def _expected_absent(self, pixel: Ints32, report: LevelReport) -> Ints32:
         if not isinstance(self.area, TiledArea):
             return expected_absent(self.prediction, pixel, report)
-        some = np.ascontiguousarray(pixel[:: _every(pixel)])
+        some = np.ascontiguousarray(pixel[:: one_in(pixel)])
         share = self.area.shares_above(some, report.absent, report.limit_dbm)
-        return _most_expected(report.absent, share)
+        return most_expected(report.absent, share)
 
 
 def _likelihoods_on_ways(model: BayesModel, known: KnownReading) -> tuple[Floats32, float]:
     return likelihoods(model, model.whole.points, known.reading)
-
-
-def mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:
-    """Return the mean variance that the roughness of the prediction adds, for each cell."""
-    squares = rough_squares(pixel, _every(pixel), predicted, cell)
-    return np.asarray(predicted.share * (squares.sum(axis=1) / squares.shape[1]))
-
-
-def expected_absent(predicted: Prediction, pixel: Ints32, report: LevelReport) -> Ints32:
-    """Return absent cells that hypotheses expect to be in the report, most expected first."""
-    absent = report.absent
-    if not absent.size:
-        return absent
-    share = shares_above(pixel, _every(pixel), predicted, absent, report.limit_dbm)
-    return _most_expected(absent, share)
-
-
-def _most_expected(absent: Ints32, share: Floats) -> Ints32:
-    expected = [k for k, part in enumerate(share.tolist()) if part > _LEAST_EXPECTED]
-    expected.sort(key=lambda k: -share[k])
-    found: Ints32 = absent[expected]
-    return found
-
-
-def _every(pixel: Ints32) -> int:
-    """Return how many hypotheses one stands for, where some stand for all of them."""
-    return max(pixel.size // SAMPLE, 1)
