@@ -126,13 +126,10 @@ SPUN = "\n\ndef test_spin():\n    from toy.sums import spin\n\n    spin(3)\n"
 TOY = {
     "toy/__init__.py": "",
     "toy/sums.py": (
-        "def add(a, b):\n    return a + b\n\n\n"
-        f"{SPIN}"
-        "def unseen(a, b):\n    return a - b\n"
+        f"def add(a, b):\n    return a + b\n\n\n{SPIN}def unseen(a, b):\n    return a - b\n"
     ),
     "tests/test_sums.py": (
-        "from toy.sums import add\n\n\n"
-        f"def test_add():\n    assert add(2, 3) == 5\n{SPUN}"
+        f"from toy.sums import add\n\n\ndef test_add():\n    assert add(2, 3) == 5\n{SPUN}"
     ),
     "pyproject.toml": "[tool.pytest.ini_options]\n",
 }

@@ -44,7 +44,9 @@ class Watched:
     ask. What the page wants to do later it does so many times sooner as ``hurry`` says.
     """
 
-    def __init__(self, browser, file, *, at="", width=1280, height=860, scheme="light", own="", hurry=1):
+    def __init__(
+        self, browser, file, *, at="", width=1280, height=860, scheme="light", own="", hurry=1
+    ):
         self.own = (f"{own}/", "blob:", "data:") if own else ("file:", "blob:", "data:")
         self.context = browser.new_context(
             viewport={"width": width, "height": height},

@@ -46,6 +46,8 @@ plan = "cells.csv"
 shadowing_db = 8.0
 [journeys]
 length_m = 250
+[output]
+pictures = "none"
 """
 
 

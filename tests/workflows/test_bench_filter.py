@@ -28,7 +28,9 @@ def test_a_small_bench(monkeypatch):
 @pytest.mark.filterwarnings("default")
 def test_a_step_in_one_thread_and_in_two(monkeypatch):
     monkeypatch.setattr(bench_threads, "_PARTICLES_OF_A_TURN", 1)
-    found = bench_threads.bench_threads(2, runs=1, particles=(500, 3000), least=2048, settings=SMALL)
+    found = bench_threads.bench_threads(
+        2, runs=1, particles=(500, 3000), least=2048, settings=SMALL
+    )
     assert (found.threads, found.runs, found.processors > 0) == (2, 1, True)
     assert found.load_average >= 0
     assert [(one.particles, one.is_divided) for one in found.steps] == [(500, False), (3000, True)]
