@@ -35,7 +35,7 @@ half_pixels = st.integers(-30, 60).map(lambda n: n * 2.5)
 anywhere = st.one_of(half_pixels, st.floats(-200.0, 300.0))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(ranks, st.lists(st.tuples(anywhere, anywhere), min_size=1, max_size=20))
 def test_same_as_brute_force(chosen, offsets):
     index = index_of(chosen)
