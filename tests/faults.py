@@ -31,20 +31,13 @@ if __name__ == "__main__":
     _HERE = Path(__file__).resolve().parent
     sys.path[:0] = [str(_HERE / room) for room in ("", "database", "learning", "workflows")]
 
-import learning_world
 import small_world
 
-from mapfilter.config.load import load_config
 from mapfilter.database.build import build
 from mapfilter.database.merge import merge
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
-from mapfilter.experiments.sweep.run import sweep
-from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.tracks.store import write_log
-from mapfilter.workflows.learn import run_learn
-from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
 
 _BEYOND = 1.5
 """A writer is killed within so many times the time that it takes: it may be the next one."""
@@ -108,19 +101,34 @@ def job_of(name: str, work: Path) -> Job:
         options = {"tile_px": 8, "resume": True}
         floor_dbm = small_world.FLOOR_DBM
         return Job(out, lambda v: build(*given, floor_dbm=floor_dbm + v, **options), database)
-    if name == "sweep":
-        config = work / "inputs" / "world" / "world.toml"
-        plans = [sweep_plans(load_config(config, [*_GRID, f"sweep.seed={v}"])) for v in (0, 1)]
-        world = sweep_world(load_config(config, _GRID), plans[0][0][0].radios)
-        folders = {key: one.path for key, one in plans[0][1].items()}
+    return _sweeping(work, out) if name == "sweep" else _learning(work, out)
 
-        def table() -> str:
-            try:
-                return hashlib.sha256(read_runs(out / "runs.parquet").to_csv().encode()).hexdigest()
-            except StoreError as error:
-                return _RESUME if _RESUME in str(error) else str(error)
 
-        return Job(out, lambda v: sweep(plans[v][0], world, folders, out), table)
+# Only those who write tables or learn wait for what that imports.
+def _sweeping(work: Path, out: Path) -> Job:
+    from mapfilter.config.load import load_config
+    from mapfilter.experiments.sweep.run import sweep
+    from mapfilter.experiments.sweep.table import read_runs
+    from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
+
+    config = work / "inputs" / "world" / "world.toml"
+    plans = [sweep_plans(load_config(config, [*_GRID, f"sweep.seed={v}"])) for v in (0, 1)]
+    world = sweep_world(load_config(config, _GRID), plans[0][0][0].radios)
+    folders = {key: one.path for key, one in plans[0][1].items()}
+
+    def table() -> str:
+        try:
+            return hashlib.sha256(read_runs(out / "runs.parquet").to_csv().encode()).hexdigest()
+        except StoreError as error:
+            return _RESUME if _RESUME in str(error) else str(error)
+
+    return Job(out, lambda v: sweep(plans[v][0], world, folders, out), table)
+
+
+def _learning(work: Path, out: Path) -> Job:
+    from mapfilter.config.load import load_config
+    from mapfilter.workflows.learn import run_learn
+
     settings = [f"database.path={json.dumps(str(work / 'inputs' / 'taught' / 'database'))}"]
     configs = [
         load_config(None, [*settings, f"track.path={json.dumps(str(work / 'inputs' / logs))}"])
@@ -166,6 +174,10 @@ def _world(inputs: Path) -> None:
 
 
 def _journeys(inputs: Path) -> None:
+    import learning_world
+
+    from mapfilter.tracks.store import write_log
+
     plan = learning_world.plan_of()
     learning_world.database_of(plan, inputs / "taught")
     rng = np.random.default_rng(3)
@@ -190,7 +202,8 @@ def kill(work: Path, count: int, seed: int = 1) -> Counter[str]:
     """Kill each of the writers in turn at random moments, and look at what it left."""
     turns = _TURNS if count >= len(_TURNS) else ("build", "merge")
     make_inputs(work, *sorted(set(turns)))
-    context = _forks()
+    later = ["mapfilter.workflows.learn", "mapfilter.workflows.sweep_plan"]
+    context = _forks(*(later if "sweep" in turns else ()))
     with _outcomes(work, "kill") as outcomes:
         jobs = {name: job_of(name, work) for name in sorted(set(turns))}
         whole, longest_s = {}, {}
@@ -385,9 +398,10 @@ def _outcomes(work: Path, kind: str) -> Iterator[Outcomes]:
     yield outcomes
 
 
-def _forks():  # type: ignore[no-untyped-def]
+def _forks(*modules: str):  # type: ignore[no-untyped-def]
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["mapfilter.workflows.learn", "mapfilter.workflows.sweep_plan"])
+    used = ["mapfilter.database.build", "mapfilter.database.merge", "small_world"]
+    context.set_forkserver_preload([*used, *modules])
     return context
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mapfilter.errors import MapfilterError
 
-MUTATIONS = 300
+MUTATIONS = 100
 """How many of each sample the tests try when nobody asks for more."""
 LONGEST_S = 10.0
 MEMORY_BYTES = 512 << 20

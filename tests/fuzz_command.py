@@ -30,6 +30,8 @@ _LONGEST_BATCH_S = 1200.0
 """Of processor time."""
 _WAITING_S = 300.0
 """A child that has used no processor time for so long waits for ever."""
+_LOOKING_S = 5.0
+"""How often children are looked after that say nothing."""
 _SEEDS = 1_000_000
 """Batches of one seed at most: the next seed has other copies."""
 _KEYS = ("read", "refused", "longest_s")
@@ -119,7 +121,7 @@ def _ended(
     free: list[dict[str, _Prepared]],
 ) -> Iterator[tuple[str, int, dict[str, Any]]]:
     """Wait a while, and yield what the children found that answered or wait for ever."""
-    answered = wait(list(running), timeout=5.0)
+    answered = wait(list(running), timeout=_LOOKING_S)
     for answers, (child, files) in list(running.items()):
         if answers in answered or child.is_stuck():
             del running[answers]

@@ -92,7 +92,8 @@ def test_what_ends_breaks_or_leaves_files_is_a_fault(read, word, tmp_path, capsy
 
 
 def test_who_waits_for_ever_is_ended(monkeypatch, tmp_path, capsys) -> None:
-    monkeypatch.setattr(fuzz_command, "_WAITING_S", 1.0)
+    monkeypatch.setattr(fuzz_command, "_WAITING_S", 0.5)
+    monkeypatch.setattr(fuzz_command, "_LOOKING_S", 0.1)
     out = tmp_path / "out.json"
     assert _main({"bad": _waits}, out, "--batch", "20", "--mutations", "20") == 1
     assert "no answer after" in capsys.readouterr().out

@@ -120,17 +120,16 @@ def test_imports_through_others():
     assert models / "motion.py" not in imports.importers(models / "state.py")
 
 
+SPIN = "def spin(n):\n    while n > 0:\n        n -= 1\n\n\n"
+SPUN = "\n\ndef test_spin():\n    from toy.sums import spin\n\n    spin(3)\n"
 # A file, and tests that notice a bug in its first function and none in its second.
 TOY = {
     "toy/__init__.py": "",
     "toy/sums.py": (
-        "def add(a, b):\n    return a + b\n\n\n"
-        "def spin(n):\n    while n > 0:\n        n -= 1\n\n\n"
-        "def unseen(a, b):\n    return a - b\n"
+        f"def add(a, b):\n    return a + b\n\n\n{SPIN}def unseen(a, b):\n    return a - b\n"
     ),
     "tests/test_sums.py": (
-        "from toy.sums import add, spin\n\n\n"
-        "def test_add():\n    assert add(2, 3) == 5\n\n\ndef test_spin():\n    spin(3)\n"
+        f"from toy.sums import add\n\n\ndef test_add():\n    assert add(2, 3) == 5\n{SPUN}"
     ),
     "pyproject.toml": "[tool.pytest.ini_options]\n",
 }
@@ -142,7 +141,7 @@ def toy(tmp_path, monkeypatch):
     for name, text in TOY.items():
         (tmp_path / "toy" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "toy" / name).write_text(text)
-    monkeypatch.setattr(judge, "_PATIENCE_S", 1.0)
+    monkeypatch.setattr(judge, "_PATIENCE_S", 0.25)
     return tmp_path / "toy"
 
 
@@ -174,17 +173,20 @@ def test_killed_survived_timed_out_and_not_judged_twice(toy):
 
 
 def test_a_mutant_is_judged_by_the_nearest_tests_alone(toy):
+    # None of these spins.
+    for name in ("toy/sums.py", "tests/test_sums.py"):
+        (toy / name).write_text(TOY[name].replace(SPIN, "").replace(SPUN, ""))
     (toy / "tests" / "test_any.py").write_text(
         "import toy.other\nfrom toy.sums import unseen\n\n\n"
         "def test_unseen():\n    assert unseen(3, 2) == 1\n"
     )
     (toy / "toy" / "other.py").write_text("")
     # Of two that import the file, the one that imports less.
-    assert judged(toy, near=1)["- → +11"] == record.SURVIVED
+    assert judged(toy, near=1)["- → +6"] == record.SURVIVED
     assert judged(toy, near=1) == {}
     # One that no test noticed is judged again by more tests; one that a test noticed is not.
     again = judged(toy, near=2)
-    assert again["- → +11"] == record.KILLED
+    assert again["- → +6"] == record.KILLED
     assert "+ → -2" not in again
     assert judged(toy) == {}
 
@@ -225,7 +227,9 @@ def test_kernels_hold_constants_and_compiled_functions():
 
 def test_a_mutant_that_no_test_is_near_to_survives_and_nothing_is_run(toy):
     (toy / "toy" / "alone.py").write_text("A = 1\n")
-    assert judged(toy, near=3)["1 → 21"] == record.SURVIVED
+    # The only test that there is could not even be imported.
+    (toy / "toy" / "sums.py").unlink()
+    assert judged(toy, near=3) == {"1 → 21": record.SURVIVED}
 
 
 def test_tests_that_fail_anyway_are_an_error(toy):

@@ -54,10 +54,10 @@ def test_the_final_file_does_not_fit(tmp_path, monkeypatch, size):
     assert_told(tmp_path / "x.tif")
 
 
-def test_a_thousand_bands_can_be_read_again(tmp_path):
+def test_hundreds_of_bands_can_be_read_again(tmp_path):
     """In blocks of 256 x 256 pixels the bands of one would fill more than 64 MiB."""
     lattice = Lattice("EPSG:32635", 385_000.0, 6_672_000.0, 5.0, 257, 260)
-    ids = [f"ap-{number}" for number in range(1100)]
+    ids = [f"ap-{number}" for number in range(270)]
     path = tmp_path / "rxlev.tif"
     levels = np.full((lattice.rows, lattice.cols), np.nan, dtype=np.float32)
     levels[3, 7] = -70.0
@@ -66,4 +66,4 @@ def test_a_thousand_bands_can_be_read_again(tmp_path):
     )
     found = open_rasters(path)
     assert found.cell_ids == tuple(ids)
-    assert found.read()[1099, 3, 7] == np.float32(-80.99)
+    assert found.read()[269, 3, 7] == np.float32(-72.69)

@@ -218,7 +218,7 @@ def test_damaged_pixels_are_told_when_read(written: Path, tmp_path: Path) -> Non
 # rasterio's own logger stumbles over GDAL messages that quote bytes which are no text.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @given(st.data())
-@settings(max_examples=150, derandomize=True)
+@settings(max_examples=50, derandomize=True)
 def test_damaged_bytes_are_told_or_harmless(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:

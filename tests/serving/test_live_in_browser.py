@@ -142,7 +142,7 @@ def test_a_page_that_is_refused_says_why_and_comes_in_when_there_is_room(
         address = f"{made.address}/view/{session}"
         first = Watched(browser, address, own=made.address)
         first.until("MF.page.live.state === 'live'")
-        second = Watched(browser, address, own=made.address)
+        second = Watched(browser, address, own=made.address, hurry=20)
         second.until("MF.page.live.state.startsWith('refused: 1 streams')")
         second.page.wait_for_selector("#link:has-text('refused')")
         first.close()

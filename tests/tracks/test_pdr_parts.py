@@ -114,7 +114,7 @@ def test_the_offset_of_a_steady_compass_is_its_angle():
 
 
 @given(st.floats(-np.pi, np.pi), st.floats(-0.002, 0.002))
-@settings(max_examples=30)
+@settings(max_examples=25)
 def test_a_drifting_gyroscope_is_followed(angle_rad, drift_radps):
     """The level frame turns with the drift: seen in it, the north turns back by it."""
     time_s, level = samples(angle_rad - drift_radps * np.arange(6000) / 10, 600)

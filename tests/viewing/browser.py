@@ -8,6 +8,9 @@ import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 
+HURRY = """const later = window.setTimeout;
+window.setTimeout = (task, wait_ms, ...given) => later(task, wait_ms / %g, ...given);"""
+
 
 def executable():
     """Path of the browser; skips the test where there is none."""
@@ -38,10 +41,12 @@ class Watched:
     """A page that remembers what must not happen: requests, errors, messages of the console.
 
     It is a file, with the network cut; or an address of the service ``own``, the only one it may
-    ask.
+    ask. What the page wants to do later it does so many times sooner as ``hurry`` says.
     """
 
-    def __init__(self, browser, file, *, at="", width=1280, height=860, scheme="light", own=""):
+    def __init__(
+        self, browser, file, *, at="", width=1280, height=860, scheme="light", own="", hurry=1
+    ):
         self.own = (f"{own}/", "blob:", "data:") if own else ("file:", "blob:", "data:")
         self.context = browser.new_context(
             viewport={"width": width, "height": height},
@@ -50,6 +55,8 @@ class Watched:
             accept_downloads=True,
             reduced_motion="reduce",
         )
+        if hurry != 1:
+            self.context.add_init_script(HURRY % hurry)
         self.page = self.context.new_page()
         self.faults, self.requests = [], []
         self.page.on("console", lambda one: self.faults.append(f"{one.type}: {one.text}"))

@@ -130,8 +130,8 @@ def test_cells_above_two_bytes_keep_their_numbers(tmp_path):
 
 def test_runs_over_many_cells():
     """A replay over a plan of more cells than two bytes count."""
-    many, log = 33_000, walk_log()
-    plan = CellPlan(log.crs, tuple(replace(make_plan().cells[0], id=f"c{i}") for i in range(many)))
+    many, log, cell = 33_000, walk_log(), make_plan().cells[0]
+    plan = CellPlan(log.crs, tuple(replace(cell, id=f"c{i}") for i in range(many)))
     last = f"c{many - 1}"
     log = replace(log, radio=log.radio.assign(cell=last))
     count = len(epochs(log))

@@ -9,6 +9,7 @@ import pytest
 from command_line import ONE, assert_done, mapfilter, settings
 
 from mapfilter.tracks.store import read_log, write_log
+from mapfilter.workflows import replay_baseline
 
 PLAN = """cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz,arfcn,bsic
 A,S1,60.16690,24.94300,30,60,50,1825.2,612,17
@@ -46,6 +47,8 @@ plan = "cells.csv"
 shadowing_db = 8.0
 [journeys]
 length_m = 250
+[output]
+pictures = "none"
 """
 
 
@@ -93,6 +96,19 @@ def make_world(folder: Path) -> World:
     for command in ("predict", "build", "simulate"):
         assert_done(mapfilter(command, "-c", world.toml))
     return world
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _small_baselines(request):
+    """Locate few single reports beside each replay: they take longer than the replay itself.
+
+    Tests of this baseline locate as many as a user does.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.stem != "test_replay_baseline":
+            patch.setattr(replay_baseline, "MOST_REPORTS", 20)
+            patch.setattr(replay_baseline, "CALIBRATED_WITH", 40)
+        yield
 
 
 @pytest.fixture(scope="session")

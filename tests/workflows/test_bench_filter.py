@@ -3,9 +3,8 @@
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.workflows import bench_filter
+from mapfilter.workflows import bench_filter, bench_threads
 from mapfilter.workflows.bench import run_bench
-from mapfilter.workflows.bench_threads import bench_threads
 
 SMALL = (
     "area.bbox=24.9420,60.1660,24.9495,60.1697", "area.resolution_m=10", "journeys.length_m=400",
@@ -13,7 +12,8 @@ SMALL = (
 
 
 @pytest.mark.filterwarnings("default")
-def test_a_small_bench():
+def test_a_small_bench(monkeypatch):
+    monkeypatch.setattr(bench_filter, "_PER_ROW", 2)
     found = bench_filter.bench_filter(
         runs=1, particles=(500,), tracks=1, length_m=400.0, settings=SMALL
     )
@@ -26,8 +26,11 @@ def test_a_small_bench():
 
 
 @pytest.mark.filterwarnings("default")
-def test_a_step_in_one_thread_and_in_two():
-    found = bench_threads(2, runs=1, particles=(500, 3000), least=2048, settings=SMALL)
+def test_a_step_in_one_thread_and_in_two(monkeypatch):
+    monkeypatch.setattr(bench_threads, "_PARTICLES_OF_A_TURN", 1)
+    found = bench_threads.bench_threads(
+        2, runs=1, particles=(500, 3000), least=2048, settings=SMALL
+    )
     assert (found.threads, found.runs, found.processors > 0) == (2, 1, True)
     assert found.load_average >= 0
     assert [(one.particles, one.is_divided) for one in found.steps] == [(500, False), (3000, True)]

@@ -25,6 +25,7 @@ GRID = settings(
     sweep__update_length_m="5,20",
     sweep__routes=3,
     sweep__draws=4,
+    journeys__length_m=120,
     output__pictures="none",
 )
 GIVEN = [text.removeprefix("--set=") for text in GRID]

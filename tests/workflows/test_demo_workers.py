@@ -24,7 +24,6 @@ from mapfilter._parallel import (
 from mapfilter._partial import remove_left
 from mapfilter._workers import NoProcessError
 from mapfilter.errors import MapfilterError, fail
-from mapfilter.workflows import demo
 
 
 def _where() -> int:
@@ -121,6 +120,9 @@ def _half_written(path: str) -> None:
 
 
 def _stopped_while_one_writes(out: Path, target: Path) -> None:
+    # Workers import this file: what they have no use for would keep them waiting.
+    from mapfilter.workflows import demo
+
     with demo._cleared(out), local_executor(2) as workers:
         begun(workers, partial(_half_written, str(target)))
         until_s = time.monotonic() + 60

@@ -33,7 +33,7 @@ class _Fake:
     """A benchmark of two parts that counts what it located."""
 
     def __init__(self):
-        self.done, self.stop_at = [], None
+        self.done, self.stop_at, self.drawn = [], None, False
 
     def units(self, folder):
         names = sorted(path.stem for path in folder.glob("*.txt"))
@@ -47,7 +47,8 @@ class _Fake:
         found = Found(task.part, "bayes", task.unit, True, True, False, error, error <= 1.0)
         times = np.arange(9.0)
         truth = Truth(times, 500.0 + 10 * times, np.full(9, 500.0))
-        return Judged((found,), {"bayes": Journey(_estimate(float(task.run)), truth)})
+        journey = Journey(_estimate(float(task.run)), truth)
+        return Judged((found,), {"bayes": journey} if self.drawn else {})
 
     def benchmark(self):
         return Benchmark("fake", "fake-data", ("*.txt",), self.units, self.judge)
@@ -63,8 +64,8 @@ def fake(tmp_path, monkeypatch):
     return made
 
 
-@pytest.mark.usefixtures("fake")
-def test_rows_table_and_pictures(tmp_path):
+def test_rows_table_and_pictures(fake, tmp_path):
+    fake.drawn = True
     result = run_recorded("fake", tmp_path, tmp_path / "out")
     assert [(row.part, row.n, row.mean_m, row.coverage_95) for row in result.rows] == [
         ("one", 2, 1.5, 0.5),

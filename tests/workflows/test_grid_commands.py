@@ -51,7 +51,7 @@ def test_a_benchmark_of_the_grid(world, tmp_path):
         1,
         *STATED,
     ]
-    given += ["--world", "easy", *settings(prediction__shadowing_db=6, journeys__length_m=1940)]
+    given += ["--world", "easy", *settings(prediction__shadowing_db=6, journeys__length_m=800)]
     cases = ["--case", "levels-6", "--case", "smooth-6"]
     told = mapfilter(
         "evaluate", "global-positioning", "-c", world.benchmark_toml, *given, *cases,
@@ -65,7 +65,7 @@ def test_a_benchmark_of_the_grid(world, tmp_path):
 
 def test_the_grid_smooths_a_track(world, tmp_path):
     given = ["--db", world.database, "--log", world.journeys / "journey-0000-draw-000", *STATED]
-    given += ["--filter", "grid", "--out", tmp_path, "--json"]
+    given += ["--filter", "grid", "--out", tmp_path, "--json", *settings(output__pictures="none")]
     plain = assert_done(mapfilter("replay", *given)).json
     first = read_estimate(tmp_path / "estimate.parquet")
     smoothed = assert_done(mapfilter("replay", *given, "--smooth")).json

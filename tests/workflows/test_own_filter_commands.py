@@ -127,7 +127,9 @@ def test_a_replay_without_a_map_takes_the_sites_of_the_database(own_world, tmp_p
 
 def test_a_sweep_of_a_filter_without_a_map_takes_the_sites_of_the_database(own_world, tmp_path):
     place = settings(database__path=own_world.database, rasters__path=own_world.rasters)
-    ekf = [*GRID, *place, *settings(filter__name="ekf"), "--vary", "filter.kalman.step_sd_m=0.3,3"]
+    grid = settings(sweep__routes=1, sweep__draws=1, output__pictures="none")
+    ekf = [*grid, *place, *settings(filter__name="ekf", journeys__length_m=120)]
+    ekf += ["--vary", "filter.kalman.step_sd_m=0.3,3"]
     assert_done(mapfilter("sweep", "-c", own_world.toml, *ekf, "--out", tmp_path))
     runs = read_runs(tmp_path / "sweep" / "runs.parquet")
     assert set(runs["filter"]) == {"ekf"}

@@ -1,6 +1,7 @@
 """Figures of one command are never replaced by those of another."""
 
 import json
+import shutil
 
 import pytest
 from command_line import ONE, assert_done, assert_refused, contents, mapfilter, settings
@@ -8,7 +9,7 @@ from command_line import ONE, assert_done, assert_refused, contents, mapfilter, 
 from mapfilter.workflows import replay
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def commands(world):
     """Each command on the same log, with its results in the same folder."""
 
@@ -17,9 +18,20 @@ def commands(world):
         return mapfilter("replay", *given, "--log", log, *out)
 
     def locate(log, *out):
-        return mapfilter("locate", "--db", world.database, "--log", log, *out)
+        # The method that is fitted soonest.
+        given = "--db", world.database, "--method", "centroid"
+        return mapfilter("locate", *given, "--log", log, *out)
 
     return {"replay": replay, "locate": locate}
+
+
+@pytest.fixture(scope="module")
+def found(world, commands, tmp_path_factory):
+    """Results of each command for the same log; nobody may change them."""
+    folder = tmp_path_factory.mktemp("found")
+    for name, command in commands.items():
+        assert_done(command(world.journeys / ONE, "--out", folder / name))
+    return folder
 
 
 @pytest.mark.parametrize(
@@ -33,9 +45,11 @@ def commands(world):
         ("locate", "replay", "expected figures of a replay, or nothing yet, found those of mapfi"),
     ],
 )
-def test_a_folder_of_another_command_is_refused(first, second, told, commands, log, tmp_path):
-    out = "--out", tmp_path / "located"
-    assert_done(commands[first](log, *out))
+def test_a_folder_of_another_command_is_refused(
+    first, second, told, commands, found, world, tmp_path
+):
+    out, log = ("--out", tmp_path / "located"), world.journeys / ONE
+    shutil.copytree(found / first, tmp_path / "located")
     before = contents(tmp_path / "located")
     assert_refused(commands[second](log, *out), "figures.json: ", told, "another folder by --out")
     assert contents(tmp_path / "located") == before
@@ -51,8 +65,8 @@ def test_figures_of_nobody_are_left_as_they_are(commands, log, tmp_path):
     assert (folder / "figures.json").read_text(encoding="utf-8") == "mine"
 
 
-def test_the_folder_of_one_log_of_several_is_looked_at_too(commands, world, log, tmp_path):
-    assert_done(commands["locate"](log, "--out", tmp_path / "all" / ONE))
+def test_the_folder_of_one_log_of_several_is_looked_at_too(commands, world, found, tmp_path):
+    shutil.copytree(found / "locate", tmp_path / "all" / ONE)
     before = contents(tmp_path / "all")
     assert_refused(commands["replay"](world.journeys, "--out", tmp_path / "all"), f"{ONE}/figures")
     assert contents(tmp_path / "all") == before
@@ -80,10 +94,10 @@ def test_results_of_several_logs_are_replaced_by_those_of_another_replay(command
 @pytest.mark.parametrize("damage", ["", '{"log": "my-wa'])
 @pytest.mark.parametrize("command", ["replay", "locate"])
 def test_damaged_figures_beside_files_of_the_command_are_replaced(
-    command, damage, commands, log, tmp_path
+    command, damage, commands, found, world, tmp_path
 ):
-    folder = tmp_path / "located"
-    assert_done(commands[command](log, "--out", folder))
+    folder, log = tmp_path / "located", world.journeys / ONE
+    shutil.copytree(found / command, folder)
     whole = (folder / "figures.json").read_text(encoding="utf-8")
     (folder / "figures.json").write_text(damage, encoding="utf-8")
     other = "locate" if command == "replay" else "replay"
