@@ -13,9 +13,8 @@ import pytest
 from fuzz import MUTATIONS
 from hypothesis import settings
 
-# A slow machine is no failure: speed belongs in benchmarks. Twice as many examples take twice as
-# long, and each run tries others.
-settings.register_profile("mapfilter", deadline=None, max_examples=50)
+# A slow machine is no failure: speed belongs in benchmarks.
+settings.register_profile("mapfilter", deadline=None)
 settings.load_profile("mapfilter")
 
 # Commands, with imports from several rooms: python -m tests.fuzz, python -m tests.faults.

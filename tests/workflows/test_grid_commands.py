@@ -51,7 +51,7 @@ def test_a_benchmark_of_the_grid(world, tmp_path):
         1,
         *STATED,
     ]
-    given += ["--world", "easy", *settings(prediction__shadowing_db=6, journeys__length_m=800)]
+    given += ["--world", "easy", *settings(prediction__shadowing_db=6, journeys__length_m=1940)]
     cases = ["--case", "levels-6", "--case", "smooth-6"]
     told = mapfilter(
         "evaluate", "global-positioning", "-c", world.benchmark_toml, *given, *cases,
