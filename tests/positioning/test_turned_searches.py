@@ -47,7 +47,8 @@ def turned_log(seed, by_rad, turned_s=20.0):
 
 def searched(positioner, log, seed):
     """Search for a position; return errors, and whether they are claimed."""
-    rng, truth, state, rows = np.random.default_rng(seed), log.truth, positioner.begin(), []
+    truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
+    rng, state, rows = np.random.default_rng(seed), positioner.begin(), []
     for epoch in epochs(log):
         state, output = positioner.step(state, epoch, rng)
         if output is None or output.fix is None:
