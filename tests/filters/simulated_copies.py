@@ -7,13 +7,20 @@ import numpy as np
 import pytest
 from numba import config
 
+from mapfilter import _cuda
 from mapfilter.filters import cuda_copies
 from mapfilter.filters.resampling import copy_with_jitter
 
 assert config.ENABLE_CUDASIM
-COUNT = 150
-"""More than one block of threads, the last of which is not full."""
+BLOCK, COUNT = 32, 70
+"""Threads of a block, and hypotheses: more than one block, the last of which is not full."""
 KEY = np.uint64(2**63 + 5)
+
+
+@pytest.fixture(autouse=True)
+def _small_blocks(monkeypatch):
+    """The simulator starts all threads of a block, also those that have nothing to do."""
+    monkeypatch.setattr(_cuda, "_THREADS", BLOCK)
 
 
 def particles(rows):

@@ -23,6 +23,7 @@ from mapfilter.workflows import learn_study
 from mapfilter.workflows.check_suspects import run_check_suspects
 from mapfilter.workflows.learn import run_learn
 
+JOURNEYS = 5
 FEW = ["filter.bayes.max_particles=3000", "filter.bayes.min_search_particles=3000"]
 
 
@@ -33,7 +34,7 @@ def configured(database, logs):
 
 @pytest.fixture(scope="module")
 def faulty(tmp_path_factory):
-    """A database with a cell 12 dB too weak and a silent one, and eight journeys with truth."""
+    """A database with a cell 12 dB too weak and a silent one, and some journeys with truth."""
     folder = tmp_path_factory.mktemp("learn")
     given = plan_of()
     true = CellPlan(
@@ -42,7 +43,7 @@ def faulty(tmp_path_factory):
     )
     database_of(given, folder / "given")
     rng = np.random.default_rng(3)
-    for number in range(8):
+    for number in range(JOURNEYS):
         write_log(log_of(true, rng, silent=("S1C",), blocks=20), folder / "logs" / f"j{number}")
     return folder / "given" / "database", folder / "logs"
 
@@ -60,7 +61,7 @@ def found(result):
 def test_faults_are_named_with_truth(taught):
     result, _ = taught
     assert found(result) == {("offset", "S2B"), ("dead", "S1C")}
-    assert (result.logs, result.used) == (8, 8)
+    assert (result.logs, result.used) == (JOURNEYS, JOURNEYS)
 
 
 def test_the_accepted_database_is_another_one_and_the_report_lies_beside_it(taught, faulty):
@@ -85,7 +86,7 @@ def test_tables_and_patch_say_the_same(taught):
     assert cells.loc["S1C", "received"] == 0
     assert cells.loc["S2B", "offset_db"] == pytest.approx(12.0, abs=2.5)
     journeys = pd.read_csv(result.out / "journeys.csv")
-    assert journeys["log"].tolist() == [f"j{n}" for n in range(8)]
+    assert journeys["log"].tolist() == [f"j{n}" for n in range(JOURNEYS)]
     assert (journeys["trust"] > 0.9).all()
 
 
@@ -108,8 +109,8 @@ def test_without_truth_and_interrupted_it_goes_on_where_it_was(faulty, tmp_path,
         config, out, use_truth=False, resume=True, progress=lambda *at: shown.append(at)
     )
     # Three were kept; where the map alone places no journey of equal blocks, there is a third pass.
-    assert len(calls) == 4 + 5 + 8 + 8 * len(result.notes)
-    assert shown[-1] == (24, 24)
+    assert len(calls) == 4 + (JOURNEYS - 3) + JOURNEYS * (1 + len(result.notes))
+    assert shown[-1] == (3 * JOURNEYS, 3 * JOURNEYS)
     assert [done for done, _ in shown] == sorted(done for done, _ in shown)
     assert {("dead", "S1C")} <= found(result) <= {("offset", "S2B"), ("dead", "S1C")}
     assert not list(tmp_path.glob(".out*"))
@@ -215,7 +216,7 @@ def test_the_command_line_prints_findings_and_accepts_the_patch(faulty, tmp_path
     assert shown.exit_code == 0, shown.output
     found = json.loads(shown.stdout.splitlines()[-1])
     assert {one["kind"] for one in found["findings"]} == {"offset", "dead"}
-    assert all(one["journeys"] == 8 for one in found["findings"])
+    assert all(one["journeys"] == JOURNEYS for one in found["findings"])
     patch = tmp_path / "learned" / "patch.toml"
     patch.write_text(patch.read_text().replace("accept = true", "accept = false", 1))
     out = tmp_path / "after"

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 PIPELINES = Path(__file__).resolve().parents[2] / "pipelines"
-ROUTES, DRAWS = 40, 5
+ROUTES, DRAWS = 40, 2
+"""Routes differ more than draws do: success has a deviation of 0.06, and of 0.05 by five draws."""
 
 
 def run_script(name: str, capsys: pytest.CaptureFixture[str], *settings: str) -> dict:

@@ -38,9 +38,15 @@ from mapfilter.workflows import bench_device
 assert config.ENABLE_CUDASIM
 DEVICE = Device("gpu", np)
 """Kernels are simulated; the simulator takes NumPy's arrays."""
-COUNT = 150
-"""More than one block of threads, the last of which is not full."""
+BLOCK, COUNT = 32, 70
+"""Threads of a block, and hypotheses: more than one block, the last of which is not full."""
 JITTER = np.array([0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4], np.float32)
+
+
+@pytest.fixture(autouse=True)
+def _small_blocks(monkeypatch):
+    """The simulator starts all threads of a block, also those that have nothing to do."""
+    monkeypatch.setattr(_cuda, "_THREADS", BLOCK)
 
 
 def particles(rows=8, seed=3):

@@ -108,11 +108,11 @@ def test_particles_agree_with_the_grid(area, log, change):
 
 @pytest.mark.long
 def test_the_error_falls_with_the_root_of_the_number(area, log):
-    reference = beliefs(positioner(area, grid=False, count=1_000_000), log, FINE_M)[-1]
+    reference = beliefs(positioner(area, grid=False, count=1_000_000), log, FINE_M, count=10)[-1]
 
     def error(count):
         some = positioner(area, grid=False, count=count)
-        found = [beliefs(some, log, FINE_M, seed)[-1] for seed in range(120)]
+        found = [beliefs(some, log, FINE_M, seed, count=10)[-1] for seed in range(80)]
         return np.mean([variation(one, reference) for one in found])
 
     assert error(1000) / error(4000) == pytest.approx(2.0, rel=0.1)

@@ -279,7 +279,8 @@ def faulty(log, fault):
 
 def tracked(log, seed, positioner):
     """Track a log from its known start; return how far off each epoch is, its radius and status."""
-    rng, truth = np.random.default_rng(seed), log.truth
+    rng = np.random.default_rng(seed)
+    truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
     state = positioner.begin_at(truth["east_m"][0], truth["north_m"][0], 5.0, rng)
     rows, reasons = [], set()
     for epoch in epochs(log):

@@ -124,7 +124,8 @@ def zero_after(log, from_s, until_s=np.inf):
 
 
 def followed(log, seed, positioner=AREA):
-    rng, truth, found = np.random.default_rng(seed), log.truth, []
+    rng, found = np.random.default_rng(seed), []
+    truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
     state = positioner.begin_at(truth["east_m"][0], truth["north_m"][0], 5.0, rng)
     for epoch in epochs(log):
         state, output = positioner.step(state, epoch, rng)
@@ -350,7 +351,8 @@ def test_a_walk_in_feet_is_located_and_says_so():
     right, reasons, wrong = 0, set(), 0
     for seed in (1, 2, 3):
         log = in_feet(walk_log(TOWN, seed, error_db=3.0))
-        rng, truth = np.random.default_rng(seed), log.truth
+        rng = np.random.default_rng(seed)
+        truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
         state, ends = AREA.begin(), []
         for epoch in epochs(log):
             state, output = AREA.step(state, epoch, rng)

@@ -159,9 +159,12 @@ def test_every_value_is_that_of_the_whole_area(database, whole, side):
         assert tiled.matched_way(*some) == whole.matched_way(*some)
 
 
-@pytest.mark.parametrize(("side", "largest_bytes"), [(40, HELD_BYTES), (48, 150_000)])
+# Where little is held, tiles are read anew at each epoch: some show it.
+@pytest.mark.parametrize(
+    ("side", "largest_bytes", "length_m"), [(40, HELD_BYTES, 400.0), (48, 150_000, 120.0)]
+)
 @pytest.mark.parametrize("levels", [True, False])
-def test_a_walk_is_located_alike(database, whole, town, side, largest_bytes, levels):
+def test_a_walk_is_located_alike(database, whole, town, side, largest_bytes, length_m, levels):
     """To the last bit, and however little is held."""
     tiled = TiledArea.of_database(database, side, largest_bytes, search_tiles=EVERY_TILE)
     outputs = []
@@ -169,12 +172,12 @@ def test_a_walk_is_located_alike(database, whole, town, side, largest_bytes, lev
         filter_ = BayesFilter(max_particles=4000, min_search_particles=2000, levels=levels)
         positioner = filter_.over_area(area)
         rng, state, found = np.random.default_rng(5), positioner.begin(), []
-        for epoch in epochs(walk_log(town, 6, 400.0)):
+        for epoch in epochs(walk_log(town, 6, length_m)):
             state, output = positioner.step(state, epoch, rng)
             found.append(repr((output.fix, output.evidence)))
         outputs.append(found)
     assert outputs[0] == outputs[1]
-    assert len(set(outputs[0])) > 60
+    assert len(set(outputs[0])) > 0.75 * len(outputs[0]) > 15
 
 
 def test_what_is_held_stays_within_its_bytes(database, whole):

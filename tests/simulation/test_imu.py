@@ -64,7 +64,7 @@ def test_a_perfect_unit_leads_back_to_the_truth():
 
 def test_bias_and_scale_are_one_draw_for_each_journey():
     errors = replace(PERFECT, bias_sd_deg=degrees(0.1), scale=0.05)
-    journeys = 4000
+    journeys = 1500
     step, heading = motions(errors, journeys, straight(3))
     np.testing.assert_allclose(heading, heading[:, :1].repeat(3, axis=1))
     np.testing.assert_allclose(step, step[:, :1].repeat(3, axis=1))
@@ -81,7 +81,7 @@ def test_bias_and_scale_are_one_draw_for_each_journey():
 def test_drift_grows_with_the_root_of_time_whatever_the_period(period_s):
     rate = np.radians(0.5)
     errors = replace(PERFECT, drift_deg_per_sqrt_s=degrees(rate))
-    journeys, ticks = 3000, int(64 / period_s)
+    journeys, ticks = 1200, int(64 / period_s)
     _, heading = motions(errors, journeys, straight(ticks, period_s=period_s))
     for after_s in (4.0, 16.0, 64.0):
         drift = heading[:, int(after_s / period_s) - 1]
