@@ -74,7 +74,7 @@ def _share_held(options, walks):
 @pytest.mark.parametrize("smooth", [False, True])
 def test_radii_hold_where_errors_of_fixes_last(smooth):
     rng = np.random.default_rng(3)
-    walks = [_walk(rng) for _ in range(12)]
+    walks = [_walk(rng) for _ in range(20)]
     white = _share_held(KalmanFilter(smooth=smooth), walks)
     lasting = KalmanFilter(smooth=smooth, fix_lasting_m=LASTING_M, fix_lasting_s=MEMORY_S)
     assert white < 0.7
@@ -83,7 +83,7 @@ def test_radii_hold_where_errors_of_fixes_last(smooth):
 
 def test_radii_hold_without_dead_reckoning():
     rng = np.random.default_rng(4)
-    walks = [_walk(rng, reckoned=False) for _ in range(12)]
+    walks = [_walk(rng, reckoned=False) for _ in range(20)]
     lasting = KalmanFilter(fix_lasting_m=LASTING_M, fix_lasting_s=MEMORY_S)
     assert _share_held(KalmanFilter(), walks) < 0.88
     assert _share_held(lasting, walks) > 0.9
