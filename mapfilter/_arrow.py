@@ -1,15 +1,17 @@
-"""Reading with Arrow, so that no thread of it outlives the read with an object of Python in hand.
+"""Reading with Arrow, so that no thread of it holds an object of Python afterwards.
 
 Arrow's threads may still hold the last reference to what they read when the result is there. They
 give it back when they are next given time; where that is bytes or a file of Python, and Python is
-ending by then, the process aborts after all its work is done.
+ending by then, the process aborts after all its work is done. So Parquet is read without threads,
+and readers that always use them get a copy in Arrow's own memory.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, BinaryIO
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -53,7 +55,7 @@ def open_parquet(source: Any, footer: pq.FileMetaData | None = None) -> Iterator
     ``source`` is a path, a file of Python or one of Arrow; ``footer`` its footer, where it was read
     before. Raises what Arrow raises.
     """
-    # Reading ahead is left to a thread.
+    # Reading ahead is left to a thread, which would hold the source.
     with pq.ParquetFile(
         source, metadata=footer, pre_buffer=False, page_checksum_verification=True
     ) as file:
@@ -65,6 +67,22 @@ def arrow_bytes(data: bytes | memoryview) -> pa.Buffer:
 
     For readers of Arrow that always use threads, as that of CSV.
     """
-    sink = pa.BufferOutputStream()
-    sink.write(data)
-    return sink.getvalue()
+    held = pa.allocate_buffer(len(data))
+    if len(data):
+        memoryview(held).cast("B")[:] = data
+    return held
+
+
+def arrow_file(stream: BinaryIO) -> pa.Buffer:
+    """Return the bytes of a file as :func:`arrow_bytes` does, read into that memory at once.
+
+    Raises
+    ------
+    OSError
+        The file became shorter meanwhile.
+    """
+    held = pa.allocate_buffer(stream.seek(0, os.SEEK_END))
+    stream.seek(0)
+    if stream.readinto(memoryview(held)) != held.size:  # type: ignore[attr-defined]
+        raise OSError("the file became shorter while it was read")
+    return held

@@ -104,7 +104,7 @@ def job_of(name: str, work: Path) -> Job:
     return _sweeping(work, out) if name == "sweep" else _learning(work, out)
 
 
-# Only those who write tables or learn wait for what that imports.
+# What these two import takes long, and who only builds or merges needs none of it.
 def _sweeping(work: Path, out: Path) -> Job:
     from mapfilter.config.load import load_config
     from mapfilter.experiments.sweep.run import sweep

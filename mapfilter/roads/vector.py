@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pyproj.exceptions import CRSError, ProjError
 from shapely.errors import GEOSException
 
-from mapfilter._arrow import arrow_bytes
+from mapfilter._arrow import arrow_file, open_parquet
 from mapfilter._inputs import open_input
 from mapfilter._ogr import PARQUET, VectorSource, sealed_gdal, vector_source
 from mapfilter._types import Ints
@@ -209,7 +209,10 @@ def _guarded(name: str, read: Callable[[], T]) -> T:
 
 
 def _parquet_frame(stream: BinaryIO) -> GeoDataFrame:
-    return geopandas.read_parquet(pa.BufferReader(arrow_bytes(stream.read())))
+    # What is no Parquet is refused by its end, before all of it is read.
+    with open_parquet(stream):
+        pass
+    return geopandas.read_parquet(pa.BufferReader(arrow_file(stream)))
 
 
 def _nothing_there(

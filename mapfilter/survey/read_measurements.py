@@ -216,7 +216,8 @@ def _notes(tables: Sequence[Rows]) -> tuple[str, ...]:
         of = [table for table in tables if what in table.aside]
         total, names = sum(table.aside[what] for table in of), [table.path.name for table in of]
         found.append(f"{counted(total, what)} in {len(of)} files ({listed(names)})")
-        example = next((note for note in of[0].notes() if what in note), "")
+        noted = counted(of[0].aside[what], what)
+        example = next((note for note in of[0].notes() if noted in note), "")
         if (at := example.find(", such as ")) >= 0:
             found[-1] += example[at:]
     kept = (

@@ -108,6 +108,9 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
         except (pa.ArrowException, ValueError, OSError) as error:
             got = (str(error).splitlines() or ["nothing"])[0]
             raise fail(InputError, str(path), "a readable table", got, "cut off") from error
+        if not rows.columns.is_unique:
+            faults.add(str(path), "each column once", "a name of two columns")
+            continue
         if lacking := [column for column in SENSOR_COLUMNS[name] if column not in rows]:
             faults.add(str(path), f"columns {', '.join(SENSOR_COLUMNS[name])}", f"no {lacking[0]}")
         for column in SENSOR_COLUMNS[name]:

@@ -1,6 +1,8 @@
 """Arrow: what is read leaves no thread behind that holds an object of Python."""
 
 import ast
+import io
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import mapfilter
-from mapfilter._arrow import arrow_bytes, open_parquet
+from mapfilter._arrow import arrow_bytes, arrow_file, open_parquet
 
 ROOT = Path(mapfilter.__file__).parent
 THREADED = {"read_csv", "read_parquet", "read_feather", "open_csv", "read_json", "dataset"}
@@ -43,7 +45,7 @@ def test_what_always_uses_threads_is_given_memory_of_arrow():
         of_pandas = isinstance(node.func.value, ast.Name) and node.func.value.id == "pd"
         if node.func.attr in THREADED and not of_pandas:
             given = ast.unparse(node.args[0])
-            assert given.startswith("pa.BufferReader(arrow_bytes("), (file, given)
+            assert re.match(r"pa\.BufferReader\(arrow_(bytes|file)\(", given), (file, given)
             found.append(file)
     assert len(found) == 3
 
@@ -102,3 +104,24 @@ def test_bytes_are_copied():
     held = arrow_bytes(memoryview(data)[4:])
     data[4] = ord("9")
     assert held.to_pybytes() == b"1,2\n"
+    assert arrow_bytes(b"").to_pybytes() == b""
+
+
+def test_a_file_is_read_whole_from_anywhere_in_it(tmp_path):
+    path = tmp_path / "some"
+    path.write_bytes(bytes(range(256)))
+    with path.open("rb") as stream:
+        stream.read(7)
+        assert arrow_file(stream).to_pybytes() == bytes(range(256))
+
+
+def test_a_file_that_is_cut_off_meanwhile_is_told():
+    class Shrinking(io.BytesIO):
+        def seek(self, to, whence=0):
+            at = super().seek(to, whence)
+            if not to and not whence:
+                self.truncate(10)
+            return at
+
+    with pytest.raises(OSError, match="shorter"):
+        arrow_file(Shrinking(b"0123456789ABC"))

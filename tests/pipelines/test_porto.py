@@ -11,7 +11,8 @@ import pytest
 
 PIPELINES = Path(__file__).resolve().parents[2] / "pipelines"
 ROUTES, DRAWS = 40, 2
-"""Routes differ more than draws do: success has a deviation of 0.06, and of 0.05 by five draws."""
+"""The paper has 100 runs. Routes differ more than draws do: a share of success has a deviation of
+0.06, and of 0.05 by five draws."""
 
 
 def run_script(name: str, capsys: pytest.CaptureFixture[str], *settings: str) -> dict:

@@ -31,7 +31,6 @@ def not_watching(positioner):
     return replace(positioner, holds=HoldRules(watched=False))
 
 
-WATCHED, UNWATCHED = watching(AREA), not_watching(AREA)
 SMALL = BayesFilter(heading_sd_deg=6.0, **FEW).over_area(AREA.area)
 SEEDS = range(1, 9)
 

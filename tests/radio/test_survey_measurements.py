@@ -168,6 +168,16 @@ def test_a_bad_time_or_accuracy_costs_only_itself(tmp_path):
     assert "expected ISO 8601" in note
 
 
+def test_one_odd_time_in_each_of_many_files_is_told_with_an_example(tmp_path):
+    text = "cell,lat,lon,level_dbm,time\nA,60.18,24.95,-80,yesterday\n"
+    files = [tmp_path / f"drive-{number}.csv" for number in range(4)]
+    for number, file in enumerate(files):
+        file.write_text(text.replace("60.18", f"60.18{number}"))
+    (note,) = read_measurements(files).notes
+    assert note.startswith("4 times not understood (levels kept) in 4 files (drive-0.csv")
+    assert "such as 'yesterday' in line 2; expected ISO 8601" in note
+
+
 def test_repetitions_are_left_out_and_told(tmp_path):
     lines = PLAIN.splitlines(keepends=True)
     found = read_measurements([write(tmp_path, "".join([*lines, lines[3], lines[3]]))])

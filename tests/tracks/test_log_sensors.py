@@ -88,6 +88,17 @@ def barometer(tmp_path):
     return tmp_path / "sensors" / "barometer"
 
 
+def test_a_sensor_table_with_two_columns_of_a_name_is_refused(log, sensors, tmp_path):
+    write_log(log, tmp_path / "log", sensors=sensors)
+    path = tmp_path / "log" / "sensors" / "gyroscope.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.append_column(table.column_names[0], table[0]), path)
+    # A log made by hand lists no checksums.
+    (tmp_path / "log" / "log.json").write_text('{"crs": "EPSG:32635"}')
+    with pytest.raises(InputError, match="each column once, found a name of two columns"):
+        read_sensors(tmp_path / "log")
+
+
 def test_sensor_tables_are_numbers(barometer):
     path = barometer.with_suffix(".csv")
     path.write_text("time_s,pressure_hpa\n0,1013\n1_0,1013\n")

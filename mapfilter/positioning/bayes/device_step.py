@@ -29,7 +29,7 @@ from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.beyond_edge import BEYOND_COST_PER_M, beyond_edge
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.sampled_cells import expected_absent, mean_rough_db2, one_in
+from mapfilter.positioning.bayes.sampled_cells import expected_absent, mean_rough_db2, sample_stride
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class DeviceStep:
         arrays, model, area = self.device.arrays, self.model, self.model.area
         pixel = arrays.empty(log_weight.size, dtype=np.int32)
         cuda_reports.pixels(cloud.state, area.frame, pixel)
-        every = one_in(pixel)
+        every = sample_stride(pixel)
         some = np.ascontiguousarray(on_host(pixel[::every]))
         before = log_weight.copy()
         cloud = self._aged(cloud, reading)

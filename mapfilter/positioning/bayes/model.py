@@ -50,7 +50,7 @@ from mapfilter.positioning.bayes.sampled_cells import (
     expected_absent,
     mean_rough_db2,
     most_expected,
-    one_in,
+    sample_stride,
 )
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 
@@ -384,7 +384,7 @@ class BayesModel:
     def _expected_absent(self, pixel: Ints32, report: LevelReport) -> Ints32:
         if not isinstance(self.area, TiledArea):
             return expected_absent(self.prediction, pixel, report)
-        some = np.ascontiguousarray(pixel[:: one_in(pixel)])
+        some = np.ascontiguousarray(pixel[:: sample_stride(pixel)])
         share = self.area.shares_above(some, report.absent, report.limit_dbm)
         return most_expected(report.absent, share)
 

@@ -8,14 +8,14 @@ from mapfilter._types import Floats, Ints32
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import Prediction, rough_squares, shares_above
 
-SAMPLE = 256
-"""Number of hypotheses that stand for all of them, or more than that."""
+_SAMPLE = 256
+"""At least so many hypotheses, and fewer than twice as many, stand for all of them."""
 _LEAST_EXPECTED = 0.02
 
 
 def mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats:
     """Return the mean variance that the roughness of the prediction adds, for each cell."""
-    squares = rough_squares(pixel, one_in(pixel), predicted, cell)
+    squares = rough_squares(pixel, sample_stride(pixel), predicted, cell)
     return np.asarray(predicted.share * (squares.sum(axis=1) / squares.shape[1]))
 
 
@@ -24,7 +24,7 @@ def expected_absent(predicted: Prediction, pixel: Ints32, report: LevelReport) -
     absent = report.absent
     if not absent.size:
         return absent
-    share = shares_above(pixel, one_in(pixel), predicted, absent, report.limit_dbm)
+    share = shares_above(pixel, sample_stride(pixel), predicted, absent, report.limit_dbm)
     return most_expected(absent, share)
 
 
@@ -36,6 +36,6 @@ def most_expected(absent: Ints32, share: Floats) -> Ints32:
     return found
 
 
-def one_in(pixel: Ints32) -> int:
-    """Return how many hypotheses one stands for, where some stand for all of them."""
-    return max(pixel.size // SAMPLE, 1)
+def sample_stride(pixel: Ints32) -> int:
+    """Return the stride that takes the sample out of all hypotheses."""
+    return max(pixel.size // _SAMPLE, 1)
