@@ -21,6 +21,7 @@ def start(kernel: Any, count: int, *given: Any) -> None:
     # A narrow belief does not fill a device, of which numba warns. Filters of warnings belong to
     # the whole process, so they are put back at once, and by one thread at a time.
     with _CONFIGURING, warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Grid size")
+        # numba puts a colour before the text where it can.
+        warnings.filterwarnings("ignore", message=".*Grid size")
         configured = kernel[-(-count // _THREADS), _THREADS]
     configured(*given)

@@ -108,7 +108,7 @@ class WarningKernel:
     """A kernel that warns of few blocks as it is configured, and of something as it runs."""
 
     def __getitem__(self, blocks_threads):
-        warnings.warn("Grid size 1 will likely result in GPU under-utilization", stacklevel=2)
+        warnings.warn("\33[1mGrid size 1 will likely result in GPU under-utilization", stacklevel=2)
         return lambda *_: warnings.warn(f"{blocks_threads}", stacklevel=2)
 
 
