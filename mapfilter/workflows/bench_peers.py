@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -38,7 +39,9 @@ from mapfilter.workflows.bench_numpy import MAP, NumpyModel, Step, numpy_step
 OWN, NUMPY = "mapfilter", "numpy"
 PACKAGES = ("particles", "stonesoup", "filterpy")
 PARTICLES = (10_000, 100_000, 1_000_000)
-_PACKAGE_STEPS = 10
+_Steps = Callable[[Floats], object]
+_MOST_STEPS, _MOST_MOVED = 10, 2_000_000
+"""Steps in a row of a turn, as a filter takes them, and particles that these move in all."""
 _ACCESSES_OF_STATE, _ACCESSES_OF_KEPT = 4, 4
 """How often a step reads or writes what it has of a particle, if each pass is through memory."""
 
@@ -113,23 +116,33 @@ def bench_peers(
 def compare(inputs: StepInputs, belief: ParticleBelief, runs: int) -> dict[str, float]:
     """Return nanoseconds per particle of a whole step, by package, mapfilter first."""
     count = belief.log_weight.size
+    in_row = max(min(_MOST_STEPS, _MOST_MOVED // count), 1)
     rng, jitter = np.random.default_rng(1), np.array(JITTER)
     peer = NumpyModel(inputs, belief)
     wide = np.vstack([belief.state.astype(np.float64), np.zeros(count)])
-    steps: dict[str, tuple[Step | None, int]] = {
-        NUMPY: (numpy_step(peer, jitter, rng), 1),
-        "particles": (particles_step(peer, rng, _PACKAGE_STEPS), _PACKAGE_STEPS),
-        "stonesoup": (stone_soup_step(peer, rng), 1),
-        "filterpy": (filterpy_step(peer, jitter, rng), 1),
-    }
     own = jitter.astype(np.float32)
-    tasks: dict[str, Callable[[], object]] = {OWN: lambda: whole_step(inputs, belief, own, rng)}
-    for name, (step, _) in steps.items():
-        if step is not None:
-            tasks[name] = lambda step=step: step(wide)  # type: ignore[misc]
+    steps: dict[str, _Steps | None] = {
+        OWN: _in_a_row(lambda _: whole_step(inputs, belief, own, rng), in_row),
+        NUMPY: _in_a_row(numpy_step(peer, jitter, rng), in_row),
+        "particles": particles_step(peer, rng, in_row),
+        "stonesoup": _in_a_row(stone_soup_step(peer, rng), in_row),
+        "filterpy": _in_a_row(filterpy_step(peer, jitter, rng), in_row),
+    }
+    tasks = {name: partial(step, wide) for name, step in steps.items() if step is not None}
     took_s = median_seconds(tasks, runs, time.process_time)
-    times = {name: steps[name][1] if name in steps else 1 for name in tasks}
-    return {name: 1e9 * took_s[name] / (times[name] * count) for name in tasks}
+    return {name: 1e9 * seconds / (in_row * count) for name, seconds in took_s.items()}
+
+
+def _in_a_row(step: _Steps | None, times: int) -> _Steps | None:
+    """Return a step that is taken several times from the same state; None for none."""
+    if step is None:
+        return None
+
+    def several(state: Floats) -> None:
+        for _ in range(times):
+            step(state)
+
+    return several
 
 
 def memory_limit(rows: int, kept: int, count: int, runs: int) -> tuple[float, int]:
