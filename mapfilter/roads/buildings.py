@@ -15,7 +15,8 @@ from rasterio.transform import Affine
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.roads.maps import Query, read_elements
+from mapfilter.roads.elements import Query
+from mapfilter.roads.maps import read_elements
 from mapfilter.roads.ways import Bounds, Buildings, Geometries, polygons_inside
 
 STOREY_HEIGHT_M = 3.2

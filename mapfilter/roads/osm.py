@@ -30,7 +30,8 @@ from geopandas import GeoDataFrame
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools
-from mapfilter.roads.maps import Query, nothing_there, read_elements
+from mapfilter.roads.elements import Query
+from mapfilter.roads.maps import nothing_there, read_elements
 from mapfilter.roads.ways import Bounds, Squares, Water, Ways, lines_inside, polygons_inside
 
 Profile = Literal["walking", "driving"]

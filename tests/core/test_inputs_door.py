@@ -342,7 +342,8 @@ ALLOWED = {
     ("tracks/table_files.py", "read_csv"), ("tracks/table_files.py", "open_parquet"),
     ("tracks/readers/lines.py", "read_csv"), ("positioning/fingerprints/tables.py", "read_csv"),
     ("experiments/benchmarks/ottawa_sessions.py", "read_csv"), ("radio/tables.py", "ZipFile"),
-    ("roads/maps.py", "read_dataframe"), ("roads/maps.py", "GzipFile"), ("roads/maps.py", "open"),
+    ("roads/osm_xml.py", "read_dataframe"), ("roads/osm_xml.py", "GzipFile"),
+    ("roads/osm_xml.py", "open"),
     ("workflows/info.py", "list_layers"), ("workflows/info.py", "read_info"),
     ("viewing/page.py", "GzipFile"),
     # Who calls it is listed here by `open_parquet`.
