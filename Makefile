@@ -37,12 +37,12 @@ $(VENV)/.demo: EXTRAS :=
 $(VENV)/.test: EXTRAS := [test,docs]
 
 # pip compiles modules one after the other, other packages' tests among them: half of its time. A few
-# modules are templates that no Python compiles. Kernels are compiled here, or the first replay would
+# modules are templates that no Python compiles, and of some packages next to none is ever imported. Kernels are compiled here, or the first replay would
 # wait for them.
 $(VENV)/.demo $(VENV)/.test: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.$(EXTRAS)'
-	$(BIN)/python -m compileall -qq -j 0 -x /tests/ $(VENV)/lib || true
+	$(BIN)/python -m compileall -qq -j 0 -x '/(tests|pip|setuptools|fontTools|pygments)/' $(VENV)/lib || true
 	$(BIN)/python -m mapfilter.workflows.kernels --replay
 	touch $@
 
