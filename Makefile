@@ -37,8 +37,8 @@ $(VENV)/.demo: EXTRAS :=
 $(VENV)/.test: EXTRAS := [test,docs]
 
 # pip compiles modules one after the other, other packages' tests among them: half of its time. A few
-# modules are templates that no Python compiles, and of some packages next to none is ever imported. Kernels are compiled here, or the first replay would
-# wait for them.
+# modules are templates that no Python compiles, and of some packages next to none is imported.
+# Kernels are compiled here, or the first replay would wait for them.
 $(VENV)/.demo $(VENV)/.test: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.$(EXTRAS)'

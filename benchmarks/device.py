@@ -1,8 +1,8 @@
 """The grid filter on a graphics processor beside the processor: python benchmarks/device.py.
 
 A walk on the embedded map is located by ``grid`` on both, in turns: how far the estimates lie
-apart, and wall time. Cases are a walk with a compass, without one, with GNSS fixes, and one of
-which a single report is heard, so that the belief stays spread over the map.
+apart, and wall time. Cases are a walk with a compass, without one, with GNSS fixes, and one that
+receives a single report, so that the belief stays spread over the map.
 ``mapfilter bench filter --device gpu`` times a step of many particles.
 """
 
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from mapfilter._device import open_device
 from mapfilter.database.store import open_database
+from mapfilter.errors import MapfilterError
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import GridFilter
@@ -50,16 +51,16 @@ def with_fixes(log: TrackLog) -> TrackLog:
 
 
 def one_report(log: TrackLog) -> TrackLog:
-    """Return a log whose phone hears nothing after its first report."""
+    """Return a log whose phone receives nothing after its first report."""
     first_s = log.radio["time_s"].min()
     return replace(log, radio=log.radio[log.radio["time_s"] == first_s])
 
 
 CASES: dict[str, Callable[[TrackLog], TrackLog]] = {
     "compass": lambda log: log,
-    "no compass": without_compass,
+    "no-compass": without_compass,
     "fixes": with_fixes,
-    "one report": one_report,
+    "one-report": one_report,
 }
 
 
@@ -76,9 +77,13 @@ def largest(values: NDArray[np.float64]) -> float | None:
 
 
 def apart(one: TrackEstimate, other: TrackEstimate) -> dict[str, object]:
-    """Return the largest differences of positions and radii, and how many statuses differ."""
+    """Return how far positions and radii lie apart at most, and how many epochs differ otherwise.
+
+    Positions are compared where both have one; epochs in which only one has are counted.
+    """
     return {
         "epochs": len(one.status),
+        "with_one_position": int(np.sum(np.isnan(one.east_m) != np.isnan(other.east_m))),
         "position_m": largest(np.hypot(one.east_m - other.east_m, one.north_m - other.north_m)),
         "radii_m": largest(np.abs(one.radii_m - other.radii_m)),
         "statuses": sum(a != b for a, b in zip(one.status, other.status, strict=True)),
@@ -88,12 +93,19 @@ def apart(one: TrackEstimate, other: TrackEstimate) -> dict[str, object]:
 def main() -> None:
     """Locate the walk on both, and print what was seen."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--length-m", type=float, default=100.0)
+    parser.add_argument("--runs", type=int, default=5, help="that the medians are of")
+    parser.add_argument("--length-m", type=float, default=100.0, help="of the walk")
     parser.add_argument("--seed", type=int, default=1, help="of the walk")
-    parser.add_argument("--case", choices=CASES, nargs="*", default=list(CASES))
+    parser.add_argument(
+        "--case", choices=CASES, nargs="*", default=list(CASES), help="all by default"
+    )
     given = parser.parse_args()
-    device = open_device("gpu")
+    if given.runs < 1:
+        parser.error("--runs: expected a number from 1 on")
+    try:
+        device = open_device("gpu")
+    except MapfilterError as error:
+        raise SystemExit(str(error)) from error
     with tempfile.TemporaryDirectory(prefix="mapfilter-device-") as name:
         world = f"journeys.length_m={given.length_m}", f"journeys.seed={given.seed}"
         database, folders = make_world(Path(name), ["journeys.count=1", *world])
@@ -106,8 +118,8 @@ def main() -> None:
             took = [[located(log, one)[1] for one in (here, there)] for _ in range(given.runs)]
             cpu_s, gpu_s = (median(times) for times in zip(*took, strict=True))
             times = {"cpu_s": cpu_s, "gpu_s": gpu_s, "speedup": cpu_s / gpu_s}
-            told = {"device": device.title, "case": case, **apart(*found), **times}
-            print(json.dumps(told), flush=True)
+            row = {"device": device.title, "case": case, **apart(*found), **times}
+            print(json.dumps(row), flush=True)
 
 
 if __name__ == "__main__":

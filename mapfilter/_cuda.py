@@ -22,6 +22,6 @@ def start(kernel: Any, count: int, *given: Any) -> None:
     # the whole process, so they are put back at once, and by one thread at a time.
     with _CONFIGURING, warnings.catch_warnings():
         # numba puts a colour before the text where it can.
-        warnings.filterwarnings("ignore", message=".*Grid size")
+        warnings.filterwarnings("ignore", message=r"(\x1b\[[0-9;]*m)*Grid size")
         configured = kernel[-(-count // _THREADS), _THREADS]
     configured(*given)

@@ -14,8 +14,8 @@ from geopandas import GeoDataFrame
 from mapfilter._inputs import check_file
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import unproject
-from mapfilter.roads.elements import BoxDeg, Query
-from mapfilter.roads.osm_pbf import LARGEST_KEPT_BYTES, Version, pbf_header_deg, read_pbf
+from mapfilter.roads.elements import BoxDeg, Query, Version
+from mapfilter.roads.osm_pbf import pbf_header_deg, read_pbf
 from mapfilter.roads.osm_xml import read_xml, xml_header_deg
 from mapfilter.roads.ways import Bounds, on_earth
 
@@ -27,7 +27,7 @@ SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
 _MOST_KEPT = 8
 # Readers take elements that have a node in the box; a long way may cross an area without one.
 _READ_PAD_M = 2000.0
-# Layers of an area are read about boxes that differ by metres: rounded, they are one part of a map.
+# Layers of an area are read about boxes that differ by metres: rounded, they usually are one part.
 _READ_STEPS_A_DEGREE = 200
 
 
@@ -94,13 +94,22 @@ def read_elements(
     """Return the elements of a map in and about a box (m), sorted by id; the caller clips them.
 
     Columns are ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an empty text
-    where an element has no such tag.
+    where an element has no such tag. Read is what has a node within 2 to 3 km of the box.
+
+    Raises
+    ------
+    InputError
+        There is no such map, it is damaged, or the CRS does not show the box.
     """
     path = resolve_map(name_or_path)
     west, south, east, north = bounds_m
     pad_m = _READ_PAD_M
-    wide = (west - pad_m, south - pad_m, east + pad_m, north + pad_m)
-    found = _read(path, _rounded_out(box_deg(crs, wide)), query)
+    wide = box_deg(crs, (west - pad_m, south - pad_m, east + pad_m, north + pad_m))
+    if not np.all(np.isfinite(wide)):
+        expected = f"an area that {crs} shows, within {pad_m / 1000:g} km of its edges, too"
+        got = ", ".join(f"{side:.0f}" for side in bounds_m)
+        raise fail(InputError, f"{path}, area", expected, got, "a CRS of another region")
+    found = _read(path, _rounded_out(wide), query)
     if found is None:
         found = GeoDataFrame({"id": np.empty(0, np.int64), "osm_type": []}, geometry=[], crs=crs)
     found = found[~found.geometry.isna() & ~found.geometry.is_empty]
@@ -154,7 +163,7 @@ def _read(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
     Of a PBF these are the elements with a node in the box. Callers change nothing in them.
     """
     version, wanted = Version.of(path), tuple(query.wanted.items())
-    if version.size_bytes > LARGEST_KEPT_BYTES:
+    if not version.is_small:
         return _read_anew(path, version, box, query)
     return _read_kept(path, version, box, wanted, query.tags)
 

@@ -26,7 +26,7 @@ from shapely.errors import GEOSException
 from mapfilter._inputs import open_input
 from mapfilter._ogr import sealed_gdal
 from mapfilter.errors import InputError, fail
-from mapfilter.roads.elements import BoxDeg, Query
+from mapfilter.roads.elements import CUT_OFF, BoxDeg, Query
 
 _CHUNK_BYTES = 1 << 20
 _LARGEST_RATIO = 60
@@ -35,11 +35,16 @@ _MOST_NODES_IN_MEMORY_MB = 100
 # Keys whose closed ways are areas; closed highways are lines here unless area=yes.
 _AREA_KEYS = "building,landuse,natural,place,water,waterway"
 _LAYERS = ("lines", "multipolygons")
-_CUT_OFF = "cut off, or another format under this name"
 
 
 def read_xml(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
-    """Return the elements of a map that touch a box; None without any."""
+    """Return the elements of a map that touch a box (degrees); None without any.
+
+    Raises
+    ------
+    InputError
+        The file is damaged, or no map.
+    """
     with tempfile.TemporaryDirectory(prefix="mapfilter-osm-") as folder:
         plain = _checked(path, Path(folder))
         settings = Path(folder) / "osmconf.ini"
@@ -59,7 +64,13 @@ def read_xml(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | Non
 
 
 def xml_header_deg(path: Path) -> BoxDeg | None:
-    """Return the box in the header of a map; None without any."""
+    """Return the box in the header of a map; None without any.
+
+    Raises
+    ------
+    InputError
+        The file is damaged, or no map.
+    """
     head = _Head()
     with _faults_of(path), _opened(path) as stream:
         while head.parser.StartElementHandler is not None and (chunk := stream.read(1 << 16)):
@@ -140,9 +151,9 @@ def _faults_of(path: Path) -> Iterator[None]:
     except expat.ExpatError as error:
         where = f"{path} line {error.lineno}"
         got = expat.ErrorString(error.code)
-        raise fail(InputError, where, expected, got, _CUT_OFF) from error
+        raise fail(InputError, where, expected, got, CUT_OFF) from error
     except (OSError, EOFError, LookupError, ValueError, zlib.error) as error:
-        raise fail(InputError, str(path), expected, error, _CUT_OFF) from error
+        raise fail(InputError, str(path), expected, error, CUT_OFF) from error
 
 
 def _read_layer(

@@ -10,8 +10,7 @@ from made_maps import AREA, write_pbf
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project
-from mapfilter.roads import maps, osm_pbf
-from mapfilter.roads.buildings import read_buildings
+from mapfilter.roads import elements, maps
 from mapfilter.roads.maps import box_deg, map_bounds_deg, resolve_map
 from mapfilter.roads.osm import read_squares, read_ways
 
@@ -237,65 +236,6 @@ def test_folders_of_other_users_do_not_matter(make_map, shared_temporary):
     assert len(read_ways(path, "walking", *AREA)) == 1
 
 
-def openings(monkeypatch):
-    """Return the list to which each opening of a PBF is added: file and box."""
-    found, opened = [], osm_pbf._opened
-
-    def counted(*given):
-        found.append(given)
-        return opened(*given)
-
-    monkeypatch.setattr(osm_pbf, "_opened", counted)
-    return found
-
-
-def test_layers_of_an_area_are_read_from_one_part_that_is_decoded_once(make_map, monkeypatch):
-    house = (2, {"building": "yes"}, [(20, 20), (40, 20), (40, 40), (20, 40), (20, 20)])
-    square = (3, {"highway": "pedestrian", "area": "yes"}, [(9, 9), (9, 60), (60, 60), (9, 9)])
-    path = make_map([(1, {"highway": "footway"}, [(10, 10), (50, 10)]), house, square])
-    opened = openings(monkeypatch)
-    crs, (west, south, east, north) = AREA
-
-    def read(by_m):
-        bounds = west - by_m, south - by_m, east + by_m, north + by_m
-        found = read_buildings(path, crs, bounds).footprints, read_ways(path, "walking", *AREA)
-        return [shapely.to_wkb(one).tolist() for one in (found[0], found[1].geometry)]
-
-    first = read(0.0)
-    assert [len(one) for one in first] == [1, 1]
-    assert len(opened) == 1
-    # Areas that differ by the half width of a way read the same part.
-    assert read(6.0) == first
-    assert len(opened) == 1
-    # The same, decoded for each layer.
-    for module in (maps, osm_pbf):
-        monkeypatch.setattr(module, "LARGEST_KEPT_BYTES", 0)
-    assert read(0.0) == first
-    assert len(opened) == 3
-
-
-def test_of_a_large_map_the_part_in_the_box_is_read(make_map, monkeypatch, shared_temporary):
-    squares = [(2, {"highway": "pedestrian", "area": "yes"}, [(9, 9), (9, 60), (60, 60), (9, 9)])]
-    ways = [(1, {"highway": "footway"}, [(10, 10), (50, 10)]),
-            (3, {"highway": "footway"}, [(9_000, 9_000), (9_050, 9_000)])]  # fmt: skip
-    path = make_map([*ways, *squares])
-
-    def read():
-        found = read_ways(path, "walking", *AREA), read_squares(path, *AREA)
-        return [shapely.to_wkb(one.geometry).tolist() for one in found]
-
-    whole = read()
-    assert [len(one) for one in whole] == [1, 1]
-    opened = openings(monkeypatch)
-    for module in (maps, osm_pbf):
-        monkeypatch.setattr(module, "LARGEST_KEPT_BYTES", 0)
-    monkeypatch.setattr(osm_pbf, "_LARGEST_IN_MEMORY_BYTES", 0)
-    assert read() == whole
-    # The whole map, and the part of it, for each of both.
-    assert [place == path for place, _ in opened] == [True, False, True, False]
-    assert not list(shared_temporary.iterdir())
-
-
 def test_a_map_is_read_again_when_it_was_written_anew(make_map):
     road = {"highway": "residential"}
     made = make_map([(5, road, [(10, 10), (60, 10)])])
@@ -325,7 +265,7 @@ def test_a_small_map_is_read_once_for_each_part(make_map, monkeypatch):
     (crs, (west, south, east, north)) = AREA
     read_ways(made, "walking", crs, (west - 1_000, south, east, north))
     assert len(read) == 2
-    monkeypatch.setattr(maps, "LARGEST_KEPT_BYTES", 1)
+    monkeypatch.setattr(elements, "_LARGEST_KEPT_BYTES", 1)
     for _ in range(2):
         read_ways(made, "walking", *AREA)
     assert len(read) == 4

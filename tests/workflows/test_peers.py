@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows import bench_filter
+from mapfilter.workflows import bench_peers as bench_peers_module
 from mapfilter.workflows.bench import run_bench
 from mapfilter.workflows.bench_numpy import MAP, NumpyModel, numpy_step, systematic_indices
 from mapfilter.workflows.bench_peers import (
@@ -102,6 +104,74 @@ def test_packages_are_compared_with_the_step(world):
     found = compare(*bench_filter.step_inputs(model, log, 500), runs=1)
     assert {"mapfilter", "numpy"} <= set(found)
     assert min(found.values()) > 0
+
+
+@pytest.mark.parametrize(("count", "steps"), [(500, 10), (400_000, 5)])
+@pytest.mark.filterwarnings("default")
+def test_times_are_those_of_one_step_of_several(world, monkeypatch, count, steps):
+    model, log = world
+    monkeypatch.setattr(bench_peers_module, "median_seconds", one_second_each)
+    monkeypatch.setattr(bench_peers_module, "_in_a_row", lambda step, _: step)
+    found = compare(*bench_filter.step_inputs(model, log, count), runs=1)
+    assert list(found.values()) == pytest.approx([1e9 / (steps * count)] * len(found))
+
+
+def one_second_each(tasks, *_):
+    return dict.fromkeys(tasks, 1.0)
+
+
+def test_steps_in_a_row_are_as_many_as_are_counted():
+    taken = []
+    bench_peers_module._in_a_row(taken.append, 4)("state")
+    assert taken == ["state"] * 4
+    assert bench_peers_module._in_a_row(None, 4) is None
+
+
+def made_particles(done):
+    """Return a stand-in for the package: its loop over moves, weights and resampling."""
+
+    def chosen(weight):
+        done.append("choice")
+        return np.zeros(weight.size, dtype=int)
+
+    class Smc:
+        def __init__(self, fk, N, **_):  # noqa: N803
+            self.fk, self.count = fk, N
+
+        def run(self):
+            for t in range(self.fk.T):
+                # Nothing is resampled before the first step.
+                before = None if t == 0 else self.X[chosen(self.W)]
+                self.X = self.fk.M0(self.count) if t == 0 else self.fk.M(t, before)
+                self.W = self.fk.logG(t, before, self.X)
+
+    class Kac:
+        def __init__(self, T):  # noqa: N803
+            self.T = T
+
+    package, core, resampling = (ModuleType(f"particles{end}") for end in ("", ".core", ".re"))
+    package.SMC, core.FeynmanKac, resampling.systematic = Smc, Kac, chosen
+    return {"particles": package, "particles.core": core, "particles.resampling": resampling}
+
+
+def test_particles_moves_weighs_and_resamples_as_often_as_it_is_counted(monkeypatch):
+    done = []
+
+    class Model:
+        def move(self, state, _):
+            done.append("move")
+            return state
+
+        def log_likelihood(self, state):
+            done.append("weigh")
+            return state[0]
+
+    for name, module in made_particles(done).items():
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.setattr(bench_peers_module, "_installed", lambda _: True)
+    several = particles_step(Model(), np.random.default_rng(1), 3)
+    assert several(np.zeros((MAP + 1, 30))).shape == (MAP + 1, 30)
+    assert done == ["move", "weigh", "choice"] * 3
 
 
 @pytest.mark.filterwarnings("default")
