@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import Any, Generic, Protocol, TypeVar
@@ -42,6 +42,7 @@ _KEPT = ("motion", "radio")
 _SNAPSHOT_EVERY_M = 20.0
 
 StateT = TypeVar("StateT")
+OnSnapshots = Callable[[tuple[Snapshot, ...], bool], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +167,7 @@ def locate(
     snapshots: bool = False,
     risk: float = DEFAULT_RISK,
     recorder: Recorder | None = None,
+    on_snapshots: OnSnapshots | None = None,
 ) -> PositionedTrack:
     """Locate a log: the one loop over epochs.
 
@@ -182,6 +184,10 @@ def locate(
         smoothed have a level only where the smoother gives one.
     recorder : Recorder, optional
         Sees every step; the result is the same with and without one.
+    on_snapshots : callable, optional
+        With ``snapshots``, called once with all of them, and whether there is evidence: as soon as
+        there will be no more, when the filter first tracks or is lost, or at the end. Its time is
+        not the filter's.
 
     Raises
     ------
@@ -217,12 +223,20 @@ def locate(
             smoother.add(before, state)
         if snapshots:
             album.add(state, epoch, output)
+            if on_snapshots is not None and not album.open:
+                paused_s = time.process_time()
+                on_snapshots(tuple(album.taken), output.evidence is not None)
+                began_s += time.process_time() - paused_s
+                on_snapshots = None
     estimate = columns.estimate(filter_.crs, filter_.name, log.start_utc_s, tuple(unused))
     if smoother is not None:
         unknown = np.full(len(estimate), nan)
         estimate = replace(estimate, radius_99_m=unknown, protection_m=unknown)
         estimate = smoother.smoothed(estimate, rng)
-    return PositionedTrack(estimate, tuple(album.taken), time.process_time() - began_s)
+    took_s = time.process_time() - began_s
+    if snapshots and on_snapshots is not None:
+        on_snapshots(tuple(album.taken), estimate.evidence is not None)
+    return PositionedTrack(estimate, tuple(album.taken), took_s)
 
 
 def kinds_of(log: TrackLog) -> frozenset[Kind]:

@@ -20,7 +20,7 @@ from mapfilter.evaluation.accuracy import Truth, accuracy, outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.estimate import PositionedTrack
+from mapfilter.positioning.estimate import PositionedTrack, Snapshot
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
@@ -28,6 +28,7 @@ from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, f
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
+from mapfilter.report.ground import BaseMap
 from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
@@ -64,10 +65,9 @@ from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.track_pictures import (
     Handed,
     TrackPictures,
-    begin_mapless,
+    begin_belief,
     begin_pictures,
     drawn_beside,
-    track_pictures,
     with_error_picture,
 )
 from mapfilter.workflows.views import run_figures
@@ -211,12 +211,27 @@ def run_replay(
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
         recorder = TraceRecorder(filter_) if html else None
-        track = locate(log, filter_, rng, snapshots=drawn, risk=risk, recorder=recorder)
+        truth, pictures = Truth.of_table(log.truth), Handed()
+        base = _base_map(database) if drawn else None
+
+        def draw_belief(snapshots: tuple[Snapshot, ...], has_evidence: bool) -> None:
+            # By another process while the rest of the log is located.
+            if base is not None:
+                pictures.update(begin_belief(snapshots, has_evidence, truth, base, drawing))
+
+        track = locate(
+            log,
+            filter_,
+            rng,
+            snapshots=drawn,
+            risk=risk,
+            recorder=recorder,
+            on_snapshots=draw_belief,
+        )
         into = new if count == 1 else new / name
-        truth = Truth.of_table(log.truth)
-        mapless = begin_mapless(track, truth, drawing) if drawn and database is not None else {}
-        shown = _shown(database, truth, track) if drawn else None
-        pictures = begin_pictures(shown, drawing, mapless) if shown is not None else {}
+        shown = TrackPictures(track.estimate, truth, base) if drawn else None
+        if shown is not None:
+            pictures = begin_pictures(shown, drawing, pictures)
         baseline = baselines.of(log)
         if shown is not None:
             beside_m = baseline.error_m if baseline is not None else None
@@ -292,11 +307,8 @@ def _database(config: Config, options: FilterOptions) -> RadioRouteDatabase | No
     return open_database(config.database_path, verify="full")
 
 
-def _shown(
-    database: RadioRouteDatabase | None, truth: Truth | None, track: PositionedTrack
-) -> TrackPictures:
-    base = street_map(database, served_points(database)) if database is not None else None
-    return track_pictures(track, truth, base)
+def _base_map(database: RadioRouteDatabase | None) -> BaseMap | None:
+    return None if database is None else street_map(database, served_points(database))
 
 
 def _write(

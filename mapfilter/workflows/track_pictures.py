@@ -19,7 +19,7 @@ import numpy as np
 from mapfilter._parallel import begun
 from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import Truth
-from mapfilter.positioning.estimate import PositionedTrack, Snapshot, TrackEstimate
+from mapfilter.positioning.estimate import Snapshot, TrackEstimate
 from mapfilter.report.ground import MAX_PANELS, BaseMap
 from mapfilter.workflows.drawer import DRAWING_LIBRARY, drawer_process
 from mapfilter.workflows.results import PICTURES
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from mapfilter.report.canvas import Drawn
 
 _CANDIDATES, _BELIEF, _TRACK, _ERROR, _EVIDENCE = PICTURES
-_PLAIN = (_TRACK, _EVIDENCE)
 _SQUARE_M = 5.0
 _DRAWING_LIBRARY = DRAWING_LIBRARY
 
@@ -62,52 +61,40 @@ class TrackPictures:
         Of the log.
     truth : Truth or None
         Its true positions, where the log has them.
-    snapshots : tuple of Snapshot
-        The belief at a few moments.
     base : BaseMap or None
         The map below; without any, errors alone are drawn.
     """
 
     estimate: TrackEstimate
     truth: Truth | None
-    snapshots: tuple[Snapshot, ...]
     base: BaseMap | None
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the pictures that there are."""
-        has_evidence = self.estimate.evidence is not None
-        there = {
-            _CANDIDATES: bool(self.snapshots) and not has_evidence,
-            _BELIEF: bool(self.snapshots) and has_evidence,
-            _TRACK: True,
-            _ERROR: self.truth is not None,
-            _EVIDENCE: has_evidence and len(self.estimate) > 0,
-        }
+        """Names of the pictures that there are, besides that of the belief."""
+        error = (_ERROR,) if self.truth is not None else ()
         if self.base is None:
-            return (_ERROR,) if there[_ERROR] else ()
-        return tuple(name for name in PICTURES if there[name])
+            return error
+        has_evidence = self.estimate.evidence is not None and len(self.estimate) > 0
+        return (_TRACK, *error, *((_EVIDENCE,) if has_evidence else ()))
 
 
-def track_pictures(
-    track: PositionedTrack, truth: Truth | None, base: BaseMap | None
-) -> TrackPictures:
-    """Choose what the pictures of a located log show.
+def begin_belief(
+    snapshots: Sequence[Snapshot],
+    has_evidence: bool,
+    truth: Truth | None,
+    base: BaseMap,
+    drawers: Executor,
+) -> Handed:
+    """Hand out the picture of the belief, which is known while a log is still being located.
 
     Of the candidate filter snapshots are of candidates thinning out (Fig. 1 of the paper).
     """
-    has_evidence = track.estimate.evidence is not None
-    spread = _places if has_evidence else _candidates
-    chosen = choose_snapshots(track.snapshots, spread) if track.snapshots else []
-    return TrackPictures(track.estimate, truth, tuple(chosen), base)
-
-
-def begin_mapless(track: PositionedTrack, truth: Truth | None, drawers: Executor) -> Handed:
-    """Hand out the picture that needs no map, of the evidence, while the map is being read."""
-    if track.estimate.evidence is None or not len(track.estimate):
+    if not snapshots:
         return {}
-    shown = TrackPictures(track.estimate, truth, (), None)
-    return {_EVIDENCE: begun(drawers, partial(draw_picture, shown, _EVIDENCE))}
+    name, spread = (_BELIEF, _places) if has_evidence else (_CANDIDATES, _candidates)
+    chosen = choose_snapshots(snapshots, spread)
+    return {name: begun(drawers, partial(draw_snapshots, name, chosen, truth, base))}
 
 
 def begin_pictures(
@@ -115,17 +102,12 @@ def begin_pictures(
 ) -> Handed:
     """Hand out the pictures of a located log that need no single reports.
 
-    What is returned waits for the PNG of each, by its name. Those that were ``handed`` out already
-    are not drawn again.
+    What is returned waits for the PNG of each, by its name, those that were ``handed`` out already
+    among them.
     """
-    # Only pictures of the belief need snapshots.
-    plain = replace(shown, snapshots=())
-    return {
-        name: handed.get(name)
-        or begun(drawers, partial(draw_picture, plain if name in _PLAIN else shown, name))
-        for name in shown.names
-        if name != _ERROR
-    }
+    new = [name for name in shown.names if name != _ERROR and name not in handed]
+    drawn = {name: begun(drawers, partial(draw_picture, shown, name)) for name in new}
+    return _in_order({**handed, **drawn})
 
 
 def with_error_picture(
@@ -137,9 +119,13 @@ def with_error_picture(
     """
     if _ERROR not in shown.names:
         return handed
-    plain = replace(shown, snapshots=(), base=None)
+    plain = replace(shown, base=None)
     errors = begun(drawers, partial(draw_picture, plain, _ERROR, single_reports_m))
-    return {name: handed.get(name, errors) for name in shown.names}
+    return _in_order({**handed, _ERROR: errors})
+
+
+def _in_order(handed: Handed) -> Handed:
+    return {name: handed[name] for name in PICTURES if name in handed}
 
 
 def draw_picture(shown: TrackPictures, name: str, single_reports_m: Floats | None = None) -> bytes:
@@ -149,9 +135,19 @@ def draw_picture(shown: TrackPictures, name: str, single_reports_m: Floats | Non
     return png_of(_drawn(shown, name, single_reports_m))
 
 
+def draw_snapshots(
+    name: str, snapshots: Sequence[Snapshot], truth: Truth | None, base: BaseMap
+) -> bytes:
+    """Return the picture of a belief as PNG."""
+    from mapfilter.report.canvas import png_of
+    from mapfilter.report.snapshots import plot_belief, plot_candidates
+
+    plot = plot_candidates if name == _CANDIDATES else plot_belief
+    return png_of(plot(snapshots, truth, base))
+
+
 def _drawn(shown: TrackPictures, name: str, single_reports_m: Floats | None) -> Drawn:
     from mapfilter.report.errors import plot_error_over_distance, plot_evidence
-    from mapfilter.report.snapshots import plot_belief, plot_candidates
     from mapfilter.report.track import plot_track
 
     estimate, truth, base = shown.estimate, shown.truth, shown.base
@@ -161,10 +157,7 @@ def _drawn(shown: TrackPictures, name: str, single_reports_m: Floats | None) -> 
         assert truth is not None
         return plot_error_over_distance(estimate, truth, single_reports_m=single_reports_m)
     assert base is not None
-    if name == _TRACK:
-        return plot_track(estimate, truth, base)
-    plot = plot_candidates if name == _CANDIDATES else plot_belief
-    return plot(shown.snapshots, truth, base)
+    return plot_track(estimate, truth, base)
 
 
 def _candidates(snapshot: Snapshot) -> float:

@@ -13,11 +13,13 @@ import pytest
 from mapfilter._parallel import SerialExecutor, begun
 from mapfilter.cli.options import undrawn
 from mapfilter.evaluation.accuracy import Truth
-from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.filters.contract import Status
+from mapfilter.positioning.estimate import Snapshot, TrackEstimate
 from mapfilter.report.ground import BaseMap
 from mapfilter.workflows import track_pictures
 from mapfilter.workflows.track_pictures import (
-    begin_mapless,
+    TrackPictures,
+    begin_belief,
     begin_pictures,
     drawn_beside,
     with_error_picture,
@@ -28,7 +30,7 @@ def _shown():
     truth = Truth(*(np.arange(3.0) for _ in range(3)))
     estimate = TrackEstimate.of_fixes("candidate", "EPSG:32635", ())
     base = BaseMap((0.0, 0.0, 100.0, 100.0), points_m=np.array([[10.0, 20.0], [15.0, 20.0]]))
-    return track_pictures.track_pictures(PositionedTrack(estimate, (), 0.0), truth, base)
+    return TrackPictures(estimate, truth, base)
 
 
 def _pngs():
@@ -92,21 +94,36 @@ def test_no_command_that_locates_imports_what_draws():
     assert done.returncode == 0, done.stderr
 
 
-def test_what_was_handed_out_while_the_map_was_read_is_not_drawn_again():
-    shown, drawn = _shown(), []
+class Noting(SerialExecutor):
+    def __init__(self):
+        self.drawn = []
 
-    class Noting(SerialExecutor):
-        def submit(self, fn, /, *args, **kwargs):
-            drawn.append(fn)
-            return super().submit(fn, *args, **kwargs)
+    def submit(self, fn, /, *args, **kwargs):
+        self.drawn.append(fn)
+        return super().submit(fn, *args, **kwargs)
 
-    assert list(begin_pictures(shown, Noting())) == ["track.png"]
-    assert len(drawn) == 1
+
+def test_what_was_handed_out_while_the_log_was_located_is_not_drawn_again():
+    shown, noting = _shown(), Noting()
+    assert list(begin_pictures(shown, noting)) == ["track.png"]
+    assert len(noting.drawn) == 1
     before = {"track.png": lambda: b"already"}
-    assert begin_pictures(shown, Noting(), before) == before
-    assert len(drawn) == 1
-    track = PositionedTrack(shown.estimate, (), 0.0)
-    assert begin_mapless(track, shown.truth, Noting()) == {}
+    assert begin_pictures(shown, noting, before) == before
+    assert len(noting.drawn) == 1
+
+
+@pytest.mark.parametrize(
+    ("has_evidence", "name"), [(True, "belief.png"), (False, "candidates.png")]
+)
+def test_the_picture_of_the_belief_comes_first_of_all(has_evidence, name):
+    shown, noting = _shown(), Noting()
+    places = np.array([10.0, 15.0]), np.array([20.0, 20.0]), np.array([0.5, 0.5])
+    snapshot = Snapshot(1.0, 5.0, *places, 12.0, 20.0, Status.SEARCHING)
+    belief = begin_belief((snapshot,), has_evidence, shown.truth, shown.base, noting)
+    assert [png()[:4] for png in belief.values()] == [b"\x89PNG"]
+    assert list(begin_pictures(shown, noting, belief)) == [name, "track.png"]
+    assert len(noting.drawn) == 2
+    assert begin_belief((), has_evidence, shown.truth, shown.base, noting) == {}
 
 
 @pytest.mark.parametrize("pictures", ["all", "none"])
