@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
@@ -260,12 +260,31 @@ def _field_at(detail: Mapping[str, Any]) -> tuple[tuple[str, ...], Any]:
     return tuple(keys), annotation
 
 
+def _names_in(model: type[BaseModel], within: str = "") -> Iterator[str]:
+    """Yield the dotted names of all sections and keys of a configuration."""
+    for name in model.model_fields:
+        yield within + name
+        inner = without_none(field_annotation(model, name))
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            yield from _names_in(inner, f"{within}{name}.")
+
+
+def _elsewhere(keys: Sequence[str]) -> list[str]:
+    """Return at most two known names that end like an unknown one, nearest sections first."""
+    every, within = list(_names_in(Config)), ".".join(keys[:-1])
+    ends = [name.rpartition(".")[2] for name in every]
+    near = difflib.get_close_matches(keys[-1], sorted(set(ends)), n=1, cutoff=0.8)
+    found = [name for name, end in zip(every, ends, strict=True) if end in near]
+    return sorted(found, key=lambda name: not name.startswith(f"{within}."))[:2]
+
+
 def _fault(where: str, keys: Sequence[str], annotation: Any, detail: Mapping[str, Any]) -> Fault:
     """Return the fault of a field; of an unknown key, with the most similar known key."""
     kind, given = detail["type"], detail["input"]
     wanted = without_none(annotation)
     if kind == "extra_forbidden":
         close = difflib.get_close_matches(keys[-1], list(wanted.model_fields), n=2)
+        close = close or _elsewhere(keys)
         what = "section" if len(keys) == 1 else "key"
         return Fault(where, f"a known {what}", repr(keys[-1]), " or ".join(map(repr, close)))
     if kind == "value_error":

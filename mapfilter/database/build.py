@@ -76,7 +76,7 @@ def build(
     floor_dbm: float | None = None,
     tile_px: int = TILE_PX,
     inputs: Sequence[InputFile] = (),
-    attribution: str = "",
+    attribution: str | None = None,
     measured: tuple[Readings, RxLevRasters] | None = None,
     executor: Executor | None = None,
     in_flight: int = 8,
@@ -112,8 +112,8 @@ def build(
         Z-order curve, and along it within each tile.
     inputs : sequence of InputFile
         Files that roads and rasters were made from, for the record; the rasters are added.
-    attribution : str
-        Attribution that the licence of the map demands.
+    attribution : str, optional
+        Attribution that the licence of the map demands; that of a route lattice by default.
     measured : (Readings, RxLevRasters), optional
         Of rasters that a survey made: its readings, and the rasters of its deviations.
     executor : Executor, optional
@@ -185,7 +185,8 @@ def build(
             readings, deviation = measured
             deviation = replace(deviation, lattice=rasters.lattice)
             parts = MeasuredParts(readings, deviations_at_points(folder, deviation, ids))
-        head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts, parts)
+        stated = _attribution(routes) if attribution is None else attribution
+        head = Head(rasters.lattice, job.plan, parameters, stated, inputs, counts, parts)
         head.write(folder, written.parts)
     return open_written(out)
 
@@ -196,7 +197,7 @@ def build_roads(
     *,
     tile_px: int = TILE_PX,
     inputs: Sequence[InputFile] = (),
-    attribution: str = "",
+    attribution: str | None = None,
     progress: Progress | None = None,
 ) -> RadioRouteDatabase:
     """Build a database of roads alone, and open it: for positioning by map and dead reckoning.
@@ -219,7 +220,8 @@ def build_roads(
             raise fail(InputError, "roads", expected, "none", hint)
         counts = {"points": written.points, "points_below_floor": 0, "points_off_rasters": 0}
         plan = CellPlan(lattice.crs, ())
-        head = Head(lattice, plan, parameters, attribution, tuple(inputs), counts)
+        stated = _attribution(routes) if attribution is None else attribution
+        head = Head(lattice, plan, parameters, stated, tuple(inputs), counts)
         head.write(folder, written.parts)
     return open_written(out)
 
@@ -303,6 +305,10 @@ class BuildJob:
     def off_rasters(self, points: int) -> int:
         """Return how many points of a route lattice lie beyond the rasters."""
         return len(self.routes.points) - points if isinstance(self.routes, LatticeRoutes) else 0
+
+
+def _attribution(routes: RouteLattice | Routes) -> str:
+    return routes.attribution if isinstance(routes, RouteLattice) else ""
 
 
 def _aside(function: Callable[[], str]) -> Future[str]:

@@ -34,6 +34,9 @@ class RouteLattice:
         when the area has no way.
     on_square : numpy.ndarray of bool, shape (N,)
         The point lies in a square or in a walkable class of land use.
+    attribution : str
+        What the licence of the map asks for; a database that is built of the points keeps it, and
+        pictures show it.
     """
 
     lattice: Lattice
@@ -44,6 +47,7 @@ class RouteLattice:
     class_names: tuple[str, ...]
     distance_to_way_m: Floats32
     on_square: Bools
+    attribution: str = ""
 
     def __post_init__(self) -> None:
         faults = Faults()

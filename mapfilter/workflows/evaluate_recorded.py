@@ -204,7 +204,7 @@ def run_all(
     Raises
     ------
     InputError
-        None of the data sets is there, or none can be judged; the table says so, too.
+        None of the data sets is there, or none can be judged; of the latter the table says so, too.
     """
     rows: list[Row] = []
     intervals: list[RowInterval] = []
@@ -232,7 +232,9 @@ def run_all(
     result = AllResult(
         seed, tuple(rows), tuple(intervals), tuple(missing), tuple(failed), seconds, out
     )
-    write_json(out / TABLE, to_jsonable(result))
+    # Where nothing is there, nothing is written; what could not be judged is worth a table.
+    if rows or failed:
+        write_json(out / TABLE, to_jsonable(result))
     if not rows:
         raise fail(InputError, str(data), *_nothing_judged(names, missing, failed))
     return result

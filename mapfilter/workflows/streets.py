@@ -21,7 +21,7 @@ from mapfilter.roads.corridors import Positions, corridors
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.landuse import LandUse, read_landuse
 from mapfilter.roads.layers import read_layer_buildings, read_layer_water
-from mapfilter.roads.maps import resolve_map
+from mapfilter.roads.maps import OSM_ATTRIBUTION, resolve_map
 from mapfilter.roads.osm import read_water
 from mapfilter.roads.raster import read_raster_ways
 from mapfilter.roads.routes import Roads, gaps, read_roads, unused_classes, within_reach_m
@@ -32,8 +32,6 @@ from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.tracks.store import is_log
 from mapfilter.workflows.area_lattice import area_lattice
 from mapfilter.workflows.measured import recorded_rows
-
-OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 
 
 def city_of(area: Area, crs: str) -> SyntheticCity | None:

@@ -61,10 +61,10 @@ def planned_rasters(config: Config) -> RxLevRasters:
         # The other keys describe the rasters to calibrate; a survey's own need none.
         section = Rasters(path=section.path)
     if section.path is None and not config.rasters_path.exists():
+        # What would keep them from being predicted is told first.
+        roads_lattice(config)
         hint = "not predicted yet; run mapfilter predict first, or set rasters.path"
-        raise fail(
-            InputError, str(config.rasters_path), "rasters", "No such file or directory", hint
-        )
+        raise fail(InputError, str(config.rasters_path), "rasters", "none", hint)
     return open_by_section(config.rasters_path, section)
 
 

@@ -1,5 +1,7 @@
 """One call from files or tables to the route lattice gives the points of the single steps."""
 
+from dataclasses import replace
+
 import geopandas
 import numpy as np
 import pytest
@@ -9,8 +11,12 @@ from test_layers import HOUSES, ROADS, box
 from test_layers import write as write_layer
 from test_route_lattice import same
 
+from mapfilter.database.build import build, build_roads
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.corridors import Positions, corridors
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
@@ -38,12 +44,28 @@ def test_a_map_with_its_buildings_and_water():
         8.0,
         water=read_water("helsinki", *here),
     )
-    same(read_routes("helsinki", MAP, half_width_m=8.0), expected)
+    found = read_routes("helsinki", MAP, half_width_m=8.0)
+    same(replace(found, attribution=""), expected)
     bare = read_routes(
         "helsinki", MAP, half_width_m=8.0, squares=False, buildings=False, water=False
     )
     assert len(bare) > len(expected)
     assert not bare.on_square.any()
+
+
+def test_points_of_a_map_state_its_source_and_a_database_of_them_keeps_it(tmp_path):
+    routes = read_routes("helsinki", MAP)
+    assert routes.attribution == "© OpenStreetMap contributors (ODbL)"
+    assert read_routes(ROADS, TOWN, class_column="fclass", id_column="osm_id").attribution == ""
+    assert build_roads(routes, tmp_path / "kept").attribution == routes.attribution
+    assert build_roads(routes, tmp_path / "own", attribution="© us").attribution == "© us"
+    level_dbm = np.full((MAP.rows, MAP.cols), -60.0, dtype=np.float32)
+    write_rasters(tmp_path / "rxlev.tif", MAP, [("A", level_dbm)], ["A"])
+    east_m, north_m = MAP.east_north(3, 4)
+    plan = CellPlan(MAP.crs, (Cell("A", "A", east_m, north_m, 30.0, None, 50.0, 1800.0, "omni"),))
+    rasters = open_rasters(tmp_path / "rxlev.tif")
+    assert build(rasters, plan, routes, tmp_path / "db").attribution == routes.attribution
+    assert build(rasters, plan, routes, tmp_path / "no", attribution="").attribution == ""
 
 
 def test_a_layer_as_a_file_and_as_a_table(tmp_path):

@@ -124,6 +124,11 @@ def test_wrong_values(text, told, write):
         ("area.map.name=3", "setting area.map: expected a text, found {'name': 3}"),
         ("aera.map=x", "setting aera: expected a known section, found 'aera' (likely: 'area')"),
         ("area.mop=x", "setting area.mop: expected a known key, found 'mop' (likely: 'map')"),
+        # Known elsewhere, nearest sections first.
+        ("filter.levels=false", "found 'levels' (likely: 'filter.bayes.levels'"),
+        ("journeys.level_eror_db=5", "(likely: 'prediction.ground_truth.level_error_db' or"),
+        ("bayes.levels=false", "expected a known section, found 'bayes' (likely: 'filter.bayes'"),
+        ("filter.qqq=1", "setting filter.qqq: expected a known key, found 'qqq'\n"),
         (
             "cells.sites=many",
             "setting cells.sites: expected a whole number in 1..1000, found 'many'",

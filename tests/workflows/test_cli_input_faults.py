@@ -153,3 +153,20 @@ def test_landuse_of_another_crs_or_cut_off(own_world, landuse):
         name.unlink()
         assert_refused(mapfilter("build", "-c", own_world.toml, *given), name.name)
     assert contents(own_world.database) == before
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("area.map=nowhere.osm.pbf", "nowhere.osm.pbf: expected a map"),
+        ("area.crs=EPSG:4326", "area.crs: expected a projected CRS in metres"),
+        ("area.bbox=2.3,48.8,2.32,48.82", "helsinki, area 2.2997, 48.7999"),
+        ("cells.seed=3", "rxlev.tif: expected rasters, found none (likely: not predicted yet"),
+    ],
+)
+def test_what_keeps_rasters_from_being_predicted_is_told_before_that_there_are_none(
+    setting, told, tmp_path
+):
+    refused = mapfilter("build", "--set", setting, "--out", tmp_path / "out")
+    assert (refused.code, told in refused.err) == (2, True)
+    assert not (tmp_path / "out").exists()
