@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
@@ -270,12 +271,19 @@ def _names_in(model: type[BaseModel], within: str = "") -> Iterator[str]:
 
 
 def _elsewhere(keys: Sequence[str]) -> list[str]:
-    """Return at most two known names that end like an unknown one, nearest sections first."""
-    every, within = list(_names_in(Config)), ".".join(keys[:-1])
-    ends = [name.rpartition(".")[2] for name in every]
-    near = difflib.get_close_matches(keys[-1], sorted(set(ends)), n=1, cutoff=0.8)
-    found = [name for name, end in zip(every, ends, strict=True) if end in near]
-    return sorted(found, key=lambda name: not name.startswith(f"{within}."))[:2]
+    """Return the nearest known names that end like an unknown one, or none where these are many."""
+    every = [name.split(".") for name in _names_in(Config)]
+    ends = sorted({name[-1] for name in every})
+    near = difflib.get_close_matches(keys[-1], ends, n=1, cutoff=0.8)
+    shared = {".".join(name): _shared(keys, name) for name in every if name[-1] in near}
+    found = [name for name, sections in shared.items() if sections == max(shared.values())]
+    return found if len(found) <= 2 else []
+
+
+def _shared(keys: Sequence[str], others: Sequence[str]) -> int:
+    """Return how many sections two names have in common, from the outermost on."""
+    both = zip(keys[:-1], others[:-1], strict=False)
+    return len(list(takewhile(lambda pair: pair[0] == pair[1], both)))
 
 
 def _fault(where: str, keys: Sequence[str], annotation: Any, detail: Mapping[str, Any]) -> Fault:

@@ -308,7 +308,8 @@ class BuildJob:
 
 
 def _attribution(routes: RouteLattice | Routes) -> str:
-    return routes.attribution if isinstance(routes, RouteLattice) else ""
+    laid = routes.points if isinstance(routes, LatticeRoutes) else routes
+    return laid.attribution if isinstance(laid, RouteLattice) else ""
 
 
 def _aside(function: Callable[[], str]) -> Future[str]:

@@ -36,6 +36,7 @@ def routes_of(database: RadioRouteDatabase) -> RouteLattice:
         names,
         points.distance_to_way_m,
         points.on_square,
+        database.attribution,
     )
 
 

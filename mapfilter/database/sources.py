@@ -54,6 +54,7 @@ class LatticeRoutes:
             whole.class_names,
             whole.distance_to_way_m[inside],
             whole.on_square[inside],
+            whole.attribution,
         )
 
     def weight(self, window: Lattice) -> float:

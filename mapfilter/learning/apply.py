@@ -203,6 +203,7 @@ def _with_ways(
         names,
         np.concatenate([routes.distance_to_way_m, *away])[order],
         np.concatenate([routes.on_square, np.zeros(row.size, dtype=np.bool_)])[order],
+        routes.attribution,
     )
     return grown, np.concatenate([level, added], axis=1)[:, order]
 

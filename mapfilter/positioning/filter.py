@@ -43,6 +43,7 @@ _SNAPSHOT_EVERY_M = 20.0
 
 StateT = TypeVar("StateT")
 OnSnapshots = Callable[[tuple[Snapshot, ...], bool], None]
+"""Takes snapshots, and whether the last of their epochs has evidence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,8 +187,8 @@ def locate(
         Sees every step; the result is the same with and without one.
     on_snapshots : callable, optional
         With ``snapshots``, called once with all of them, and whether there is evidence: as soon as
-        there will be no more, when the filter first tracks or is lost, or at the end. Its time is
-        not the filter's.
+        there will be no more, when the filter first tracks or is lost, or at the end. The time of
+        the call itself is not the filter's.
 
     Raises
     ------

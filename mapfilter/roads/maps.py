@@ -97,7 +97,7 @@ def read_elements(
     """Return the elements of a map in and about a box (m), sorted by id; the caller clips them.
 
     Columns are ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an empty text
-    where an element has no such tag. Read is what has a node within 2 to 3 km of the box.
+    where an element has no such tag. Elements with a node within 2 to 3 km are read.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def read_elements(
     pad_m = _READ_PAD_M
     wide = box_deg(crs, (west - pad_m, south - pad_m, east + pad_m, north + pad_m))
     if not np.all(np.isfinite(wide)):
-        expected = f"an area that {crs} shows, within {pad_m / 1000:g} km of its edges, too"
+        expected = f"an area that {crs} can show, with {pad_m / 1000:g} km around it"
         got = ", ".join(f"{side:.0f}" for side in bounds_m)
         raise fail(InputError, f"{path}, area", expected, got, "a CRS of another region")
     found = _read(path, _rounded_out(wide), query)

@@ -58,7 +58,8 @@ def read_routes(
     roads : path, GeoDataFrame, Ways or None
         OpenStreetMap file (``.osm.pbf``, ``.osm``, ``.osm.gz``) or embedded map ("helsinki");
         vector file of lines and polygons in any CRS, or such a table; or ways, for instance from
-        :func:`mapfilter.roads.corridors.corridors`. None only together with ``landuse``.
+        :func:`mapfilter.roads.corridors.corridors`. None only together with ``landuse``. Of a map
+        the points keep the attribution; of ways read from one, :func:`mapfilter.build` is given it.
     lattice : Lattice
         Area and resolution; normally ``rasters.lattice``.
     profile : {"walking", "driving"}

@@ -53,8 +53,9 @@ AnyStep = Callable[[Floats], object]
 class PeerStep:
     """A step of so many particles; nanoseconds of processor time per particle.
 
-    Medians over runs, which take turns, and ratios to the filter's own. In its turn each takes ten
-    steps one after the other, two of a million particles.
+    Medians over runs, which take turns, and ratios to the filter's own. In its turn each takes the
+    same step up to ten times, so that at most two million particles move; ``particles``, whose loop
+    cannot repeat a step, takes as many that follow each other.
 
     Parameters
     ----------

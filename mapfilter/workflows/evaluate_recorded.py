@@ -204,21 +204,29 @@ def run_all(
     Raises
     ------
     InputError
-        None of the data sets is there, or none can be judged; of the latter the table says so, too.
+        None of the data sets is there, in which case nothing is written; or none can be judged, as
+        the table has it, too.
     """
     rows: list[Row] = []
     intervals: list[RowInterval] = []
     missing: list[str] = []
     failed: list[str] = []
     seconds: dict[str, float] = {}
-    ensure_writable_folder(out)
-    for number, name in enumerate(names):
-        part = part_of(progress, number, len(names))
+    there: list[str] = []
+    for name in names:
         try:
             _check_there(name, data)
         except InputError as error:
             missing.append(f"{name}: {error}")
+        else:
+            there.append(name)
+    if not there:
+        raise fail(InputError, str(data), *_nothing_judged(names, missing, failed))
+    ensure_writable_folder(out)
+    for number, name in enumerate(names):
+        if name not in there:
             continue
+        part = part_of(progress, number, len(names))
         run: Callable[..., RecordedResult | OttawaResult]
         run = run_ottawa if name == OTTAWA else partial(run_recorded, name)
         try:
@@ -232,9 +240,7 @@ def run_all(
     result = AllResult(
         seed, tuple(rows), tuple(intervals), tuple(missing), tuple(failed), seconds, out
     )
-    # Where nothing is there, nothing is written; what could not be judged is worth a table.
-    if rows or failed:
-        write_json(out / TABLE, to_jsonable(result))
+    write_json(out / TABLE, to_jsonable(result))
     if not rows:
         raise fail(InputError, str(data), *_nothing_judged(names, missing, failed))
     return result

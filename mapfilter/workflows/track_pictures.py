@@ -106,7 +106,11 @@ def begin_pictures(
     among them.
     """
     new = [name for name in shown.names if name != _ERROR and name not in handed]
-    drawn = {name: begun(drawers, partial(draw_picture, shown, name)) for name in new}
+    mapless = replace(shown, base=None)
+    drawn = {
+        name: begun(drawers, partial(draw_picture, mapless if name == _EVIDENCE else shown, name))
+        for name in new
+    }
     return _in_order({**handed, **drawn})
 
 

@@ -61,8 +61,9 @@ def planned_rasters(config: Config) -> RxLevRasters:
         # The other keys describe the rasters to calibrate; a survey's own need none.
         section = Rasters(path=section.path)
     if section.path is None and not config.rasters_path.exists():
-        # What would keep them from being predicted is told first.
-        roads_lattice(config)
+        # What would keep them from being predicted comes first.
+        if config.prediction.model != "survey" and config.area.has_extent:
+            roads_lattice(config)
         hint = "not predicted yet; run mapfilter predict first, or set rasters.path"
         raise fail(InputError, str(config.rasters_path), "rasters", "none", hint)
     return open_by_section(config.rasters_path, section)

@@ -133,5 +133,7 @@ def test_boxes_are_rounded_outwards(box, expected):
 def test_an_area_that_its_crs_does_not_show_is_refused(write, tmp_path):
     suffix = "osm.pbf" if write is write_pbf else "osm"
     path = write(tmp_path / f"made.{suffix}", [FOOTWAY])
-    with pytest.raises(InputError, match=r"area: expected an area that EPSG:32629 shows, .*region"):
+    with pytest.raises(
+        InputError, match=r"area: expected an area that EPSG:32629 can show, .*region"
+    ):
         read_ways(path, "walking", "EPSG:32629", (5e7, 0.0, 5e7 + 1000, 1000.0))

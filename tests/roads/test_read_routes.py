@@ -12,6 +12,8 @@ from test_layers import write as write_layer
 from test_route_lattice import same
 
 from mapfilter.database.build import build, build_roads
+from mapfilter.database.rewrite import routes_of
+from mapfilter.database.sources import LatticeRoutes
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
@@ -57,7 +59,11 @@ def test_points_of_a_map_state_its_source_and_a_database_of_them_keeps_it(tmp_pa
     routes = read_routes("helsinki", MAP)
     assert routes.attribution == "© OpenStreetMap contributors (ODbL)"
     assert read_routes(ROADS, TOWN, class_column="fclass", id_column="osm_id").attribution == ""
-    assert build_roads(routes, tmp_path / "kept").attribution == routes.attribution
+    kept = build_roads(routes, tmp_path / "kept")
+    assert kept.attribution == routes_of(kept).attribution == routes.attribution
+    source = LatticeRoutes(routes)
+    assert build_roads(source, tmp_path / "source").attribution == routes.attribution
+    assert source.part(MAP.window(2, 2, 20, 20)).attribution == routes.attribution
     assert build_roads(routes, tmp_path / "own", attribution="© us").attribution == "© us"
     level_dbm = np.full((MAP.rows, MAP.cols), -60.0, dtype=np.float32)
     write_rasters(tmp_path / "rxlev.tif", MAP, [("A", level_dbm)], ["A"])

@@ -126,7 +126,12 @@ def test_wrong_values(text, told, write):
         ("area.mop=x", "setting area.mop: expected a known key, found 'mop' (likely: 'map')"),
         # Known elsewhere, nearest sections first.
         ("filter.levels=false", "found 'levels' (likely: 'filter.bayes.levels'"),
-        ("journeys.level_eror_db=5", "(likely: 'prediction.ground_truth.level_error_db' or"),
+        (
+            "filter.grid.level_eror_db=5",
+            "(likely: 'filter.bayes.level_error_db' or 'filter.kalman.",
+        ),
+        ("prediction.slope_error=5", "(likely: 'prediction.ground_truth.slope_error'"),
+        ("database.seed=5", "setting database.seed: expected a known key, found 'seed'\n"),
         ("bayes.levels=false", "expected a known section, found 'bayes' (likely: 'filter.bayes'"),
         ("filter.qqq=1", "setting filter.qqq: expected a known key, found 'qqq'\n"),
         (

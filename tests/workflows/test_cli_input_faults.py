@@ -170,3 +170,16 @@ def test_what_keeps_rasters_from_being_predicted_is_told_before_that_there_are_n
     refused = mapfilter("build", "--set", setting, "--out", tmp_path / "out")
     assert (refused.code, told in refused.err) == (2, True)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["[prediction]\nmodel = 'survey'\n", "[roads]\nlayer = 'roads.gpkg'\n"],
+    ids=["survey", "own roads"],
+)
+def test_an_area_that_is_not_needed_is_not_asked_for(given, tmp_path):
+    """A survey covers its measurements, and a planner's rasters are an area of their own."""
+    (tmp_path / "given.toml").write_text(f"[area]\nmap = 'none'\n{given}")
+    refused = mapfilter("build", "-c", tmp_path / "given.toml", "--out", tmp_path / "out")
+    assert refused.code == 2
+    assert "run mapfilter predict first, or set rasters.path" in refused.err

@@ -228,7 +228,7 @@ def test_all_names_what_is_missing_or_failed_and_keeps_the_rest(fake, tmp_path, 
     # Where nothing is there, nothing is written; what is there and cannot be judged is told.
     with pytest.raises(InputError, match="absent-data"):
         run_all(tmp_path, tmp_path / "new", names=("absent",))
-    assert not (tmp_path / "new").exists() or not list((tmp_path / "new").iterdir())
+    assert not (tmp_path / "new").exists()
     with pytest.raises(InputError, match="half of one"):
         run_all(tmp_path, tmp_path / "new", names=("damaged",))
     assert json.loads((tmp_path / "new" / "table.json").read_text())["rows"] == []

@@ -1,4 +1,4 @@
-"""Snapshots are told as soon as there will be no more of them."""
+"""Snapshots are handed over as soon as there will be no more of them."""
 
 import time
 
@@ -38,7 +38,7 @@ def told_by(filter_, log, **given):
     return told, found, counter.epochs
 
 
-def test_they_are_told_once_when_the_filter_tracks(database):
+def test_they_are_handed_over_once_when_the_filter_tracks(database):
     log = walk_log(((EAST, 150.0), (NORTH, 100.0)))
     filter_ = BayesFilter().over_area(open_area(database))
     told, found, epochs = told_by(filter_, log, snapshots=True)
@@ -51,7 +51,7 @@ def test_they_are_told_once_when_the_filter_tracks(database):
     assert at == first + 1 < epochs
 
 
-def test_they_are_told_at_the_end_where_it_never_does(database):
+def test_they_are_handed_over_at_the_end_where_it_never_does(database):
     log = walk_log(((EAST, 5.0),))
     filter_ = BayesFilter().over_area(open_area(database))
     ((at, snapshots, _),), found, epochs = told_by(filter_, log, snapshots=True)
@@ -59,7 +59,7 @@ def test_they_are_told_at_the_end_where_it_never_does(database):
     assert snapshots == found.snapshots
 
 
-def test_nothing_is_told_where_there_are_none(database):
+def test_nothing_is_handed_over_where_there_are_none(database):
     filter_ = BayesFilter().over_area(open_area(database))
     assert told_by(filter_, walk_log(((EAST, 5.0),)))[0] == []
 
