@@ -65,7 +65,9 @@ def planned_rasters(config: Config) -> RxLevRasters:
         if config.prediction.model != "survey" and config.area.has_extent:
             roads_lattice(config)
         hint = "not predicted yet; run mapfilter predict first, or set rasters.path"
-        raise fail(InputError, str(config.rasters_path), "rasters", "none", hint)
+        raise fail(
+            InputError, str(config.rasters_path), "rasters", "No such file or directory", hint
+        )
     return open_by_section(config.rasters_path, section)
 
 

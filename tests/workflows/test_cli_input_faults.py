@@ -161,7 +161,7 @@ def test_landuse_of_another_crs_or_cut_off(own_world, landuse):
         ("area.map=nowhere.osm.pbf", "nowhere.osm.pbf: expected a map"),
         ("area.crs=EPSG:4326", "area.crs: expected a projected CRS in metres"),
         ("area.bbox=2.3,48.8,2.32,48.82", "helsinki, area 2.2997, 48.7999"),
-        ("cells.seed=3", "rxlev.tif: expected rasters, found none (likely: not predicted yet"),
+        ("cells.seed=3", "found No such file or directory (likely: not predicted yet"),
     ],
 )
 def test_what_keeps_rasters_from_being_predicted_is_told_before_that_there_are_none(
