@@ -36,8 +36,8 @@ from mapfilter.report.snapshots import plot_belief, story_bounds_m
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.served import served_points, street_map
-from mapfilter.workflows.world import filter_choice
 
 GALLERY = Path(__file__).parent / "_static" / "gallery"
 PICTURES = {

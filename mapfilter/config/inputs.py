@@ -20,7 +20,7 @@ from mapfilter.config.fields import (
     Size,
     with_columns,
 )
-from mapfilter.database.build import MARGIN_DB, TILE_PX
+from mapfilter.database.defaults import MARGIN_DB, TILE_PX
 from mapfilter.options import NotNegative, Positive, Seed
 from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
 

@@ -13,8 +13,12 @@ from mapfilter.config.fields import (
     Section,
 )
 from mapfilter.options import NotNegative, Positive
-from mapfilter.roads.buildings import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
-from mapfilter.roads.corridors import MAX_ACCURACY_M, MAX_GAP_M
+from mapfilter.roads.defaults import (
+    DEFAULT_HEIGHT_M,
+    MAX_ACCURACY_M,
+    MAX_GAP_M,
+    STOREY_HEIGHT_M,
+)
 
 
 class BuildingsSection(Section):

@@ -18,6 +18,7 @@ from mapfilter._arguments import PATH, Argument, check_arguments
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
+from mapfilter.database.defaults import MARGIN_DB, TILE_PX
 from mapfilter.database.floor import FLOOR_DBM, floor_of
 from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.measured import MeasuredParts, Readings, deviations_at_points
@@ -41,8 +42,6 @@ from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
 
-MARGIN_DB = 6.0
-TILE_PX = 256
 TASKS_A_WORKER = 4
 """Tasks in flight for each worker, which keep all of them busy."""
 PIXELS_A_TASK = 16_000_000

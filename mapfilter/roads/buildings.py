@@ -15,12 +15,11 @@ from rasterio.transform import Affine
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
+from mapfilter.roads.defaults import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
 from mapfilter.roads.elements import Query
 from mapfilter.roads.maps import read_elements
 from mapfilter.roads.ways import Bounds, Buildings, Geometries, polygons_inside
 
-STOREY_HEIGHT_M = 3.2
-DEFAULT_HEIGHT_M = 12.0
 _FOOT_M = 0.3048
 _HIGHEST_M = 1000.0
 

@@ -20,6 +20,7 @@ from mapfilter._types import Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.roads.corridor_net import grown_lines
+from mapfilter.roads.defaults import MAX_ACCURACY_M, MAX_GAP_M
 from mapfilter.roads.ways import Ways
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
 _CLASS = "corridor"
 CORRIDOR_HALF_WIDTH_M = 15.0
-MAX_ACCURACY_M = 50.0
-MAX_GAP_M = 100.0
 _MANY_GAPS = 0.05
 """Of the steps of all sessions: with fewer gaps, other sessions close them, or they are pauses."""
 

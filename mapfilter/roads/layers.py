@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.roads.buildings import (
-    DEFAULT_HEIGHT_M,
-    STOREY_HEIGHT_M,
     check_heights,
     made_buildings,
 )
+from mapfilter.roads.defaults import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
 from mapfilter.roads.vector import Layer, read_layer
 from mapfilter.roads.ways import (
     Bounds,

@@ -18,7 +18,7 @@ from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, 
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
-from mapfilter.workflows.world import outside_m
+from mapfilter.workflows.on_lattice import outside_m
 
 _AWAY_M = 5000.0
 _MANY = 0.2

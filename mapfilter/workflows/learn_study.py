@@ -39,9 +39,9 @@ from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_lacks import check_log
-from mapfilter.workflows.world import filter_choice
 
 _LEAST_KNOWN = 0.3
 _KNOWN_M = 50.0

@@ -9,7 +9,7 @@ from pyproj.exceptions import ProjError
 
 from mapfilter._types import Floats
 from mapfilter.geodesy import Lattice, project, unproject
-from mapfilter.workflows.world import outside_m
+from mapfilter.workflows.on_lattice import outside_m
 
 AWAY_M = 5000.0
 """Positions all of which lie farther outside of an area are those of another one."""

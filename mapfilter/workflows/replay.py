@@ -41,14 +41,17 @@ from mapfilter.viewing.page import write_page
 from mapfilter.viewing.runs import ViewedRun
 from mapfilter.viewing.trace import TraceRecorder
 from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.logs import journeys_of, open_journey
+from mapfilter.workflows.planned_cells import plan_antennas, planned_cells
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
 from mapfilter.workflows.replay_lacks import advice_of, check_log, fixes_note, lack_of
 from mapfilter.workflows.replayed import (
     ReplayedLog,
     ReplayResult,
     route_of,
+    run_figures,
     summary_figures,
     summary_of,
 )
@@ -70,8 +73,6 @@ from mapfilter.workflows.track_pictures import (
     drawn_beside,
     with_error_picture,
 )
-from mapfilter.workflows.views import run_figures
-from mapfilter.workflows.world import filter_choice, plan_antennas, planned_cells
 
 
 class _Logs:

@@ -6,6 +6,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,18 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.replay_baseline import SingleReports, together
 
 _NAMED = 3
+
+_SHOWN = {
+    "switched": "converged",
+    "switch_time_s": "converged after, s",
+    "switch_distance_m": "converged after, m",
+    "error_at_switch_m": "error then, m",
+    "error_mean_m": "mean error, m",
+    "error_67_m": "error at 67 %, m",
+    "error_95_m": "error at 95 %, m",
+    "final_status": "status at the end",
+}
+"""Figures of a run that a page shows, and their names there."""
 
 
 @dataclass(frozen=True)
@@ -197,3 +210,18 @@ def _shared_notes(logs: Sequence[ReplayedLog]) -> list[str]:
             _, _, rest = note.rpartition(f"{log.name}/")
             owners.setdefault(rest, []).append(log.name)
     return [f"{note} (in {_named(names)})" for note, names in owners.items()]
+
+
+def run_figures(figures: Mapping[str, Any]) -> dict[str, str]:
+    """Return the figures of a run as a page shows them."""
+    found: dict[str, str] = {}
+    for name, label in _SHOWN.items():
+        value = figures.get(name)
+        if isinstance(value, bool):
+            found[label] = "yes" if value else "no"
+        elif isinstance(value, float):
+            if isfinite(value):
+                found[label] = f"{value:.1f}"
+        elif value is not None:
+            found[label] = str(value)
+    return found

@@ -30,8 +30,8 @@ from mapfilter.serving.sessions import Sessions
 from mapfilter.serving.store import SessionStore
 from mapfilter.tracks.identify import PlanNames
 from mapfilter.viewing.bundle import database_bundle
+from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.terminal import print_message
-from mapfilter.workflows.world import filter_choice
 
 TOKEN_VARIABLE = "MAPFILTER_TOKEN"
 

@@ -16,7 +16,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.ground import BaseMap
-from mapfilter.workflows.area_lattice import pixels_on
+from mapfilter.workflows.on_lattice import pixels_on
 
 MOST_PX = 1200
 """Pixels along the longer side of a thinned area; a map in a picture is some 1 000 wide."""

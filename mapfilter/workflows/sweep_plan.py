@@ -36,13 +36,10 @@ from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import (
-    filter_choice,
-    planned_rasters,
-    raster_world,
-)
+from mapfilter.workflows.world import planned_rasters, raster_world
 
 GROUND_TRUTH = "ground truth"
 

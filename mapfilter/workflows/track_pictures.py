@@ -192,7 +192,9 @@ def _places(snapshot: Snapshot) -> float:
     if not snapshot.weight.size:
         return 0.0
     at_m = np.array([snapshot.hypothesis_east_m, snapshot.hypothesis_north_m])
-    _, square = np.unique(np.round(at_m / _SQUARE_M), axis=1, return_inverse=True)
-    mass = np.bincount(square.ravel(), snapshot.weight)
+    col, row = np.round(at_m / _SQUARE_M).astype(np.int64)
+    # One number for each square: pairs take ten times as long to sort.
+    _, square = np.unique(col * (np.ptp(row) + 1) + row, return_inverse=True)
+    mass = np.bincount(square, snapshot.weight)
     mass = mass[mass > 0]
     return float(np.exp(-np.sum(mass * np.log(mass))))

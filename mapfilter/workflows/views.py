@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -34,18 +33,6 @@ _BOUND_LAYERS = {
     "along_bound_m": "Least error along the street",
 }
 """Bands of a bound that a page shows, and their names there."""
-
-_SHOWN = {
-    "switched": "converged",
-    "switch_time_s": "converged after, s",
-    "switch_distance_m": "converged after, m",
-    "error_at_switch_m": "error then, m",
-    "error_mean_m": "mean error, m",
-    "error_67_m": "error at 67 %, m",
-    "error_95_m": "error at 95 %, m",
-    "final_status": "status at the end",
-}
-"""Figures of a run that a page shows, and their names there."""
 
 
 def run_view(
@@ -118,21 +105,6 @@ def _bounded(bundle: Mapping[str, Any], path: Path) -> dict[str, Any]:
 def database_view(database: RadioRouteDatabase) -> dict[str, Any]:
     """Return the bundle of a database."""
     return database_bundle(f"Database {database.path.name}", database)
-
-
-def run_figures(figures: Mapping[str, Any]) -> dict[str, str]:
-    """Return the figures of a run as a page shows them."""
-    found: dict[str, str] = {}
-    for name, label in _SHOWN.items():
-        value = figures.get(name)
-        if isinstance(value, bool):
-            found[label] = "yes" if value else "no"
-        elif isinstance(value, float):
-            if isfinite(value):
-                found[label] = f"{value:.1f}"
-        elif value is not None:
-            found[label] = str(value)
-    return found
 
 
 def view_figures(bundle: Mapping[str, Any], file: Path) -> dict[str, Any]:

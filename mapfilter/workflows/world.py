@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
 
-from mapfilter._types import Floats
-from mapfilter.config.fields import Section
 from mapfilter.config.inputs import Area, Rasters
-from mapfilter.config.sections import Config, FilterSection
+from mapfilter.config.sections import Config
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
-from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs, short_crs, unproject
-from mapfilter.positioning.filter import FilterOptions
-from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
-from mapfilter.radio.msi import read_antennas
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -34,8 +28,9 @@ from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.workflows.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.area_lattice import area_lattice as area_lattice
 from mapfilter.workflows.area_lattice import check_scale as check_scale
-from mapfilter.workflows.area_lattice import pixels_on
 from mapfilter.workflows.area_lattice import roads_lattice as roads_lattice
+from mapfilter.workflows.on_lattice import outside_m, pixels_on
+from mapfilter.workflows.planned_cells import plan_antennas, planned_cells
 from mapfilter.workflows.stated_power import check_eirp_stated
 from mapfilter.workflows.streets import Streets
 
@@ -144,42 +139,6 @@ def raster_world(config: Config, rasters: RxLevRasters) -> tuple[RxLevRasters, C
         rasters, world = replace(rasters, lattice=lattice), World(config, lattice)
     check_cells_near(whole.plan, world.lattice, str(config.cells.plan or "cells"))
     return rasters, whole.plan, world
-
-
-def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> CellPlan:
-    """Read the cell plan of a configuration; of a public list, only the cells near the area.
-
-    Raises
-    ------
-    InputError
-        There is none, or it is wrong.
-    """
-    cells = config.cells
-    if cells.plan is None:
-        raise fail(InputError, "cells.plan", "a cell plan", "none")
-    bounds_m = None
-    if cells.layout == "opencellid" and area is not None:
-        west, south, east, north = area.bounds_m
-        reach_m = cells.reach_m
-        bounds_m = west - reach_m, south - reach_m, east + reach_m, north + reach_m
-    return read_cell_plan(
-        cells.plan,
-        crs,
-        layout=cells.layout,
-        columns=cells.columns.given,
-        defaults={
-            "height_m": cells.height_m,
-            "eirp_dbm": cells.eirp_dbm,
-            "frequency_mhz": cells.frequency_mhz,
-        },
-        bounds_m=bounds_m,
-    )
-
-
-def plan_antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
-    """Read the measured antennas that a plan names from their folder, where one is given."""
-    folder = config.cells.antennas
-    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
 
 
 @dataclass(frozen=True)
@@ -312,14 +271,6 @@ def check_cells_near(plan: CellPlan, lattice: Lattice, where: str) -> None:
     raise fail(InputError, where, expected, got, hint)
 
 
-def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
-    """Return how far outside a lattice positions lie; 0 inside."""
-    west, south, east, north = lattice.bounds_m
-    off_east_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
-    off_north_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
-    return np.asarray(np.hypot(off_east_m, off_north_m))
-
-
 def map_cover(world: World) -> tuple[str, ...]:
     """Return a note when the ways of a map cover only a part of the requested area.
 
@@ -362,31 +313,3 @@ def raster_cover(area: Area, lattice: Lattice) -> tuple[str, ...]:
 
 def _note(what: str, share: float) -> tuple[str, ...]:
     return () if share >= _ENOUGH else (f"{what} covers {share:.0%} of the area",)
-
-
-def option_sections(section: FilterSection, options: object) -> list[tuple[str, Section]]:
-    """Return the sections that hold a filter's options, with their full names."""
-    inner = [(f"filter.{name}", value) for name, value in section if isinstance(value, Section)]
-    sections: list[tuple[str, Section]] = [("filter", section), *inner]
-    return [(name, part) for name, part in sections if isinstance(options, part.kinds)]
-
-
-def filter_choice(section: FilterSection) -> FilterOptions:
-    """Return the options of the filter that a configuration names, with the values of its section.
-
-    Raises
-    ------
-    ConfigError
-        A custom filter cannot be imported, or the filter cannot smooth.
-    """
-    options: Any = filter_options(section.name)
-    for _, part in option_sections(section, options):
-        shared = {one.name for one in fields(options)} & set(type(part).model_fields)
-        options = replace(options, **{name: getattr(part, name) for name in shared})
-    if section.smooth:
-        if not hasattr(options, "smooth"):
-            able = ", ".join(name for name in BUILT_IN if hasattr(filter_options(name), "smooth"))
-            raise fail(ConfigError, "filter.smooth (--smooth)", able, section.name)
-        options = replace(options, smooth=True)
-    chosen: FilterOptions = options
-    return chosen

@@ -15,8 +15,9 @@ from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate import load_benchmark
 from mapfilter.workflows.evaluate_audit import CHANGES
+from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World, filter_choice
+from mapfilter.workflows.world import World
 
 EASY = (
     PredictionModel(shadowing_db=6.0),

@@ -22,7 +22,8 @@ from mapfilter.workflows.evaluate_foreign import (
     run_foreign,
     write_journeys,
 )
-from mapfilter.workflows.world import World, filter_choice
+from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.world import World
 
 SMALL = [
     'area.map="manhattan"',

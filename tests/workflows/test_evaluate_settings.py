@@ -34,7 +34,8 @@ from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.world import World, filter_choice
+from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.world import World
 
 LATTICE = Lattice("EPSG:32629", 500_000.0, 4_500_000.0, 10.0, 2, 2)
 EMPTY = np.zeros((2, 2), dtype=np.float32)

@@ -1,0 +1,40 @@
+"""Where positions and boxes lie, seen from a lattice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.geodesy import Lattice
+
+
+def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
+    """Return how far outside a lattice positions lie; 0 inside."""
+    west, south, east, north = lattice.bounds_m
+    off_east_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
+    off_north_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
+    return np.asarray(np.hypot(off_east_m, off_north_m))
+
+
+def pixels_on(
+    lattice: Lattice, bounds_m: tuple[float, float, float, float]
+) -> tuple[int, int, int, int] | None:
+    """Return the pixels of a lattice that a box in its CRS touches, or None where there are none.
+
+    Examples
+    --------
+    >>> lattice = Lattice("EPSG:32635", 0.0, 100.0, 5.0, 20, 20)
+    >>> pixels_on(lattice, (10.0, 50.0, 30.0, 200.0))
+    (0, 2, 10, 4)
+    >>> pixels_on(lattice, (100.0, 0.0, 200.0, 100.0)) is None
+    True
+    """
+    west, south, east, north = bounds_m
+    # A hair inside, so that an edge on a pixel's edge takes no pixel beyond it.
+    hair_m = 1e-6 * lattice.resolution_m
+    top, left = lattice.row_col(west + hair_m, north - hair_m)
+    bottom, right = lattice.row_col(east - hair_m, south + hair_m)
+    top, left = max(int(top), 0), max(int(left), 0)
+    rows = min(int(bottom), lattice.rows - 1) - top + 1
+    cols = min(int(right), lattice.cols - 1) - left + 1
+    return None if rows < 1 or cols < 1 else (top, left, rows, cols)

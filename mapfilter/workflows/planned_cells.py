@@ -1,0 +1,46 @@
+"""The cell plan that a configuration names, and the measured antennas of its cells."""
+
+from __future__ import annotations
+
+from mapfilter.config.sections import Config
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.antenna import MeasuredAntenna
+from mapfilter.radio.cells import CellPlan, read_cell_plan
+from mapfilter.radio.msi import read_antennas
+
+
+def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> CellPlan:
+    """Read the cell plan of a configuration; of a public list, only the cells near the area.
+
+    Raises
+    ------
+    InputError
+        There is none, or it is wrong.
+    """
+    cells = config.cells
+    if cells.plan is None:
+        raise fail(InputError, "cells.plan", "a cell plan", "none")
+    bounds_m = None
+    if cells.layout == "opencellid" and area is not None:
+        west, south, east, north = area.bounds_m
+        reach_m = cells.reach_m
+        bounds_m = west - reach_m, south - reach_m, east + reach_m, north + reach_m
+    return read_cell_plan(
+        cells.plan,
+        crs,
+        layout=cells.layout,
+        columns=cells.columns.given,
+        defaults={
+            "height_m": cells.height_m,
+            "eirp_dbm": cells.eirp_dbm,
+            "frequency_mhz": cells.frequency_mhz,
+        },
+        bounds_m=bounds_m,
+    )
+
+
+def plan_antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
+    """Read the measured antennas that a plan names from their folder, where one is given."""
+    folder = config.cells.antennas
+    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
