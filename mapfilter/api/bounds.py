@@ -52,7 +52,7 @@ class Bound:
             Where to draw; a new figure when left out.
         """
         from mapfilter.report.basemap import BaseMap
-        from mapfilter.report.network import plot_point_values
+        from mapfilter.report.coverage import plot_point_values
 
         radio, database = self.found.radio, self.database
         base = BaseMap(

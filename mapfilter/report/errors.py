@@ -92,7 +92,7 @@ def plot_error_over_distance(
     if np.isfinite(radii_m[2]).any():
         for radius_m in radii_m:
             axes.fill_between(distance_m, radius_m, color=ORANGE, alpha=0.16, linewidth=0)
-        band = Look(color=ORANGE, linewidth=1.1, label="50, 67, 95 % radius by the filter")
+        band = Look(color=ORANGE, linewidth=1.1, label="95 % radius; darker: 67, 50 %")
         axes.plot(distance_m, radii_m[2], **band)
     levels_m = np.where(np.isfinite(estimate.protection_m), estimate.protection_m, np.nan)
     if np.isfinite(levels_m).any():

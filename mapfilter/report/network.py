@@ -1,23 +1,21 @@
-"""A network on the map: cells, best server, levels, margin, land use, bounds at points.
+"""A network on the map: its cells, their points, and the best server at each pixel.
 
-Figs. 2 to 4 of Khalaf-Allah (2007) are points by cell (of one site, and of all) and land use.
+Figs. 2 and 4 of Khalaf-Allah (2007) are points by cell, of one site and of all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from math import cos, hypot, sin
+from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
-from matplotlib.figure import Figure
+from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError
@@ -37,37 +35,24 @@ from mapfilter.report.basemap import (
     largest,
     local_frame,
     map_axes,
-    map_height_in,
     shape_faults,
     short_names,
     side_legend,
 )
 from mapfilter.report.canvas import (
     BLACK,
-    BLUE,
-    GREY,
     Look,
     distinct_colours,
-    figure_of,
     grouped,
     mark,
-    new_figure,
     styled,
 )
-from mapfilter.roads.landuse import LandUse
-
-STEPS_DB = (0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0)
-"""Where the classes of margins begin; the last has no end."""
 
 _ARROW_SHARE = 0.06
 """Length of a sector's arrow, as a share of the extent's diagonal."""
 
-_LEGEND_IN, _WIDE_LEGEND_IN, _BAR_IN, _POINT_BAR_IN = 2.7, 3.4, 1.7, 1.5
-_ONE_CELL = "#fff7bc"
-_PANEL_IN, _LEGEND_ROW_IN, _COLUMNS = 5.2, 0.24, 4
-_NOT_WALKABLE, _UNKNOWN = "#ececec", "white"
-_MOST_NAMES, _MOST_TWINS = 60, 25
-_SHOWN = (2.0, 98.0)
+_LEGEND_IN, _MOST_NAMES = 2.7, 60
+_DEEP_ROWS, _DEEP_ENOUGH = 400, 0.6
 
 
 def draw_cells(axes: Axes, frame: LocalFrame, plan: CellPlan, bounds_m: Bounds) -> None:
@@ -151,8 +136,9 @@ def plot_points_per_cell(
     for index, places_m in enumerate(points_by_cell.values()):
         x, y = frame(*places_m)
         axes.scatter(x, y, s=size, color=groups.colours[index], marker="s", linewidths=0, zorder=3)
-        groups.add(index, grouped(counts[index]), (x, y))
-    _finish(axes, base, plan, title)
+        named_at = _nearest_to_median(x, y) if x.size else None
+        groups.add(index, grouped(counts[index]), named_at)
+    finish_map(axes, base, plan, title)
     side_legend(axes, "cell: points", groups.handles, counts, network_legend(plan))
     return axes
 
@@ -184,9 +170,10 @@ def plot_best_server(
     colours, limits = ListedColormap(groups.colours or "w"), (-0.5, max(len(cell_ids), 1) - 0.5)
     draw_raster(axes, base, lattice, shown, cmap=colours, clim=limits, alpha=0.85, zorder=1)
     for index, count in enumerate(counts):
-        places_m = lattice.east_north(*np.nonzero(best_server == index))
-        groups.add(index, f"{100 * count / best_server.size:.1f} %", frame(*places_m))
-    _finish(axes, base, plan, title)
+        own = best_server == index
+        named_at = frame(*lattice.east_north(*_deepest(own))) if count else None
+        groups.add(index, f"{100 * count / best_server.size:.1f} %", named_at)
+    finish_map(axes, base, plan, title)
     side_legend(axes, "cell: share of area", groups.handles, counts, network_legend(plan))
     return axes
 
@@ -202,184 +189,41 @@ class _Groups:
         self._axes, self._plan, self._ids = axes, plan, cell_ids
         self._names, self._named = short_names(cell_ids), largest(counts, _MOST_NAMES)
 
-    def add(self, index: int, amount: str, at: tuple[Floats, Floats]) -> None:
-        """Add a cell to the legend; name it at the place nearest to their median.
+    def add(self, index: int, amount: str, named_at: tuple[Any, Any] | None) -> None:
+        """Add a cell to the legend, and name it at a place, if it has any.
 
         Indoor cells are named at their marks, and so are not named here.
         """
         name, colour = self._ids[index], self.colours[index]
         self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
         indoor = name in self._plan and self._plan[name].indoor
-        if at[0].size and index in self._named and not indoor:
-            x, y = at
-            middle = int(np.argmin(np.hypot(x - np.median(x), y - np.median(y))))
+        if named_at is not None and index in self._named and not indoor:
+            x, y = named_at
             look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME
-            self._axes.text(float(x[middle]), float(y[middle]), self._names[index], **look)
+            self._axes.text(float(x), float(y), self._names[index], **look)
 
 
-@styled
-def plot_level(
-    level_dbm: NDArray[np.floating],
-    lattice: Lattice,
-    plan: CellPlan,
-    base: BaseMap,
-    ax: Axes | None = None,
-    *,
-    title: str = "Level of the best server",
-    range_dbm: tuple[float, float] = (-110.0, -50.0),
-) -> Axes:
-    """Draw a level raster, of one cell or of the best server.
-
-    Levels are NaN where nothing is known; ``range_dbm`` are the two ends of the colour scale.
-    """
-    shape_faults(level_dbm, lattice).raise_if_any(InputError)
-    axes = map_axes(ax, base, _BAR_IN)
-    draw_base(axes, base, streets=OVER_RASTER)
-    image = draw_raster(axes, base, lattice, level_dbm, cmap="viridis", clim=range_dbm, zorder=1)
-    look = Look(shrink=0.75, pad=0.02, aspect=32, extend="both")
-    figure_of(axes).colorbar(image, ax=axes, label="level / dBm", **look)
-    _finish(axes, base, plan, title)
-    return axes
+def _deepest(own: NDArray[np.bool_]) -> tuple[Any, Any]:
+    """Return row and column of the most central pixel of those that lie deep in a cell's own."""
+    # A name needs no better place than one of some hundred rows.
+    step = max(max(own.shape) // _DEEP_ROWS, 1)
+    some = own[::step, ::step]
+    if not some.any():
+        step, some = 1, own
+    depth = distance_transform_edt(np.pad(some, 1))[1:-1, 1:-1]
+    rows, cols = np.nonzero(depth >= _DEEP_ENOUGH * depth.max())
+    row, col = _nearest_to_median(rows, cols)
+    return step * row, step * col
 
 
-@styled
-def plot_margin(
-    margin_db: NDArray[np.floating],
-    lattice: Lattice,
-    plan: CellPlan,
-    base: BaseMap,
-    ax: Axes | None = None,
-    *,
-    title: str = "Margin of the best server over the second",
-) -> Axes:
-    """Draw the margin in classes, dark where two cells are nearly equal, with each one's share.
-
-    The margin, >= 0, is the best level above the second best; infinite where one cell is received
-    alone, NaN where none is or where it is not to be drawn, such as beside the ways.
-    """
-    faults = shape_faults(margin_db, lattice)
-    known = ~np.isnan(margin_db)
-    if known.any() and float(margin_db[known].min()) < 0:
-        faults.add("margin", "dB >= 0", float(margin_db[known].min()))
-    faults.raise_if_any(InputError)
-    ramp = matplotlib.colormaps["cividis"](np.linspace(0.0, 0.93, len(STEPS_DB)))
-    colours = [*(to_hex(colour) for colour in ramp), _ONE_CELL]
-    classes = np.searchsorted(np.array(STEPS_DB), margin_db[known], side="right") - 1
-    classes[np.isinf(margin_db[known])] = len(STEPS_DB)
-    counts = np.bincount(classes, minlength=len(colours))
-    shown = np.ma.masked_array(np.zeros(margin_db.shape, dtype=np.int64), ~known)
-    shown[known] = classes
-    axes = map_axes(ax, base, _WIDE_LEGEND_IN)
-    draw_base(axes, base, streets=OVER_RASTER)
-    norm = BoundaryNorm(np.arange(-0.5, len(colours)), len(colours))
-    draw_raster(axes, base, lattice, shown, cmap=ListedColormap(colours), norm=norm)
-    _finish(axes, base, plan, title)
-    between = [f"{low:g} to {high:g} dB" for low, high in pairwise(STEPS_DB)]
-    names = [*between, f"{STEPS_DB[-1]:g} dB and more", "one cell alone"]
-    rim = Look(markeredgecolor=GREY, markeredgewidth=0.4)
-    shares = 100 * counts / max(counts.sum(), 1)
-    handles = [
-        mark(f"{name}: {share:.1f} %", "s", 8, color=colour, **rim)
-        for name, colour, share in zip(names, colours, shares, strict=True)
-    ]
-    side_legend(axes, "margin: share of pixels", handles, counts.tolist(), network_legend(plan))
-    return axes
+def _nearest_to_median(x: NDArray[Any], y: NDArray[Any]) -> tuple[Any, Any]:
+    """Return the place that is nearest to the median of some."""
+    middle = int(np.argmin(np.hypot(x - np.median(x), y - np.median(y))))
+    return x[middle], y[middle]
 
 
-def _finish(axes: Axes, base: BaseMap, plan: CellPlan, title: str) -> None:
+def finish_map(axes: Axes, base: BaseMap, plan: CellPlan, title: str) -> None:
+    """Mark the cells, and add title and attribution."""
     draw_cells(axes, local_frame(base), plan, base.bounds_m)
     axes.set_title(title)
     attribute(axes, base)
-
-
-@styled
-def plot_landuse(
-    landuse: LandUse, lattice: Lattice, base: BaseMap, *, title: str = "Land use"
-) -> Figure:
-    """Draw the classes beside the walkable places, with the share of each class in the area.
-
-    Classes that are nowhere in the area are left out of the legend.
-    """
-    shape_faults(landuse.code, lattice).raise_if_any(InputError)
-    colours = list(landuse.colours) or distinct_colours(len(landuse.names))
-    counts = np.bincount(landuse.code[landuse.code >= 0], minlength=len(landuse.names))
-    there = np.flatnonzero(counts)
-    rows = -(-len(there) // _COLUMNS)
-    height_in = map_height_in(base, _PANEL_IN) + 1.15 + _LEGEND_ROW_IN * rows
-    figure = new_figure(2 * _PANEL_IN + 0.9, height_in)
-    left, right = figure.subplots(1, 2)
-    walkable = np.ma.masked_where(landuse.code < 0, landuse.walkable)
-    panels = (
-        (left, np.ma.masked_less(landuse.code, 0), colours or [_UNKNOWN]),
-        (right, walkable, [_NOT_WALKABLE, BLUE]),
-    )
-    for axes, shown, palette in panels:
-        draw_base(axes, base, streets=OVER_RASTER, scale_bar=axes is left)
-        limits = (-0.5, len(palette) - 0.5)
-        draw_raster(axes, base, lattice, shown, cmap=ListedColormap(palette), clim=limits)
-    left.set_title(title)
-    right.set_title(f"Where one can walk: {100 * landuse.walkable.mean():.1f} % of the area")
-    right.set_ylabel("")
-    right.set_yticklabels([])
-    attribute(right, base)
-    handles = []
-    for code in there:
-        can_walk, share = landuse.can_walk[code], 100 * counts[code] / landuse.code.size
-        label = f"{landuse.names[code]}{' (walkable)' if can_walk else ''}: {share:.1f} %"
-        rim = (BLACK, 1.0) if can_walk else (GREY, 0.4)
-        handles.append(mark(label, "s", 8, color=colours[code], mec=rim[0], mew=rim[1]))
-    where = Look(loc="outside lower center", frameon=False, handletextpad=0.3)
-    figure.legend(handles=handles, ncols=_COLUMNS, **where)
-    return figure
-
-
-@styled
-def plot_point_values(
-    values: NDArray[np.floating],
-    lattice: Lattice,
-    plan: CellPlan,
-    base: BaseMap,
-    ax: Axes | None = None,
-    *,
-    title: str,
-    label: str,
-    limits: tuple[float, float] | None = None,
-) -> Axes:
-    """Draw a figure of every point, such as a bound or the metres to a fix; light is small.
-
-    Values are NaN off the points, and where levels carry no information. ``label`` stands beside
-    the colour scale, ``limits`` are its ends, by default those of nearly all values.
-    """
-    shape_faults(values, lattice).raise_if_any(InputError)
-    known = values[np.isfinite(values)]
-    low, high = limits or (np.percentile(known, _SHOWN) if known.size else (0.0, 1.0))
-    ends = float(low), max(float(high), float(low) + 1e-9)
-    axes = map_axes(ax, base, _POINT_BAR_IN)
-    draw_base(axes, base)
-    image = draw_raster(axes, base, lattice, values, cmap="viridis_r", clim=ends)
-    _finish(axes, base, plan, title)
-    figure_of(axes).colorbar(image, ax=axes, shrink=0.75, label=label, extend="neither")
-    return axes
-
-
-def plot_twins(
-    twin_error: NDArray[np.floating],
-    pairs_m: Floats,
-    lattice: Lattice,
-    plan: CellPlan,
-    base: BaseMap,
-) -> Axes:
-    """Draw the similarity of each point's twin, and the worst pairs joined by lines.
-
-    The probability of an error is 0 to 0.5; ``pairs_m``, (n, 4), are east and north of both
-    places, the worst first, of which some are drawn.
-    """
-    title, label = "Probability of confusion with another place", "probability of an error"
-    look = Look(title=title, label=label, limits=(0.0, 0.5))
-    axes = plot_point_values(twin_error, lattice, plan, base, **look)
-    frame = local_frame(base)
-    ends = [np.column_stack(frame(pair[[0, 2]], pair[[1, 3]])) for pair in pairs_m[:_MOST_TWINS]]
-    axes.add_collection(LineCollection(ends, colors=BLACK, linewidths=0.9, zorder=8))
-    for end in ends:
-        axes.scatter(end[:, 0], end[:, 1], s=10, color=BLACK, zorder=9, linewidths=0)
-    return axes

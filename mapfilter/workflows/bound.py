@@ -23,7 +23,7 @@ from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, bound, on_latti
 from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
-from mapfilter.report.network import plot_point_values, plot_twins
+from mapfilter.report.coverage import plot_point_values, plot_twins
 
 NOTES = (
     "exact for the error model: the bound from given gradients; bits by the serving cell",

@@ -50,9 +50,7 @@ class State:
 
 
 def judged(state, *, weighed=True, positioned=False, contested=False, left=False):
-    rules = SimpleNamespace(
-        claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0, converge_threshold=2.0
-    )
+    rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0)
     beliefs = SimpleNamespace(
         options=SimpleNamespace(split_mass=0.4),
         options_of=lambda _: SimpleNamespace(switch_mass=0.99, switch_hold_m=14.0),
@@ -130,11 +128,15 @@ def test_a_loss_begins_a_recovery_unless_a_rest_alone_is_in_doubt(status):
     assert judged(State(Belief()), left=True, contested=True).recovery == Recovery()
 
 
-@pytest.mark.parametrize(("lead", "agrees"), [(-2.1, True), (-1.9, False)])
-def test_an_alternative_close_behind_leaves_a_doubt(lead, agrees):
-    place = SimpleNamespace(summary=SimpleNamespace(mean=(0.0, 0.0)))
+@pytest.mark.parametrize(
+    ("lead", "away_m", "agrees"),
+    [(3.0, 60.0, True), (4.0, 60.0, False), (4.0, 40.0, True)],
+)
+def test_an_alternative_leaves_a_doubt_by_its_odds_elsewhere(lead, away_m, agrees):
+    """A lead of 8 makes it as probable: of 3, 1 / (1 + exp(-5)) = 0.9933 are left, of 4 0.982."""
+    place = SimpleNamespace(summary=SimpleNamespace(mean=(0.0, away_m)))
     other = SimpleNamespace(log_bayes_factor=lambda _: lead, belief=place)
-    found = judged(replace(after_a_loss(100.0), alternative=other, belief=At()))
+    found = judged(replace(after_a_loss(100.0), alternative=other, belief=At(1.0)))
     assert found.status is Status.UNCERTAIN
     assert isnan(found.recovery.agrees_from_m) != agrees
 

@@ -39,3 +39,22 @@ def test_no_bias_has_no_sign(tmp_path, monkeypatch):
     assert "bias 0.0 dB" in told[0]
     save(plot_left_out(measured, predicted + 1.0), tmp_path / "left-out.png")
     assert "bias \N{MINUS SIGN}1.0 dB" in told[1]
+
+
+@pytest.mark.parametrize("rows", [40, 1000])
+def test_a_cell_is_named_deep_in_its_own_area(rows):
+    """Cell 0 lies about cell 1, whose middle is its median, and has a thin arm besides."""
+    lattice = Lattice(CRS, 565_000.0, 5_934_000.0, 5.0, rows, rows)
+    server = np.zeros((rows, rows), dtype=int)
+    server[rows // 8 : -rows // 8, rows // 4 :] = 1
+    server[rows // 2, rows // 2 :] = 0
+    plan = CellPlan(CRS, ())
+    axes = plot_best_server(server, ["A", "B"], lattice, plan, BaseMap(lattice.bounds_m))
+    places = {text.get_text(): text.get_position() for text in axes.texts}
+    unit_m = 5.0 * rows / 1000 if 5.0 * rows >= 1000 else 5.0 * rows
+    x, y = np.array(places["A"]) / unit_m
+    # The widest part of cell 0 is the quarter at the left; the middle of its height is at 1/2.
+    assert x == pytest.approx(1 / 8, abs=1 / 16)
+    assert y == pytest.approx(1 / 2, abs=1 / 8)
+    x, y = np.array(places["B"]) / unit_m
+    assert (x > 1 / 4) & (abs(y - 1 / 2) > 1 / 16)

@@ -16,7 +16,7 @@ from mapfilter.rasters.opening import open_rasters
 from mapfilter.report import basemap
 from mapfilter.report.basemap import BaseMap, draw_base, largest
 from mapfilter.report.canvas import BLUE, ORANGE, new_figure, png_of, save
-from mapfilter.report.network import plot_landuse, plot_margin
+from mapfilter.report.coverage import plot_landuse, plot_margin
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings

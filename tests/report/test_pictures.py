@@ -19,8 +19,9 @@ from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base, local_frame
 from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION, save
+from mapfilter.report.coverage import plot_level
 from mapfilter.report.errors import plot_error_over_distance
-from mapfilter.report.network import draw_cells, plot_best_server, plot_level, plot_points_per_cell
+from mapfilter.report.network import draw_cells, plot_best_server, plot_points_per_cell
 from mapfilter.report.snapshots import plot_candidates
 from mapfilter.report.track import plot_track
 

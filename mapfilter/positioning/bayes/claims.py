@@ -6,7 +6,6 @@ from dataclasses import replace
 from math import nan
 
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.bayes.alternative import doubted
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery, certainty
 from mapfilter.positioning.bayes.state import BayesState
@@ -44,8 +43,9 @@ def judged(
         uncertain = probability < rules.claimed_from
         if recovery is not None and weighed:
             travelled_m = state.reckoning.travelled_m
+            # An alternative is in the probability, with its odds.
             agrees = probability >= options.switch_mass
-            agrees = agrees and not doubted(rules, belief, state.null, state.alternative)
+            agrees = agrees and state.null.log_odds <= rules.converge_log_odds
             recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
         if uncertain or recovery is not None:
             return replace(state, status=Status.UNCERTAIN, recovery=recovery)
