@@ -23,6 +23,7 @@ from mapfilter.config.fields import (
 from mapfilter.database.defaults import MARGIN_DB, TILE_PX
 from mapfilter.options import NotNegative, Positive, Seed
 from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
+from mapfilter.radio.cell_layouts import OFFSETS
 
 _PLACE_OF_A_MADE_CITY = {"southwest": (3.0, 0.0), "size_m": (3000.0, 3000.0)}
 
@@ -92,12 +93,13 @@ class Area(Section):
         return self.map != NO_MAP or self.has_box
 
 
-@with_columns(*PLAN_COLUMNS, "east", "north", "crs")
+@with_columns(*PLAN_COLUMNS, "east", "north", "crs", *OFFSETS)
 class CellColumns(Columns):
     """``[cells.columns]``: names of the plan's columns, where a cell list has others.
 
     Each key is a column of the plan; its value is the name of that column in the list. Positions
-    are ``lat`` and ``lon``, or ``east`` and ``north``.
+    are ``lat`` and ``lon``, or ``east`` and ``north``, and ``east_offset_m`` and ``north_offset_m``
+    from there.
     """
 
 

@@ -38,6 +38,8 @@ COLUMNS = (
     *("technology", "assumed"),
 )
 """Columns of a file that mapfilter writes, in order."""
+OFFSETS = ("east_offset_m", "north_offset_m")
+"""Of an antenna from the place that is stated, its site's, which planning tools keep apart."""
 SELDOM = ("technology", "assumed")
 """Those that are left out where no cell has them."""
 ATOLL: Columns = {
@@ -47,6 +49,8 @@ ATOLL: Columns = {
     "lon": ("LONGITUDE",),
     "east": ("X",),
     "north": ("Y",),
+    "east_offset_m": ("DX",),
+    "north_offset_m": ("DY",),
     "height_m": ("HEIGHT",),
     "azimuth_deg": ("AZIMUT", "AZIMUTH"),
     "downtilt_deg": (
@@ -96,13 +100,13 @@ _OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs")} |
 }
 LAYOUTS: Mapping[Layout, Columns] = {
     "plan": _OWN,
-    "atoll": {name: (*ATOLL.get(name, ()), name) for name in _OWN},
+    "atoll": {name: (*ATOLL.get(name, ()), name) for name in (*_OWN, *OFFSETS)},
     "opencellid": OPENCELLID,
 }
 
 UNUSED_COLUMNS = "columns not used that resemble fields"
 """What the note on such columns begins with."""
-_NOT_RESEMBLED = ("technology", "assumed", "crs", "cgi")
+_NOT_RESEMBLED = ("technology", "assumed", "crs", "cgi", *OFFSETS)
 _RADIOS = {"GSM", "UMTS", "LTE", "CDMA", "NR"}
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
 

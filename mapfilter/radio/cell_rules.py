@@ -52,6 +52,9 @@ class Range:
         return inside and not (self.whole and value != int(value))
 
 
+OFFSET = Range(-1000, 1000, "metres")
+"""Of an antenna from its site, along east or north."""
+
 RANGES: dict[str, Range] = {
     "east_m": Range(-1e8, 1e8, "finite metres"),
     "north_m": Range(-1e8, 1e8, "finite metres"),

@@ -13,6 +13,7 @@ from typing import Any
 
 from pyproj import CRS
 
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.geodesy import degree_fault, project, projected_crs, unproject
 from mapfilter.radio.cell_layouts import (
@@ -20,6 +21,7 @@ from mapfilter.radio.cell_layouts import (
     ATOLL,
     COLUMNS,
     LAYOUTS,
+    OFFSETS,
     Arranged,
     Layout,
     arrange,
@@ -28,6 +30,7 @@ from mapfilter.radio.cell_layouts import (
 )
 from mapfilter.radio.cell_rules import (
     ANTENNAS,
+    OFFSET,
     OPTIONAL,
     RANGES,
     TECHNOLOGIES,
@@ -101,7 +104,7 @@ def read_plan(
     if len(systems) > 1:
         faults.add(f"{path}, crs", "one CRS in all rows", ", ".join(sorted(systems)))
     _place(path, rows, crs, faults)
-    return rows, arranged.notes
+    return rows, (*arranged.notes, *_moved_from_sites(rows, arranged))
 
 
 def _check_layout(where: str, header: tuple[str, ...]) -> None:
@@ -185,6 +188,12 @@ def _row(where: str, line: int, given: Mapping[str, str], table: Arranged, fault
     for name in ("lat", "lon", "east", "north"):
         if name in given:
             values[name] = parse(name, "a number")
+    for name in OFFSETS:
+        if given.get(name):
+            value = parse(name, OFFSET.expected)
+            if value is not None and not OFFSET.holds(value):
+                refuse(name, OFFSET.expected, given[name], OFFSET.hint(value))
+            values[name] = value
     values.setdefault("azimuth_deg", None)
     indoor = given.get("indoor", "").lower()
     if indoor not in _TRUE | _FALSE | {""}:
@@ -233,6 +242,22 @@ def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
         if wrong is not None:
             faults.add(f"{path} row {row.line}, {names}", *wrong)
             row.faulty = True
+
+
+def _moved_from_sites(rows: list[Row], table: Arranged) -> tuple[str, ...]:
+    """Move cells from the places of their sites by what they lie beside these; return a note."""
+    moved, farthest_m = 0, 0.0
+    for row in rows:
+        east_m, north_m = (row.values.get(name) or 0.0 for name in OFFSETS)
+        if not row.faulty and (east_m or north_m):
+            row.values["east_m"] += east_m
+            row.values["north_m"] += north_m
+            moved, farthest_m = moved + 1, max(farthest_m, math.hypot(east_m, north_m))
+    if not moved:
+        return ()
+    names = " and ".join(table.shown.get(name, name) for name in OFFSETS if name in table.header)
+    some = number_of(moved, "cell lies", "cells lie")
+    return (f"{some} beside the place of the site, by {names}, up to {farthest_m:.3g} m",)
 
 
 def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | None:
