@@ -195,11 +195,15 @@ class Score(Accuracy):
     def __repr__(self) -> str:
         if not self.switched:
             return "Score: the filter never converged"
+        then = "the ground truth tells nothing of what came then"
+        if self.scored_epochs:
+            then = f"then {self.error_mean_m:.1f} m on average, {self.error_95_m:.1f} m at 95 %"
+        if self.success is None:
+            return f"Score: converged where the ground truth does not tell; {then}"
         outcome = "right" if self.success else "wrong"
         return (
             f"Score: converged after {self.switch_distance_m:.0f} m, "
-            f"{self.error_at_switch_m:.1f} m off ({outcome}); "
-            f"then {self.error_mean_m:.1f} m on average, {self.error_95_m:.1f} m at 95 %"
+            f"{self.error_at_switch_m:.1f} m off ({outcome}); {then}"
         )
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -5,17 +5,16 @@ Success and errors after convergence are those of Khalaf-Allah 2007, section 6.2
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
-from math import ceil, inf, nan
+from math import ceil, inf, isfinite, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats
-from mapfilter.filters.contract import Reason, Status
-from mapfilter.geodesy import unproject
+from mapfilter._words import number_of
+from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 
 if TYPE_CHECKING:
@@ -26,6 +25,9 @@ SUCCESS_RADIUS_M = 50.0
 
 RADII = (50, 67, 95, 99)
 """Per cent of the belief that the radii of an estimate hold."""
+
+GAP_S, GAP_M = 30.0, 50.0
+"""Between true positions that are farther apart than both, nobody knows the way."""
 
 _CLAIMS = (Status.CONVERGED, Status.TRACKING)
 _WINDOW_M = 100.0
@@ -60,6 +62,26 @@ class Truth:
         north_m = np.interp(at_s, self.time_s, self.north_m)
         return np.where(inside, east_m, np.nan), np.where(inside, north_m, np.nan)
 
+    def tells(self, time_s: ArrayLike) -> Bools:
+        """Return whether the true position is known at other times: within the record, in no gap.
+
+        A gap is between neighbours more than 30 s and 50 m apart.
+
+        Examples
+        --------
+        >>> truth = Truth(*np.array([[0.0, 10.0, 60.0, 99.0], [0.0, 9.0, 99.0, 130.0], [0.0] * 4]))
+        >>> truth.tells([-1.0, 5.0, 10.0, 20.0, 70.0, 100.0]).tolist()
+        [False, True, True, False, True, False]
+        """
+        at_s = np.asarray(time_s, dtype=np.float64)
+        legs_m = np.hypot(np.diff(self.east_m), np.diff(self.north_m))
+        is_gap = (np.diff(self.time_s) > GAP_S) & (legs_m > GAP_M)
+        last = self.time_s.size - 1
+        before = np.clip(np.searchsorted(self.time_s, at_s, side="right") - 1, 0, last - 1)
+        measured = np.isin(at_s, self.time_s)
+        inside = (at_s >= self.time_s[0]) & (at_s <= self.time_s[-1])
+        return np.asarray(inside & (measured | ~is_gap[before]))
+
     def distance_at(self, time_s: ArrayLike) -> Floats:
         """Return the true distance travelled since the start, interpolated to other times."""
         legs_m = np.hypot(np.diff(self.east_m), np.diff(self.north_m))
@@ -75,18 +97,21 @@ class Accuracy:
     ----------
     switched : bool
         Whether the filter ever switched to tracking.
-    success : bool
-        It did, and was at most 50 m off then; never switching is a failure.
+    success : bool or None
+        It did, and was at most 50 m off then; never switching is a failure. None where the ground
+        truth does not tell: it begins later or ends earlier, or has a gap there.
     switch_time_s, switch_distance_m, error_at_switch_m : float
-        When, after how many true metres, and how far off; NaN if it never switched.
+        When, after how many true metres, and how far off; NaN if it never switched, the latter two
+        also where the ground truth does not tell.
     error_mean_m, error_67_m, error_95_m : float
-        Mean and percentiles of the error over all located epochs from the switch on.
+        Mean and percentiles of the error over all located epochs from the switch on at which the
+        truth is known.
     scored_epochs : int
         How many those are.
     """
 
     switched: bool
-    success: bool
+    success: bool | None
     switch_time_s: float
     switch_distance_m: float
     error_at_switch_m: float
@@ -97,9 +122,13 @@ class Accuracy:
 
 
 def position_errors_m(estimate: TrackEstimate, truth: Truth) -> Floats:
-    """Return the horizontal error at every epoch, shape (N,); NaN where there is no position."""
+    """Return the horizontal error at every epoch, shape (N,).
+
+    NaN where there is no position, or the ground truth does not tell.
+    """
     east_m, north_m = truth.at(estimate.time_s)
-    return np.asarray(np.hypot(estimate.east_m - east_m, estimate.north_m - north_m))
+    errors_m = np.hypot(estimate.east_m - east_m, estimate.north_m - north_m)
+    return np.where(truth.tells(estimate.time_s), errors_m, np.nan)
 
 
 def percentile_m(errors_m: Floats, share: float) -> float:
@@ -126,12 +155,14 @@ def accuracy(estimate: TrackEstimate, truth: Truth) -> Accuracy:
     time_s = float(estimate.time_s[switch])
     after_m = errors_m[switch:]
     after_m = after_m[np.isfinite(after_m)]
+    error_m = float(errors_m[switch])
+    told = isfinite(error_m)
     return Accuracy(
         True,
-        bool(errors_m[switch] <= SUCCESS_RADIUS_M),
+        error_m <= SUCCESS_RADIUS_M if told else None,
         time_s,
-        float(truth.distance_at(time_s)),
-        float(errors_m[switch]),
+        float(truth.distance_at(time_s)) if told else nan,
+        error_m,
         float(after_m.mean()) if after_m.size else nan,
         percentile_m(after_m, 0.67),
         percentile_m(after_m, 0.95),
@@ -139,68 +170,32 @@ def accuracy(estimate: TrackEstimate, truth: Truth) -> Accuracy:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """One located track.
+def truth_notes(estimate: TrackEstimate, truth: Truth) -> tuple[str, ...]:
+    """Return what a ground truth does not tell of a track that was located.
 
-    Parameters
-    ----------
-    final_status : str
-        Status at the last epoch; empty without any epoch.
-    switched : bool
-        Whether the filter ever switched to tracking.
-    switch_time_s : float
-        When, in seconds since the start of the log; NaN if it never did.
-    epochs : int
-        How many there are.
-    epochs_by_status : dict
-        How many of each status that occurs.
-    last_lon_deg, last_lat_deg : float
-        The last position, WGS 84; NaN where there is none.
-    last_time_s : float
-        When that was.
-    unused : dict
-        How many readings were not used, by reason.
-    unknown_cells : dict
-        How many readings name each cell that is not in the database, the most frequent first.
+    Epochs before it begins and after it ends are no reason for a note, as many records are shorter
+    than the log, but for the switch.
     """
-
-    final_status: str
-    switched: bool
-    switch_time_s: float
-    epochs: int
-    epochs_by_status: dict[str, int]
-    last_lon_deg: float
-    last_lat_deg: float
-    last_time_s: float
-    unused: dict[str, int]
-    unknown_cells: dict[str, int]
-
-
-def outcome(estimate: TrackEstimate) -> Outcome:
-    """Summarise a located track."""
-    switch = estimate.converged_at
-    statuses = Counter(estimate.status)
-    located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))[-1:]
-    lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
-    unused: Counter[str] = Counter()
-    unknown: Counter[str] = Counter()
-    for reading in estimate.unused:
-        unused[str(reading.reason)] += reading.readings
-        if reading.reason is Reason.UNKNOWN_CELL:
-            unknown[reading.what] += reading.readings
-    return Outcome(
-        str(estimate.status[-1]) if len(estimate) else "",
-        switch is not None,
-        float(estimate.time_s[switch]) if switch is not None else nan,
-        len(estimate),
-        {str(status): statuses[status] for status in Status if statuses[status]},
-        float(lon[0]) if located.size else nan,
-        float(lat[0]) if located.size else nan,
-        float(estimate.time_s[located[0]]) if located.size else nan,
-        dict(sorted(unused.items())),
-        dict(sorted(unknown.items(), key=lambda one: (-one[1], one[0]))),
-    )
+    inside = (estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1])
+    if len(estimate) and not inside.any():
+        own, its = (f"{one.time_s[0]:.0f} to {one.time_s[-1]:.0f} s" for one in (estimate, truth))
+        return (f"the ground truth ({its}) covers no epoch of the log ({own}): another clock?",)
+    notes = []
+    switch, told = estimate.converged_at, truth.tells(estimate.time_s)
+    if switch is not None and not told[switch]:
+        at_s = estimate.time_s[switch]
+        notes.append(
+            f"the ground truth has no position at the switch ({at_s:.0f} s): whether that was "
+            "right is not known, and counts neither as right nor as wrong"
+        )
+    unknown = int((inside & ~told).sum())
+    if unknown:
+        some = number_of(unknown, "epoch lies", "epochs lie")
+        notes.append(
+            f"{some} in gaps of the ground truth (over {GAP_S:g} s and {GAP_M:g} m), and "
+            f"{'is' if unknown == 1 else 'are'} not scored"
+        )
+    return tuple(notes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,8 +252,7 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
         Later epochs do not count.
     """
     errors_m = position_errors_m(estimate, truth)
-    inside = (estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1])
-    counted = inside & (estimate.time_s <= until_s)
+    counted = truth.tells(estimate.time_s) & (estimate.time_s <= until_s)
     claimed = counted & claims_of(estimate)
     known = counted & np.array([status.is_followed for status in estimate.status], dtype=bool)
     converged = counted & np.array([s is Status.CONVERGED for s in estimate.status], dtype=bool)

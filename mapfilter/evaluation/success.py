@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, fields
-from itertools import takewhile
+from itertools import compress, takewhile
 from math import sqrt
 from typing import Any
 
@@ -93,7 +93,7 @@ class SuccessSummary:
     Parameters
     ----------
     runs, switched, successes : int
-        Counts.
+        Counts of the runs whose ground truth tells whether they were right.
     success, success_low, success_high : float
         Share of successful runs and its 95 % interval, with each route as a cluster; NaN for the
         runs of a single route.
@@ -123,7 +123,8 @@ def summarise(
 ) -> SuccessSummary:
     """Put the scores of many runs together.
 
-    As in the paper's Table 4, errors are those after *successful* global positioning.
+    As in the paper's Table 4, errors are those after *successful* global positioning. Runs whose
+    ground truth does not tell whether they were right are left out.
 
     Parameters
     ----------
@@ -131,6 +132,9 @@ def summarise(
         The route of each run, as anything that is equal for runs on one route; without it each run
         has its own.
     """
+    told = [score.success is not None for score in scores]
+    routes = None if routes is None else list(compress(routes, told))
+    scores = list(compress(scores, told))
     runs = len(scores)
     switched = [score for score in scores if score.switched]
     right = [score for score in switched if score.success]

@@ -101,10 +101,11 @@ def plot_error_over_distance(
     if known_m.size:
         axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
     if score.switched:
-        at_m, error_m = score.switch_distance_m, score.error_at_switch_m
+        at_m, error_m = float(truth.distance_at(score.switch_time_s)), score.error_at_switch_m
         star = Look(markersize=15, markeredgecolor="white", zorder=6, clip_on=False)
         name = f"switch: {error_m:.0f} m off after {at_m:.0f} m"
-        axes.plot([at_m], [error_m], "*", color=VERMILLION, label=name, **star)
+        if score.success is not None:
+            axes.plot([at_m], [error_m], "*", color=VERMILLION, label=name, **star)
         for figure, after_m, dashes, colour in (
             ("mean", score.error_mean_m, "-", BLACK),
             ("67 %", score.error_67_m, (0, (6, 2)), GREEN),

@@ -97,7 +97,7 @@ def plot_track(
         x, y = frame(estimate.east_m[[switch]], estimate.north_m[[switch]])
         star = Look(s=230, marker="*", color=VERMILLION, edgecolors="white")
         axes.scatter(x, y, linewidths=1.0, zorder=10, label="switch to tracking", **star)
-        if truth is not None:
+        if truth is not None and truth.tells(estimate.time_s[switch]):
             true_x, true_y = frame(*truth.at(estimate.time_s[[switch]]))
             ends = [x[0], true_x[0]], [y[0], true_y[0]]
             axes.plot(*ends, color=VERMILLION, linewidth=1.4, zorder=9)

@@ -16,7 +16,8 @@ from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
-from mapfilter.evaluation.accuracy import Truth, accuracy, outcome
+from mapfilter.evaluation.accuracy import Truth, accuracy, truth_notes
+from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -239,6 +240,8 @@ def run_replay(
             pictures = with_error_picture(pictures, shown, drawing, beside_m)
         if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
+        if truth is not None:
+            log = replace(log, notes=(*log.notes, *truth_notes(track.estimate, truth)))
         fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
         log = replace(log, notes=(*log.notes, *fixes))
         lack = lack_of(opened, log, options, track.estimate, database)

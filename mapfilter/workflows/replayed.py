@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from mapfilter._words import number_of
-from mapfilter.evaluation.accuracy import Accuracy, Outcome
+from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.evaluation.outcome import Outcome
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.tracks.log import TrackLog

@@ -8,7 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.evaluation.accuracy import Truth, accuracy, percentile_m, position_errors_m
+from mapfilter.evaluation.accuracy import (
+    Truth,
+    accuracy,
+    percentile_m,
+    position_errors_m,
+    truth_notes,
+)
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 
@@ -124,11 +130,65 @@ def test_the_first_switch_counts():
     assert (score.switch_time_s, score.error_at_switch_m) == (1, 0)
 
 
-def test_a_switch_outside_the_truth_is_no_success():
-    score = accuracy(estimate([(30, 100, 100, C)]), TRUTH)
-    assert (score.switched, score.success, score.scored_epochs) == (True, False, 0)
+@pytest.mark.parametrize("at_s", [-1, 30])
+def test_a_switch_outside_the_truth_is_neither_right_nor_wrong(at_s):
+    score = accuracy(estimate([(at_s, 100, 100, C)]), TRUTH)
+    assert (score.switched, score.success, score.scored_epochs) == (True, None, 0)
+    assert (score.switch_time_s, isnan(score.switch_distance_m)) == (at_s, True)
     assert isnan(score.error_at_switch_m)
     assert isnan(score.error_67_m)
+
+
+# A position each 10 s, then none for 40 s in which 60 m are walked, then a rest of 40 s, then 31 s
+# and 49 m, 30 s and 300 m.
+GAPS = Truth(
+    np.array([0.0, 10.0, 50.0, 90.0, 121.0, 151.0]),
+    np.array([0.0, 15.0, 75.0, 75.0, 124.0, 424.0]),
+    np.zeros(6),
+)
+
+
+def test_between_true_positions_far_apart_in_time_and_place_nobody_knows_the_way():
+    at_s = [0, 5, 10, 10.1, 30, 49.9, 50, 70, 100, 130, 151, 151.1]
+    told = [True] * 3 + [False] * 3 + [True] * 5 + [False]
+    assert GAPS.tells(at_s).tolist() == told
+    assert isinstance(bool(GAPS.tells(30.0)), bool)
+    found = estimate([(time, 15.0, 0.0, T) for time in at_s])
+    assert np.isfinite(position_errors_m(found, GAPS)).tolist() == told
+
+
+def test_what_lies_in_a_gap_of_the_truth_is_not_scored():
+    score = accuracy(estimate([(10, 15, 4, C), (30, 0, 900, T), (60, 75, 2, T)]), GAPS)
+    assert (score.success, score.error_at_switch_m, score.error_mean_m) == (True, 4.0, 3.0)
+    assert score.scored_epochs == 2
+    score = accuracy(estimate([(30, 45, 0, C), (60, 75, 2, T)]), GAPS)
+    assert (score.success, isnan(score.switch_distance_m)) == (None, True)
+    assert (score.error_mean_m, score.scored_epochs) == (2.0, 1)
+
+
+def test_what_the_truth_does_not_tell_is_noted():
+    at_switch = "the ground truth has no position at the switch ({} s): whether that was right is "
+    at_switch += "not known, and counts neither as right nor as wrong"
+    gaps = "{} in gaps of the ground truth (over 30 s and 50 m), and {} not scored"
+    for rows, notes in (
+        ([(10, 15, 4, C), (60, 75, 2, T)], ()),
+        ([(-5, 0, 0, S), (10, 15, 4, C), (200, 0, 0, T)], ()),
+        ([(-5, 0, 0, C), (10, 15, 4, T)], (at_switch.format(-5),)),
+        ([(10, 15, 4, C), (20, 0, 0, T)], (gaps.format("1 epoch lies", "is"),)),
+        (
+            [(20, 0, 0, C), (30, 0, 0, T)],
+            (at_switch.format(20), gaps.format("2 epochs lie", "are")),
+        ),
+        (
+            [(1000, 0, 0, C), (1200, 0, 0, T)],
+            (
+                "the ground truth (0 to 151 s) covers no epoch of the log (1000 to 1200 s): "
+                "another clock?",
+            ),
+        ),
+    ):
+        assert truth_notes(estimate(rows), GAPS) == notes
+    assert truth_notes(estimate([]), GAPS) == ()
 
 
 @given(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5))

@@ -123,6 +123,19 @@ def test_epochs_without_truth_do_not_count():
     assert found.km == pytest.approx(0.02)
 
 
+def test_epochs_in_a_gap_of_the_truth_do_not_count():
+    """The truth is at 0 and 40 s only, 400 m apart."""
+    record = Truth(np.array([0.0, 40.0]), np.array([0.0, 400.0]), np.zeros(2))
+    fixes = [
+        Fix(
+            time, 0.0, 0.0, np.eye(2), np.full(3, 1e3), status, 1, 1.0, 0, 0.0, Reason.USED, 1e3
+        )
+        for time, status in ((0.0, Status.TRACKING), (20.0, Status.CONVERGED), (40.0, Status.LOST))
+    ]  # fmt: skip
+    found = score_claims(TrackEstimate.of_fixes("EPSG:32629", "bayes", fixes), record)
+    assert (found.epochs, found.claimed, found.converged, found.within_50m) == (2, 1, 0, 1)
+
+
 def test_a_track_without_a_claim():
     found = claims("SSLS", 5.0)
     assert (found.claimed, found.within_50m, found.covered) == (0, 0, (0, 0, 0, 0))

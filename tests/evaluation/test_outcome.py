@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from mapfilter.evaluation.accuracy import outcome
+from mapfilter.evaluation.outcome import outcome
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading

@@ -40,8 +40,9 @@ def test_wilson_of_impossible_counts(successes, runs):
 
 
 def score(error_at_switch_m, distance_m=100.0, mean_m=4.0, share_67_m=5.0, share_95_m=9.0):
+    right = None if isnan(error_at_switch_m) else error_at_switch_m <= 50
     return Accuracy(
-        True, error_at_switch_m <= 50, 60.0, distance_m, error_at_switch_m,
+        True, right, 60.0, distance_m, error_at_switch_m,
         mean_m, share_67_m, share_95_m, 10,
     )  # fmt: skip
 
@@ -67,8 +68,19 @@ def test_a_summary_by_hand():
 
 
 def test_a_switch_where_the_truth_is_unknown_is_neither_right_nor_wrong():
-    summary = summarise([score(nan), score(1.0)])
-    assert (summary.switched, summary.successes, summary.success, summary.wrong) == (2, 1, 0.5, 0)
+    summary = summarise([score(nan, nan, 900.0), score(1.0), score(51.0), score(nan)])
+    assert (summary.runs, summary.switched, summary.successes) == (2, 2, 1)
+    assert (summary.success, summary.wrong) == (0.5, 0.5)
+    assert (summary.success_low, summary.success_high) == wilson_interval(1, 2)
+    assert (summary.switch_distance_m, summary.error_mean_m) == (100.0, 4.0)
+    nothing = summarise([score(nan)], ["a"])
+    assert (nothing.runs, isnan(nothing.success)) == (0, True)
+
+
+def test_routes_are_those_of_the_runs_that_are_told():
+    scores = [score(nan), score(1.0), score(60.0), score(1.0)]
+    found = summarise(scores, ["a", "b", "b", "c"])
+    assert found == summarise(scores[1:], ["b", "b", "c"])
 
 
 def test_a_summary_of_nothing_and_of_failures():

@@ -74,6 +74,20 @@ def test_a_score_has_the_error_of_each_epoch(track):
     assert repr(mf.score(track.estimate, walk_log().truth)) == repr(score)
 
 
+def test_a_score_says_what_the_ground_truth_does_not_tell(track):
+    truth = walk_log().truth
+    whole = mf.score(track, truth)
+    late = mf.score(track, truth[truth["time_s"] > whole.switch_time_s])
+    assert (late.switched, late.success) == (True, None)
+    begins = "Score: converged where the ground truth does not tell; then "
+    assert repr(late).startswith(begins + f"{late.error_mean_m:.1f} m on average")
+    other = mf.score(track, truth.assign(time_s=truth["time_s"] + 1e6))
+    assert repr(other) == (
+        "Score: converged where the ground truth does not tell; "
+        "the ground truth tells nothing of what came then"
+    )
+
+
 def test_what_is_no_ground_truth_is_refused(track):
     with pytest.raises(mf.MapfilterError, match="columns time_s, east_m and north_m, found x"):
         mf.score(track, pd.DataFrame({"x": [1.0]}))

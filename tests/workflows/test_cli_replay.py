@@ -183,6 +183,19 @@ def test_notes_of_a_log_are_told(log, replay):
     assert f"notes:\n  {told[0]}\n  {told[1]}\n" in replay(log).out
 
 
+def test_a_ground_truth_that_begins_after_the_switch_tells_nothing_of_it(log, replay, tmp_path):
+    at_s = assert_done(replay(log, "--json")).json["switch_time_s"]
+    truth = pd.read_csv(log / "truth.csv")
+    truth[truth["time_s"] > at_s].to_csv(log / "truth.csv", index=False)
+    found = assert_done(replay(log, "--json", "--set", 'output.pictures="first"')).json
+    assert (found["switched"], found["success"], found["switch_time_s"]) == (True, None, at_s)
+    assert (found["switch_distance_m"], found["error_at_switch_m"]) == (None, None)
+    assert found["error_mean_m"] > 0
+    told = f"the ground truth has no position at the switch ({at_s:.0f} s): whether that was right"
+    assert [note[: len(told)] for note in found["notes"]] == [told]
+    assert (tmp_path / "out" / "error.png").exists()
+
+
 def test_several_logs_are_summed_up_without_truth(own_world, replay, tmp_path):
     for folder in sorted(own_world.journeys.iterdir()):
         log = read_log(folder)

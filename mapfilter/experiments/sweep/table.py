@@ -20,7 +20,13 @@ from mapfilter.evaluation.accuracy import Accuracy
 from mapfilter.evaluation.success import COORDINATES, SuccessCell
 from mapfilter.experiments.sweep.plan import Run
 
-_TYPES = {"str": pa.string(), "float": pa.float64(), "int": pa.int32(), "bool": pa.bool_()}
+_TYPES = {
+    "str": pa.string(),
+    "float": pa.float64(),
+    "int": pa.int32(),
+    "bool": pa.bool_(),
+    "bool | None": pa.bool_(),
+}
 
 
 def _columns(of: type) -> list[tuple[str, pa.DataType]]:

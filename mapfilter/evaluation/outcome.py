@@ -1,0 +1,77 @@
+"""What a filter reports of a located track, without any ground truth."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.geodesy import unproject
+from mapfilter.positioning.estimate import TrackEstimate
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One located track.
+
+    Parameters
+    ----------
+    final_status : str
+        Status at the last epoch; empty without any epoch.
+    switched : bool
+        Whether the filter ever switched to tracking.
+    switch_time_s : float
+        When, in seconds since the start of the log; NaN if it never did.
+    epochs : int
+        How many there are.
+    epochs_by_status : dict
+        How many of each status that occurs.
+    last_lon_deg, last_lat_deg : float
+        The last position, WGS 84; NaN where there is none.
+    last_time_s : float
+        When that was.
+    unused : dict
+        How many readings were not used, by reason.
+    unknown_cells : dict
+        How many readings name each cell that is not in the database, the most frequent first.
+    """
+
+    final_status: str
+    switched: bool
+    switch_time_s: float
+    epochs: int
+    epochs_by_status: dict[str, int]
+    last_lon_deg: float
+    last_lat_deg: float
+    last_time_s: float
+    unused: dict[str, int]
+    unknown_cells: dict[str, int]
+
+
+def outcome(estimate: TrackEstimate) -> Outcome:
+    """Summarise a located track."""
+    switch = estimate.converged_at
+    statuses = Counter(estimate.status)
+    located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))[-1:]
+    lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
+    unused: Counter[str] = Counter()
+    unknown: Counter[str] = Counter()
+    for reading in estimate.unused:
+        unused[str(reading.reason)] += reading.readings
+        if reading.reason is Reason.UNKNOWN_CELL:
+            unknown[reading.what] += reading.readings
+    return Outcome(
+        str(estimate.status[-1]) if len(estimate) else "",
+        switch is not None,
+        float(estimate.time_s[switch]) if switch is not None else nan,
+        len(estimate),
+        {str(status): statuses[status] for status in Status if statuses[status]},
+        float(lon[0]) if located.size else nan,
+        float(lat[0]) if located.size else nan,
+        float(estimate.time_s[located[0]]) if located.size else nan,
+        dict(sorted(unused.items())),
+        dict(sorted(unknown.items(), key=lambda one: (-one[1], one[0]))),
+    )
