@@ -39,8 +39,9 @@ _SHADES = {
     Status.SEARCHING: "#eeeeee",
     Status.UNCERTAIN: "#fbf3d0",
     Status.LOST: "#f7d9c9",
+    Status.OUTSIDE: "#c4dcf0",
 }
-_SPANS = (*_SHADES.values(), "#dce9f5")
+_SPANS = tuple(_SHADES.values())
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, GREY)
 _WIDE, _LEAST_M = 12.0, 0.3
 _SQUARE_M, _SQUARE_S = 25.0, 20.0
@@ -61,9 +62,9 @@ def plot_error_over_distance(
     The error's axis is logarithmic where hundreds of metres become few; the filter's own radii are
     a band, its protection levels dotted; epochs without a position leave a gap. Marks the switch
     from searching to tracking, the 50 m that count as success there, the mean and the 67 and 95 %
-    errors after it, and where the filter was searching, uncertain or lost. ``single_reports_m`` are
-    errors of reports that were located one by one: their median is a line. Without a title it is
-    the filter's name.
+    errors after it, and where the filter was searching, uncertain, lost or outside of the map.
+    ``single_reports_m`` are errors of reports that were located one by one: their median is a line.
+    Without a title it is the filter's name.
     """
     distance_m = truth.distance_at(estimate.time_s)
     errors_m = position_errors_m(estimate, truth)
@@ -265,7 +266,7 @@ def running_mean(along: Floats, values: Floats, width: float) -> Floats:
 def shade_statuses(
     axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True
 ) -> None:
-    """Shade the stretches of a track during which the filter was searching, uncertain or lost."""
+    """Shade where the filter was searching, uncertain, lost or outside of the map, a shade each."""
     for status, colour in _SHADES.items():
         has = np.array([s is status for s in estimate.status], dtype=bool)
         name = status.lower() if named else None

@@ -256,6 +256,20 @@ def test_error_plot_shows_lost_and_radius(area, tmp_path):
     assert pixels_near(tmp_path / "e.png", "#f7d9c9") > 1000
 
 
+def test_every_status_without_a_claim_has_a_shade_of_its_own_and_a_name(area, tmp_path):
+    good = estimate(area, 100.0)
+    shaded = (Status.SEARCHING, Status.UNCERTAIN, Status.LOST, Status.OUTSIDE)
+    told = replace(good, status=tuple(shaded[4 * i // len(good)] for i in range(len(good))))
+    axes = plot_error_over_distance(told, area.truth)
+    handles, names = axes.get_legend_handles_labels()
+    found = {name: to_hex(one.get_facecolor()) for one, name in zip(handles, names, strict=True)
+             if name in [status.lower() for status in shaded]}  # fmt: skip
+    assert set(found) == {"searching", "uncertain", "lost", "outside"}
+    assert len(set(found.values())) == 4
+    save(axes, tmp_path / "e.png")
+    assert pixels_near(tmp_path / "e.png", found["outside"]) > 1000
+
+
 def test_an_error_that_is_nowhere_known_is_not_in_the_legend(area):
     good = estimate(area, 100.0)
     nowhere = np.full(len(good), np.nan)
