@@ -11,22 +11,26 @@ Import :func:`check_filter` into a test and give it a filter, a database and a l
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass, replace
 from math import isfinite, nan
 from typing import Any
 
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import (
     BeliefFilter,
     Estimate,
     MotionStep,
     Reason,
+    ReturnTypeError,
     Status,
     UpdateInfo,
 )
+from mapfilter.positioning.custom_filter import ADVICE
 from mapfilter.positioning.epochs import Epoch, epochs
 from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.filter import Filter, estimate_of, kinds_of, locate, usable_part
@@ -94,8 +98,29 @@ def check_filter(
         With the clause that is broken: a fix for every epoch, statuses in order, radii that grow,
         finite positions once converged, states that are never changed in place, an epoch without
         measurements that moves nothing, a result that only the generator decides, one epoch at a
-        time the same as the whole log.
+        time the same as the whole log, functions that return what they have to.
+    ConfigError
+        The code of a custom filter ends in an error, with its file and line.
     """
+    with _named_clause():
+        _check_filter(filter_, database, log, seed)
+
+
+@contextmanager
+def _named_clause() -> Iterator[None]:
+    """Name the clause of a function that returns something else; advise nobody to call this."""
+    try:
+        yield
+    except ReturnTypeError as error:
+        raise ContractError(str(error)) from error
+    except ConfigError as error:
+        if isinstance(error.__cause__, ReturnTypeError):
+            raise ContractError(str(error.__cause__)) from error
+        plain = (replace(one, hint="") if one.hint == ADVICE else one for one in error.faults)
+        raise ConfigError(tuple(plain)) from error.__cause__
+
+
+def _check_filter(filter_: Any, database: RadioRouteDatabase, log: TrackLog, seed: int) -> None:
     bound = as_filter(filter_, database)
     log, _ = usable_part(log, bound)
     merged = epochs(log)

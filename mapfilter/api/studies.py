@@ -81,7 +81,7 @@ def simulate(
     walker : WalkerModel, optional
         Place on the street, and stops.
     profile : {"walking", "driving"}
-        Ways that routes may use, and speed.
+        Ways that routes may use, and speed. Logs of drives state that a vehicle moved.
     seed : int
         Of routes and noise.
 

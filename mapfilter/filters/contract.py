@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from mapfilter._types import Floats
 
 PriorT = TypeVar("PriorT", contravariant=True)
 BeliefT = TypeVar("BeliefT")
+SecondT = TypeVar("SecondT")
 ReadingT = TypeVar("ReadingT", contravariant=True)
 
 
@@ -165,3 +166,52 @@ class BeliefFilter(Protocol[PriorT, BeliefT, ReadingT]):
 
     def locate(self, belief: BeliefT) -> Estimate:
         """Return the position of the belief."""
+
+
+class ReturnTypeError(TypeError):
+    """A function of a filter returned something else than its contract says.
+
+    Parameters
+    ----------
+    function : str
+        Its name.
+    expected, got : str
+        What it has to return, and what it did.
+    """
+
+    def __init__(self, function: str, expected: str, got: str) -> None:
+        self.function, self.expected, self.got = function, expected, got
+        super().__init__(f"{function} returns {expected}, not {got}")
+
+
+def checked_pair(
+    returned: Any, function: str, first: str, second: type[SecondT]
+) -> tuple[Any, SecondT]:
+    """Return what a function of a filter returned, where it is a pair of which the second is typed.
+
+    Parameters
+    ----------
+    first : str
+        What the first one is called.
+
+    Raises
+    ------
+    ReturnTypeError
+        It is no pair, or the second is of another type.
+    """
+    is_pair = isinstance(returned, tuple | list) and len(returned) == 2
+    if is_pair and isinstance(returned[1], second):
+        return returned[0], returned[1]
+    got = f"({first}, {_type_name(returned[1])})" if is_pair else _type_name(returned)
+    raise ReturnTypeError(function, f"({first}, {second.__name__})", got)
+
+
+def checked_estimate(returned: Any) -> Estimate:
+    """Return what ``locate`` returned; ReturnTypeError where it is no estimate."""
+    if isinstance(returned, Estimate):
+        return returned
+    raise ReturnTypeError("locate", "Estimate", _type_name(returned))
+
+
+def _type_name(value: object) -> str:
+    return "None" if value is None else type(value).__name__

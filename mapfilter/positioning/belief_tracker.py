@@ -12,7 +12,15 @@ import numpy as np
 
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.filters.contract import BeliefFilter, Estimate, Reason, Status, UpdateInfo
+from mapfilter.filters.contract import (
+    BeliefFilter,
+    Estimate,
+    Reason,
+    Status,
+    UpdateInfo,
+    checked_estimate,
+    checked_pair,
+)
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
@@ -109,16 +117,14 @@ class BeliefTracker(Filter[TrackState]):
             belief = self.filter.init(self.reading_of(epoch), rng)
         else:
             for motion in epoch.motion:
-                belief, moved = self.filter.predict(belief, motion, rng)
-                if not isinstance(moved, Reason):
-                    raise TypeError("predict returns (belief, Reason)")
+                returned = self.filter.predict(belief, motion, rng)
+                belief, moved = checked_pair(returned, "predict", "belief", Reason)
                 if moved is not Reason.USED:
                     unused.append(_unused(epoch, "motion", "", moved))
         reading = self.reading_of(epoch)
         if reading is not None:
-            belief, info = self.filter.update(belief, reading, rng)
-            if not isinstance(info, UpdateInfo):
-                raise TypeError("update returns (belief, UpdateInfo)")
+            updated = self.filter.update(belief, reading, rng)
+            belief, info = checked_pair(updated, "update", "belief", UpdateInfo)
             status, count, reason = info.status, info.hypotheses, info.reason
             label = _unused(epoch, SERVING, cell, reason)
             if reason not in _SILENT and label not in unused:
@@ -126,9 +132,7 @@ class BeliefTracker(Filter[TrackState]):
         elif status is Status.CONVERGED:
             # CONVERGED lasts one epoch, also where the next one has no measurement.
             status = Status.TRACKING
-        located = self.filter.locate(belief)
-        if not isinstance(located, Estimate):
-            raise TypeError(f"locate returns an Estimate, not {type(located).__name__}")
+        located = checked_estimate(self.filter.locate(belief))
         fix = self._fix(epoch, located, status, count, reason)
         return TrackState(belief, status, count), StepOutput(fix, unused=tuple(unused))
 

@@ -25,11 +25,15 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, MapfilterError, fail
+from mapfilter.filters.contract import ReturnTypeError, checked_pair
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
 from mapfilter.positioning.candidate import cell_points, startable
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind, Smoother
+
+ADVICE = "mapfilter.testing.check_filter names the clause of the contract that it breaks"
+"""Hint of errors in the code of a custom filter."""
 
 _BELIEF_FUNCTIONS = ("init", "predict", "update", "locate")
 _EPOCH_FUNCTIONS = ("begin", "step")
@@ -125,6 +129,8 @@ def _lacking(found: object, names: tuple[str, ...]) -> list[str]:
 def wrap_user_errors(name: str, owner: object = None) -> Iterator[None]:
     """Name the file and line of an error in a filter's code; the cause keeps the traceback.
 
+    Of what a function returns against the contract, the function is named.
+
     Parameters
     ----------
     owner : object
@@ -139,6 +145,9 @@ def wrap_user_errors(name: str, owner: object = None) -> Iterator[None]:
         yield
     except MapfilterError:
         raise
+    except ReturnTypeError as error:
+        where = f"filter {name}, {error.function}"
+        raise fail(ConfigError, where, f"it to return {error.expected}", error.got) from error
     except Exception as error:
         # The last line outside of libraries is most likely the user's own.
         frames, file = (
@@ -151,8 +160,7 @@ def wrap_user_errors(name: str, owner: object = None) -> Iterator[None]:
         own = [frame for frame in frames if file is not None and Path(frame.filename) == file]
         at = (own or list(frames))[-1]
         where = f"filter {name}, {Path(at.filename).name} line {at.lineno}, in {at.name}"
-        hint = "mapfilter.testing.check_filter names the clause of the contract that it breaks"
-        raise fail(ConfigError, where, "a filter that runs", _fault_text(error), hint) from error
+        raise fail(ConfigError, where, "a filter that runs", _fault_text(error), ADVICE) from error
 
 
 def _fault_text(error: BaseException) -> str:
@@ -266,7 +274,4 @@ class CustomEpochFilter(Filter[Any]):
     def step(self, state: Any, epoch: Epoch, rng: np.random.Generator) -> tuple[Any, StepOutput]:
         """Take one epoch."""
         with wrap_user_errors(self.name, self.filter):
-            state, output = self.filter.step(state, epoch, rng)
-            if not isinstance(output, StepOutput):
-                raise TypeError("step returns (state, StepOutput)")
-            return state, output
+            return checked_pair(self.filter.step(state, epoch, rng), "step", "state", StepOutput)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, accuracy, position_errors_m
 from mapfilter.filters.contract import Status
@@ -39,10 +39,12 @@ _SHADES = {
     Status.SEARCHING: "#eeeeee",
     Status.UNCERTAIN: "#fbf3d0",
     Status.LOST: "#f7d9c9",
+    Status.OUTSIDE: "#c4dcf0",
 }
-_SPANS = (*_SHADES.values(), "#dce9f5")
+_SPANS = tuple(_SHADES.values())
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, GREY)
 _WIDE, _LEAST_M = 12.0, 0.3
+_NEARLY_ALL = 0.9
 _SQUARE_M, _SQUARE_S = 25.0, 20.0
 _PANEL_IN, _PANELS_WIDE = (4.4, 2.3), 2
 
@@ -61,11 +63,11 @@ def plot_error_over_distance(
     The error's axis is logarithmic where hundreds of metres become few; the filter's own radii are
     a band, its protection levels dotted; epochs without a position leave a gap. Marks the switch
     from searching to tracking, the 50 m that count as success there, the mean and the 67 and 95 %
-    errors after it, and where the filter was searching, uncertain or lost. ``single_reports_m`` are
-    errors of reports that were located one by one: their median is a line. Without a title it is
-    the filter's name.
+    errors after it, and where the filter was searching, uncertain, lost or outside of the map.
+    ``single_reports_m`` are errors of reports that were located one by one: their median is a line.
+    Without a title it is the filter's name.
     """
-    distance_m = truth.distance_at(estimate.time_s)
+    distance_m = distance_along_m(estimate, truth)
     errors_m = position_errors_m(estimate, truth)
     length_m = max(float(truth.distance_at(truth.time_s[-1])), 1.0)
     score = accuracy(estimate, truth)
@@ -104,8 +106,9 @@ def plot_error_over_distance(
         at_m, error_m = float(truth.distance_at(score.switch_time_s)), score.error_at_switch_m
         star = Look(markersize=15, markeredgecolor="white", zorder=6, clip_on=False)
         name = f"switch: {error_m:.0f} m off after {at_m:.0f} m"
-        if score.success is not None:
-            axes.plot([at_m], [error_m], "*", color=VERMILLION, label=name, **star)
+        if score.success is None:
+            name = "switch: where the truth is not known"
+        axes.plot([at_m], [error_m], "*", color=VERMILLION, label=name, **star)
         for figure, after_m, dashes, colour in (
             ("mean", score.error_mean_m, "-", BLACK),
             ("67 %", score.error_67_m, (0, (6, 2)), GREEN),
@@ -119,6 +122,8 @@ def plot_error_over_distance(
         text = axes.text(0.5, 0.55, "never switched to tracking", transform=axes.transAxes)
         text.set(ha="center", color=GREY, fontsize=12, path_effects=HALO)
     axes.set(xlabel="distance travelled / m", ylabel="position error / m")
+    if not _covers(truth, estimate):
+        axes.set_xlabel(f"distance travelled / m, in the {_covered(truth, estimate)}")
     axes.set_title(title or f"Filter: {estimate.filter}")
     tidy(axes, grid=False)
     legend(axes, ax, 4)
@@ -205,10 +210,10 @@ def plot_errors_apart(
 def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = "") -> Figure:
     """Draw entropy, the leading hypothesis's and the runner-up's shares, and the status.
 
-    Over the true distance travelled; over seconds where the truth is not known. The entropy is
-    counted over squares of 25 m and rises by up to a bit wherever the belief lies across two of
-    them, so its mean over as long a way (over 20 s without truth) is drawn. Without a title it is
-    the filter's name.
+    Over the true distance travelled; over seconds where the truth is not known, or that of a part
+    only. The entropy is counted over squares of 25 m and rises by up to a bit wherever the belief
+    lies across two of them, so its mean over as long a way (or over 20 s) is drawn. Without a title
+    it is the filter's name.
 
     Raises
     ------
@@ -219,7 +224,7 @@ def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = 
     if evidence is None or not len(estimate):
         raise fail(InputError, "estimate, evidence", "epochs with probabilities", "none")
     along, across, window, mean = estimate.time_s, "time / s", _SQUARE_S, f"{_SQUARE_S:g} s"
-    if truth is not None and truth.time_s.size:
+    if truth is not None and truth.time_s.size and _covers(truth, estimate):
         along, across = truth.distance_at(estimate.time_s), "distance travelled / m"
         window, mean = _SQUARE_M, f"{_SQUARE_M:g} m"
     figure = new_figure(*_EVIDENCE_IN)
@@ -240,6 +245,27 @@ def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = 
     above.set_title(title or f"Filter: {estimate.filter}")
     bottom_legend(figure, 5)
     return figure
+
+
+def distance_along_m(estimate: TrackEstimate, truth: Truth) -> Floats:
+    """Return the true distance travelled at each epoch; NaN before and after the truth."""
+    covered = _during(truth, estimate)
+    return np.where(covered, truth.distance_at(estimate.time_s), np.nan)
+
+
+def _during(truth: Truth, estimate: TrackEstimate) -> Bools:
+    """Return which epochs lie within the times of a truth."""
+    return np.asarray((estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1]))
+
+
+def _covers(truth: Truth, estimate: TrackEstimate) -> bool:
+    """Return whether there is a truth at nearly all epochs."""
+    return not len(estimate) or bool(_during(truth, estimate).mean() >= _NEARLY_ALL)
+
+
+def _covered(truth: Truth, estimate: TrackEstimate) -> str:
+    known_s, whole_s = np.ptp(truth.time_s), np.ptp(estimate.time_s)
+    return f"{known_s:.0f} of {whole_s:.0f} s with a truth"
 
 
 def running_mean(along: Floats, values: Floats, width: float) -> Floats:
@@ -266,11 +292,15 @@ def running_mean(along: Floats, values: Floats, width: float) -> Floats:
 def shade_statuses(
     axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True
 ) -> None:
-    """Shade the stretches of a track during which the filter was searching, uncertain or lost."""
+    """Shade where the filter was searching, uncertain, lost or outside of the map, a shade each.
+
+    ``along`` is finite where there is something to shade.
+    """
     for status, colour in _SHADES.items():
-        has = np.array([s is status for s in estimate.status], dtype=bool)
+        has = np.array([s is status for s in estimate.status], dtype=bool) & np.isfinite(along)
         name = status.lower() if named else None
         for first, end in stretches(has):
-            ends = float(along[first]), float(along[min(end, along.size - 1)])
+            last = end if end < along.size and np.isfinite(along[end]) else end - 1
+            ends = float(along[first]), float(along[last])
             axes.axvspan(*ends, color=colour, linewidth=0, zorder=0, label=name)
             name = None

@@ -32,7 +32,7 @@ from mapfilter.report.canvas import (
     styled,
     tidy,
 )
-from mapfilter.report.errors import shade_statuses
+from mapfilter.report.errors import distance_along_m, shade_statuses
 from mapfilter.report.track import plot_track
 
 _SIDE_IN = 6.4
@@ -197,7 +197,7 @@ def plot_worst_run(
     plot_track(estimate, near, shown, left, title=place, zoom=False)
     left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3, frameon=False)
     _mark_worst(left, local_frame(shown), estimate, near, worst)
-    distance_m = truth.distance_at(estimate.time_s)
+    distance_m = distance_along_m(estimate, truth)
     errors_m = position_errors_m(estimate, truth)
     shade_statuses(right, estimate, distance_m)
     right.axhline(alert_limit_m, color=GREY, linewidth=1.0, linestyle=(0, (5, 3)))
@@ -216,7 +216,7 @@ def plot_worst_run(
     most_m = np.nanmax([*errors_m, *levels_m, 2 * SUCCESS_RADIUS_M])
     right.set_ylim(_LEAST_M, min(1.5 * most_m, max(_MOST_M, 1.2 * np.nanmax([*errors_m, 1.0]))))
     if last > first:
-        ends = distance_m[first], distance_m[last]
+        ends = truth.distance_at(estimate.time_s[[first, last]])
         name = f"claims > {SUCCESS_RADIUS_M:.0f} m off"
         right.hlines(1.15 * _LEAST_M, *ends, color=BLACK, linewidth=4.0, label=name)
     right.set_xlim(0.0, max(float(truth.distance_at(truth.time_s[-1])), 1.0))

@@ -36,6 +36,7 @@ _MARGIN_SHARE = 0.08
 _LEAST_MARGIN_M = 40.0
 _TRUTH = "#868686"
 _CLAIMED = (Status.CONVERGED, Status.TRACKING)
+_GONE = (Status.LOST, Status.OUTSIDE)
 
 
 @styled
@@ -141,8 +142,8 @@ def _outcome(estimate: TrackEstimate, truth: Truth | None) -> str:
             words += f", {score.error_at_switch_m:.0f} m off{right}"
             if np.isfinite(score.error_mean_m):
                 words += f"; mean error then {score.error_mean_m:.1f} m"
-    lost = len(estimate) and estimate.status[-1] is Status.LOST
-    return f"{words}; lost at the end" if lost else words
+    last = estimate.status[-1] if len(estimate) else Status.SEARCHING
+    return f"{words}; {last.lower()} at the end" if last in _GONE else words
 
 
 def _surroundings(estimate: TrackEstimate, truth: Truth | None) -> Bounds | None:

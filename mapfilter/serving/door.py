@@ -70,8 +70,9 @@ class Door:
         client = request.client.host if request.client is not None else ""
         wait_s = self.rate.wait_s(client, cost, time.monotonic()) if cost > 0 else 0.0
         if wait_s:
-            per_s = f"{self.limits.rate_per_s:g} a second"
-            error = RequestError(429, "rateLimitExceeded", f"more requests than {per_s}")
+            most = f"{self.limits.rate_per_s:g} a second, or {self.rate.burst:g} at once"
+            text = f"more epochs and other requests than {most} (each epoch of a request counts)"
+            error = RequestError(429, "rateLimitExceeded", text)
             error.retry_s = wait_s + again / self.limits.rate_per_s
             raise error
 

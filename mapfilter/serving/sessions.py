@@ -81,7 +81,7 @@ class Sessions:
         RequestError
             Faults (400), or there are as many sessions as there may be (503).
         """
-        name, seed, start = wanted(document, self.positioner.crs)
+        name, seed, start = wanted(document, self.positioner.area.lattice)
         if len(self.all) >= self.limits.sessions:
             most = f"{self.limits.sessions} sessions are open, the most there may be"
             raise RequestError(503, "tooManySessions", most)

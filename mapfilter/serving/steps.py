@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import project
+from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput
-from mapfilter.serving.documents import RequestError, check_keys, number, text, whole
+from mapfilter.serving.documents import RequestError, check_keys, text, whole
 from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.events import fix_document, json_bytes
+from mapfilter.serving.places import check_fixes, start_of
 from mapfilter.serving.session import Progress
 from mapfilter.serving.watching import Watcher
 from mapfilter.tracks.identify import PlanNames
@@ -84,6 +85,7 @@ def stepped(
         Faults of the request.
     """
     epochs = read_epochs(document, names, before.time_s)
+    check_fixes(epochs, before.state, positioner.area.lattice)
     rng = np.random.default_rng()
     rng.bit_generator.state = before.rng
     state, fixes, details, faults = before.state, [], [], [""]
@@ -130,9 +132,15 @@ def shown_or(nothing: bytes, make: Callable[[], bytes], faults: list[str]) -> by
 
 
 def wanted(
-    document: Mapping[str, Any], crs: str
+    document: Mapping[str, Any], lattice: Lattice
 ) -> tuple[str, int | None, tuple[float, float, float] | None]:
-    """Return name, seed and start (east, north, deviation) of a new session."""
+    """Return name, seed and start (east, north, deviation) of a new session over an area.
+
+    Raises
+    ------
+    RequestError
+        With all faults together.
+    """
     faults = Faults()
     check_keys(document, ("name", "seed", "start"), "body", faults)
     name, seed, start = "", None, None
@@ -142,22 +150,10 @@ def wanted(
         most = 2**SEED_BITS - 1
         seed = whole(document["seed"], "seed", f"a whole number in 0..{most}", faults, 0, most)
     given = document.get("start")
-    if given is not None and not isinstance(given, dict):
-        faults.add("start", "an object with lat_deg, lon_deg and sd_m", "something else")
+    if isinstance(given, dict):
+        start = start_of(given, lattice, faults)
     elif given is not None:
-        ranges = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": 1e5}
-        check_keys(given, tuple(ranges), "start", faults)
-        found = [
-            number(given.get(key), f"start.{key}", f"a number up to {most:g}", faults, low, most)
-            for key, most in ranges.items()
-            for low in (0.0 if key == "sd_m" else -most,)
-        ]
-        if not faults.found:
-            lat_deg, lon_deg, sd_m = (float(one) for one in found if one is not None)
-            east_m, north_m = project(crs, lon_deg, lat_deg)
-            if not (np.isfinite(east_m) and np.isfinite(north_m)):
-                faults.add("start", f"a place that {crs} covers", "one beyond it")
-            start = float(east_m), float(north_m), sd_m
+        faults.add("start", "an object with lat_deg, lon_deg and sd_m", "something else")
     if faults.found:
         raise RequestError.of(InputError(tuple(faults.found)))
     return name, seed, start

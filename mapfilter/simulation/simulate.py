@@ -104,7 +104,7 @@ def simulate_journeys(
     name : str
         Such as ``journey-0003-draw-000``; names sort in the order of the journeys.
     log : TrackLog
-        With its truth.
+        With its truth; of the profile "driving" it states that a vehicle moved.
 
     Raises
     ------
@@ -136,13 +136,17 @@ def simulate_log(
     imu_rng: np.random.Generator,
     radio_rng: np.random.Generator,
 ) -> TrackLog:
-    """Make the log of one journey; arguments as of :func:`simulate_journeys`."""
+    """Make the log of one journey; arguments as of :func:`simulate_journeys`.
+
+    A drive is stated to be a vehicle's (``log.vehicle``).
+    """
     return make_log(
         crs,
         motion=noisy_motion(at_ticks(truth, settings.imu.period_s), settings.imu, imu_rng),
         radio=reports(truth, levels, plan, settings.reports, radio_rng),
         truth=truth,
         start_utc_s=settings.start_utc_s,
+        vehicle=True if settings.journey.profile == "driving" else None,
     )
 
 

@@ -13,12 +13,12 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.misplaced import outside_m
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
-from mapfilter.workflows.on_lattice import outside_m
 
 _AWAY_M = 5000.0
 _MANY = 0.2

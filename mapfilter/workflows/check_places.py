@@ -18,7 +18,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg
 from mapfilter.roads.ways import Ways
-from mapfilter.workflows.on_lattice import outside_m
+from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.world import area_lattice
 
 BoxDeg = tuple[float, float, float, float]

@@ -28,6 +28,7 @@ from mapfilter.tracks.open_log import list_journeys
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
+from mapfilter.workflows.info_results import result_info
 
 _MAPS = (".pbf", ".osm", ".osm.gz", ".osm.bz2")
 _LAYERS = (".gpkg", ".shp", ".geojson", ".fgb")
@@ -39,7 +40,7 @@ _SAMPLED_PX = 4_000_000
 _LEAST_OF_PLAN = 2
 _PLACES = {"lat", "lon", "latitude", "longitude", "x", "y", "east", "north", "mcc", "mnc"}
 _PLAN = {name.casefold() for name in (*COLUMNS, *(n for names in ATOLL.values() for n in names))}
-_EXPECTED = "a database, raster, log, recording, map, layer or table"
+_EXPECTED = "a database, raster, log, recording, map, layer, table or result"
 _USE_OF: dict[str, str] = {
     "rinex-nav": "name it beside a recording of pseudoranges: mapfilter convert REC NAV --out LOG",
     "opencellid-cells": 'cells.plan, with cells.layout = "opencellid"',
@@ -72,6 +73,8 @@ def run_info(path: Path) -> dict[str, Any]:
     logs = sorted(inner for inner in path.iterdir() if is_log(inner))
     if logs:
         return {"kind": "logs", "logs": len(logs), "first": logs[0].name, "last": logs[-1].name}
+    if (found := result_info(path)) is not None:
+        return found
     recordings = _recordings_in(path)
     if recordings:
         counts = {name: recordings.count(name) for name in sorted(set(recordings))}
@@ -98,6 +101,8 @@ def _file_info(path: Path) -> dict[str, Any]:
     if is_log(path.parent):
         hint = "a part of a log; name the folder that it lies in"
         raise fail(InputError, str(path), _EXPECTED, "a file", hint)
+    if (found := result_info(path)) is not None:
+        return found
     if suffix == ".parquet":
         whole = (path.parent / MANIFEST).exists()
         hint = "a part of a database; name the folder that it lies in"

@@ -1,19 +1,8 @@
-"""Where positions and boxes lie, seen from a lattice."""
+"""Where boxes lie, seen from a lattice."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from mapfilter._types import Floats
 from mapfilter.geodesy import Lattice
-
-
-def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
-    """Return how far outside a lattice positions lie; 0 inside."""
-    west, south, east, north = lattice.bounds_m
-    off_east_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
-    off_north_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
-    return np.asarray(np.hypot(off_east_m, off_north_m))
 
 
 def pixels_on(

@@ -6,7 +6,6 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, listed
 from mapfilter.geodesy import Lattice, same_crs, short_crs
@@ -15,12 +14,12 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import by_streets_alone
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers import plain_csv
 from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
 from mapfilter.tracks.schema import PLACE, SERVING
-from mapfilter.workflows.misplaced import is_near, misplaced_by
 
 _MOTION_COLUMNS = (
     "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps "
@@ -46,7 +45,7 @@ def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> No
     for table in ("truth", "gnss"):
         places = getattr(log, table)
         east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
-        _check_near(f"{path}, {table}", east_m, north_m, lattice, faults)
+        check_near(f"{path}, {table}", east_m, north_m, lattice, faults)
 
 
 def lack_of(
@@ -213,18 +212,3 @@ def lacking(
     elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turns:
         lacks.append("no heading (turns alone do not give one; the filter bayes needs none)")
     return " and ".join(lacks)
-
-
-def _check_near(
-    where: str, east_m: Floats, north_m: Floats, lattice: Lattice, faults: Faults
-) -> None:
-    if not east_m.size or is_near(east_m, north_m, lattice):
-        return
-    box = lattice.bounds_m
-    found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
-    expected = f"positions near the database's {_box(*box)}"
-    faults.add(where, expected, _box(*found), misplaced_by(east_m, north_m, lattice))
-
-
-def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:
-    return f"{west_m:.0f}..{east_m:.0f} m east, {south_m:.0f}..{north_m:.0f} m north"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from mapfilter._io import read_json
 from mapfilter.errors import OutputError, StoreError, fail
@@ -19,9 +20,18 @@ PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.
 
 _OF_ONE_LOG = {*ESTIMATES, FIGURES, REPLAY_HTML, *PICTURES}
 
-
 _OF_REPLAY, _OF_REPORTS = "filter", "database_reports"
 """Entries that only the figures of a replay, and only those of single reports have."""
+
+
+def is_of_replay(figures: Mapping[str, Any]) -> bool:
+    """Return whether a replay wrote some figures."""
+    return _OF_REPLAY in figures
+
+
+def is_of_reports(figures: Mapping[str, Any]) -> bool:
+    """Return whether ``locate`` wrote some figures."""
+    return _OF_REPORTS in figures
 
 
 def check_figures_of_replay(out: Path) -> None:

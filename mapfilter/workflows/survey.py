@@ -29,7 +29,7 @@ from mapfilter.survey.leave_out import LeftOut, Validation, leave_out
 from mapfilter.survey.measured_map import Survey, SurveyOptions, fit_survey
 from mapfilter.survey.measurements import Measurements, named_after
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
-from mapfilter.workflows.on_lattice import outside_m
+from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.planned_cells import planned_cells
 from mapfilter.workflows.served import thinned_lattice

@@ -25,11 +25,12 @@ from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.maps import map_bounds_deg, resolve_map
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
+from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.area_lattice import area_lattice as area_lattice
 from mapfilter.workflows.area_lattice import check_scale as check_scale
 from mapfilter.workflows.area_lattice import roads_lattice as roads_lattice
-from mapfilter.workflows.on_lattice import outside_m, pixels_on
+from mapfilter.workflows.on_lattice import pixels_on
 from mapfilter.workflows.planned_cells import plan_antennas, planned_cells
 from mapfilter.workflows.stated_power import check_eirp_stated
 from mapfilter.workflows.streets import Streets

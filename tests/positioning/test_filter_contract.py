@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from cross_world import CROSSING, make_database, walk_log, walk_tables
 
+from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Estimate, Reason, Status, UpdateInfo
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
@@ -154,6 +155,59 @@ class Drifting(Steady):
 def test_a_breach_is_named(made, clause, database):
     with pytest.raises(ContractError, match=clause):
         check_filter(made, database, walk_log())
+
+
+class Silent(Beliefs):
+    def update(self, belief, epoch, rng):
+        return belief, None
+
+
+class Alone(Beliefs):
+    def update(self, belief, epoch, rng):
+        return belief
+
+
+class Unreasoned(Beliefs):
+    def predict(self, belief, motion, rng):
+        return belief, "used"
+
+
+class Nowhere(Beliefs):
+    def locate(self, belief):
+        return None
+
+
+class Stateless(Steady):
+    def step(self, state, epoch, rng):
+        return fix_at(epoch, Status.SEARCHING)
+
+
+@pytest.mark.parametrize(
+    ("made", "clause"),
+    [
+        (Silent, "update returns (belief, UpdateInfo), not (belief, None)"),
+        (Alone, "update returns (belief, UpdateInfo), not int"),
+        (Unreasoned, "predict returns (belief, Reason), not (belief, str)"),
+        (Nowhere, "locate returns Estimate, not None"),
+        (Stateless, "step returns (state, StepOutput), not StepOutput"),
+    ],
+)
+def test_a_function_that_returns_something_else_is_named(made, clause, database):
+    with pytest.raises(ContractError) as caught:
+        check_filter(made, database, walk_log())
+    assert str(caught.value) == clause
+
+
+class Dividing(Beliefs):
+    def update(self, belief, epoch, rng):
+        return belief / 0
+
+
+def test_an_error_in_a_filter_does_not_advise_the_check_that_met_it(database):
+    with pytest.raises(ConfigError, match=r"in update: .*ZeroDivisionError") as caught:
+        check_filter(Dividing, database, walk_log())
+    assert "check_filter" not in str(caught.value)
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
 
 
 def test_a_short_log_is_not_enough(database):

@@ -143,8 +143,8 @@ def test_what_a_function_makes_is_looked_at_too(tmp_path):
     ("name", "told"),
     [
         ("Failing", r"test_own_filter.py line \d+, in update: .*ValueError: the idea was wrong"),
-        ("Talking", r"TypeError: update returns \(belief, UpdateInfo\)"),
-        ("Floating", "TypeError: locate returns an Estimate, not tuple"),
+        ("Talking", r"Talking, update: expected it to return \(belief, UpdateInfo\), found"),
+        ("Floating", "Floating, locate: expected it to return Estimate, found tuple$"),
     ],
 )
 def test_what_goes_wrong_in_it_is_told_with_its_place(name, told, tmp_path):

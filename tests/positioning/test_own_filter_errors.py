@@ -133,7 +133,7 @@ def test_a_filter_over_epochs_is_asked_for_what_it_has():
 def test_a_step_without_an_output_breaks_the_contract():
     own = Plain()
     own.step = lambda *_: ("state", "no output")
-    with pytest.raises(ConfigError, match=r"TypeError: step returns \(state, StepOutput\)"):
+    with pytest.raises(ConfigError, match=r"step: expected it to return \(state, StepOutput\)"):
         CustomEpochFilter(own, "package:Own", "EPSG:32632").step("state", "epoch", "rng")
 
 

@@ -99,6 +99,12 @@ def test_evidence_with_and_without_truth(tmp_path, truth):
     assert blue_pixels(tmp_path / "evidence.png") > 300
 
 
+def test_evidence_is_over_time_where_the_truth_is_of_a_part():
+    part = Truth(TRUTH.time_s[50:90], TRUTH.east_m[50:90], TRUTH.north_m[50:90])
+    names = [plot_evidence(estimate(), truth).axes[1].get_xlabel() for truth in (TRUTH, part)]
+    assert names == ["distance travelled / m", "time / s"]
+
+
 def test_entropy_does_not_rise_where_a_belief_crosses_squares():
     """A narrow belief on the way lies in one square of 25 m, in two, in one again."""
     found = estimate()

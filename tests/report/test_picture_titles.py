@@ -56,6 +56,7 @@ SEARCHING, CONVERGED, TRACKING, UNCERTAIN, LOST, OUTSIDE = Status
     [
         (track(SEARCHING, SEARCHING), TRUTH, "did not converge"),
         (track(SEARCHING, LOST), TRUTH, "did not converge; lost at the end"),
+        (track(SEARCHING, OUTSIDE), TRUTH, "did not converge; outside at the end"),
         (track(SEARCHING, CONVERGED), None, "converged after 50 s"),
         (track(SEARCHING, CONVERGED), NOTHING, "converged after 50 s"),
         (

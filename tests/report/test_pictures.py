@@ -256,6 +256,38 @@ def test_error_plot_shows_lost_and_radius(area, tmp_path):
     assert pixels_near(tmp_path / "e.png", "#f7d9c9") > 1000
 
 
+def test_every_status_without_a_claim_has_a_shade_of_its_own_and_a_name(area, tmp_path):
+    good = estimate(area, 100.0)
+    shaded = (Status.SEARCHING, Status.UNCERTAIN, Status.LOST, Status.OUTSIDE)
+    told = replace(good, status=tuple(shaded[4 * i // len(good)] for i in range(len(good))))
+    axes = plot_error_over_distance(told, area.truth)
+    handles, names = axes.get_legend_handles_labels()
+    found = {name: to_hex(one.get_facecolor()) for one, name in zip(handles, names, strict=True)
+             if name in [status.lower() for status in shaded]}  # fmt: skip
+    assert set(found) == {"searching", "uncertain", "lost", "outside"}
+    assert len(set(found.values())) == 4
+    save(axes, tmp_path / "e.png")
+    assert pixels_near(tmp_path / "e.png", found["outside"]) > 1000
+
+
+def test_errors_are_drawn_where_the_truth_is_known(area):
+    """Radii and statuses of the rest do not pile up at its ends."""
+    good = replace(estimate(area, 100.0), radii_m=np.full((61, 3), 25.0))
+    for first, last, switch in ((0, 150, "10 m off"), (150, 251, "the truth is not known")):
+        known = slice(first, last)
+        truth = Truth(area.truth.time_s[known], area.truth.east_m[known], area.truth.north_m[known])
+        axes = plot_error_over_distance(good, truth)
+        lines = {line.get_label(): line.get_xdata() for line in axes.lines}
+        drawn_m = lines["95 % radius; darker: 67, 50 %"]
+        assert np.isfinite(drawn_m).sum() == np.ptp(truth.time_s) // 5 + 1
+        _, names = axes.get_legend_handles_labels()
+        assert ("searching" in names) is (first == 0)
+        (star,) = (name for name in names if name.startswith("switch: "))
+        assert switch in star
+        of_s = f"{np.ptp(truth.time_s):.0f} of 300 s with a truth"
+        assert axes.get_xlabel() == f"distance travelled / m, in the {of_s}"
+
+
 def test_an_error_that_is_nowhere_known_is_not_in_the_legend(area):
     good = estimate(area, 100.0)
     nowhere = np.full(len(good), np.nan)

@@ -223,6 +223,10 @@ def test_requests_and_epochs_are_limited_by_rate(positioner, cross):
             assert answer.code == 200
             answer = await ask(app, "GET", "/")
             assert (answer.code, answer.reason) == (429, "rateLimitExceeded")
+            assert answer.json["error"]["message"] == (
+                "more epochs and other requests than 0.5 a second, or 10 at once (each epoch of a "
+                "request counts)"
+            )
             assert int(answer.headers["retry-after"]) >= 1
 
         asyncio.run(run())

@@ -97,6 +97,11 @@ def test_driving(town, levels, plan):
     )
     (log,) = made(town, levels, plan, settings).values()
     assert 150 < log.duration_s < 400
+    assert log.vehicle is True
+
+
+def test_walks_do_not_state_whose_motion_it_is(town, levels, plan):
+    assert {log.vehicle for log in made(town, levels, plan).values()} == {None}
 
 
 @pytest.mark.parametrize("form", ["parquet", "csv"])

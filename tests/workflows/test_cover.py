@@ -9,7 +9,7 @@ from command_line import assert_done, assert_refused, contents, mapfilter
 
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.workflows.on_lattice import outside_m
+from mapfilter.tracks.misplaced import outside_m
 
 BEYOND = "--set=area.bbox=24.9420,60.1660,24.9645,60.1697"
 """The world's box, three times as wide."""

@@ -1,6 +1,7 @@
 """``info`` says what files and folders of all kinds are, and where to use them."""
 
 import gzip
+import json
 from pathlib import Path
 
 import geopandas
@@ -12,6 +13,9 @@ from command_line import assert_done, assert_refused, mapfilter
 from made_recordings import MADE
 
 from mapfilter.errors import InputError
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate_store import write_estimate, write_gpx
 from mapfilter.roads.maps import resolve_map
 from mapfilter.workflows.info import run_info
 
@@ -176,3 +180,72 @@ def test_a_file_that_cannot_be_opened_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("mapfilter._inputs.os.open", refuse)
     with pytest.raises(InputError, match="a readable file, found Permission denied"):
         run_info(tmp_path / "a.json")
+
+
+def estimate_in(folder, figures=None):
+    """An estimate of two epochs in a folder, with figures beside it."""
+    fixes = [
+        Fix(float(time_s), 385_000.0, 6_672_000.0, np.eye(2), np.arange(3.0), status, 1, np.nan, 0,
+            np.nan, Reason.USED)
+        for time_s, status in enumerate((Status.SEARCHING, Status.CONVERGED))
+    ]  # fmt: skip
+    folder.mkdir(parents=True)
+    estimate = TrackEstimate.of_fixes("EPSG:32635", "bayes", fixes)
+    write_estimate(estimate, folder / "estimate.parquet")
+    write_gpx(estimate, folder / "estimate.gpx")
+    if figures is not None:
+        (folder / "figures.json").write_text(json.dumps(figures))
+    return folder
+
+
+FIGURES = {
+    "log": "walk", "filter": "bayes", "epochs": 2, "epochs_by_status": {"SEARCHING": 1},
+    "switched": True, "switch_time_s": 1.0, "error_mean_m": 7.5, "unused": {}, "notes": [],
+}  # fmt: skip
+
+
+def test_a_replay_is_a_result_no_recording(tmp_path):
+    folder = estimate_in(tmp_path / "located", FIGURES)
+    shown = {name: FIGURES[name] for name in FIGURES if name not in ("unused", "notes")}
+    for path, kind in (
+        (folder, "replay"),
+        (folder / "estimate.parquet", "estimate"),
+        (folder / "estimate.gpx", "estimate"),
+    ):
+        found = info(path)
+        assert found.pop("use").startswith("what a filter estimated, no ground truth; ")
+        assert found == {"kind": kind, **shown}
+    (folder / "replay.html").touch()
+    assert info(folder)["use"].endswith(f"mapfilter view {folder}")
+    (folder / "figures.json").write_text("{")
+    assert_refused(mapfilter("info", folder), "figures.json: expected")
+
+
+def test_an_estimate_by_itself(tmp_path):
+    folder = estimate_in(tmp_path / "located")
+    found = info(folder / "estimate.parquet")
+    assert (found["kind"], found["filter"], found["switched"]) == ("estimate", "bayes", True)
+    assert found["epochs_by_status"] == {"SEARCHING": 1, "CONVERGED": 1}
+
+
+def test_several_replays_and_located_reports(tmp_path):
+    for name in ("a", "b"):
+        estimate_in(tmp_path / "several" / name, FIGURES)
+    figures = {"logs": 2, "switched": 1, "final_statuses": {"LOST": 1, "TRACKING": 1}}
+    (tmp_path / "several" / "summary.json").write_text(json.dumps(figures))
+    found = info(tmp_path / "several")
+    assert found.pop("use").startswith("what a filter estimated")
+    assert found == {"kind": "replays", **figures}
+    (tmp_path / "reports").mkdir()
+    (tmp_path / "reports" / "positions.csv").write_text("time_s,lat,lon\n0,60,24\n")
+    (tmp_path / "reports" / "figures.json").write_text('{"database_reports": 9, "reports": 3}')
+    found = info(tmp_path / "reports")
+    assert (found["kind"], found["reports"]) == ("located reports", 3)
+
+
+def test_figures_of_another_program_are_no_results(tmp_path):
+    name, text = MADE["gpx"]
+    (tmp_path / name).write_text(text)
+    (tmp_path / "summary.json").write_text("[1, 2]")
+    (tmp_path / "figures.json").write_text("no JSON")
+    assert info(tmp_path)["kind"] == "recordings"

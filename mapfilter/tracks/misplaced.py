@@ -1,4 +1,4 @@
-"""Positions that lie elsewhere than a database: which mistake would put them into its area."""
+"""Positions that lie elsewhere than an area: how far, and which mistake would put them into it."""
 
 from __future__ import annotations
 
@@ -8,13 +8,20 @@ import numpy as np
 from pyproj.exceptions import ProjError
 
 from mapfilter._types import Floats
+from mapfilter.errors import Faults
 from mapfilter.geodesy import Lattice, project, unproject
-from mapfilter.workflows.on_lattice import outside_m
 
 AWAY_M = 5000.0
 """Positions all of which lie farther outside of an area are those of another one."""
-_ELSEWHERE = "log of another area or zone"
 _MOST_TRIED = 200
+
+
+def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
+    """Return how far outside a lattice positions lie; 0 inside."""
+    west, south, east, north = lattice.bounds_m
+    off_east_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
+    off_north_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
+    return np.asarray(np.hypot(off_east_m, off_north_m))
 
 
 def is_near(east_m: Floats, north_m: Floats, lattice: Lattice) -> bool:
@@ -25,8 +32,38 @@ def is_near(east_m: Floats, north_m: Floats, lattice: Lattice) -> bool:
     return float(outside_m(east_m[known], north_m[known], lattice).min()) <= AWAY_M
 
 
+def check_near(
+    where: str,
+    east_m: Floats,
+    north_m: Floats,
+    lattice: Lattice,
+    faults: Faults,
+    otherwise: str = "log of another area or zone",
+) -> None:
+    """Note positions of which none lies near a database's area, with the likely mistake.
+
+    Parameters
+    ----------
+    east_m, north_m : (N,) array
+        In the CRS of the lattice; none are no fault.
+    otherwise : str
+        The mistake to name where none of the usual ones explains them.
+    """
+    if not east_m.size or is_near(east_m, north_m, lattice):
+        return
+    box = lattice.bounds_m
+    found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
+    expected = f"positions near the database's {_box(*box)}"
+    mistake = misplaced_by(east_m, north_m, lattice) or otherwise
+    faults.add(where, expected, _box(*found), mistake)
+
+
+def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:
+    return f"{west_m:.0f}..{east_m:.0f} m east, {south_m:.0f}..{north_m:.0f} m north"
+
+
 def misplaced_by(east_m: Floats, north_m: Floats, lattice: Lattice) -> str:
-    """Return the likely mistake of positions that lie outside of a lattice.
+    """Return the likely mistake of positions that lie outside of a lattice; "" for none of them.
 
     Each of the usual mistakes is undone; the first one that brings them into the area is named.
 
@@ -40,7 +77,7 @@ def misplaced_by(east_m: Floats, north_m: Floats, lattice: Lattice) -> str:
     for mistake, east, north in _undone(lattice.crs, east_m, north_m):
         if is_near(east, north, lattice):
             return mistake
-    return _ELSEWHERE
+    return ""
 
 
 def _undone(crs: str, east_m: Floats, north_m: Floats) -> Iterator[tuple[str, Floats, Floats]]:

@@ -1,0 +1,93 @@
+"""Positions that devices send: in or near the area, or refused with the likely mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import Lattice, project, unproject
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.epochs import Epoch
+from mapfilter.serving.documents import RequestError, check_keys, number
+from mapfilter.tracks.misplaced import check_near, misplaced_by, outside_m
+
+START_REACH_M, START_REACH_SD = 500.0, 5.0
+"""A start is of this area up to so far outside, or up to so many of its own deviations."""
+
+_RANGES = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": 1e5}
+_MOST_DEG = 180.0
+_ELSEWHERE = "a position of another area or zone"
+
+
+def start_of(
+    given: Mapping[str, Any], lattice: Lattice, faults: Faults
+) -> tuple[float, float, float] | None:
+    """Return a known start (east, north, deviation) in the CRS of an area; None, with faults.
+
+    Parameters
+    ----------
+    given : mapping
+        ``lat_deg``, ``lon_deg`` and ``sd_m``.
+    lattice : Lattice
+        Of the area. A start farther outside than 500 m and than five deviations is a fault.
+    """
+    before = len(faults.found)
+    check_keys(given, tuple(_RANGES), "start", faults)
+    found = [
+        number(given.get(key), f"start.{key}", f"a number up to {most:g}", faults, low, most)
+        for key, most in _RANGES.items()
+        for low in (0.0 if key == "sd_m" else -most,)
+    ]
+    if len(faults.found) > before:
+        return None
+    lat_deg, lon_deg, sd_m = (float(one) for one in found if one is not None)
+    east_m, north_m = project(lattice.crs, [lon_deg], [lat_deg])
+    if not (np.isfinite(east_m).all() and np.isfinite(north_m).all()):
+        faults.add("start", f"a place that {lattice.crs} covers", "one beyond it")
+        return None
+    reach_m = max(START_REACH_M, START_REACH_SD * sd_m)
+    away_m = float(outside_m(east_m, north_m, lattice)[0])
+    if away_m > reach_m:
+        expected = f"a place in the area ({_box_deg(lattice)}), or at most {reach_m:.0f} m outside"
+        got = f"latitude {lat_deg:g}, longitude {lon_deg:g}, {away_m / 1000:.1f} km outside"
+        faults.add("start", expected, got, misplaced_by(east_m, north_m, lattice) or _ELSEWHERE)
+        return None
+    return float(east_m[0]), float(north_m[0]), sd_m
+
+
+def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -> None:
+    """Check that a position of a request lies near an area, as one of a log has to.
+
+    It is checked until a position of the session was used; the device may leave the area later.
+    Once the session has a belief, only positions that a usual mistake explains are a fault: others
+    may be those of a spoofer, and the filter rejects them.
+
+    Raises
+    ------
+    RequestError
+        There are positions, and all of them lie elsewhere (400).
+    """
+    placed = [(index, one.fix) for index, one in enumerate(epochs) if one.fix is not None]
+    if not placed or before.last_fix is not None:
+        return
+    east_m = np.array([fix.east_m for _, fix in placed])
+    north_m = np.array([fix.north_m for _, fix in placed])
+    # Also those of a place that is not near: no receiver reports metres as small.
+    as_small = np.maximum(np.abs(east_m), np.abs(north_m)).max() <= _MOST_DEG
+    mistake = "degrees given for metres" if as_small else misplaced_by(east_m, north_m, lattice)
+    if before.belief is not None and not mistake:
+        return
+    faults, where = Faults(), f"epochs[{placed[0][0]}].gnss"
+    check_near(where, east_m, north_m, lattice, faults, mistake or _ELSEWHERE)
+    if faults.found:
+        raise RequestError.of(InputError(tuple(faults.found)))
+
+
+def _box_deg(lattice: Lattice) -> str:
+    west, south, east, north = lattice.bounds_m
+    lon_deg, lat_deg = unproject(lattice.crs, [west, west, east, east], [south, north] * 2)
+    latitudes = f"latitude {lat_deg.min():.4f} to {lat_deg.max():.4f}"
+    return f"{latitudes}, longitude {lon_deg.min():.4f} to {lon_deg.max():.4f}"
