@@ -272,7 +272,7 @@ def read_cell_plan(
     columns : mapping of str to str, optional
         The file's column by field, where it has another name; other columns are ignored, then.
     defaults : mapping of str to float, optional
-        With ``columns`` or another layout: values of fields that have no column or are empty.
+        Values of fields that have no column or are empty, with a note.
     bounds_m : tuple of float, optional
         West, south, east, north: cells beyond them are left out with a note.
 
