@@ -40,6 +40,7 @@ from mapfilter.options import Positive
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork, street_network
 from mapfilter.roads.osm import Profile
@@ -135,7 +136,7 @@ def simulate(
         imu=imu or ImuNoise(),
         reports=reports or ReportModel(),
     )
-    network = _network(roads, rasters, profile)
+    network, rasters = _network(roads, rasters, profile), named_by_plan(rasters, cells)
     return dict(simulate_journeys(network, rasters, cells, settings, seed))
 
 
@@ -260,7 +261,8 @@ def sweep(
         for noise, varied in _distinguished(several or (ImuNoise(),))
     ]
     network = _network(roads, rasters, "walking")
-    world = SweepWorld.of(network, database.plan, {radio.name: rasters})
+    named = named_by_plan(rasters, database.plan)
+    world = SweepWorld.of(network, database.plan, {radio.name: named})
     return Sweep(sweep_runs(plans, world, {"database": database}, executor=executor))
 
 
