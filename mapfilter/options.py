@@ -14,6 +14,7 @@ Names carry their unit (``_m``, ``_deg``, ``_dbm``).
 from __future__ import annotations
 
 import operator
+import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -259,6 +260,8 @@ def fits(annotation: Any, value: Any) -> bool:
         return value is None
     if inner is bool or inner is str:
         return isinstance(value, inner)
+    if inner is Path:
+        return isinstance(value, str | os.PathLike)
     if inner in (int, float):
         try:
             number = float(value)
@@ -271,7 +274,7 @@ def fits(annotation: Any, value: Any) -> bool:
         return (inner is float or number == int(number)) and all(
             _holds(one, value) for one in limits
         )
-    # Lists, paths and nested options check themselves or are checked by their owner.
+    # Lists and nested options check themselves or are checked by their owner.
     return not (isinstance(inner, type) and is_dataclass(inner)) or isinstance(value, inner)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from mapfilter._arguments import Argument, check_arguments, check_seed
+from mapfilter._arguments import Argument, Setting, WholeNumber, check_arguments
 from mapfilter.api.given import database_argument, opened
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.first_fix import FirstFixOptions
@@ -95,12 +95,14 @@ def bound(
     ConfigError
         An argument is none of these, or the seed is none.
     """
-    check_arguments("bound", database_argument(database))
     check_arguments(
         "bound",
-        Argument("errors", errors, ErrorModel | None, "ErrorModel"),
-        Argument("options", options, FirstFixOptions | None, "FirstFixOptions"),
+        database_argument(database),
+        keywords=[
+            Argument("errors", errors, ErrorModel | None, "ErrorModel"),
+            Argument("options", options, FirstFixOptions | None, "FirstFixOptions"),
+            Setting("seed", seed, WholeNumber),
+        ],
     )
-    check_seed("bound", seed)
     database = opened(database)
     return Bound(bound_of(database, errors=errors, options=options, seed=seed), database)

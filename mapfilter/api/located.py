@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from mapfilter._arguments import Argument, check_arguments, generator
+from mapfilter._arguments import Argument, Setting, check_arguments, generator
 from mapfilter.api.given import database_argument, log_argument, opened, read
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
+from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.integrity import DEFAULT_RISK
@@ -158,10 +159,20 @@ def locate(
     StoreError
         A path holds no database, or one that is damaged.
     ConfigError
-        Log or database is neither, the seed is none, the filter is none, a custom filter fails, or
-        the risk does not lie between 0 and 1.
+        Log or database is neither, the seed is none, the filter is none, a custom filter fails,
+        the risk does not lie between 0 and 1, or another argument is of another type.
     """
-    check_arguments("locate", log_argument(log), database_argument(database))
+    check_arguments(
+        "locate",
+        log_argument(log),
+        database_argument(database),
+        keywords=[
+            Setting("ways", ways, bool),
+            Setting("snapshots", snapshots, bool),
+            Setting("risk", risk, Probability),
+            Setting("record", record, bool),
+        ],
+    )
     rng = generator("locate", seed)
     database = opened(database)
     log = read(log, database.lattice.crs)

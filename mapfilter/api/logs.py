@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from mapfilter._arguments import PATH, Argument, check_arguments, shown
+from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments, shown
 from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
@@ -57,13 +57,20 @@ def read_log(
     StoreError
         A file of a log is missing, cut off or changed since it was written.
     ConfigError
-        There is no path, one is no path, or the CRS is no text.
+        There is no path, one is no path, the CRS is no text, or another argument is of another
+        type.
     """
     check_arguments(
         "read_log",
         Argument("paths", paths, PATH | Iterable, _FILES),
         Argument("crs", crs, str, "a CRS such as database.lattice.crs"),
         Argument("truth", truth, PATH | Iterable, _FILES),
+        keywords=[
+            Setting("zone", zone, str),
+            Entries("columns", columns, str, "the column of each field"),
+            Setting("course_motion", course_motion, bool),
+            Argument("walk", walk, WalkOptions | None, "WalkOptions"),
+        ],
     )
     given, true = _several("paths", paths), _several("truth", truth)
     if not given:

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._arguments import PATH, Argument, check_arguments, generator
+from mapfilter._arguments import PATH, Argument, Setting, check_arguments, generator
 from mapfilter.api.given import opened, read
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.options import Positive
 from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.locating import locate_by, locator_for
 from mapfilter.positioning.fingerprints.options import AUTO, Method
@@ -61,6 +62,7 @@ def locate_reports(
             RadioRouteDatabase | PATH | Reports | TrackLog | Iterable,
             "a database or its path, reports, or logs",
         ),
+        keywords=[Setting("level_error_db", level_error_db, Positive)],
     )
     rng = generator("locate_reports", seed)
     plan = None

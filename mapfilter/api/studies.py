@@ -8,11 +8,21 @@ from dataclasses import asdict, dataclass, fields
 from html import escape
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from mapfilter._arguments import PATH, Argument, check_arguments, check_seed
+from mapfilter._arguments import (
+    PATH,
+    Argument,
+    Count,
+    Entries,
+    Setting,
+    WholeNumber,
+    check_arguments,
+    executor_argument,
+    items,
+)
 from mapfilter.api.given import database_argument, opened
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
@@ -26,11 +36,14 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
+from mapfilter.options import Positive
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork, street_network
+from mapfilter.roads.osm import Profile
 from mapfilter.roads.routes import read_roads
 from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Ways
@@ -44,6 +57,8 @@ from mapfilter.tracks.log import TrackLog
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_FILTERS = 'names and options, such as {"mine": BayesFilter()}'
+
 
 def simulate(
     rasters: RxLevRasters,
@@ -56,7 +71,7 @@ def simulate(
     imu: ImuNoise | None = None,
     reports: ReportModel | None = None,
     walker: WalkerModel | None = None,
-    profile: Literal["walking", "driving"] = "walking",
+    profile: Profile = "walking",
     seed: int = 0,
 ) -> dict[str, TrackLog]:
     """Simulate journeys along streets: dead reckoning, radio reports and ground truth.
@@ -102,14 +117,17 @@ def simulate(
         _rasters(rasters),
         Argument("cells", cells, CellPlan, "a cell plan of read_cell_plan"),
         _roads(roads),
+        keywords=[
+            Setting("journeys", journeys, Count),
+            Setting("draws", draws, Count),
+            Setting("length_m", length_m, Positive),
+            Argument("imu", imu, ImuNoise | None, "ImuNoise"),
+            _reports(reports),
+            Argument("walker", walker, WalkerModel | None, "WalkerModel"),
+            Setting("profile", profile, Profile),
+            Setting("seed", seed, WholeNumber),
+        ],
     )
-    check_arguments(
-        "simulate",
-        Argument("imu", imu, ImuNoise | None, "ImuNoise"),
-        Argument("reports", reports, ReportModel | None, "ReportModel"),
-        Argument("walker", walker, WalkerModel | None, "WalkerModel"),
-    )
-    check_seed("simulate", seed)
     journey = JourneyPlan(length_m=length_m, profile=profile, walker=walker or WalkerModel())
     settings = SimulationSettings(
         journeys=journeys,
@@ -118,7 +136,7 @@ def simulate(
         imu=imu or ImuNoise(),
         reports=reports or ReportModel(),
     )
-    network = _network(roads, rasters, profile)
+    network, rasters = _network(roads, rasters, profile), named_by_plan(rasters, cells)
     return dict(simulate_journeys(network, rasters, cells, settings, seed))
 
 
@@ -206,19 +224,23 @@ def sweep(
     ConfigError
         An argument is none of these, or the seed is none.
     """
+    several = (noises,) if isinstance(noises, ImuNoise) else () if noises is None else noises
     check_arguments(
         "sweep",
         database_argument(database),
         _rasters(rasters),
         _roads(roads),
-        Argument("filters", filters, Mapping, 'names and options, such as {"mine": BayesFilter()}'),
+        Entries("filters", filters, object, _FILTERS, optional=False),
+        keywords=[
+            *items("noises", several, ImuNoise, "ImuNoise"),
+            Setting("routes", routes, Count),
+            Setting("draws", draws, Count),
+            Setting("length_m", length_m, Positive),
+            _reports(reports),
+            Setting("seed", seed, WholeNumber),
+            executor_argument(executor),
+        ],
     )
-    check_arguments(
-        "sweep",
-        Argument("noises", noises, ImuNoise | Sequence | None, "ImuNoise, or several"),
-        Argument("reports", reports, ReportModel | None, "ReportModel"),
-    )
-    check_seed("sweep", seed)
     database = opened(database)
     reports = reports or ReportModel()
     radio = Radio() if reports.radio == AS_PREDICTED else Radio("ground truth", nan)
@@ -236,10 +258,11 @@ def sweep(
             seed=seed,
             varied=varied,
         )
-        for noise, varied in _distinguished(noises or ImuNoise())
+        for noise, varied in _distinguished(several or (ImuNoise(),))
     ]
     network = _network(roads, rasters, "walking")
-    world = SweepWorld.of(network, database.plan, {radio.name: rasters})
+    named = named_by_plan(rasters, database.plan)
+    world = SweepWorld.of(network, database.plan, {radio.name: named})
     return Sweep(sweep_runs(plans, world, {"database": database}, executor=executor))
 
 
@@ -260,10 +283,9 @@ def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
 
 
 def _distinguished(
-    noises: Sequence[ImuNoise] | ImuNoise,
+    noises: Sequence[ImuNoise],
 ) -> list[tuple[ImuNoise, tuple[tuple[str, float], ...]]]:
     """Return each noise with the values of those fields that the table has no column for."""
-    noises = [noises] if isinstance(noises, ImuNoise) else noises
     if len(set(noises)) < len(noises):
         again = next(repr(noise) for noise in noises if list(noises).count(noise) > 1)
         raise fail(ConfigError, "noises", "one noise or several, each once", again)
@@ -283,6 +305,10 @@ def _distinguished(
     ]
 
 
+def _reports(value: object) -> Argument:
+    return Argument("reports", value, ReportModel | None, "ReportModel")
+
+
 def _rasters(value: object) -> Argument:
     return Argument("rasters", value, RxLevRasters, "rasters of open_rasters")
 
@@ -291,9 +317,7 @@ def _roads(value: object) -> Argument:
     return Argument("roads", value, Layer | PATH | Ways, "a map's path or name, or ways")
 
 
-def _network(
-    roads: Layer | Ways, rasters: RxLevRasters, profile: Literal["walking", "driving"]
-) -> StreetNetwork:
+def _network(roads: Layer | Ways, rasters: RxLevRasters, profile: Profile) -> StreetNetwork:
     if not isinstance(roads, Ways):
         roads = read_roads(roads, rasters.lattice, profile=profile).ways
     return street_network(roads)

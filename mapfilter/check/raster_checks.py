@@ -17,7 +17,7 @@ from mapfilter.errors import Fault, InputError, listed
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.files import check_plausible
-from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters, in_other_case
 
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
 
@@ -145,8 +145,10 @@ def check_ids(rasters: RxLevRasters, plan: CellPlan, where: str, findings: Findi
     held = set(rasters.cell_ids)
     missing = [cell_id for cell_id in plan.ids if cell_id not in held]
     unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
+    cased = in_other_case(unknown, missing)
     if missing:
         evidence = f"{len(missing)} of {len(plan)} cells have no raster: {listed(missing)}."
+        evidence += f" {cased[:1].upper()}{cased[1:]}." if cased else ""
         findings.add("cell-without-raster", f"{where} and {rasters.path}", evidence)
     if unknown:
         evidence = f"{len(unknown)} of {len(held)} rasters have no cell: {listed(unknown)}."

@@ -130,6 +130,7 @@ class Cells(Section):
         hold losses and listed cells have none.
     height_m : float
         Antenna height above ground of outdoor cells by rule, and of listed cells without one.
+        Height, EIRP and frequency have to be set for cells of a list in mapfilter's own columns.
     seed : int
         Seed of a plan by rule.
     """

@@ -8,13 +8,24 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
+from numbers import Real
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
 import numpy as np
 
-from mapfilter._arguments import PATH, Argument, check_arguments
+from mapfilter._arguments import (
+    FUNCTION,
+    PATH,
+    Argument,
+    Count,
+    Setting,
+    WholeNumber,
+    check_arguments,
+    executor_argument,
+    items,
+)
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
@@ -146,6 +157,20 @@ def build(
         Argument("plan", plan, CellPlan, "a cell plan of read_cell_plan"),
         Argument("routes", routes, RouteLattice | Routes, "routes of read_routes"),
         Argument("out", out, PATH, "the path of a folder"),
+        keywords=[
+            Argument("margin_db", margin_db, Real, "dB"),
+            Argument("floor_dbm", floor_dbm, Real | None, "dBm"),
+            Setting("tile_px", tile_px, int),
+            *items("inputs", inputs, InputFile, "InputFile"),
+            Setting("attribution", attribution, str | None),
+            Argument("measured", measured, tuple | None, "readings and rasters of deviations"),
+            executor_argument(executor),
+            Setting("in_flight", in_flight, Count),
+            Setting("pixels_a_task", pixels_a_task, WholeNumber),
+            Setting("writers", writers, Count),
+            Setting("resume", resume, bool),
+            Argument("progress", progress, FUNCTION, "a function"),
+        ],
     )
     floor_dbm = floor_of(plan, floor_dbm)
     check_parameters(margin_db, floor_dbm, tile_px)

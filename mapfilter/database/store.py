@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import pyarrow as pa
 
-from mapfilter._arguments import check_path
+from mapfilter._arguments import Setting, check_arguments, path_argument
 from mapfilter._io import check_part, left_aside
 from mapfilter.database.checked import Part, generation_of
 from mapfilter.database.manifest import CELLS, MANIFEST, POINTS, read_manifest
@@ -70,9 +70,13 @@ def read_cells(source: Source, crs: str) -> CellPlan:
         raise fail(StoreError, str(source), "a cell table", error, "damaged") from error
 
 
+Verify = Literal["sizes", "full"]
+"""What of the parts is compared when a database is opened."""
+
+
 def open_database(
     path: Path | str,
-    verify: Literal["sizes", "full"] = "sizes",
+    verify: Verify = "sizes",
     *,
     generation: str | None = None,
 ) -> RadioRouteDatabase:
@@ -96,9 +100,16 @@ def open_database(
         No database, one of another version, its manifest is damaged, a part is missing, cut off,
         of another length or has another checksum; or it is not the one of ``generation``.
     ConfigError
-        The path is none.
+        The path is none, or another argument is of another type.
     """
-    check_path("open_database", "path", path)
+    check_arguments(
+        "open_database",
+        path_argument("path", path),
+        keywords=[
+            Setting("verify", verify, Verify),
+            Setting("generation", generation, str | None),
+        ],
+    )
     return _settled(Path(path), verify, generation)
 
 

@@ -43,6 +43,7 @@ from mapfilter.radio.tables import number, read_table
 
 _ALLOWED = {*COLUMNS, "east", "north", "crs", *chain.from_iterable(ALIASES.values())}
 _REQUIRED = ("cell", "height_m", "eirp_dbm", "frequency_mhz")
+_DEFAULT_HINT = "set cells.{}, which is then taken for all cells without one"
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
 _NEAR_DEG = 3.0
 _OTHER_LAYOUTS: Mapping[Layout, str] = {
@@ -90,7 +91,6 @@ def read_plan(
     if layout == "plan" and not columns:
         _check_layout(where, table.header)
         _check_own_header(where, table.header, wrong)
-        defaults = None
     arranged = arrange(table, layout, columns or {}, defaults or {}, faults)
     _check_fields(where, layout, arranged.header, table.header, wrong)
     wrong.raise_if_any(InputError)
@@ -147,6 +147,7 @@ def _check_fields(
     for name in wanted:
         if name not in fields:
             hint = f"left out or misspelt; cells.columns.{name} names a column called otherwise"
+            hint += f"; or {_DEFAULT_HINT.format(name)}" if name in RANGES else ""
             faults.add(where, f"a column {name}", none_of(header), hint)
 
 
@@ -182,7 +183,7 @@ def _row(where: str, line: int, given: Mapping[str, str], table: Arranged, fault
             elif value is not None:
                 values[name] = int(value) if allowed.whole else value
         elif name in _REQUIRED:
-            refuse(name, allowed.expected, "nothing")
+            refuse(name, allowed.expected, "nothing", _DEFAULT_HINT.format(name))
         elif name in OPTIONAL:
             values[name] = None
     for name in ("lat", "lon", "east", "north"):

@@ -7,13 +7,16 @@ import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
+from numbers import Real
 from pathlib import Path
+from typing import Annotated
 
-from mapfilter._arguments import check_path
+from mapfilter._arguments import Entries, Setting, check_arguments, path_argument
 from mapfilter._io import atomic_file
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, short_crs, unproject
+from mapfilter.options import Words
 from mapfilter.radio.cell_layouts import COLUMNS, SELDOM, Layout
 from mapfilter.radio.cell_rules import (
     OPTIONAL,
@@ -26,6 +29,10 @@ from mapfilter.radio.cell_rules import (
     technology_faults,
 )
 from mapfilter.radio.cell_table import read_plan
+
+_BOUNDS_M = Annotated[
+    tuple[float, float, float, float] | None, Words("west, south, east, north in metres")
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +272,7 @@ def read_cell_plan(
     columns : mapping of str to str, optional
         The file's column by field, where it has another name; other columns are ignored, then.
     defaults : mapping of str to float, optional
-        With ``columns`` or another layout: values of fields that have no column or are empty.
+        Values of fields that have no column or are empty, with a note.
     bounds_m : tuple of float, optional
         West, south, east, north: cells beyond them are left out with a note.
 
@@ -275,9 +282,18 @@ def read_cell_plan(
         The file is missing, empty or no such table; or with file, row (line of the file) and field
         of every fault, and the likely mistake.
     ConfigError
-        The path is none.
+        The path is none, or another argument is of another type.
     """
-    check_path("read_cell_plan", "path", path)
+    check_arguments(
+        "read_cell_plan",
+        path_argument("path", path),
+        keywords=[
+            Setting("layout", layout, Layout),
+            Entries("columns", columns, str, "the column of each field"),
+            Entries("defaults", defaults, Real, "the value of each field"),
+            Setting("bounds_m", bounds_m, _BOUNDS_M),
+        ],
+    )
     path = Path(path)
     faults = Faults()
     rows, notes = read_plan(path, projected_crs(crs), faults, layout, columns, defaults)

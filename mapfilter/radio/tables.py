@@ -14,6 +14,7 @@ from typing import Any
 from python_calamine import CalamineError, CalamineWorkbook
 
 from mapfilter._inputs import first_foreign_byte, read_input, wide_encoding
+from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
 
 _LARGEST_BYTES = 1 << 26
@@ -76,7 +77,8 @@ def read_table(path: Path, what: str) -> Table:
     """Read a table whose first line names its columns.
 
     Text has commas, semicolons or tabs, and is UTF-8, UTF-16 or UTF-32 with a byte order mark, or
-    else Windows-1252 (with a note). Of a workbook (.xlsx, .xls, .ods) the first sheet is read.
+    else Windows-1252 (with a note); a first line ``sep=;`` is no header. Of a workbook (.xlsx,
+    .xls, .ods) the first sheet is read.
 
     Parameters
     ----------
@@ -92,6 +94,7 @@ def read_table(path: Path, what: str) -> Table:
     if data.startswith(_WORKBOOKS):
         return _read_workbook(path, data, what)
     text, notes = _decoded(path, data)
+    text = without_separator_line(text)
     head = next((line for line in text.splitlines() if line.strip()), "")
     separator = max(_SEPARATORS, key=head.count)
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)

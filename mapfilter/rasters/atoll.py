@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from mapfilter._inputs import open_input
+from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cell_rules import id_fault
@@ -142,7 +143,7 @@ def _is_index(path: Path) -> bool:
         return False
     try:
         with open_input(path) as stream:
-            head = stream.read(_LONGEST_HEAD_BYTES).upper()
+            head = without_separator_line(stream.read(_LONGEST_HEAD_BYTES)).upper()
     except (OSError, InputError):
         return False
     first = next((line for line in head.splitlines() if line.strip()), b"")

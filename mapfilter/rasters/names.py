@@ -1,9 +1,13 @@
-"""Names of rasters that are ids of a plan within a common prefix and suffix."""
+"""Names of rasters that are ids of a plan: in another Unicode form, or between common texts."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from unicodedata import normalize
 
+from mapfilter._words import number_of
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 
@@ -17,40 +21,66 @@ def named_by_plan(rasters: RxLevRasters, plan: CellPlan) -> RxLevRasters:
     Planning tools name files such as ``HD0001_1_RSRP.tif`` for the cell ``HD0001_1``. Nothing
     changes where any raster has an id of the plan, or where fewer than nine of ten names fit.
 
+    Before that, names that equal an id of the plan in Unicode's composed form (NFC) become that id
+    where there is only one such name and id: macOS and some archives take letters with marks apart.
+
     Returns
     -------
     RxLevRasters
         With a note where names changed; ``check_against_plan`` finds the names that do not fit.
     """
+    ids = _by_form(plan.ids)
+    rasters = _composed(rasters, ids)
     held = rasters.cell_ids
     if not held or any(cell_id in plan for cell_id in held):
         return rasters
+    forms = {name: normalize("NFC", name) for name in held}
     best: tuple[int, int, str, str] | None = None
-    for prefix, suffix in {pair for name in held[:_TRIED] for pair in _around(name, plan)}:
-        inner = {_within(name, prefix, suffix) for name in held}
-        fitting = sum(name is not None and name in plan for name in inner)
+    for prefix, suffix in {pair for name in held[:_TRIED] for pair in _around(forms[name], ids)}:
+        inner = {_within(form, prefix, suffix) for form in forms.values()}
+        fitting = sum(form is not None and form in ids for form in inner)
         # Of equally good ones that with the longest ids.
         rank = (fitting, -len(prefix) - len(suffix), prefix, suffix)
         best = rank if best is None or rank > best else best
     if best is None or best[0] < _LEAST_SHARE * len(held):
         return rasters
     _, _, prefix, suffix = best
-
-    def cell_of(name: str) -> str:
-        inner = _within(name, prefix, suffix)
-        return inner if inner is not None and inner in plan else name
-
-    files = tuple(replace(f, cell_ids=tuple(map(cell_of, f.cell_ids))) for f in rasters.files)
+    within = {name: _within(form, prefix, suffix) for name, form in forms.items()}
+    named = {name: ids[form] for name, form in within.items() if form is not None and form in ids}
     note = f"rasters named {prefix}*{suffix}, where * is a cell of the plan"
-    return replace(
-        rasters, cell_ids=tuple(map(cell_of, held)), files=files, notes=(*rasters.notes, note)
-    )
+    return _renamed(rasters, named, note)
 
 
-def _around(name: str, plan: CellPlan) -> list[tuple[str, str]]:
-    """Return what stands before and after each id of the plan within a name."""
+def _composed(rasters: RxLevRasters, ids: Mapping[str, str]) -> RxLevRasters:
+    """Return rasters with ids of a plan where names are these in another Unicode form."""
+    names = _by_form(rasters.cell_ids)
+    named = {name: ids[form] for form, name in names.items() if ids.get(form, name) != name}
+    if not named:
+        return rasters
+    some = number_of(len(named), "raster")
+    return _renamed(rasters, named, f"{some} named as in the plan, in another Unicode form")
+
+
+def _by_form(names: Iterable[str]) -> dict[str, str]:
+    """Return names by their composed form, without those of which several have the same."""
+    forms = [(normalize("NFC", name), name) for name in names]
+    times = Counter(form for form, _ in forms)
+    return {form: name for form, name in forms if times[form] == 1}
+
+
+def _renamed(rasters: RxLevRasters, named: Mapping[str, str], note: str) -> RxLevRasters:
+    def new(names: Iterable[str]) -> tuple[str, ...]:
+        return tuple(named.get(name, name) for name in names)
+
+    files = tuple(replace(file, cell_ids=new(file.cell_ids)) for file in rasters.files)
+    notes = (*rasters.notes, note)
+    return replace(rasters, cell_ids=new(rasters.cell_ids), files=files, notes=notes)
+
+
+def _around(name: str, ids: Iterable[str]) -> list[tuple[str, str]]:
+    """Return what stands before and after each id within a name."""
     found = []
-    for cell_id in plan.ids:
+    for cell_id in ids:
         at = name.find(cell_id)
         while at >= 0:
             found.append((name[:at], name[at + len(cell_id) :]))

@@ -10,9 +10,10 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from pathlib import Path
 
-from mapfilter._arguments import check_path
+from mapfilter._arguments import Argument, Setting, check_arguments, path_argument
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cell_rules import id_fault
@@ -82,9 +83,20 @@ def open_rasters(
         upside-down pixels, bands without or with the same cell id, unknown quantity, files of
         different systems, an index that does not fit its files.
     ConfigError
-        The path is none.
+        The path is none, or another argument is of another type.
     """
-    check_path("open_rasters", "path", path)
+    check_arguments(
+        "open_rasters",
+        path_argument("path", path),
+        keywords=[
+            Setting("quantity", quantity, Quantity | None),
+            Setting("crs", crs, str | None),
+            Argument("factor", factor, Real, "a number"),
+            Argument("nodata", nodata, Real | None, "a number"),
+            Argument("resolution_m", resolution_m, Real | None, "metres"),
+            Setting("resampling", resampling, Resampling),
+        ],
+    )
     path = Path(path)
     _check_options(crs, factor, nodata, resolution_m)
     declared = Declared(projected_crs(crs, "rasters, crs") if crs is not None else None, nodata)

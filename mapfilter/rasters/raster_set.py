@@ -196,15 +196,33 @@ class RxLevRasters:
         faults.raise_if_any(InputError)
 
 
+def in_other_case(unknown: Sequence[str], missing: Sequence[str]) -> str:
+    """Return that names of rasters are ids without one but for the case, or "".
+
+    Examples
+    --------
+    >>> in_other_case(["s1a", "x"], ["S1A", "S1B"])
+    "names differ in upper and lower case only: raster 's1a', cell 'S1A'"
+    """
+    ids = {cell_id.casefold(): cell_id for cell_id in missing}
+    alike = [(name, ids[name.casefold()]) for name in unknown if name.casefold() in ids]
+    if not alike:
+        return ""
+    (name, cell_id), more = alike[0], len(alike) - 1
+    others = f" and {more} more" if more else ""
+    return f"names differ in upper and lower case only: raster {name!r}, cell {cell_id!r}{others}"
+
+
 def check_against_plan(rasters: RxLevRasters, plan: CellPlan) -> None:
     """Check that rasters and plan hold the same cells."""
     faults, held = Faults(), set(rasters.cell_ids)
-    unknown = [repr(cell_id) for cell_id in rasters.cell_ids if cell_id not in plan]
-    missing = [repr(cell_id) for cell_id in plan.ids if cell_id not in held]
-    hint = "rasters and plan of different dates or places"
+    unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
+    missing = [cell_id for cell_id in plan.ids if cell_id not in held]
+    hint = in_other_case(unknown, missing) or "rasters and plan of different dates or places"
     if unknown:
-        faults.add(str(rasters.path), "cells of the plan only", listed(unknown), hint)
+        got = listed([repr(one) for one in unknown])
+        faults.add(str(rasters.path), "cells of the plan only", got, hint)
     if missing:
-        got = f"no band for {listed(missing)}"
+        got = f"no band for {listed([repr(one) for one in missing])}"
         faults.add(str(rasters.path), "a band for each cell of the plan", got, hint)
     faults.raise_if_any(InputError)

@@ -19,6 +19,7 @@ from rasterio.windows import Window
 
 from mapfilter._gdal import open_raster
 from mapfilter._inputs import read_input
+from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
@@ -144,8 +145,10 @@ def _read_table(path: Path) -> tuple[dict[int, tuple[str, bool]], bool]:
     """Return code -> (class, walkable), and whether the codes are colours."""
     try:
         text = read_input(path, _LARGEST_TABLE_BYTES, "a table").decode("utf-8-sig")
-        delimiter = ";" if ";" in text.partition("\n")[0] else ","
-        rows = list(csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter))
+        table = without_separator_line(text).lstrip("\r\n")
+        header = 1 + text[: len(text) - len(table)].count("\n")
+        delimiter = ";" if ";" in table.partition("\n")[0] else ","
+        rows = list(csv.DictReader(io.StringIO(table, newline=""), delimiter=delimiter))
     except (UnicodeDecodeError, csv.Error) as error:
         raise fail(InputError, str(path), "a readable CSV table", error) from error
     columns = set(rows[0]) if rows else set()
@@ -156,7 +159,7 @@ def _read_table(path: Path) -> tuple[dict[int, tuple[str, bool]], bool]:
         raise fail(InputError, str(path), expected, got)
     faults = Faults()
     keys: dict[int, tuple[str, bool]] = {}
-    for line, row in enumerate(rows, start=2):
+    for line, row in enumerate(rows, start=header + 1):
         code = _code(row, is_colour, f"{path} row {line}", faults)
         if (row["walkable"] or "").strip() not in ("0", "1"):
             faults.add(f"{path} row {line}, walkable", "0 or 1", repr(row["walkable"]))

@@ -29,6 +29,7 @@ import shapely
 from geopandas import GeoDataFrame
 from numpy.typing import NDArray
 
+from mapfilter._arguments import Setting, check_arguments
 from mapfilter._types import Bools
 from mapfilter.roads.elements import Query
 from mapfilter.roads.maps import nothing_there, read_elements
@@ -85,7 +86,10 @@ def read_ways(path: str | Path, profile: Profile, crs: str, bounds_m: Bounds) ->
     ------
     InputError
         The map is missing or damaged, or has no such ways in the area.
+    ConfigError
+        The profile is none of these.
     """
+    check_arguments("read_ways", keywords=[Setting("profile", profile, Profile)])
     found = read_elements(path, crs, bounds_m, _HIGHWAYS)
     area = _is_area(found)
     # Lifts drawn as outlines come as polygons, too; they fall out by their class.

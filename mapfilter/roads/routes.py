@@ -6,17 +6,19 @@ import difflib
 import os
 from collections.abc import Mapping
 from dataclasses import replace
+from numbers import Real
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import shapely
 from geopandas import GeoDataFrame
 
-from mapfilter._arguments import PATH, Argument, check_arguments
+from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments
 from mapfilter._types import Bools
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
+from mapfilter.options import Words
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.index import (
     HALF_WIDTH_M,
@@ -34,6 +36,8 @@ from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways, clip_ways
 
 LANDUSE_CLASS = "land use"
+_LANDUSE = Annotated[tuple[Path, Path] | None, Words("two paths: of a raster and of its table")]
+_CUT_OUT = "a layer, or true or false"
 
 
 def read_routes(
@@ -86,7 +90,7 @@ def read_routes(
         A file is missing, damaged or of another area, a half width is not a length, or no point is
         left.
     ConfigError
-        Roads or lattice are neither.
+        An argument is of another type, or the profile is none.
 
     Examples
     --------
@@ -99,6 +103,23 @@ def read_routes(
         "read_routes",
         Argument("roads", roads, Layer | PATH | Ways | None, "a map's path or name, or ways"),
         Argument("lattice", lattice, Lattice, "a lattice such as rasters.lattice"),
+        keywords=[
+            Setting("profile", profile, Profile),
+            Argument("half_width_m", half_width_m, Real, "metres"),
+            Entries(
+                "half_width_by_class_m",
+                half_width_by_class_m,
+                Real,
+                "metres of each class of way",
+            ),
+            Setting("squares", squares, bool),
+            Argument("buildings", buildings, Layer | PATH | Buildings | bool, _CUT_OUT),
+            Argument("water", water, Layer | PATH | Water | bool, _CUT_OUT),
+            Setting("landuse", landuse, _LANDUSE),
+            Setting("layer_name", layer_name, str | None),
+            Setting("class_column", class_column, str | None),
+            Setting("id_column", id_column, str | None),
+        ],
     )
     if roads is None and landuse is None:
         raise fail(InputError, "roads", "a map, a layer or ways; or landuse", "none")
@@ -178,7 +199,10 @@ def read_roads(
     ------
     InputError
         The file is missing or damaged, or has nothing in the area.
+    ConfigError
+        The profile is none.
     """
+    check_arguments("read_roads", keywords=[Setting("profile", profile, Profile)])
     source = Path(source) if isinstance(source, os.PathLike) else source
     by_class_m = half_width_by_class_m or {}
     crs, wide_m = lattice.crs, within_reach_m(lattice.bounds_m, half_width_m, by_class_m)

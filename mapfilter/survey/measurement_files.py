@@ -20,6 +20,7 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
+from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs, is_above_asu
 from mapfilter.radio.identities import technology
@@ -185,7 +186,8 @@ def _lines(path: Path) -> Iterator[tuple[int, str | None]]:
         while text := stream.readline(_LONGEST_LINE):
             line += 1
             if len(text) < _LONGEST_LINE or text.endswith("\n"):
-                yield line, text.rstrip("\r\n")
+                text = text.rstrip("\r\n")
+                yield line, without_separator_line(text) if line == 1 else text
                 continue
             while (more := stream.readline(_LONGEST_LINE)) and not more.endswith("\n"):
                 pass

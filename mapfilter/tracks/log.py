@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from numbers import Real
 from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from mapfilter._arguments import Argument, Entries, Setting, check_arguments, items
 from mapfilter._html import html_table, shortened
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
@@ -209,6 +211,8 @@ def make_log(
         for radians, steps that are none, raw RXLEV for dBm, a CRS that is not projected, tables
         that do not overlap in time, a start outside the years 1 to 9999, an almanac of another
         time, or one without a start.
+    ConfigError
+        An argument that is no table is of another type.
 
     Examples
     --------
@@ -224,6 +228,18 @@ def make_log(
     """
     # Each table is an argument by its name: one without an argument is an error in every call.
     arguments = locals()
+    check_arguments(
+        "make_log",
+        keywords=[
+            Argument("almanac", almanac, Almanac | None, "an almanac"),
+            Argument("start_utc_s", start_utc_s, Real, "UTC seconds, or NaN"),
+            *items("notes", notes, str, "a text"),
+            Argument("imu", imu, ImuNoise | None, "ImuNoise"),
+            Setting("vehicle", vehicle, bool | None),
+            Entries("names", names, str, "the name of each table"),
+            Entries("row_numbers", row_numbers, object, "the row numbers of each table"),
+        ],
+    )
     faults, called, numbers = Faults(), names or {}, row_numbers or {}
     whole = called.get("log", "log")
     try:
@@ -261,7 +277,8 @@ def make_log(
         tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)
         every_note += more
     every_note = tuple(dict.fromkeys(every_note))
-    return TrackLog(str(crs), start_utc_s, **tables, notes=every_note, imu=imu, vehicle=vehicle)
+    moved = None if vehicle is None else bool(vehicle)
+    return TrackLog(str(crs), start_utc_s, **tables, notes=every_note, imu=imu, vehicle=moved)
 
 
 def rows_by_kind(log: TrackLog) -> dict[Kind, pd.DataFrame]:

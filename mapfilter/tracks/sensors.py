@@ -46,9 +46,12 @@ counter-clockwise from grid east; ``reckoning`` belongs to motion made of these 
 :class:`mapfilter.tracks.pdr.walk.Reckoned`.
 """
 
+Form = Literal["parquet", "csv"]
+"""Of the tables of a log."""
+
 
 def write_sensors(
-    folder: Path, sensors: Mapping[str, pd.DataFrame], form: Literal["parquet", "csv"]
+    folder: Path, sensors: Mapping[str, pd.DataFrame], form: Form
 ) -> list[dict[str, Any]]:
     """Write sensor tables into a log's new folder, and return their parts for its head."""
     parts: list[dict[str, Any]] = []

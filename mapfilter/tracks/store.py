@@ -12,13 +12,13 @@ from dataclasses import asdict
 from difflib import get_close_matches
 from math import inf, isnan, nan
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mapfilter._arguments import PATH, Argument, check_arguments
+from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments
 from mapfilter._inputs import shown
 from mapfilter._io import (
     atomic_dir,
@@ -34,7 +34,7 @@ from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.tracks.imu_noise import parse_imu_noise
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
-from mapfilter.tracks.sensors import FOLDER, SENSOR_COLUMNS, write_sensors
+from mapfilter.tracks.sensors import FOLDER, SENSOR_COLUMNS, Form, write_sensors
 from mapfilter.tracks.table_files import read_table
 
 HEAD = "log.json"
@@ -114,7 +114,7 @@ def _others(folder: Path, used: Collection[Path]) -> list[Path]:
 def write_log(
     log: TrackLog,
     folder: str | Path,
-    format: Literal["parquet", "csv"] = "parquet",  # noqa: A002
+    format: Form = "parquet",  # noqa: A002
     sensors: Mapping[str, pd.DataFrame] | None = None,
 ) -> None:
     """Write a log as a folder, in one step; equal logs give equal bytes.
@@ -133,12 +133,16 @@ def write_log(
     OutputError
         The folder cannot be written, or holds files that no log of mapfilter lists.
     ConfigError
-        There is no log, or no path.
+        There is no log, or no path, or another argument is of another type.
     """
     check_arguments(
         "write_log",
         Argument("log", log, TrackLog, "a log of read_log or make_log"),
         Argument("folder", folder, PATH, "the path of a folder"),
+        keywords=[
+            Setting("format", format, Form),
+            Entries("sensors", sensors, pd.DataFrame, "the table of each sensor"),
+        ],
     )
     folder = Path(folder)
     check_log_replaceable(folder)

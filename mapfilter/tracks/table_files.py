@@ -17,6 +17,7 @@ import pyarrow.csv as arrow_csv
 
 from mapfilter._arrow import arrow_bytes, open_parquet
 from mapfilter._inputs import open_input, read_input, wide_encoding
+from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.tracks.schema import SCHEMA
@@ -88,6 +89,7 @@ def as_frame(table: pa.Table) -> pd.DataFrame:
 def _read_csv(table: str, path: Path) -> ReadTable:
     data = read_input(path, _LARGEST_BYTES, "a table").removeprefix(codecs.BOM_UTF8)
     _check_encoding(path, data)
+    data = without_separator_line(data)
     begin = len(data) - len(data.lstrip(b"\r\n \t"))
     end = data.find(b"\n", begin)
     if begin == len(data):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mapfilter.config.inputs import Cells
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
@@ -9,9 +10,19 @@ from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
 
+_DEFAULTS = ("height_m", "eirp_dbm", "frequency_mhz")
+
+
+def own_layout(cells: Cells) -> bool:
+    """Return whether a cell plan has the columns that mapfilter writes, by their own names."""
+    return cells.layout == "plan" and not cells.columns.given
+
 
 def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> CellPlan:
     """Read the cell plan of a configuration; of a public list, only the cells near the area.
+
+    Height, EIRP and frequency of cells without one are those of the configuration; a plan in
+    mapfilter's own layout has to have them unless they are stated there.
 
     Raises
     ------
@@ -26,16 +37,13 @@ def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> Cell
         west, south, east, north = area.bounds_m
         reach_m = cells.reach_m
         bounds_m = west - reach_m, south - reach_m, east + reach_m, north + reach_m
+    own, stated = own_layout(cells), cells.model_fields_set
     return read_cell_plan(
         cells.plan,
         crs,
         layout=cells.layout,
         columns=cells.columns.given,
-        defaults={
-            "height_m": cells.height_m,
-            "eirp_dbm": cells.eirp_dbm,
-            "frequency_mhz": cells.frequency_mhz,
-        },
+        defaults={name: getattr(cells, name) for name in _DEFAULTS if not own or name in stated},
         bounds_m=bounds_m,
     )
 

@@ -6,6 +6,7 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.workflows.planned_cells import own_layout
 
 _NAMED = 3
 
@@ -16,8 +17,7 @@ def cells_without_eirp(config: Config, rasters: RxLevRasters, plan: CellPlan) ->
     A value for ``cells.eirp_dbm`` in the configuration is taken as it is.
     """
     cells = config.cells
-    own = cells.layout == "plan" and not cells.columns.given
-    if rasters.quantity != "loss" or cells.plan is None or own:
+    if rasters.quantity != "loss" or cells.plan is None or own_layout(cells):
         return []
     if "eirp_dbm" in cells.model_fields_set:
         return []

@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from unicodedata import normalize
 
 import pytest
 
+from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.names import named_by_plan
-from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 
 CRS = "EPSG:32629"
 LATTICE = Lattice(CRS, 500_000.0, 4_000_000.0, 5.0, 4, 4)
@@ -82,3 +84,39 @@ def test_without_any_id_in_the_first_names_nothing_changes():
     given = rasters("a", "b", "c", "HDS01")
     assert named_by_plan(given, plan(*TEN)) is given
     assert replace(given) == given
+
+
+ACCENTED = ("Café-1", "Orléans", "plain")
+
+
+@pytest.mark.parametrize(("of_files", "of_plan"), [("NFD", "NFC"), ("NFC", "NFD")])
+def test_names_in_another_unicode_form_are_those_of_the_plan(of_files, of_plan):
+    ids = tuple(normalize(of_plan, one) for one in ACCENTED)
+    found = named_by_plan(rasters(*(normalize(of_files, one) for one in ACCENTED)), plan(*ids))
+    assert found.cell_ids == ids
+    assert [file.cell_ids for file in found.files] == [ids[:2], ids[2:]]
+    note = "2 rasters named as in the plan, in another Unicode form"
+    assert found.notes == ("before", note)
+    check_against_plan(found, plan(*ids))
+
+
+def test_names_in_another_unicode_form_between_common_texts():
+    ids = ACCENTED[:2]
+    found = named_by_plan(rasters(*(normalize("NFD", f"HD{one}_é") for one in ids)), plan(*ids))
+    assert found.cell_ids == ids
+
+
+@pytest.mark.parametrize("twice", ["files", "plan"])
+def test_two_names_of_one_form_are_left_alone(twice):
+    both, one = ("Caf\u00e9", "Cafe\u0301"), ("Cafe\u0301",)
+    given = rasters(*(both if twice == "files" else one))
+    assert named_by_plan(given, plan(*(("Caf\u00e9",) if twice == "files" else both))) is given
+
+
+def test_names_in_another_case_are_named_as_that():
+    with pytest.raises(InputError) as caught:
+        check_against_plan(rasters("s1a", "s1b", "X"), plan("S1A", "S1B", "X"))
+    hint = "names differ in upper and lower case only: raster 's1a', cell 'S1A' and 1 more"
+    assert [fault.hint for fault in caught.value.faults] == [hint, hint]
+    with pytest.raises(InputError, match="different dates or places"):
+        check_against_plan(rasters("s1a"), plan("T1A"))

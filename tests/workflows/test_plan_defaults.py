@@ -2,7 +2,7 @@
 
 import pandas as pd
 import pytest
-from command_line import assert_done, mapfilter, settings
+from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.database.store import open_database
 
@@ -46,3 +46,31 @@ def test_the_floor_of_lte_is_noted_unless_it_is_given(stated, floor_dbm, world, 
     note = "database.floor_dbm = -125 is taken, the usual one of LTE cells"
     assert notes == ([note] if stated is None else [])
     assert open_database(tmp_path / "database").floor_dbm == floor_dbm
+
+
+@pytest.fixture(params=["without a column", "empty"])
+def powerless(request, world, tmp_path):
+    """Settings of a build by a plan in mapfilter's own columns without any EIRP."""
+    plan = pd.read_csv(world.plan)
+    plan = plan.drop(columns="eirp_dbm") if request.param != "empty" else plan.assign(eirp_dbm="")
+    plan.to_csv(tmp_path / "plan.csv", index=False)
+    given = {"cells__plan": tmp_path / "plan.csv", "rasters__path": world.rasters}
+    return settings(**given, rasters__quantity='"level"')
+
+
+def test_a_value_that_is_stated_is_taken_for_a_plan_in_our_own_columns(world, powerless, tmp_path):
+    stated = settings(cells__eirp_dbm=55)
+    done = mapfilter("build", "-c", world.toml, "--out", tmp_path, "--json", *powerless, *stated)
+    notes = assert_done(done).json["notes"]
+    expected = ["eirp_dbm = 55 for 3 of 3 cells without one"]
+    assert [note for note in notes if "without one" in note] == expected
+    cells = open_database(tmp_path / "database").plan.cells
+    assert {cell.eirp_dbm for cell in cells} == {55.0}
+    assert all("eirp_dbm" in cell.assumes for cell in cells)
+
+
+def test_a_value_that_nobody_states_is_missed_with_the_name_of_its_setting(
+    world, powerless, tmp_path
+):
+    done = mapfilter("build", "-c", world.toml, "--out", tmp_path, *powerless)
+    assert_refused(done, "eirp_dbm", "set cells.eirp_dbm, which is then taken for all cells")

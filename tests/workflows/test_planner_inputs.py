@@ -76,6 +76,16 @@ def test_a_default_eirp_is_not_taken_for_losses(world):
     assert_refused(build(world, "--dry-run"), *told)
 
 
+def test_losses_of_a_plan_in_our_own_columns_need_an_eirp_that_is_set(world):
+    header = "cell", "site", "east", "north", "height_m", "azimuth_deg", "eirp_dbm"
+    write_list(world, header, without=("EIRP (dBm)",))
+    own = settings(cells__layout="plan", cells__frequency_mhz=1800.0)
+    told = "set cells.eirp_dbm, which is then taken for all cells without one"
+    assert_refused(build(world, *own), "expected a column eirp_dbm", told)
+    done = assert_done(build(world, *own, *settings(cells__eirp_dbm=50.0)))
+    assert "eirp_dbm = 50 for 10 of 10 cells without one" in done.json["notes"]
+
+
 def test_an_eirp_that_is_set_is_taken(world):
     write_list(world, without=("EIRP (dBm)",))
     given = settings(cells__eirp_dbm=43.0)

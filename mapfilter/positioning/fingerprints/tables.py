@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from mapfilter._arguments import check_path
+from mapfilter._arguments import Setting, check_arguments, path_argument
 from mapfilter._inputs import read_input
+from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
@@ -60,9 +61,13 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
         The file cannot be read, has no column of positions or of levels, a column twice, or no row
         with a level; or the CRS is unknown.
     ConfigError
-        The path is none.
+        The path is none, or the CRS is no text.
     """
-    check_path("read_fingerprint_table", "path", path)
+    check_arguments(
+        "read_fingerprint_table",
+        path_argument("path", path),
+        keywords=[Setting("crs", crs, str | None)],
+    )
     path = Path(path)
     table, notes = _read(path)
     names = {name: str(name).strip() for name in table.columns}
@@ -103,7 +108,7 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
 def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     expected = "a table with a header line"
     text = read_input(path, _LARGEST_BYTES, "a table").decode("utf-8-sig", "replace")
-    lines = [line for line in text.splitlines() if line.strip()]
+    lines = [line for line in without_separator_line(text).splitlines() if line.strip()]
     if not lines:
         raise fail(InputError, str(path), expected, "an empty file", "cut off")
     separator = max(_SEPARATORS, key=lines[0].count)

@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
+from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import InputError, fail
 
 _HINTS = {
@@ -133,7 +134,7 @@ def read_text(path: Path, most_bytes: int = -1) -> Text:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if not data or data.isspace():
         raise fail(InputError, str(path), "a recording", "an empty file")
-    return Text(path, data, tuple(notes))
+    return Text(path, without_separator_line(data), tuple(notes))
 
 
 def _unpacked(path: Path, data: bytes, notes: list[str]) -> bytes:

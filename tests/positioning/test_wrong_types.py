@@ -1,0 +1,131 @@
+"""Every parameter of every public function refuses values of a wrong type, by its name."""
+
+import inspect
+
+import numpy as np
+import pytest
+from cross_world import LATTICE, make_database, make_routes, walk_log
+
+import mapfilter as mf
+from mapfilter.errors import ConfigError
+from mapfilter.radio.cells import write_cell_plan
+from mapfilter.roads.osm import read_ways
+from mapfilter.roads.routes import read_roads
+
+FUNCTIONS = [name for name in mf.__all__ if inspect.isfunction(getattr(mf, name))]
+PARAMETERS = [
+    (name, parameter)
+    for name in FUNCTIONS
+    for parameter in inspect.signature(getattr(mf, name)).parameters
+]
+NAMES_ALONE = {
+    ("make_log", "row_numbers"),
+    ("read_log", "paths"),
+    ("read_log", "truth"),
+    ("sweep", "filters"),
+}
+"""Of what is given for "a" they use the name, or say what is wrong in words of their own."""
+
+
+class Nothing:
+    """A value that no parameter takes."""
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """Return the arguments without a default of each public function."""
+    folder = tmp_path_factory.mktemp("cross")
+    make_database(folder)
+    database = mf.open_database(next(file.parent for file in folder.rglob("manifest.json")))
+    raster, log = next(folder.rglob("*.tif")), walk_log()
+    rasters = mf.open_rasters(raster, "level")
+    write_cell_plan(database.plan, folder / "cells.csv")
+    world = {"rasters": rasters, "roads": "helsinki"}
+    return {
+        "bound": {"database": database},
+        "build": {
+            "rasters": rasters,
+            "plan": database.plan,
+            "routes": make_routes(),
+            "out": folder / "out",
+        },
+        "epochs": {"log": log},
+        "locate": {"log": log, "database": database},
+        "locate_reports": {"log": log, "database": database},
+        "make_log": {"crs": log.crs, "motion": log.motion},
+        "open_database": {"path": database.path},
+        "open_rasters": {"path": raster},
+        "read_cell_plan": {"path": folder / "cells.csv", "crs": log.crs},
+        "read_fingerprint_table": {"path": folder / "table.csv"},
+        "read_log": {"paths": folder},
+        "read_routes": {"roads": "helsinki", "lattice": LATTICE},
+        "score": {"track": mf.locate(log, database, "candidate"), "truth": log.truth},
+        "simulate": world | {"cells": database.plan},
+        "sweep": world | {"database": database, "filters": {"a": "bayes"}},
+        "write_log": {"log": log, "folder": folder / "log"},
+    }
+
+
+def refused(good, function, **wrong):
+    with pytest.raises(mf.MapfilterError) as caught:
+        getattr(mf, function)(**good[function] | wrong)
+    return caught.value
+
+
+def test_all_public_functions_are_tried(good):
+    assert sorted(good) == sorted(FUNCTIONS)
+
+
+@pytest.mark.parametrize(("function", "parameter"), PARAMETERS)
+def test_another_type_is_refused_by_the_name_of_the_parameter(good, function, parameter):
+    wrongs = [Nothing(), [Nothing()], {1: Nothing()}]
+    if (function, parameter) not in NAMES_ALONE:
+        wrongs.append({"a": Nothing()})
+    for wrong in wrongs:
+        assert parameter in str(refused(good, function, **{parameter: wrong}))
+
+
+@pytest.mark.parametrize(
+    ("function", "wrong", "expected"),
+    [
+        ("locate", {"risk": "a"}, "locate, risk: expected a number > 0 and < 1, found 'a'"),
+        ("locate", {"ways": "no"}, "locate, ways: expected true or false, found 'no'"),
+        ("locate", {"record": 1}, "locate, record: expected true or false, found 1"),
+        ("simulate", {"journeys": 1.5}, "simulate, journeys: expected a whole number >= 1"),
+        ("simulate", {"journeys": 2.0}, "simulate, journeys: expected a whole number >= 1"),
+        ("simulate", {"profile": "flying"}, "'walking' or 'driving', found 'flying'"),
+        ("sweep", {"routes": 1.5}, "sweep, routes: expected a whole number >= 1, found 1.5"),
+        ("sweep", {"filters": {1: mf.BayesFilter()}}, "sweep, filters: expected names and"),
+        ("sweep", {"noises": [mf.ImuNoise(), 3]}, "sweep, noises[1]: expected ImuNoise, found 3"),
+        ("open_rasters", {"crs": 3}, "open_rasters, crs: expected a text"),
+        ("open_rasters", {"quantity": "levels"}, "expected 'level', 'loss', 'deviation'"),
+        ("open_rasters", {"resampling": "cubic"}, "'nearest' or 'bilinear', found 'cubic'"),
+        ("open_database", {"verify": "all"}, "expected 'sizes' or 'full', found 'all'"),
+        ("read_cell_plan", {"layout": "Atoll"}, "'plan', 'atoll', or 'opencellid', found 'Atoll'"),
+        ("write_log", {"format": "CSV"}, "expected 'parquet' or 'csv', found 'CSV'"),
+        ("read_routes", {"profile": "Walking"}, "'walking' or 'driving', found 'Walking'"),
+        ("read_routes", {"landuse": ("a.tif",)}, "two paths: of a raster and of its table"),
+    ],
+)
+def test_the_message_says_what_is_expected(good, function, wrong, expected):
+    error = refused(good, function, **wrong)
+    assert isinstance(error, ConfigError)
+    assert expected in str(error)
+
+
+def test_all_wrong_arguments_are_named_together(good):
+    error = refused(good, "simulate", journeys=0, draws="a", length_m=-1, imu=3, seed=-1)
+    assert len(error.faults) == 5
+
+
+def test_a_profile_is_refused_wherever_roads_are_read():
+    with pytest.raises(ConfigError, match="read_roads, profile: expected 'walking' or 'driving'"):
+        read_roads("helsinki", LATTICE, profile="Driving")
+    with pytest.raises(ConfigError, match="read_ways, profile: expected 'walking' or 'driving'"):
+        read_ways("helsinki", "", LATTICE.crs, LATTICE.bounds_m)
+
+
+def test_numbers_and_truth_values_of_numpy_are_taken(good):
+    found = mf.locate(**good["locate"], filter="candidate", ways=np.True_, risk=np.float64(1e-3))
+    assert len(found) == len(good["score"]["track"])
+    assert mf.make_log("EPSG:32629", vehicle=np.False_).vehicle is False
