@@ -64,6 +64,19 @@ def test_faults_are_named_with_truth(taught):
     assert (result.logs, result.used) == (JOURNEYS, JOURNEYS)
 
 
+def test_logs_of_the_serving_cell_alone_invent_no_faults(faulty, tmp_path):
+    database, _ = faulty
+    rng = np.random.default_rng(4)
+    for number in range(JOURNEYS + 1):
+        log = log_of(plan_of(), rng, blocks=20)
+        serving = log.radio[log.radio["role"] == "serving"]
+        alone = make_log(CRS, motion=log.motion, radio=serving, truth=log.truth)
+        write_log(alone, tmp_path / "logs" / f"j{number}")
+    result = run_learn(configured(database, tmp_path / "logs"), tmp_path / "out")
+    assert result.findings == ()
+    assert result.patch is None
+
+
 def test_the_accepted_database_is_another_one_and_the_report_lies_beside_it(taught, faulty):
     result, out = taught
     other = open_database(out, verify="full")
