@@ -23,7 +23,8 @@ from mapfilter.tracks.schema import SERVING
 
 SQUARE_M = 40.0
 """Side of the squares: shadowing has changed little within one."""
-_LARGEST_RADIUS_M = 60.0
+LARGEST_RADIUS_M = 60.0
+"""Reports whose place is less sure make no visit."""
 _APART_DB = 15.0
 _AT_SENSITIVITY_DBM = -104.0
 
@@ -211,7 +212,7 @@ def _of_journey(
         if not any(map(_is_level, epoch.radio)):
             continue
         place = float(journey.east_m[i]), float(journey.north_m[i])
-        if not (np.isfinite(place).all() and journey.radius_m[i] <= _LARGEST_RADIUS_M):
+        if not (np.isfinite(place).all() and journey.radius_m[i] <= LARGEST_RADIUS_M):
             continue
         levels.append(_report(epoch, resolver, place, phone.bound_dbm(epoch)))
         places.append(place)
