@@ -148,6 +148,17 @@ class Survey:
     cells: Mapping[str, SurveyedCell]
     notes: tuple[str, ...]
 
+    def can_fill(self, cell: SurveyedCell) -> bool:
+        """Return whether a cell's trend holds far from its readings.
+
+        The mean of few levels does not, nor does a path loss from an antenna that was estimated
+        from levels which are all the same, as those at the end of a phone's scale.
+        """
+        if cell.estimated:
+            return bool(np.ptp(cell.points.level_dbm) > 0)
+        enough = len(cell.points) >= self.options.min_points_to_locate
+        return enough or cell.trend.covariate is not None
+
 
 def fit_survey(
     measurements: Measurements,
