@@ -346,7 +346,7 @@ def _unfilled(survey: Survey, ids: Sequence[str]) -> list[str]:
         return []
     return [
         f"{number_of(count, 'cell')} not filled beyond {survey.options.reach_m:g} m from readings: "
-        f"fewer than {survey.options.min_points_to_locate} squares, or one level everywhere"
+        f"fewer than {survey.options.min_points_to_fill} squares, or one level everywhere"
     ]
 
 
