@@ -46,6 +46,8 @@ REMEDIES = {
     "journeys-disagree": "Look at the cell; mapfilter learn proposes a patch with the evidence.",
     "journeys-off-map": "Add the way to the map; mapfilter learn proposes a patch.",
     "journeys-unlisted-cell": "Add the cell to the plan, and build again.",
+    "journeys-unused": "Take logs with levels and motion, along ways of the map; mapfilter learn "
+    "lists the trust in each.",
     "landuse-classes": "Add the classes to the table, or export the raster without blending.",
     "landuse-invalid": "Correct the land-use raster or its table.",
     "landuse-outside": "Take the land-use raster of this area.",

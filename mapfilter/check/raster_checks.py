@@ -28,6 +28,8 @@ _NO_LEVEL_ABOVE = 60.0
 _TELLING_SHARE = 0.01
 _MOST_SHARE = 0.5
 _NEAR_ZERO = 1.0
+_LARGEST_OF_TYPES = (255.0, 32767.0, 65535.0)
+_FAR_DB = 20.0
 _MANY_TIMES = 10
 _PHONE_M = 1.5
 _NEAREST_RING_M = 64.0
@@ -59,11 +61,18 @@ def kind_of(values: Floats32) -> Kind:
     return "loss" if np.median(known) > _LEAST_LOSS_DB else "unclear"
 
 
-def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
+def nodata_taken_as_level(values: Floats32, factor: float = 1.0) -> tuple[float, float] | None:
     """Return the number that means no data though the file does not state it, and its share.
 
-    That is one and the same number, beyond all levels (such as -9999), or exactly 0 among levels
-    that are below it.
+    That is one and the same number, beyond all levels (such as -9999), exactly 0 among levels
+    that are below it, or the largest number of an integer type, far above all others.
+
+    Parameters
+    ----------
+    values : ndarray of float32
+        NaN without data.
+    factor : float
+        By which the stored numbers were multiplied.
 
     Examples
     --------
@@ -71,9 +80,16 @@ def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
     (-9999.0, 0.5)
     >>> nodata_taken_as_level(np.float32([-80.5, 0, 0, -70]))
     (0.0, 0.5)
+    >>> nodata_taken_as_level(np.float32([80, 140, 255, 255]))
+    (255.0, 0.5)
     >>> nodata_taken_as_level(np.float32([-80.5, -70]))
     """
     known = values[~np.isnan(values)]
+    if (top := _top_of_type(known, factor)) is not None:
+        return top
+    low, others = known[known < _NO_LEVEL_BELOW], known[known >= _NO_LEVEL_BELOW]
+    if low.size and others.size and (low == low[0]).all() and (others >= 0).all():
+        return float(low[0]), low.size / known.size
     beyond = known[(known < _NO_LEVEL_BELOW) | (known > _NO_LEVEL_ABOVE)]
     inside = known.size - beyond.size
     if beyond.size and (beyond == beyond[0]).all() and (inside == 0 or (known < 0).any()):
@@ -85,6 +101,26 @@ def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
     near = int((np.abs(others) < _NEAR_ZERO).sum())
     apart = bool((others < 0).all() or (others >= _LEAST_LOSS_DB).all())
     return (0.0, zero / known.size) if apart and zero > _MANY_TIMES * near else None
+
+
+def _top_of_type(known: Floats32, factor: float) -> tuple[float, float] | None:
+    """Return the largest number of an integer type and its share, where it means no data.
+
+    Numbers that reach up to it are those of a raster that was cut off there.
+    """
+    exact = known / np.float64(factor)
+    stored = np.rint(exact)
+    if not known.size or stored.max() not in _LARGEST_OF_TYPES:
+        return None
+    if not np.allclose(exact, stored, rtol=1e-6, atol=1e-3):
+        return None
+    at_top = stored == stored.max()
+    share, others = float(at_top.mean()), known[~at_top]
+    if share < _TELLING_SHARE or not others.size:
+        return None
+    top = known[at_top][0]
+    far = np.abs(top - others).min() >= _FAR_DB
+    return (float(top), share) if far else None
 
 
 def falls_with_distance(sample: RasterSample, east_m: float, north_m: float) -> float:
@@ -175,7 +211,7 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
         except InputError as error:
             findings.add_faults(error, "rasters-invalid")
             continue
-        if (taken := nodata_taken_as_level(sample.values)) is not None:
+        if (taken := nodata_taken_as_level(sample.values, rasters.factor)) is not None:
             nodata.append((cell_id, *taken))
             kept = np.where(sample.values == np.float32(taken[0]), np.nan, sample.values)
             sample = replace(sample, values=kept.astype(np.float32))

@@ -37,6 +37,11 @@ class Lesson:
         """Which journeys were located where they were."""
         return np.asarray(self.learned.trust > 0.5)
 
+    @property
+    def visits_by_journey(self) -> Ints:
+        """Number of visits of each journey."""
+        return np.bincount(self.visits.journey, minlength=len(self.learned.trust))
+
 
 @dataclass(frozen=True)
 class UnlistedCell:

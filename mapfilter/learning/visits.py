@@ -3,11 +3,13 @@
 Reports of a journey in one square of some tens of metres are one visit for each cell: their errors
 are the same. Its level is the median over the reports, in which a cell that is missing counts as
 weaker than what a report could hold: the weakest level in a full report, else the receiver's
-sensitivity. Where the median is such a bound, the cell was not received.
+sensitivity. Where the median is such a bound, the cell was not received. A report of the serving
+cell alone says nothing of other cells, unless most reports of its journey have neighbours.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -21,7 +23,8 @@ from mapfilter.tracks.schema import SERVING
 
 SQUARE_M = 40.0
 """Side of the squares: shadowing has changed little within one."""
-_LARGEST_RADIUS_M = 60.0
+LARGEST_RADIUS_M = 60.0
+"""Reports whose place is less sure make no visit."""
 _APART_DB = 15.0
 _AT_SENSITIVITY_DBM = -104.0
 
@@ -92,13 +95,8 @@ def visits_of(journeys: Sequence[Placed], plan: CellPlan, field: RadioField) -> 
     field : RadioField
         Predicted levels, for that choice.
     """
-    most = max((_neighbours(e) for j in journeys for e in j.epochs), default=0)
-    weakest = min(
-        (r.level_dbm for j in journeys for e in j.epochs for r in e.radio if _is_level(r)),
-        default=_AT_SENSITIVITY_DBM,
-    )
     resolver = _Resolver(plan, field)
-    parts = [_of_journey(n, one, resolver, most, weakest) for n, one in enumerate(journeys)]
+    parts = [_of_journey(n, one, resolver) for n, one in enumerate(journeys)]
     names = [one.name for one in fields(Visits)]
     kinds: Mapping[str, type] = {
         **dict.fromkeys(("journey", "cell", "square"), np.int64),
@@ -123,6 +121,45 @@ def predicted_dbm(field: RadioField, plan: CellPlan, east_m: Floats, north_m: Fl
     columns = [plan.index(name) for name in field.cell_ids]
     found[:, columns] = field.level_dbm[row, col]
     return found
+
+
+@dataclass(frozen=True)
+class _Phone:
+    """What the reports of a journey can hold.
+
+    Parameters
+    ----------
+    most : int
+        Neighbours in a full report.
+    weakest_dbm : float
+        Its sensitivity: no level is below it.
+    lists_neighbours : bool
+        Whether most of its reports have neighbours: one without any then received none.
+    """
+
+    most: int
+    weakest_dbm: float
+    lists_neighbours: bool
+
+    @classmethod
+    def of(cls, epochs: Sequence[Epoch]) -> _Phone:
+        reports = [epoch for epoch in epochs if any(map(_is_level, epoch.radio))]
+        counts = [_neighbours(epoch) for epoch in reports]
+        levels = (row.level_dbm for epoch in reports for row in epoch.radio if _is_level(row))
+        return cls(
+            max(counts, default=0),
+            min(levels, default=_AT_SENSITIVITY_DBM),
+            2 * sum(count > 0 for count in counts) > len(counts),
+        )
+
+    def bound_dbm(self, epoch: Epoch) -> float:
+        """Return below which level a cell is that a report lacks; NaN where that is unknown."""
+        neighbours = _neighbours(epoch)
+        if not (neighbours or self.lists_neighbours):
+            return math.nan
+        if neighbours < self.most:
+            return self.weakest_dbm
+        return min(row.level_dbm for row in epoch.radio if _is_level(row))
 
 
 class _Resolver:
@@ -166,18 +203,18 @@ def _neighbours(epoch: Epoch) -> int:
 
 
 def _of_journey(
-    number: int, journey: Placed, resolver: _Resolver, most: int, weakest_dbm: float
+    number: int, journey: Placed, resolver: _Resolver
 ) -> dict[str, Floats | Ints | Bools]:
     """Return the columns of the visits of one journey."""
-    cells = len(resolver.plan)
+    cells, phone = len(resolver.plan), _Phone.of(journey.epochs)
     levels, places = [], []
     for i, epoch in enumerate(journey.epochs):
         if not any(map(_is_level, epoch.radio)):
             continue
         place = float(journey.east_m[i]), float(journey.north_m[i])
-        if not (np.isfinite(place).all() and journey.radius_m[i] <= _LARGEST_RADIUS_M):
+        if not (np.isfinite(place).all() and journey.radius_m[i] <= LARGEST_RADIUS_M):
             continue
-        levels.append(_report(epoch, resolver, place, most, weakest_dbm))
+        levels.append(_report(epoch, resolver, place, phone.bound_dbm(epoch)))
         places.append(place)
     if not levels:
         return {one.name: np.empty(0) for one in fields(Visits)}
@@ -205,14 +242,12 @@ def _of_journey(
 
 
 def _report(
-    epoch: Epoch, resolver: _Resolver, place: tuple[float, float], most: int, weakest_dbm: float
+    epoch: Epoch, resolver: _Resolver, place: tuple[float, float], bound_dbm: float
 ) -> Floats:
     """Return (level, bound) of each cell in one report, shape (cells, 2); NaN where unknown."""
     cells = len(resolver.plan)
-    level, bound = np.full(cells, np.nan), np.full(cells, weakest_dbm)
+    level, bound = np.full(cells, np.nan), np.full(cells, bound_dbm)
     rows = [row for row in epoch.radio if _is_level(row)]
-    if most and _neighbours(epoch) >= most:
-        bound[:] = min(row.level_dbm for row in rows)
     serving = -1
     for row in sorted(rows, key=lambda row: row.role != SERVING):
         cell = resolver.cell(row, serving, *place)

@@ -139,7 +139,7 @@ def plot_points_per_cell(
         named_at = _nearest_to_median(x, y) if x.size else None
         groups.add(index, grouped(counts[index]), named_at)
     finish_map(axes, base, plan, title)
-    side_legend(axes, "cell: points", groups.handles, counts, network_legend(plan))
+    side_legend(axes, "cell: points", groups.handles, groups.counts, network_legend(plan))
     return axes
 
 
@@ -174,18 +174,20 @@ def plot_best_server(
         named_at = frame(*lattice.east_north(*_deepest(own))) if count else None
         groups.add(index, f"{100 * count / best_server.size:.1f} %", named_at)
     finish_map(axes, base, plan, title)
-    side_legend(axes, "cell: share of area", groups.handles, counts, network_legend(plan))
+    side_legend(axes, "cell: share of area", groups.handles, groups.counts, network_legend(plan))
     return axes
 
 
 class _Groups:
-    """The colours, names and legend of the cells on a map."""
+    """The colours, names and legend of the cells on a map; the legend lacks those without any."""
 
     def __init__(
         self, axes: Axes, plan: CellPlan, cell_ids: Sequence[str], counts: Sequence[int]
     ) -> None:
         self.colours = distinct_colours(len(cell_ids))
         self.handles: list[Line2D] = []
+        self.counts = [count for count in counts if count]
+        self._sizes = counts
         self._axes, self._plan, self._ids = axes, plan, cell_ids
         self._names, self._named = short_names(cell_ids), largest(counts, _MOST_NAMES)
 
@@ -195,7 +197,8 @@ class _Groups:
         Indoor cells are named at their marks, and so are not named here.
         """
         name, colour = self._ids[index], self.colours[index]
-        self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
+        if self._sizes[index]:
+            self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
         indoor = name in self._plan and self._plan[name].indoor
         if named_at is not None and index in self._named and not indoor:
             x, y = named_at

@@ -67,6 +67,9 @@ class SurveyOptions(Options):
     min_points_to_locate : int
         An antenna of unknown place is located from at least so many; with fewer the trend is the
         mean.
+    min_points_to_fill : int
+        With fewer, the trend of a cell is not kept far from its readings, unless its antenna or a
+        prediction is given.
     neighbours : int
         Number of neighbours that "knn" averages.
     square_m : float
@@ -80,6 +83,7 @@ class SurveyOptions(Options):
     reach_m: Annotated[float, Ge(1)] = 100.0
     min_points: _Count = 3
     min_points_to_locate: Annotated[int, Ge(3), Le(1_000_000)] = 15
+    min_points_to_fill: _Count = 15
     neighbours: _Count = 8
     square_m: Annotated[float, Ge(0.1)] = 10.0
     most_points: Annotated[int, Ge(10)] = 1500
@@ -147,6 +151,17 @@ class Survey:
     shadowing: Shadowing
     cells: Mapping[str, SurveyedCell]
     notes: tuple[str, ...]
+
+    def can_fill(self, cell: SurveyedCell) -> bool:
+        """Return whether a cell's trend holds far from its readings.
+
+        That of few levels does not, nor a path loss from an antenna that was estimated from levels
+        which are all the same, as those at the end of a phone's scale.
+        """
+        if cell.trend.covariate is not None and not cell.estimated:
+            return True
+        told = not cell.estimated or np.ptp(cell.points.level_dbm) > 0
+        return bool(told and len(cell.points) >= self.options.min_points_to_fill)
 
 
 def fit_survey(

@@ -42,8 +42,9 @@ def write_survey(
     """Write the mean levels and their deviations, one band per cell, and return the cells' ids.
 
     Pixels farther from every reading of a cell than the survey's reach are NaN in both files; with
-    ``fill`` the first has the trend (the calibrated prediction) there, and the NaN of the second
-    still marks them. Cells not measured on the lattice, in the survey's CRS, are left out.
+    ``fill`` the first has the trend (the calibrated prediction) there where that holds so far
+    (:meth:`~mapfilter.survey.measured_map.Survey.can_fill`), and the NaN of the second still marks
+    them. Cells not measured on the lattice, in the survey's CRS, are left out.
     ``deviation_factor`` multiplies the deviations.
 
     Raises
@@ -54,7 +55,7 @@ def write_survey(
     ids: list[str] = []
     with tempfile.TemporaryFile() as spool:
         for done, (cell_id, cell) in enumerate(survey.cells.items(), start=1):
-            found = _on_lattice(survey, cell, lattice, fill)
+            found = _on_lattice(survey, cell, lattice, fill and survey.can_fill(cell))
             if found is not None:
                 ids.append(cell_id)
                 pixels, levels = found

@@ -16,7 +16,7 @@ def run_check_suspects(config: Config, progress: Progress | None = None) -> Chec
     """Return what the logs of a configuration tell against its database; nothing is written.
 
     Suspects are warnings: cells that are received otherwise than predicted, cells that the database
-    lacks, and paths off the map.
+    lacks, and paths off the map. Journeys that were of no use are named, too.
 
     Raises
     ------
@@ -33,6 +33,9 @@ def run_check_suspects(config: Config, progress: Progress | None = None) -> Chec
     for one in taught.unlisted:
         evidence = f"It serves in {one.journeys} journeys."
         findings.add("journeys-unlisted-cell", f"cell {one.cell}", evidence, "warning")
+    for note in taught.unused:
+        evidence = f"{note[:1].upper()}{note[1:]}."
+        findings.add("journeys-unused", str(config.track_path), evidence, "warning")
     return findings.result()
 
 

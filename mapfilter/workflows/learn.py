@@ -154,7 +154,7 @@ def run_learn(
         len(taught.names),
         int(taught.lesson.trusted.sum()),
         findings,
-        taught.notes,
+        (*taught.notes, *taught.unused),
         taught.phone,
         report / PATCH if proposed else None,
         changed,

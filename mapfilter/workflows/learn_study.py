@@ -39,7 +39,9 @@ from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.learn_lacks import log_notes, unused_notes
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_lacks import check_log
 
@@ -78,6 +80,8 @@ class Taught:
     unlisted : tuple of UnlistedCell
     phone : PhoneNoise or None
     notes : tuple of str
+    unused : tuple of str
+        Notes on journeys that taught nothing.
     """
 
     database: RadioRouteDatabase
@@ -88,6 +92,7 @@ class Taught:
     unlisted: tuple[UnlistedCell, ...]
     phone: PhoneNoise | None
     notes: tuple[str, ...]
+    unused: tuple[str, ...]
 
 
 def study_logs(
@@ -115,7 +120,8 @@ def study_logs(
     )
     database = open_database(path, verify="full")
     paths = journeys_of(config)
-    names, logs = _opened(config, paths, database)
+    opened = _opened(config, paths, database)
+    names, logs = [one.name for one in opened], [one.log for one in opened]
     key = _key(database, (*paths, *config.track.recordings), choice, seed, use_truth)
     with (
         FinishedParts(out, lambda: key, keep=resume, name="journey") as finished,
@@ -124,8 +130,7 @@ def study_logs(
     ):
         lesson, tracks, notes = _Study(
             database,
-            names,
-            logs,
+            opened,
             choice,
             seed,
             use_truth,
@@ -150,7 +155,8 @@ def study_logs(
         Patch(database.lattice.crs, database.generation, len(logs), changes),
         unlisted_cells(journeys, database.plan),
         phone_noise(good, lesson.learned.phone_db[lesson.trusted], lesson.learned.sd_db),
-        notes,
+        (*log_notes(opened), *notes),
+        unused_notes(opened, journeys, lesson.visits_by_journey, lesson.learned.trust),
     )
 
 
@@ -159,8 +165,7 @@ class _Study:
     """The passes over all journeys."""
 
     database: RadioRouteDatabase
-    names: Sequence[str]
-    logs: Sequence[TrackLog]
+    opened: Sequence[OpenedLog]
     choice: FilterOptions
     seed: int
     use_truth: bool
@@ -169,6 +174,11 @@ class _Study:
     executor: Executor
     in_flight: int
     progress: Progress | None
+
+    @property
+    def logs(self) -> list[TrackLog]:
+        """The logs, with cells named as in the plan."""
+        return [one.log for one in self.opened]
 
     def run(self) -> tuple[Lesson, list[JourneyTrack], tuple[str, ...]]:
         """Locate by map and dead reckoning, learn, locate with what was learned, learn again."""
@@ -201,7 +211,8 @@ class _Study:
         lesson = lesson_of(journeys, database.plan, database.field(), database.floor_dbm)
         if not len(lesson.visits):
             expected = "levels of cells of the database along a located journey"
-            hint = "logs without levels, or of another network"
+            none = np.zeros(len(journeys), dtype=np.int64)
+            hint = "; ".join(unused_notes(self.opened, journeys, none, lesson.learned.trust))
             raise fail(InputError, "logs", expected, "none", hint)
         return lesson
 
@@ -212,7 +223,7 @@ class _Study:
         sha256, count = database.generation, len(self.logs)
         found: dict[int, JourneyTrack] = {}
         tasks: dict[int, _Task] = {}
-        for i, (name, log) in enumerate(zip(self.names, self.logs, strict=True)):
+        for i, (name, log) in enumerate((one.name, one.log) for one in self.opened):
             part = number * count + i
             kept = self.finished.load(part) if self.finished.keep else None
             if self.use_truth and len(log.truth) > 1:
@@ -274,11 +285,9 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
         yield from (file for file in inner if file.is_file())
 
 
-def _opened(
-    config: Config, paths: Sequence[Path], database: RadioRouteDatabase
-) -> tuple[list[str], list[TrackLog]]:
-    """Return names and logs of all journeys; InputError with the faults of all of them."""
-    faults, names, logs = Faults(), list[str](), list[TrackLog]()
+def _opened(config: Config, paths: Sequence[Path], database: RadioRouteDatabase) -> list[OpenedLog]:
+    """Return the logs of all journeys; InputError with the faults of all of them."""
+    faults, logs = Faults(), list[OpenedLog]()
     for path in paths:
         try:
             opened = open_journey(config, path, database.lattice.crs)
@@ -288,7 +297,6 @@ def _opened(
             faults.found.extend(error.faults)
             continue
         check_log(path, opened.log, database.lattice, faults)
-        names.append(opened.name)
-        logs.append(name_by_plan(opened.log, database.plan))
+        logs.append(replace(opened, log=name_by_plan(opened.log, database.plan)))
     faults.raise_if_any(InputError)
-    return names, logs
+    return logs

@@ -84,15 +84,15 @@ def lack_of(
         return f"{lack} ({_BY_STREETS})"
     if "no motion" not in lack:
         return lack
-    columns = _columns_of_motion(opened)
-    if source := _receiver_motion(opened):
+    columns = columns_of_motion(opened)
+    if source := receiver_motion(opened):
         return f"{lack} (--course-motion, track.course_motion, makes it from {source}){columns}"
     if has_cells and len(log.radio):
         return f"{lack} (mapfilter locate needs none){columns}"
     return f"{lack}{columns}"
 
 
-def _columns_of_motion(opened: OpenedLog) -> str:
+def columns_of_motion(opened: OpenedLog) -> str:
     """Return which columns of motion tables were looked for, and which others there are."""
     tables = [one for one in opened.recordings if one.format == plain_csv.FORMAT.name]
     if not tables:
@@ -171,7 +171,7 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
     return tuple(notes)
 
 
-def _receiver_motion(opened: OpenedLog) -> str:
+def receiver_motion(opened: OpenedLog) -> str:
     """Return what positions of the log, or of its truth, make motion of; "" without them."""
     every = [r.tables.get("positions", r.tables.get("places")) for r in opened.recordings]
     placed = [rows for rows in every if rows is not None and rows["time_s"].nunique() > 1]

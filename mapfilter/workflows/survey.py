@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 
 from mapfilter._io import VERSION, atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.database.floor import floor_of
 from mapfilter.database.measured import Readings, readings_parquet
@@ -221,7 +222,12 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         ground_truth=None,
         plan=plan_path,
         validation=validation,
-        notes=(*measurements.notes, *survey.notes, *_advice(survey, factor, floor_dbm)),
+        notes=(
+            *measurements.notes,
+            *survey.notes,
+            *(_unfilled(survey, ids) if section.fill else ()),
+            *_advice(survey, factor, floor_dbm),
+        ),
         pictures=pictures,
     )
 
@@ -331,6 +337,17 @@ def _predicted(
         hint = "levels are the EIRP of each cell less its loss"
         raise fail(ConfigError, "cells.plan", "the plan of the losses to calibrate", "none", hint)
     return predicted_levels(rasters, plan)
+
+
+def _unfilled(survey: Survey, ids: Sequence[str]) -> list[str]:
+    """Return a note on cells that are not filled in: their trend does not hold far away."""
+    count = sum(not survey.can_fill(survey.cells[cell_id]) for cell_id in ids)
+    if not count:
+        return []
+    return [
+        f"{number_of(count, 'cell')} not filled beyond {survey.options.reach_m:g} m from readings: "
+        f"fewer than {survey.options.min_points_to_fill} squares, or one level everywhere"
+    ]
 
 
 def _advice(survey: Survey, factor: float, floor_dbm: float) -> list[str]:

@@ -14,6 +14,7 @@ from mapfilter.cli import app
 from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, InputError, MapfilterError
+from mapfilter.geodesy import unproject
 from mapfilter.learning.blank import EVERYWHERE, blank_database, blank_log
 from mapfilter.learning.patch import read_patch
 from mapfilter.radio.cells import CellPlan
@@ -27,9 +28,9 @@ JOURNEYS = 5
 FEW = ["filter.bayes.max_particles=3000", "filter.bayes.min_search_particles=3000"]
 
 
-def configured(database, logs):
+def configured(database, logs, *more):
     paths = [f"database.path={json.dumps(str(database))}", f"track.path={json.dumps(str(logs))}"]
-    return load_config(None, [*paths, *FEW])
+    return load_config(None, [*paths, *FEW, *more])
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +63,19 @@ def test_faults_are_named_with_truth(taught):
     result, _ = taught
     assert found(result) == {("offset", "S2B"), ("dead", "S1C")}
     assert (result.logs, result.used) == (JOURNEYS, JOURNEYS)
+
+
+def test_logs_of_the_serving_cell_alone_invent_no_faults(faulty, tmp_path):
+    database, _ = faulty
+    rng = np.random.default_rng(4)
+    for number in range(JOURNEYS + 1):
+        log = log_of(plan_of(), rng, blocks=20)
+        serving = log.radio[log.radio["role"] == "serving"]
+        alone = make_log(CRS, motion=log.motion, radio=serving, truth=log.truth)
+        write_log(alone, tmp_path / "logs" / f"j{number}")
+    result = run_learn(configured(database, tmp_path / "logs"), tmp_path / "out")
+    assert result.findings == ()
+    assert result.patch is None
 
 
 def test_the_accepted_database_is_another_one_and_the_report_lies_beside_it(taught, faulty):
@@ -204,6 +218,50 @@ def test_a_blank_database_has_the_points_and_no_radio(faulty, tmp_path):
     assert log.radio["level_dbm"].isna().all()
     assert log.radio["time_s"].is_unique
     assert Path(blank.path).name == "blank"
+
+
+def test_journeys_that_are_not_used_are_noted_with_the_reason(faulty, tmp_path):
+    database, _ = faulty
+    rng = np.random.default_rng(4)
+    good = [log_of(plan_of(), rng, blocks=20) for _ in range(3)]
+    for number, log in enumerate(good):
+        write_log(log, tmp_path / "logs" / f"good{number}")
+    write_log(make_log(CRS, radio=good[0].radio), tmp_path / "logs" / "still")
+    odd = good[1].radio.assign(level_dbm=np.nan)
+    log = make_log(CRS, motion=good[1].motion, radio=odd, truth=good[1].truth)
+    write_log(replace(log, notes=("read with a remark",)), tmp_path / "logs" / "silent")
+    log = make_log(CRS, motion=good[2].motion, radio=good[2].radio, truth=good[0].truth)
+    write_log(log, tmp_path / "logs" / "astray")
+    result = run_learn(configured(database, tmp_path / "logs"), tmp_path / "out")
+    assert result.used == 3
+    of = {note.partition(" ")[0]: note for note in result.notes if " not used: " in note}
+    assert set(of) == {"astray", "silent", "still"}
+    assert of["silent"].endswith("no levels")
+    assert of["still"].endswith("no motion")
+    assert "do not fit" in of["astray"]
+
+
+def test_a_log_alone_without_motion_is_refused_with_the_reason(faulty, tmp_path):
+    log = log_of(plan_of(), np.random.default_rng(0))
+    logs = write(tmp_path / "logs", make_log(CRS, radio=log.radio))
+    with pytest.raises(InputError, match="one not used: no motion"):
+        run_learn(configured(faulty[0], logs), tmp_path / "out")
+
+
+def test_recordings_that_lie_hours_apart_are_noted(faulty, tmp_path):
+    log = log_of(plan_of(), np.random.default_rng(0))
+    lon, lat = unproject(CRS, log.truth["east_m"].to_numpy(), log.truth["north_m"].to_numpy())
+    (tmp_path / "logs").mkdir()
+    serving = log.radio[log.radio["role"] == "serving"]
+    for hour, name in enumerate(("one", "other")):
+        time = 1.7e9 + 86400 * hour + serving["time_s"].to_numpy()
+        table = {"time": time, "lat": lat, "lon": lon}
+        table |= {"cell": serving["cell"].to_numpy(), "level_dbm": serving["level_dbm"].to_numpy()}
+        pd.DataFrame(table).to_csv(tmp_path / "logs" / f"{name}.csv", index=False)
+    truth = json.dumps([str(tmp_path / "logs" / f"{name}.csv") for name in ("one", "other")])
+    config = configured(faulty[0], tmp_path / "logs", f"track.truth={truth}")
+    result = run_learn(config, tmp_path / "out")
+    assert any("h apart" in note for note in result.notes)
 
 
 def told(*args):

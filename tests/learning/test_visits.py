@@ -1,5 +1,7 @@
 """Visits of reports: medians, bounds, and which cell a neighbour is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from learning_world import CRS, EAST, NORTH
@@ -56,16 +58,44 @@ def test_the_level_of_a_visit_is_the_median_of_its_reports():
 
 
 def test_a_cell_that_is_missing_in_most_reports_was_not_received():
-    reports = [(serving("A", -70.0), neighbour(2, -85.0))] + [(serving("A", -70.0),)] * 3
-    assert table(journey(*reports))[0, "B"] == (-85.0, False)
+    beside = (serving("A", -70.0), neighbour(3, -80.0))
+    reports = [(serving("A", -70.0), neighbour(2, -85.0)), *[beside] * 3]
+    assert table(journey(*reports))[0, "B"] == (-80.0, False)
 
 
 def test_the_bound_is_the_weakest_of_a_full_report_else_the_weakest_of_all():
     full = (serving("A", -60.0), neighbour(2, -80.0))
     assert table(journey(full))[0, "C"] == (-80.0, False)
-    short = (serving("A", -60.0),)
-    far = journey(short, east=EAST + 150.0)
-    assert table(journey(full), far)[1, "B"] == (-80.0, False)
+    fuller = (serving("A", -60.0), neighbour(1, -70.0), neighbour(3, -90.0))
+    short = (serving("A", -60.0), neighbour(3, -65.0))
+    at = EAST + np.array([50.0, 150.0])
+    far = replace(journey(fuller, short), east_m=at)
+    found = visits_of([far], PLAN, field())
+    b = found.level_dbm[found.cell == PLAN.index("B")]
+    assert b.tolist() == [-90.0, -90.0]
+    assert not found.received[found.cell == PLAN.index("B")].any()
+
+
+def test_reports_of_the_serving_cell_alone_say_nothing_of_other_cells():
+    full = (serving("A", -60.0), neighbour(2, -80.0))
+    alone = (serving("A", -60.0),)
+    assert set(table(journey(alone), journey(full))) == {(0, "A")} | {(1, cell) for cell in "ABCD"}
+    # Of a phone that lists neighbours now and then, reports without any say nothing either.
+    found = table(journey(full, *[alone] * 4))
+    assert found[0, "B"] == (-80.0, True)
+    # One that nearly always does would have listed them.
+    found = table(journey(alone, *[full] * 4, east=EAST + 50.0))
+    assert found[0, "B"] == (-80.0, True)
+    apart = replace(journey(*[full] * 4, alone), east_m=EAST + np.repeat([50.0, 150.0], [4, 1]))
+    found = visits_of([apart], PLAN, field())
+    b = found.cell == PLAN.index("B")
+    assert found.received[b].tolist() == [True, False]
+
+
+def test_what_a_report_can_hold_is_that_of_its_own_journey():
+    small = (serving("A", -60.0), neighbour(2, -70.0))
+    large = (serving("A", -60.0), neighbour(2, -80.0), neighbour(3, -100.0))
+    assert table(journey(small), journey(large))[0, "C"] == (-70.0, False)
 
 
 def test_of_cells_with_one_carrier_it_is_the_one_that_is_clearly_stronger():

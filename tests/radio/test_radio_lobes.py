@@ -151,3 +151,19 @@ def test_zero_beside_levels_near_zero_is_a_level():
     assert nodata_taken_as_level(near) is None
     assert nodata_taken_as_level(np.zeros(5, np.float32)) == (0.0, 1.0)
     assert nodata_taken_as_level(np.float32([120, 0, 95, 0])) == (0.0, 0.5)
+
+
+def test_the_largest_number_of_a_type_far_above_all_others_means_no_data():
+    losses = np.arange(70, 150, dtype=np.float32)
+    for top in (255, 32767, 65535):
+        found = nodata_taken_as_level(np.append(losses, np.float32([top] * 20)))
+        assert found == (top, 0.2)
+    tenths = np.float32(0.1) * np.append(10 * losses, np.float32([65535] * 20))
+    assert nodata_taken_as_level(tenths, 0.1) == (pytest.approx(6553.5), 0.2)
+    # Cut off at 255, too few, a number with decimals, or no limit of a type.
+    cut_off = np.minimum(np.arange(70, 300, dtype=np.float32), 255)
+    few = np.append(losses.repeat(10), np.float32([255]))
+    decimals = np.append(losses + 0.25, np.float32([255] * 20))
+    other = np.append(losses, np.float32([200] * 20))
+    for values in (cut_off, few, decimals, other):
+        assert nodata_taken_as_level(values) is None

@@ -71,6 +71,23 @@ def test_filled_rasters_keep_the_trend_and_still_mark(tmp_path, monkeypatch):
     np.testing.assert_allclose(level[far], trend.reshape(level.shape)[far], atol=0.006)
 
 
+@pytest.mark.parametrize("kind", ["few", "one level", "in the plan", "few are enough"])
+def test_a_trend_that_does_not_hold_far_away_is_not_filled_in(tmp_path, kind):
+    rows = along_a_street(count=120 if kind == "one level" else 8)
+    if kind == "one level":
+        rows = replace(rows, level_dbm=np.full(len(rows), -51.0))
+    plan = CellPlan(CRS, (Cell("A", "A", *ANTENNA, 30.0, None, 50.0, 1800.0, "omni"),))
+    options = SurveyOptions(reach_m=60.0, min_points_to_fill=3 if "enough" in kind else 15)
+    survey = fit_survey(rows, options, plan=plan if kind == "in the plan" else None)
+    _, mean, deviation = written(tmp_path, survey, fill=True)
+    level, off = mean.read()[0], deviation.read()[0]
+    if kind in ("in the plan", "few are enough"):
+        assert np.isfinite(level).all()
+    else:
+        np.testing.assert_array_equal(np.isnan(level), np.isnan(off))
+        assert np.isnan(level).any()
+
+
 def test_strips_and_threads_change_no_byte(tmp_path, monkeypatch):
     survey = fit_survey(shadowed(drives=2)[0], SurveyOptions())
     written(tmp_path / "one", survey)

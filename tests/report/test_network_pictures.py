@@ -17,6 +17,7 @@ from mapfilter.report import basemap
 from mapfilter.report.basemap import BaseMap, draw_base, largest
 from mapfilter.report.canvas import BLUE, ORANGE, new_figure, png_of, save
 from mapfilter.report.coverage import plot_landuse, plot_margin
+from mapfilter.report.network import plot_points_per_cell
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings
@@ -135,6 +136,16 @@ def test_points_of_large_areas_are_drawn_as_larger_pixels():
 def test_the_largest_groups_are_kept():
     assert largest([1, 5, 5, 2], 3) == {1, 2, 3}
     assert largest([], 3) == set()
+
+
+def test_cells_without_a_point_are_not_in_the_legend():
+    points = {f"S{n}A": (np.full(n % 2, 5.0), np.full(n % 2, 5.0)) for n in range(1, 60)}
+    axes = plot_points_per_cell(points, plan_of("S1A"), BaseMap(LATTICE.bounds_m))
+    shown = [text.get_text() for text in axes.figure.legends[0].get_texts()]
+    assert "S1A: 1" in shown
+    assert not any(name.endswith(": 0") for name in shown)
+    more = int(next(name for name in shown if "with less" in name).split()[1])
+    assert sum(name.endswith(": 1") for name in shown) + more == 30
 
 
 @pytest.fixture(scope="module")

@@ -263,6 +263,17 @@ def test_an_older_log_of_gnettrack_has_no_raw_identity(written):
     assert set(serving["ci"]) == {401 * 256 + 141}
 
 
+def test_a_cell_id_of_0_is_no_identity_for_gnettrack(written):
+    text = gnettrack().replace("\t102764173\t", "\t0\t", 3)
+    recording = read_recording(written("gnettrack", text))
+    rows = recording.tables["radio"]
+    serving = rows[rows["role"] == "serving"]
+    assert len(serving) == COUNT
+    assert serving["cell"].isna().sum() == 3
+    assert serving["level_dbm"].notna().all()
+    assert any("3 rows have a cell id of 0" in note for note in recording.notes)
+
+
 @pytest.mark.parametrize("names", ["gyr_{}", "gyro_{}", "gyroscope{}", "gyro_{}_radps"])
 def test_sensors_have_several_usual_names(names, tmp_path):
     head = ["time", "acc_x", "acc_y", "acc_z", *(names.format(axis) for axis in "xyz"), "mood"]

@@ -64,6 +64,11 @@ def holed(values, number):
     return values
 
 
+def whole(losses, top):
+    """Whole losses, the weakest third taken for not predicted."""
+    return np.where(losses > np.quantile(losses, 0.67), top, np.round(losses))
+
+
 def swap_degrees(world):
     for row in world.rows:
         row["lat"], row["lon"] = row["lon"], row["lat"]
@@ -145,6 +150,9 @@ ERRORS = [
     ("identical-rasters", lambda w: w.levels.update(S2C=w.levels["S2B"])),
     ("nodata-as-level", lambda w: w.each(lambda v: holed(v, -9999))),
     ("nodata-as-level", lambda w: w.each(lambda v: holed(v, 0))),
+    ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: whole(v, 255)))),
+    ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: whole(v, 65535)))),
+    ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: holed(v, -9999)))),
     ("raster-constant", lambda w: w.levels.update(I1=np.full_like(w.levels["I1"], -80))),
     ("quantity-unknown", lambda w: setattr(w, "quantity", "")),
     ("roads-outside-rasters", lambda w: setattr(w, "lattice", shifted(9000, 0))),

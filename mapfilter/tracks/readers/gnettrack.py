@@ -87,6 +87,12 @@ def _serving(rows: Columns, reading: Reading) -> dict[str, Floats]:
         # A base station of LTE has 256 cells; GSM and UMTS have none, or that of a controller.
         lte = (rows.mapped(technology, "networkmode", "networktech") == "LTE") & (node > 0)
         ci = np.where(lte, node * _LTE_CELLS + ci, ci)
+    # The program writes 0 where the phone does not know its cell.
+    unknown = ci == 0
+    if unknown.any():
+        some = number_of(int(unknown.sum()), "row has", "rows have")
+        reading.ignore(f"radio: {some} a cell id of 0, which is no identity")
+    ci = np.where(unknown, np.nan, ci)
     mcc, mnc = (np.full(len(rows), np.nan) for _ in range(2))
     for word in pd.unique(operator):
         if re.fullmatch(r"\d{5,6}", str(word)):
