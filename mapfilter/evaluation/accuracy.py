@@ -6,7 +6,7 @@ Success and errors after convergence are those of Khalaf-Allah 2007, section 6.2
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, inf, isfinite, nan
+from math import ceil, inf, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,12 +75,11 @@ class Truth:
         """
         at_s = np.asarray(time_s, dtype=np.float64)
         legs_m = np.hypot(np.diff(self.east_m), np.diff(self.north_m))
-        is_gap = (np.diff(self.time_s) > GAP_S) & (legs_m > GAP_M)
-        last = self.time_s.size - 1
-        before = np.clip(np.searchsorted(self.time_s, at_s, side="right") - 1, 0, last - 1)
+        # No gap follows the last one.
+        is_gap = np.append((np.diff(self.time_s) > GAP_S) & (legs_m > GAP_M), False)
+        before = np.clip(np.searchsorted(self.time_s, at_s, side="right") - 1, 0, None)
         measured = np.isin(at_s, self.time_s)
-        inside = (at_s >= self.time_s[0]) & (at_s <= self.time_s[-1])
-        return np.asarray(inside & (measured | ~is_gap[before]))
+        return np.asarray(np.isfinite(self.at(at_s)).all(axis=0) & (measured | ~is_gap[before]))
 
     def distance_at(self, time_s: ArrayLike) -> Floats:
         """Return the true distance travelled since the start, interpolated to other times."""
@@ -155,8 +154,7 @@ def accuracy(estimate: TrackEstimate, truth: Truth) -> Accuracy:
     time_s = float(estimate.time_s[switch])
     after_m = errors_m[switch:]
     after_m = after_m[np.isfinite(after_m)]
-    error_m = float(errors_m[switch])
-    told = isfinite(error_m)
+    error_m, told = float(errors_m[switch]), bool(truth.tells(time_s))
     return Accuracy(
         True,
         error_m <= SUCCESS_RADIUS_M if told else None,
@@ -254,14 +252,15 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
     errors_m = position_errors_m(estimate, truth)
     counted = truth.tells(estimate.time_s) & (estimate.time_s <= until_s)
     claimed = counted & claims_of(estimate)
-    known = counted & np.array([status.is_followed for status in estimate.status], dtype=bool)
+    known = np.array([status.is_followed for status in estimate.status], dtype=bool)
     converged = counted & np.array([s is Status.CONVERGED for s in estimate.status], dtype=bool)
-    lost = counted & np.array([status is Status.LOST for status in estimate.status], dtype=bool)
+    lost = np.array([status is Status.LOST for status in estimate.status], dtype=bool)
     near = errors_m <= SUCCESS_RADIUS_M
     radii_m = np.column_stack([estimate.radii_m, estimate.radius_99_m])
     held = errors_m[:, np.newaxis] <= radii_m
     followed = counted & np.logical_or.accumulate(claimed) & np.isfinite(errors_m)
-    began_claim, began_lost = claimed & ~_before(known), lost & ~_before(lost)
+    # What began before the truth, or in a gap of it, does not begin with it.
+    began_claim, began_lost = claimed & ~_before(known), counted & lost & ~_before(lost)
     return Claims(
         epochs=int(counted.sum()),
         km=float(truth.distance_at(min(until_s, float(truth.time_s[-1]))) / 1000),
@@ -272,7 +271,7 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
         wrong_converged=int((converged & ~near).sum()),
         false_starts=int((began_claim & ~near).sum()),
         lost=int(began_lost.sum()),
-        false_lost=int((began_lost & _before(known & near)).sum()),
+        false_lost=int((began_lost & _before(counted & known & near)).sum()),
         worst_100m_m=_worst_100m(errors_m[followed], truth.distance_at(estimate.time_s[followed])),
     )
 

@@ -157,6 +157,21 @@ def test_between_true_positions_far_apart_in_time_and_place_nobody_knows_the_way
     assert np.isfinite(position_errors_m(found, GAPS)).tolist() == told
 
 
+def test_a_truth_of_one_position_or_without_numbers_tells_what_it_has():
+    one = Truth(np.array([5.0]), np.array([1.0]), np.array([2.0]))
+    assert one.tells([4.0, 5.0, 6.0]).tolist() == [False, True, False]
+    holed = Truth(np.arange(4.0), np.array([0.0, nan, 2.0, 3.0]), np.zeros(4))
+    assert holed.tells([0.0, 0.5, 1.0, 1.5, 2.0, 2.5]).tolist() == [
+        *(True, False, False, False, True, True)
+    ]
+
+
+def test_a_switch_without_a_position_is_a_failure_where_the_truth_is_known():
+    score = accuracy(estimate([(5, nan, nan, C), (6, 60, 0, T)]), TRUTH)
+    assert (score.switched, score.success, score.switch_distance_m) == (True, False, 50.0)
+    assert isnan(score.error_at_switch_m)
+
+
 def test_what_lies_in_a_gap_of_the_truth_is_not_scored():
     score = accuracy(estimate([(10, 15, 4, C), (30, 0, 900, T), (60, 75, 2, T)]), GAPS)
     assert (score.success, score.error_at_switch_m, score.error_mean_m) == (True, 4.0, 3.0)

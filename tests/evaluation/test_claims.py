@@ -136,6 +136,35 @@ def test_epochs_in_a_gap_of_the_truth_do_not_count():
     assert (found.epochs, found.claimed, found.converged, found.within_50m) == (2, 1, 0, 1)
 
 
+@pytest.mark.parametrize(
+    ("statuses", "begun"),
+    [
+        ("TTTTT", (1, 0)),
+        ("SSTTT", (0, 0)),
+        ("SSSTT", (1, 0)),
+        ("LLLTT", (1, 1)),
+        ("SSLLL", (0, 0)),
+        ("TTLLL", (1, 0)),
+        ("TTTTL", (1, 1)),
+    ],
+)
+def test_what_goes_on_over_a_gap_of_the_truth_does_not_begin_anew_behind_it(statuses, begun):
+    """All claims are 80 m off; the third of five epochs lies in a gap of 400 m."""
+    time_s, east_m = [1.0, 2.0, 20.0, 42.0, 43.0], [0.0, 0.0, 0.0, 400.0, 400.0]
+    record = Truth(
+        *(np.array([one[k] for k in (0, 1, 3, 4)]) for one in (time_s, east_m)), np.zeros(4)
+    )
+    fixes = [
+        Fix(
+            time, east, 80.0, np.eye(2), np.full(3, 9.0), STATUS[letter],
+            1, 1.0, 0, 0.0, Reason.USED, 9.0,
+        )
+        for time, east, letter in zip(time_s, east_m, statuses, strict=True)
+    ]  # fmt: skip
+    found = score_claims(TrackEstimate.of_fixes("EPSG:32629", "bayes", fixes), record)
+    assert (found.epochs, found.false_starts, found.lost) == (4, *begun)
+
+
 def test_a_track_without_a_claim():
     found = claims("SSLS", 5.0)
     assert (found.claimed, found.within_50m, found.covered) == (0, 0, (0, 0, 0, 0))

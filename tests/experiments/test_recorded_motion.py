@@ -1,6 +1,7 @@
 """Motion, outages and least squares of the benchmarks on recordings."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -23,6 +24,7 @@ from mapfilter.experiments.recorded.outages import (
     log_without,
     without,
 )
+from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.gnss.sky import ecef_from_lonlat
@@ -230,3 +232,27 @@ def test_before_the_first_epoch_there_is_no_position():
     errors_m, held = errors_at(_track([1.0, 2.0]), truth, [5.0, 10.0, 12.0])
     assert errors_m.tolist() == [np.inf, 1.0, 2.0]
     assert held.tolist() == [False, True, True]
+
+
+def test_what_lies_in_a_gap_of_the_truth_is_no_missing_position():
+    """The truth is at 0, 10 and 50 s, and at 50 m from 10 s on: a gap of 100 m."""
+    truth = Truth(np.array([0.0, 10.0, 50.0]), np.array([0.0, 50.0, 150.0]), np.zeros(3))
+    estimate = _track([50.0, 51.0, np.nan])
+    errors_m, _ = errors_between(estimate, truth, 9.0, 20.0)
+    assert errors_m.tolist() == [0.0]
+    # Asked for by its time, the way between is a straight line: 2.5 m each second.
+    errors_m, _ = errors_at(estimate, truth, [11.0, 12.0])
+    assert errors_m.tolist() == [1.5, np.inf]
+
+
+@pytest.mark.parametrize(
+    ("at_s", "east_m", "expected"),
+    [(10.0, 60.0, (True, False)), (10.0, 101.0, (False, True)), (20.0, 900.0, (None, None))],
+)
+def test_a_claim_in_a_gap_of_the_truth_is_neither_right_nor_wrong(at_s, east_m, expected):
+    truth = Truth(np.array([0.0, 10.0, 50.0]), np.array([0.0, 50.0, 150.0]), np.zeros(3))
+    fix = replace(_fix(at_s, east_m, 0.0, 3.0), status=Status.CONVERGED)
+    estimate = TrackEstimate.of_fixes(CRS, "bayes", [fix])
+    for asked in (None, lambda claimed, wrong: claimed and not wrong):
+        found = score_journey("part", "bayes", "unit", estimate, truth, asked=asked)
+        assert (found.claimed, (found.success, found.wrong)) == (True, expected)

@@ -74,7 +74,7 @@ def score(
         return row | _recovered(case, walked, truth, estimate.time_s, errors_m)
     scored = accuracy(estimate, truth)
     row |= {
-        "success": scored.success,
+        "success": scored.success is True,
         "wrong": bool(scored.error_at_switch_m > SUCCESS_RADIUS_M),
         "switch_m": _finite(scored.switch_distance_m),
         **{name: _finite(getattr(scored, name)) for name in _ERRORS},

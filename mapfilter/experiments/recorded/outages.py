@@ -65,9 +65,11 @@ def errors_at(
 ) -> tuple[Floats, Bools]:
     """Return the error at the last epoch up to each time, and whether the 95 % radius held it.
 
-    Without a position the error is infinite, as before the first epoch.
+    Without a position the error is infinite, as before the first epoch. The true positions asked
+    for are taken as they are given, with straight lines between them.
     """
-    errors_m = position_errors_m(estimate, truth)
+    east_m, north_m = truth.at(estimate.time_s)
+    errors_m = np.hypot(estimate.east_m - east_m, estimate.north_m - north_m)
     at = np.searchsorted(estimate.time_s, np.asarray(times_s) + 1e-6) - 1
     there = (at >= 0) & np.isfinite(errors_m[at])
     held = there & (errors_m[at] <= estimate.radii_m[at, 2])
@@ -81,7 +83,7 @@ def errors_between(
 
     Without a position the error is infinite. Second, whether the 95 % radius held it.
     """
-    known = np.isfinite(truth.at(estimate.time_s)[0])
+    known = truth.tells(estimate.time_s)
     asked = known & (estimate.time_s > after_s) & (estimate.time_s <= until_s)
     errors_m = position_errors_m(estimate, truth)[asked]
     there = np.isfinite(errors_m)

@@ -39,7 +39,7 @@ def score_journey(
         Processor time of the filter.
     asked : callable, optional
         From "claimed a position" and "first claim more than 50 m off" to success; by default a
-        claim that is not wrong.
+        claim that is not wrong. Neither is known where the ground truth does not tell.
     from_start : bool
         Score all epochs with a position, as of smoothed tracks.
     """
@@ -47,13 +47,16 @@ def score_journey(
     switch = estimate.converged_at
     claimed = switch is not None
     first_m = float(errors_m[switch]) if switch is not None else nan
-    wrong = claimed and not first_m <= SUCCESS_RADIUS_M
+    time_s = float(estimate.time_s[switch]) if switch is not None else nan
+    told = not claimed or bool(truth.tells(time_s))
+    wrong = claimed and not first_m <= SUCCESS_RADIUS_M if told else None
     at = np.arange(len(estimate))
     since = 0 if from_start else (len(estimate) if switch is None else switch)
     scored = (at >= since) & np.isfinite(errors_m)
-    success = (claimed and not wrong) if asked is None else asked(claimed, wrong)
+    success = None
+    if wrong is not None:
+        success = (claimed and not wrong) if asked is None else asked(claimed, wrong)
     story = explain(estimate, truth)
-    time_s = float(estimate.time_s[switch]) if switch is not None else nan
     return Found(
         part,
         method,
