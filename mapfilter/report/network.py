@@ -15,7 +15,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, find_objects
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError
@@ -136,7 +136,7 @@ def plot_points_per_cell(
     for index, places_m in enumerate(points_by_cell.values()):
         x, y = frame(*places_m)
         axes.scatter(x, y, s=size, color=groups.colours[index], marker="s", linewidths=0, zorder=3)
-        named_at = _nearest_to_median(x, y) if x.size else None
+        named_at = _nearest_to_median(x, y) if x.size and groups.is_named(index) else None
         groups.add(index, grouped(counts[index]), named_at)
     finish_map(axes, base, plan, title)
     side_legend(axes, "cell: points", groups.handles, groups.counts, network_legend(plan))
@@ -169,9 +169,14 @@ def plot_best_server(
     shown = np.ma.masked_less(best_server, 0)
     colours, limits = ListedColormap(groups.colours or "w"), (-0.5, max(len(cell_ids), 1) - 0.5)
     draw_raster(axes, base, lattice, shown, cmap=colours, clim=limits, alpha=0.85, zorder=1)
+    # Each cell is looked at in its own window, as there may be a thousand.
+    labels = np.maximum(best_server, -1).astype(np.int32) + 1
+    windows = find_objects(labels, max_label=len(cell_ids))
     for index, count in enumerate(counts):
-        own = best_server == index
-        named_at = frame(*lattice.east_north(*_deepest(own))) if count else None
+        named_at, window = None, windows[index]
+        if window is not None and groups.is_named(index):
+            row, col = _deepest(best_server[window] == index)
+            named_at = frame(*lattice.east_north(row + window[0].start, col + window[1].start))
         groups.add(index, f"{100 * count / best_server.size:.1f} %", named_at)
     finish_map(axes, base, plan, title)
     side_legend(axes, "cell: share of area", groups.handles, groups.counts, network_legend(plan))
@@ -191,23 +196,28 @@ class _Groups:
         self._axes, self._plan, self._ids = axes, plan, cell_ids
         self._names, self._named = short_names(cell_ids), largest(counts, _MOST_NAMES)
 
-    def add(self, index: int, amount: str, named_at: tuple[Any, Any] | None) -> None:
-        """Add a cell to the legend, and name it at a place, if it has any.
+    def is_named(self, index: int) -> bool:
+        """Return whether a cell is named on the map: it is large, and has no name at its mark."""
+        name = self._ids[index]
+        indoor = name in self._plan and self._plan[name].indoor
+        return index in self._named and not indoor
 
-        Indoor cells are named at their marks, and so are not named here.
-        """
+    def add(self, index: int, amount: str, named_at: tuple[Any, Any] | None) -> None:
+        """Add a cell to the legend, if it has any of the map, and name it at a place."""
         name, colour = self._ids[index], self.colours[index]
         if self._sizes[index]:
             self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
-        indoor = name in self._plan and self._plan[name].indoor
-        if named_at is not None and index in self._named and not indoor:
+        if named_at is not None:
             x, y = named_at
             look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME
             self._axes.text(float(x), float(y), self._names[index], **look)
 
 
 def _deepest(own: NDArray[np.bool_]) -> tuple[Any, Any]:
-    """Return row and column of the most central pixel of those that lie deep in a cell's own."""
+    """Return row and column of the most central pixel of those that lie deep in a cell's own.
+
+    ``own`` is the smallest window that holds all of them.
+    """
     # A name needs no better place than one of some hundred rows.
     step = max(max(own.shape) // _DEEP_ROWS, 1)
     some = own[::step, ::step]

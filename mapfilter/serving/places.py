@@ -12,13 +12,22 @@ from mapfilter.geodesy import Lattice, project, unproject
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.serving.documents import RequestError, check_keys, number
-from mapfilter.tracks.misplaced import check_near, misplaced_by, outside_m
+from mapfilter.tracks.misplaced import (
+    check_near,
+    degrees_for_metres,
+    misplaced_by,
+    nearest_m,
+    outside_m,
+)
 
 START_REACH_M, START_REACH_SD = 500.0, 5.0
 """A start is of this area up to so far outside, or up to so many of its own deviations."""
 
 _RANGES = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": 1e5}
 _MOST_DEG = 180.0
+_FAR_M = 100_000.0
+"""No cells of an area are heard so far outside; nearer, its mirror image may be a true place."""
+
 _ELSEWHERE = "a position of another area or zone"
 
 
@@ -59,16 +68,18 @@ def start_of(
 
 
 def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -> None:
-    """Check that a position of a request lies near an area, as one of a log has to.
+    """Check that positions of a request lie near an area, as those of a log have to.
 
-    It is checked until a position of the session was used; the device may leave the area later.
-    Once the session has a belief, only positions that a usual mistake explains are a fault: others
-    may be those of a spoofer, and the filter rejects them.
+    They are checked until a position of the session was used; the device may leave the area later.
+    A device whose receiver is misled still has to be located by its cells: where it reports cells,
+    or the session has a belief, the filter judges what can be a spoofer's position.
 
     Raises
     ------
     RequestError
-        There are positions, and all of them lie elsewhere (400).
+        There are positions, all of them lie elsewhere, and they are degrees given for metres; or
+        the session has no belief, and another usual mistake puts them far away or the request
+        reports no cells (400).
     """
     placed = [(index, one.fix) for index, one in enumerate(epochs) if one.fix is not None]
     if not placed or before.last_fix is not None:
@@ -77,11 +88,17 @@ def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -
     north_m = np.array([fix.north_m for _, fix in placed])
     # Also those of a place that is not near: no receiver reports metres as small.
     as_small = np.maximum(np.abs(east_m), np.abs(north_m)).max() <= _MOST_DEG
-    mistake = "degrees given for metres" if as_small else misplaced_by(east_m, north_m, lattice)
-    if before.belief is not None and not mistake:
+    mistake = "degrees given for metres" if as_small else ""
+    mistake = mistake or degrees_for_metres(east_m, north_m, lattice)
+    if not mistake and before.belief is None:
+        if not any(one.radio for one in epochs):
+            mistake = _ELSEWHERE
+        elif nearest_m(east_m, north_m, lattice) > _FAR_M:
+            mistake = misplaced_by(east_m, north_m, lattice)
+    if not mistake:
         return
     faults, where = Faults(), f"epochs[{placed[0][0]}].gnss"
-    check_near(where, east_m, north_m, lattice, faults, mistake or _ELSEWHERE)
+    check_near(where, east_m, north_m, lattice, faults, mistake)
     if faults.found:
         raise RequestError.of(InputError(tuple(faults.found)))
 

@@ -68,8 +68,8 @@ class SurveyOptions(Options):
         An antenna of unknown place is located from at least so many; with fewer the trend is the
         mean.
     min_points_to_fill : int
-        With fewer, the trend of a cell is not kept far from its readings, unless its antenna or a
-        prediction is given.
+        With fewer, or one level everywhere, the trend of a cell is not kept far from its readings,
+        unless its antenna or a prediction is given.
     neighbours : int
         Number of neighbours that "knn" averages.
     square_m : float
@@ -155,12 +155,12 @@ class Survey:
     def can_fill(self, cell: SurveyedCell) -> bool:
         """Return whether a cell's trend holds far from its readings.
 
-        That of few levels does not, nor a path loss from an antenna that was estimated from levels
+        That about a given antenna or prediction does. That of few levels does not, nor of levels
         which are all the same, as those at the end of a phone's scale.
         """
         if cell.trend.covariate is not None and not cell.estimated:
             return True
-        told = not cell.estimated or np.ptp(cell.points.level_dbm) > 0
+        told = np.ptp(cell.points.level_dbm) > 0
         return bool(told and len(cell.points) >= self.options.min_points_to_fill)
 
 

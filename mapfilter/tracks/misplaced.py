@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from pyproj.exceptions import ProjError
@@ -13,7 +13,10 @@ from mapfilter.geodesy import Lattice, project, unproject
 
 AWAY_M = 5000.0
 """Positions all of which lie farther outside of an area are those of another one."""
+
 _MOST_TRIED = 200
+_TIMES = 10.0
+"""Undoing a mistake brings positions so many times nearer, or it explains nothing."""
 
 
 def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
@@ -24,12 +27,15 @@ def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
     return np.asarray(np.hypot(off_east_m, off_north_m))
 
 
+def nearest_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> float:
+    """Return how far outside a lattice the nearest of some positions lies; infinite for none."""
+    known = np.isfinite(east_m) & np.isfinite(north_m)
+    return float(outside_m(east_m[known], north_m[known], lattice).min(initial=np.inf))
+
+
 def is_near(east_m: Floats, north_m: Floats, lattice: Lattice) -> bool:
     """Return whether any of some positions lies in a lattice, or not far outside."""
-    known = np.isfinite(east_m) & np.isfinite(north_m)
-    if not known.any():
-        return False
-    return float(outside_m(east_m[known], north_m[known], lattice).min()) <= AWAY_M
+    return nearest_m(east_m, north_m, lattice) <= AWAY_M
 
 
 def check_near(
@@ -66,27 +72,38 @@ def misplaced_by(east_m: Floats, north_m: Floats, lattice: Lattice) -> str:
     """Return the likely mistake of positions that lie outside of a lattice; "" for none of them.
 
     Each of the usual mistakes is undone; the first one that brings them into the area is named.
+    One that brings them little nearer is none: beside the meridian of Greenwich or the equator the
+    place with the other sign is close to the true one.
 
     Parameters
     ----------
     east_m, north_m : (N,) array
         In the CRS of the lattice.
     """
+    return _explained(east_m, north_m, lattice, _undone)
+
+
+def degrees_for_metres(east_m: Floats, north_m: Floats, lattice: Lattice) -> str:
+    """Return which degrees of a lattice's area were given for metres; "" if they are none."""
+    return _explained(east_m, north_m, lattice, _from_degrees)
+
+
+_Undoing = Callable[[str, Floats, Floats], Iterator[tuple[str, Floats, Floats]]]
+
+
+def _explained(east_m: Floats, north_m: Floats, lattice: Lattice, undoing: _Undoing) -> str:
     step = max(1, len(east_m) // _MOST_TRIED)
     east_m, north_m = east_m[::step], north_m[::step]
-    for mistake, east, north in _undone(lattice.crs, east_m, north_m):
-        if is_near(east, north, lattice):
+    away_m = nearest_m(east_m, north_m, lattice)
+    for mistake, east, north in undoing(lattice.crs, east_m, north_m):
+        if nearest_m(east, north, lattice) <= min(AWAY_M, away_m / _TIMES):
             return mistake
     return ""
 
 
 def _undone(crs: str, east_m: Floats, north_m: Floats) -> Iterator[tuple[str, Floats, Floats]]:
     yield "east and north swapped", north_m, east_m
-    for unit, scale in (("degrees", 1.0), ("degrees times 1e7", 1e7), ("degrees times 1e6", 1e6)):
-        first, second = east_m / scale, north_m / scale
-        given = f"{unit} given for metres"
-        yield given, *_in_crs(crs, first, second)
-        yield f"{given}, latitude as east", *_in_crs(crs, second, first)
+    yield from _from_degrees(crs, east_m, north_m)
     lon_deg, lat_deg = unproject(crs, east_m, north_m)
     yield "latitude and longitude swapped", *_in_crs(crs, lat_deg, lon_deg)
     for names, lon, lat in (
@@ -98,6 +115,16 @@ def _undone(crs: str, east_m: Floats, north_m: Floats) -> Iterator[tuple[str, Fl
     swapped = "latitude and longitude swapped, with a lost sign"
     for east, north in ((1, -1), (-1, 1), (-1, -1)):
         yield swapped, *_in_crs(crs, east * lat_deg, north * lon_deg)
+
+
+def _from_degrees(
+    crs: str, east_m: Floats, north_m: Floats
+) -> Iterator[tuple[str, Floats, Floats]]:
+    for unit, scale in (("degrees", 1.0), ("degrees times 1e7", 1e7), ("degrees times 1e6", 1e6)):
+        first, second = east_m / scale, north_m / scale
+        given = f"{unit} given for metres"
+        yield given, *_in_crs(crs, first, second)
+        yield f"{given}, latitude as east", *_in_crs(crs, second, first)
 
 
 def _in_crs(crs: str, lon_deg: Floats, lat_deg: Floats) -> tuple[Floats, Floats]:

@@ -28,8 +28,10 @@ _OF_REPORTS = (
     *("method", "reports", "located", "unknown_transmitters", "scored"),
     *("error_mean_m", "error_median_m", "error_67_m", "error_95_m", "within_95"),
 )
+_JUDGED = "success"
+"""None where there is a truth that says nothing of the switch; without any truth it is missing."""
 _OF_SEVERAL = "final_statuses"
-_LOCATE_USE = "positions of single reports, no ground truth; QGIS opens positions.csv"
+_LOCATE_USE = "located positions, not to be taken for a ground truth; QGIS opens positions.csv"
 
 
 def result_info(path: Path) -> dict[str, Any] | None:
@@ -69,11 +71,12 @@ def _replay_info(kind: str, folder: Path, figures: Mapping[str, Any]) -> dict[st
 
 
 def _some(figures: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
-    return {name: figures[name] for name in names if figures.get(name) is not None}
+    given = {name: figures[name] for name in names if name in figures}
+    return {name: value for name, value in given.items() if value is not None or name == _JUDGED}
 
 
 def _use_of(folder: Path) -> str:
-    text = "what a filter estimated, no ground truth; "
+    text = "what a filter estimated, not to be taken for a ground truth; "
     pages = (folder / REPLAY_HTML, *sorted(folder.glob(f"*/{REPLAY_HTML}")))
     for page in pages:
         if page.is_file():

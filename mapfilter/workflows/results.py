@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +20,18 @@ PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.
 
 _OF_ONE_LOG = {*ESTIMATES, FIGURES, REPLAY_HTML, *PICTURES}
 
-_OF_REPLAY, _OF_REPORTS = "filter", "database_reports"
-"""Entries that only the figures of a replay, and only those of single reports have."""
+_OF_REPLAY, _OF_REPORTS = ("filter", "epochs", "epochs_by_status"), ("database_reports",)
+"""Entries that together only the figures of a replay, and only those of single reports have."""
 
 
 def is_of_replay(figures: Mapping[str, Any]) -> bool:
     """Return whether a replay wrote some figures."""
-    return _OF_REPLAY in figures
+    return figures.keys() >= set(_OF_REPLAY)
 
 
 def is_of_reports(figures: Mapping[str, Any]) -> bool:
     """Return whether ``locate`` wrote some figures."""
-    return _OF_REPORTS in figures
+    return figures.keys() >= set(_OF_REPORTS)
 
 
 def check_figures_of_replay(out: Path) -> None:
@@ -39,7 +39,7 @@ def check_figures_of_replay(out: Path) -> None:
 
     Damaged ones beside its other files are taken for its own.
     """
-    _check_figures(out, _OF_REPLAY, "a replay", ESTIMATES)
+    _check_figures(out, is_of_replay, "a replay", ESTIMATES)
 
 
 def check_figures_of_reports(out: Path) -> None:
@@ -47,10 +47,15 @@ def check_figures_of_reports(out: Path) -> None:
 
     Damaged ones beside its other files are taken for its own.
     """
-    _check_figures(out, _OF_REPORTS, "mapfilter locate", (POSITIONS,))
+    _check_figures(out, is_of_reports, "mapfilter locate", (POSITIONS,))
 
 
-def _check_figures(out: Path, entry: str, whose: str, others_of_it: Sequence[str]) -> None:
+def _check_figures(
+    out: Path,
+    is_own: Callable[[Mapping[str, Any]], bool],
+    whose: str,
+    others_of_it: Sequence[str],
+) -> None:
     figures = out / FIGURES
     if not figures.is_file():
         return
@@ -60,9 +65,12 @@ def _check_figures(out: Path, entry: str, whose: str, others_of_it: Sequence[str
         if any((out / name).is_file() for name in others_of_it):
             return
         found = {}
-    if entry not in found:
-        others = {_OF_REPLAY: "those of a replay", _OF_REPORTS: "those of mapfilter locate"}
-        got = next((words for own, words in others.items() if own in found), "others")
+    if not is_own(found):
+        got = "others"
+        if is_of_replay(found):
+            got = "those of a replay"
+        elif is_of_reports(found):
+            got = "those of mapfilter locate"
         hint = "results of one command each; give another folder by --out"
         raise fail(OutputError, str(figures), f"figures of {whose}, or nothing yet", got, hint)
 

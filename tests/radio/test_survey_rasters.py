@@ -88,6 +88,24 @@ def test_a_trend_that_does_not_hold_far_away_is_not_filled_in(tmp_path, kind):
         assert np.isnan(level).any()
 
 
+@pytest.mark.parametrize("trend", ["path_loss", "mean"])
+@pytest.mark.parametrize("spread_db", [0.0, 6.0])
+def test_one_level_everywhere_says_nothing_of_places_far_away(trend, spread_db):
+    rows = along_a_street()
+    level_dbm = -51.0 - spread_db * (np.arange(len(rows)) % 2)
+    rows = replace(rows, level_dbm=level_dbm)
+    plan = CellPlan(CRS, (Cell("A", "A", *ANTENNA, 30.0, None, 50.0, 1800.0, "omni"),))
+    predicted = {"A": lambda east_m, north_m: -60.0 - 0.01 * np.hypot(east_m, north_m) / 1e3}
+    options = SurveyOptions(trend=trend)
+    survey = fit_survey(rows, options)
+    assert survey.can_fill(survey.cells["A"]) == (spread_db > 0)
+    survey = fit_survey(rows, options, predicted=predicted)
+    assert survey.can_fill(survey.cells["A"])
+    survey = fit_survey(rows, options, plan=plan)
+    # A mean uses no antenna.
+    assert survey.can_fill(survey.cells["A"]) == (spread_db > 0 or trend == "path_loss")
+
+
 def test_strips_and_threads_change_no_byte(tmp_path, monkeypatch):
     survey = fit_survey(shadowed(drives=2)[0], SurveyOptions())
     written(tmp_path / "one", survey)

@@ -6,7 +6,8 @@ from matplotlib.image import imread
 
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.report.basemap import BaseMap
+from mapfilter.report import network
+from mapfilter.report.basemap import BaseMap, local_frame
 from mapfilter.report.canvas import save
 from mapfilter.report.network import plot_best_server
 from mapfilter.report.survey import plot_left_out
@@ -58,3 +59,35 @@ def test_a_cell_is_named_deep_in_its_own_area(rows):
     assert y == pytest.approx(1 / 2, abs=1 / 8)
     x, y = np.array(places["B"]) / unit_m
     assert (x > 1 / 4) & (abs(y - 1 / 2) > 1 / 16)
+
+
+def test_only_named_cells_are_looked_at_each_in_its_own_window(monkeypatch):
+    """A thousand cells, many of them of one pixel, cost no pass over the raster each."""
+    lattice = Lattice(CRS, 565_000.0, 5_934_000.0, 5.0, 1200, 1200)
+    server = np.add.outer(40 * (np.arange(1200) // 40), np.arange(1200) // 40).astype(np.int16)
+    server = np.minimum(server, 799)
+    ids = [f"S{number}" for number in range(1000)]
+    row, col = np.divmod(np.arange(200), 20)
+    server[60 * row + 31, 60 * col + 31] = 800 + np.arange(200)
+    west, _, _, north = lattice.bounds_m
+    indoor = Cell(
+        "S799", "S", west + 300.0, north - 300.0, 3.0, None, 20.0, 1800.0, "omni", indoor=True
+    )
+    looked, whole = [], network._deepest
+    monkeypatch.setattr(network, "_deepest", lambda own: looked.append(own.shape) or whole(own))
+    plot_best_server(server, ids, lattice, CellPlan(CRS, (indoor,)), BaseMap(lattice.bounds_m))
+    # Sixty are named, but the largest, an indoor cell, at its mark.
+    assert len(looked) == 59
+    assert max(max(shape) for shape in looked) <= 40
+
+
+@pytest.mark.parametrize("at", [(0, 0), (601, 803), (1199, 1199)])
+def test_a_cell_of_one_pixel_is_named_there(at):
+    lattice = Lattice(CRS, 565_000.0, 5_934_000.0, 5.0, 1200, 1200)
+    server = np.zeros((1200, 1200), dtype=np.int8)
+    server[at] = 1
+    base = BaseMap(lattice.bounds_m)
+    axes = plot_best_server(server, ["A", "B"], lattice, CellPlan(CRS, ()), base)
+    (place,) = [text.get_position() for text in axes.texts if text.get_text() == "B"]
+    frame = local_frame(base)
+    np.testing.assert_allclose(place, np.array(frame(*lattice.east_north(*at))))

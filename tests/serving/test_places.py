@@ -6,7 +6,10 @@ import pytest
 from asking import SERVING, ask, service
 from positioning.cross_world import CROSSING, CRS, LATTICE
 
-from mapfilter.geodesy import unproject
+from mapfilter.geodesy import Lattice, project, unproject
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.serving.places import check_fixes
 
 LON_DEG, LAT_DEG = (float(axis) for axis in unproject(CRS, *CROSSING))
 EAST_M, NORTH_M = CROSSING
@@ -76,7 +79,31 @@ def test_positions_of_another_area_are_refused_as_those_of_a_log(positioner, cro
     assert fault["message"].endswith(f"(likely: {cause})")
 
 
-def test_degrees_are_refused_after_reports_too_but_not_a_spoofer(positioner, cross):
+@pytest.mark.parametrize("north_m", [6_000.0, 45_000.0, 900_000.0])
+def test_a_device_whose_receiver_is_misled_is_located_by_its_cells(positioner, cross, north_m):
+    misled = [
+        {
+            "motion": [{"step_m": 10.0, "heading_rad": 0.0}],
+            "radio": [SERVING],
+            "gnss": [fix(EAST_M + 10.0 * number, NORTH_M + north_m)],
+        }
+        for number in range(12)
+    ]
+    _, *answers = answers_of(positioner, cross, None, *misled)
+    assert [one.code for one in answers] == [200] * 12
+    found = [one.json["fixes"][0] for one in answers]
+    # A place that is far from all hypotheses alike favours none of them.
+    assert all(abs(one["north_m"] - NORTH_M) < 300 for one in found)
+    assert found[-1]["radius_95_m"] < found[0]["radius_95_m"]
+
+
+def test_a_mistake_is_refused_beside_cells_too(positioner, cross):
+    for place in ((NORTH_M, EAST_M), (LON_DEG, LAT_DEG), (LON_DEG * 1e7, LAT_DEG * 1e7)):
+        swapped = {"radio": [SERVING], "gnss": [fix(*place)]}
+        assert [one.code for one in answers_of(positioner, cross, None, swapped)] == [201, 400]
+
+
+def test_once_there_is_a_belief_only_degrees_for_metres_are_refused(positioner, cross):
     heard = {"radio": [SERVING]}
     answers = answers_of(
         positioner,
@@ -85,9 +112,27 @@ def test_degrees_are_refused_after_reports_too_but_not_a_spoofer(positioner, cro
         heard,
         {**heard, "gnss": [fix(LON_DEG, LAT_DEG)]},
         {**heard, "gnss": [fix(LON_DEG, LAT_DEG + 1)]},
+        {**heard, "gnss": [fix(LON_DEG * 1e7, LAT_DEG * 1e7)]},
         {**heard, "gnss": [fix(EAST_M, NORTH_M + 20_000)]},
+        {"gnss": [fix(EAST_M, NORTH_M + 20_000)]},
+        {**heard, "gnss": [fix(NORTH_M, EAST_M)]},
     )
-    assert [one.code for one in answers] == [201, 200, 400, 400, 200]
+    assert [one.code for one in answers] == [201, 200, 400, 400, 400, 200, 200, 200]
+
+
+@pytest.mark.parametrize("lon_deg", [-0.04, -0.06, -0.08, -0.1])
+@pytest.mark.parametrize("believed", [False, True])
+def test_true_positions_beside_the_meridian_of_greenwich_count(lon_deg, believed):
+    crs = "EPSG:32631"
+    west_m, north_m = (float(axis[0]) for axis in project(crs, [0.02], [51.5]))
+    lattice = Lattice(crs, west_m, north_m, 5.0, 400, 400)
+    east_m, north_m = (float(axis[0]) for axis in project(crs, [lon_deg], [51.49]))
+    row = ReportRow("serving", "W", None, None, -70.0, 0)
+    radio = () if believed else (row,)
+    epoch = Epoch(0.0, radio=radio, fix=GnssFix(east_m, north_m))
+    # Only whether there is a belief counts.
+    before = BayesState(belief=object() if believed else None)
+    check_fixes([epoch], before, lattice)
 
 
 def test_a_device_may_leave_the_area(positioner, cross):

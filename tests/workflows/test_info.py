@@ -213,12 +213,29 @@ def test_a_replay_is_a_result_no_recording(tmp_path):
         (folder / "estimate.gpx", "estimate"),
     ):
         found = info(path)
-        assert found.pop("use").startswith("what a filter estimated, no ground truth; ")
+        assert found.pop("use").startswith(
+            "what a filter estimated, not to be taken for a ground truth; "
+        )
         assert found == {"kind": kind, **shown}
     (folder / "replay.html").touch()
     assert info(folder)["use"].endswith(f"mapfilter view {folder}")
     (folder / "figures.json").write_text("{")
     assert_refused(mapfilter("info", folder), "figures.json: expected")
+
+
+@pytest.mark.parametrize("success", [True, False, None])
+def test_a_switch_that_is_not_judged_is_told(tmp_path, success):
+    folder = estimate_in(tmp_path / "located", {**FIGURES, "success": success})
+    for path in (folder, folder / "estimate.parquet"):
+        assert info(path)["success"] is success
+    assert "success" not in info(estimate_in(tmp_path / "without a truth", FIGURES))
+
+
+def test_figures_with_a_filter_alone_are_those_of_another_program(tmp_path):
+    name, text = MADE["gpx"]
+    (tmp_path / name).write_text(text)
+    (tmp_path / "figures.json").write_text('{"filter": 1}')
+    assert info(tmp_path)["kind"] == "recordings"
 
 
 def test_an_estimate_by_itself(tmp_path):

@@ -1,0 +1,54 @@
+"""Which mistake explains positions elsewhere, and that beside a meridian a sign explains none."""
+
+import numpy as np
+import pytest
+
+from mapfilter.errors import Faults
+from mapfilter.geodesy import Lattice, project
+from mapfilter.tracks.misplaced import check_near, degrees_for_metres, misplaced_by
+
+CRS = "EPSG:32631"
+
+
+def box(lon_deg, lat_deg):
+    """An area of 2 km with its south-west corner there."""
+    west_m, south_m = project(CRS, [lon_deg], [lat_deg])
+    return Lattice(CRS, float(west_m[0]), float(south_m[0]) + 2000.0, 5.0, 400, 400)
+
+
+GREENWICH, EQUATOR, LYON = box(0.02, 51.5), box(3.0, 0.02), box(4.8, 45.7)
+
+
+@pytest.mark.parametrize("off_deg", [-0.06, -0.08, -0.1])
+@pytest.mark.parametrize("of", ["longitude", "latitude"])
+def test_beside_a_meridian_the_other_side_is_a_place_of_its_own(of, off_deg):
+    lattice, lon_deg, lat_deg = GREENWICH, off_deg, 51.51
+    if of == "latitude":
+        lattice, lon_deg, lat_deg = EQUATOR, 3.01, off_deg
+    east_m, north_m = project(CRS, [lon_deg], [lat_deg])
+    assert misplaced_by(east_m, north_m, lattice) == ""
+    faults = Faults()
+    check_near("log", east_m, north_m, lattice, faults)
+    assert str(faults.found[0]).endswith("(likely: log of another area or zone)")
+
+
+@pytest.mark.parametrize(
+    ("lon_deg", "lat_deg", "cause"),
+    [
+        (-4.81, 45.71, "a lost sign of longitude"),
+        (4.81, -45.71, "a lost sign of latitude"),
+        (45.71, 4.81, "latitude and longitude swapped"),
+        (4.81, 47.0, ""),
+    ],
+)
+def test_a_mistake_that_brings_positions_much_nearer_is_named(lon_deg, lat_deg, cause):
+    east_m, north_m = project(CRS, [lon_deg], [lat_deg])
+    assert misplaced_by(east_m, north_m, LYON) == cause
+    assert degrees_for_metres(east_m, north_m, LYON) == ""
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e6, 1e7])
+def test_degrees_are_no_metres(scale):
+    given = degrees_for_metres(np.array([4.81]) * scale, np.array([45.71]) * scale, LYON)
+    assert given.startswith("degrees")
+    assert given.endswith("given for metres")
