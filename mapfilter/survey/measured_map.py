@@ -160,8 +160,12 @@ class Survey:
         """
         if cell.trend.covariate is not None and not cell.estimated:
             return True
-        told = np.ptp(cell.points.level_dbm) > 0
-        return bool(told and len(cell.points) >= self.options.min_points_to_fill)
+        count = len(cell.points)
+        if count < self.options.min_points_to_fill:
+            return False
+        # Few levels may be the same by chance.
+        few = count < self.options.min_points_to_locate
+        return few or bool(np.ptp(cell.points.level_dbm) > 0)
 
 
 def fit_survey(
