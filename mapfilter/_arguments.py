@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import operator
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, NamedTuple, Protocol, runtime_checkable
+from typing import Annotated, Any, NamedTuple, Protocol, get_args, runtime_checkable
 
 import numpy as np
 from annotated_types import Ge
 
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.options import expected, fits, plain_types
+from mapfilter.options import expected, fits, items_of, plain_types
 
 # As a call, since type checkers want to know of what texts a PathLike is, and isinstance must not.
 PATH: UnionType = operator.or_(Path | str, os.PathLike)
@@ -46,8 +46,11 @@ class Argument(NamedTuple):
     expected: str
 
     def accepts(self, value: object) -> bool:
-        """Return whether a value is of one of the kinds."""
-        return isinstance(value, self.kinds)
+        """Return whether a value is of one of the kinds; true and false are no numbers."""
+        kinds = get_args(self.kinds) or (self.kinds,)
+        if isinstance(value, bool | np.bool_) and object not in kinds:
+            return bool in kinds
+        return isinstance(value, kinds)
 
 
 class Setting(NamedTuple):
@@ -72,8 +75,6 @@ class Setting(NamedTuple):
     def accepts(self, value: object) -> bool:
         """Return whether a value has the type and lies within the limits."""
         kinds = plain_types(self.annotation)
-        if bool in kinds and isinstance(value, np.bool_):
-            return True
         whole = int not in kinds or float in kinds or hasattr(value, "__index__")
         return (whole or value is None) and fits(self.annotation, value)
 
@@ -85,8 +86,10 @@ class Entries(NamedTuple):
     ----------
     kinds : type or union of types
         What each value may be; each key is a text.
+    each : str
+        A value in words.
     expected : str
-        The same in words.
+        The mapping in words.
     optional : bool
         Whether it may be None.
     """
@@ -94,14 +97,27 @@ class Entries(NamedTuple):
     name: str
     value: object
     kinds: type | UnionType
+    each: str
     expected: str
     optional: bool = True
 
     def accepts(self, value: object) -> bool:
         """Return whether a value is such a mapping."""
+        return not list(self.wrong(value))
+
+    def wrong(self, value: object) -> Iterator[Argument]:
+        """Yield what is wrong: the mapping, or each such key and value."""
         if not isinstance(value, Mapping):
-            return value is None and self.optional
-        return all(isinstance(k, str) and isinstance(v, self.kinds) for k, v in value.items())
+            if value is not None or not self.optional:
+                yield Argument(self.name, value, Mapping, self.expected)
+            return
+        for key, one in value.items():
+            if not isinstance(key, str):
+                yield Argument(f"{self.name}, key", key, str, "a text")
+            else:
+                entry = Argument(f"{self.name}[{shown(key)}]", one, self.kinds, self.each)
+                if not entry.accepts(one):
+                    yield entry
 
 
 def check_arguments(
@@ -137,15 +153,20 @@ def check_arguments(
     Traceback (most recent call last):
         ...
     mapfilter.errors.ConfigError: mean, smooth: expected true or false, found 'no'
+    >>> weights = Entries("weights", {"a": 1.0, "b": "2"}, float, "a number", "weights by name")
+    >>> check_arguments("mean", keywords=[weights])
+    Traceback (most recent call last):
+        ...
+    mapfilter.errors.ConfigError: mean, weights['b']: expected a number, found '2'
     """
     faults = Faults()
     for one in arguments:
-        if not one.accepts(one.value):
+        for wrong in _wrong(one):
             hint = _hint(one, arguments)
-            faults.add(f"{function}, {one.name}", one.expected, shown(one.value), hint)
+            faults.add(f"{function}, {wrong.name}", wrong.expected, shown(wrong.value), hint)
     for each in keywords:
-        if not each.accepts(each.value):
-            faults.add(f"{function}, {each.name}", each.expected, shown(each.value))
+        for wrong in _wrong(each):
+            faults.add(f"{function}, {wrong.name}", wrong.expected, shown(wrong.value))
     faults.raise_if_any(ConfigError)
 
 
@@ -165,9 +186,10 @@ def items(
     name: str, value: object, kinds: type | UnionType, expected: str
 ) -> list[Argument | Setting | Entries]:
     """Return the items of a list to be checked, or the list where it is none."""
-    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-        return [Argument(f"{name}[{k}]", one, kinds, expected) for k, one in enumerate(value)]
-    return [Argument(name, value, tuple, f"a list, each {expected}")]
+    listed = items_of(value)
+    if listed is None:
+        return [Argument(name, value, tuple, f"a list, each {expected}")]
+    return [Argument(f"{name}[{k}]", one, kinds, expected) for k, one in enumerate(listed)]
 
 
 def path_argument(name: str, value: object) -> Argument:
@@ -195,13 +217,21 @@ def shown(value: object) -> str:
 
     Examples
     --------
-    >>> shown("out/db"), shown({}), shown(dict)
-    ("'out/db'", 'dict', 'the class dict')
+    >>> shown("out/db"), shown(np.int64(0)), shown({}), shown(dict)
+    ("'out/db'", '0', 'dict', 'the class dict')
     """
     if isinstance(value, type):
         return f"the class {value.__name__}"
+    value = value.item() if isinstance(value, np.generic) else value
     text = repr(value)
     return text if isinstance(value, _SHOWN) and len(text) <= _MOST_SHOWN else type(value).__name__
+
+
+def _wrong(one: Argument | Setting | Entries) -> Sequence[Argument | Setting]:
+    """Return what is wrong of an argument: nothing, itself, or some of its entries."""
+    if isinstance(one, Entries):
+        return list(one.wrong(one.value))
+    return () if one.accepts(one.value) else (one,)
 
 
 def _hint(one: Argument | Entries, arguments: Sequence[Argument | Entries]) -> str:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import operator
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
@@ -36,6 +36,7 @@ from typing import (
     get_type_hints,
 )
 
+import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 
 from mapfilter.errors import ConfigError, Faults
@@ -246,20 +247,23 @@ def fits(annotation: Any, value: Any) -> bool:
     inner, limits = _split(annotation)
     origin = get_origin(inner)
     if origin is Literal:
-        return any(value == one and type(value) is type(one) for one in get_args(inner))
+        return any(_equals(value, one) for one in get_args(inner))
     if origin in (Union, UnionType):
         return any(fits(one, value) for one in get_args(inner))
     if origin is tuple:
         kinds = get_args(inner)
-        if not isinstance(value, tuple | list):
+        items = items_of(value)
+        if items is None:
             return False
         if kinds[-1] is Ellipsis:
-            return all(fits(kinds[0], one) for one in value)
-        return len(value) == len(kinds) and all(map(fits, kinds, value))
+            return all(fits(kinds[0], one) for one in items)
+        return len(items) == len(kinds) and all(map(fits, kinds, items))
     if inner is NoneType:
         return value is None
-    if inner is bool or inner is str:
-        return isinstance(value, inner)
+    if inner is bool:
+        return isinstance(value, bool | np.bool_)
+    if inner is str:
+        return isinstance(value, str)
     if inner is Path:
         return isinstance(value, str | os.PathLike)
     if inner in (int, float):
@@ -267,7 +271,7 @@ def fits(annotation: Any, value: Any) -> bool:
             number = float(value)
         except (TypeError, ValueError, OverflowError):
             return False
-        if isinstance(value, bool | str) or type(value).__name__ in ("bool_", "bool"):
+        if isinstance(value, bool | np.bool_ | str):
             return False
         if not isfinite(number):
             return False
@@ -278,11 +282,37 @@ def fits(annotation: Any, value: Any) -> bool:
     return not (isinstance(inner, type) and is_dataclass(inner)) or isinstance(value, inner)
 
 
+def items_of(value: Any) -> list[Any] | None:
+    """Return the items of a list, of another sequence or of an array of one dimension, else None.
+
+    Examples
+    --------
+    >>> items_of((1, 2)), items_of(np.arange(2).astype(str)), items_of("12")
+    ([1, 2], ['0', '1'], None)
+    """
+    if isinstance(value, str | bytes | bytearray):
+        return None
+    if isinstance(value, np.ndarray):
+        return value.tolist() if value.ndim == 1 else None
+    listed = isinstance(value, Sequence) or getattr(value, "ndim", None) == 1
+    return list(value) if listed else None
+
+
+def _equals(value: Any, choice: Any) -> bool:
+    """Return whether a value is a choice: texts by value, all else with its type, as True == 1."""
+    same = isinstance(value, str) and isinstance(choice, str)
+    return (same or type(value) is type(choice)) and bool(value == choice)
+
+
 def _as_plain(annotation: Any, value: Any) -> Any:
-    """Return a number of NumPy, or a whole float for an integer, as Python's own number."""
+    """Return what is NumPy's, or a whole float for an integer, as Python's own value."""
     types = plain_types(annotation)
-    if isinstance(value, list) and any(get_origin(one) is tuple for one in types):
-        return tuple(value)
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if any(get_origin(one) is tuple for one in types) and not isinstance(value, tuple):
+        items = items_of(value)
+        if items is not None:
+            return tuple(items)
     if value is None or not {int, float} & set(types) or isinstance(value, str | tuple):
         return value
     if float in types:

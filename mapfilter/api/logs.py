@@ -67,7 +67,7 @@ def read_log(
         Argument("truth", truth, PATH | Iterable, _FILES),
         keywords=[
             Setting("zone", zone, str),
-            Entries("columns", columns, str, "the column of each field"),
+            Entries("columns", columns, str, "a column's name", "the column of each field"),
             Setting("course_motion", course_motion, bool),
             Argument("walk", walk, WalkOptions | None, "WalkOptions"),
         ],

@@ -36,7 +36,7 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.options import Positive
+from mapfilter.options import Positive, items_of
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.cells import CellPlan
@@ -230,7 +230,7 @@ def sweep(
         database_argument(database),
         _rasters(rasters),
         _roads(roads),
-        Entries("filters", filters, object, _FILTERS, optional=False),
+        Entries("filters", filters, object, "options", _FILTERS, optional=False),
         keywords=[
             *items("noises", several, ImuNoise, "ImuNoise"),
             Setting("routes", routes, Count),
@@ -258,7 +258,7 @@ def sweep(
             seed=seed,
             varied=varied,
         )
-        for noise, varied in _distinguished(several or (ImuNoise(),))
+        for noise, varied in _distinguished(items_of(several) or [ImuNoise()])
     ]
     network = _network(roads, rasters, "walking")
     named = named_by_plan(rasters, database.plan)

@@ -39,7 +39,8 @@ COLUMNS = (
 )
 """Columns of a file that mapfilter writes, in order."""
 OFFSETS = ("east_offset_m", "north_offset_m")
-"""Of an antenna from the place that is stated, its site's, which planning tools keep apart."""
+"""Of an antenna from the place that is stated, its site's, which planning tools keep apart; in no
+file that mapfilter writes."""
 SELDOM = ("technology", "assumed")
 """Those that are left out where no cell has them."""
 ATOLL: Columns = {
@@ -95,12 +96,12 @@ ALIASES: Columns = {
 """Names by technology; a plan may have several of a field, each filled in some rows. A ``cgi`` is
 mcc, mnc, lac and ci in one text."""
 _IMPLIED = {"uarfcn": "UMTS", "psc": "UMTS", "earfcn": "LTE", "nr_arfcn": "NR", "nrarfcn": "NR"}
-_OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs")} | {
+_OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs", *OFFSETS)} | {
     name: (*((name,) if name in COLUMNS else ()), *more) for name, more in ALIASES.items()
 }
 LAYOUTS: Mapping[Layout, Columns] = {
     "plan": _OWN,
-    "atoll": {name: (*ATOLL.get(name, ()), name) for name in (*_OWN, *OFFSETS)},
+    "atoll": {name: (*ATOLL.get(name, ()), name) for name in _OWN},
     "opencellid": OPENCELLID,
 }
 
@@ -183,11 +184,10 @@ def arrange(
         assumed = {"azimuth_deg"} if unknown else set[str]()
         for name, default in defaults.items():
             if not values.get(name):
-                values[name] = repr(_usual(name, default, values.get("technology", "")))
+                values[name] = _plain(_usual(name, default, values.get("technology", "")))
                 filled[name] += 1
                 assumed.add(name)
-        if not values.get("assumed"):
-            values["assumed"] = " ".join(name for name in ASSUMABLE if name in assumed)
+        values["assumed"] = _assumed(values.get("assumed", ""), assumed)
         if "eirp_dbm" in assumed and float(values["eirp_dbm"]) != defaults["eirp_dbm"]:
             lowered[technology(values["technology"]) or ""] += 1
         if composed:
@@ -225,6 +225,20 @@ def recognised(header: Sequence[str], columns: Columns) -> list[str]:
     headings = [Heading.of(name) for name in header]
     found = {at for field, names in columns.items() for at in places_named(headings, field, names)}
     return [header[at] for at in sorted(found)]
+
+
+def _plain(value: float) -> str:
+    """Return a number as a file has it; a whole one may be part of an identity."""
+    return repr(value).removesuffix(".0")
+
+
+def _assumed(stated: str, filled: set[str]) -> str:
+    """Return the fields that hold usual values: those that a row states, and those filled in."""
+    names = stated.split()
+    if not filled.intersection(ASSUMABLE).difference(names):
+        return stated
+    others = [name for name in names if name not in ASSUMABLE]
+    return " ".join([*(name for name in ASSUMABLE if name in filled.union(names)), *others])
 
 
 def _usual(name: str, default: float, stated: str) -> float:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import difflib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from mapfilter.errors import Faults
 from mapfilter.radio.identities import LIMITS, limit_fault
 from mapfilter.radio.reported_power import ASSUMABLE
 
@@ -86,6 +88,8 @@ RANGES: dict[str, Range] = {
 }
 """The range of each numeric field of a cell."""
 
+STATED = (*(name for name in RANGES if name not in ("east_m", "north_m")), "indoor")
+"""Fields of a plan that one number may stand for in all cells without one."""
 OPTIONAL = frozenset(
     {"azimuth_deg", "vertical_beamwidth_deg", "mcc", "mnc", "lac", "ci", "arfcn", "bsic"}
 )
@@ -112,6 +116,17 @@ def id_fault(value: Any) -> tuple[str, str] | None:
     if "/" in value or "\\" in value or ".." in value or _CONTROL.search(value):
         return expected, repr(value)
     return None
+
+
+def check_fields(where: str, names: Iterable[str], known: Iterable[str], faults: Faults) -> None:
+    """Note names that are none of the known fields, with the one that is probably meant."""
+    listed = list(known)
+    for name in names:
+        if name not in listed:
+            near = difflib.get_close_matches(name, listed, n=1)
+            hint = f"{near[0]} meant" if near else ""
+            expected = "fields of a cell" if near else f"fields of a cell ({', '.join(listed)})"
+            faults.add(where, expected, repr(name), hint)
 
 
 def antenna_fault(value: Any) -> tuple[str, str] | None:

@@ -41,7 +41,7 @@ from mapfilter.radio.cell_rules import (
 from mapfilter.radio.identities import technology
 from mapfilter.radio.tables import number, read_table
 
-_ALLOWED = {*COLUMNS, "east", "north", "crs", *chain.from_iterable(ALIASES.values())}
+_ALLOWED = {*COLUMNS, "east", "north", "crs", *OFFSETS, *chain.from_iterable(ALIASES.values())}
 _REQUIRED = ("cell", "height_m", "eirp_dbm", "frequency_mhz")
 _DEFAULT_HINT = "set cells.{}, which is then taken for all cells without one"
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from numbers import Real
@@ -13,17 +13,20 @@ from typing import Annotated
 
 from mapfilter._arguments import Entries, Setting, check_arguments, path_argument
 from mapfilter._io import atomic_file
+from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, short_crs, unproject
 from mapfilter.options import Words
-from mapfilter.radio.cell_layouts import COLUMNS, SELDOM, Layout
+from mapfilter.radio.cell_layouts import COLUMNS, LAYOUTS, SELDOM, Layout
 from mapfilter.radio.cell_rules import (
     OPTIONAL,
     POINTED,
     RANGES,
+    STATED,
     antenna_fault,
     assumed_fault,
+    check_fields,
     id_fault,
     looks_like_radians,
     technology_faults,
@@ -250,7 +253,7 @@ def read_cell_plan(
     layout: Layout = "plan",
     columns: Mapping[str, str] | None = None,
     defaults: Mapping[str, float] | None = None,
-    bounds_m: tuple[float, float, float, float] | None = None,
+    bounds_m: Sequence[float] | Floats | None = None,
 ) -> CellPlan:
     """Read a cell plan from a CSV file and bring it into ``crs``.
 
@@ -272,8 +275,9 @@ def read_cell_plan(
     columns : mapping of str to str, optional
         The file's column by field, where it has another name; other columns are ignored, then.
     defaults : mapping of str to float, optional
-        Values of fields that have no column or are empty, with a note.
-    bounds_m : tuple of float, optional
+        Values of fields that have no column or are empty, with a note; of any field that is a
+        number (``indoor``: 0 or 1), except a position.
+    bounds_m : four floats, optional
         West, south, east, north: cells beyond them are left out with a note.
 
     Raises
@@ -282,21 +286,26 @@ def read_cell_plan(
         The file is missing, empty or no such table; or with file, row (line of the file) and field
         of every fault, and the likely mistake.
     ConfigError
-        The path is none, or another argument is of another type.
+        The path is none, another argument is of another type, or ``columns`` or ``defaults`` have
+        a name that is no field.
     """
     check_arguments(
         "read_cell_plan",
         path_argument("path", path),
         keywords=[
             Setting("layout", layout, Layout),
-            Entries("columns", columns, str, "the column of each field"),
-            Entries("defaults", defaults, Real, "the value of each field"),
+            Entries("columns", columns, str, "a column's name", "the column of each field"),
+            Entries("defaults", defaults, Real, "a number", "the value of each field"),
             Setting("bounds_m", bounds_m, _BOUNDS_M),
         ],
     )
     path = Path(path)
     faults = Faults()
-    rows, notes = read_plan(path, projected_crs(crs), faults, layout, columns, defaults)
+    check_fields("read_cell_plan, columns", columns or {}, LAYOUTS["plan"], faults)
+    check_fields("read_cell_plan, defaults", defaults or {}, STATED, faults)
+    faults.raise_if_any(ConfigError)
+    usual = {name: float(value) for name, value in (defaults or {}).items()}
+    rows, notes = read_plan(path, projected_crs(crs), faults, layout, columns, usual)
     known = {each.name for each in fields(Cell)}
     whole = [row for row in rows if not row.faulty]
     if layout == "opencellid" and whole:

@@ -110,6 +110,7 @@ def read_routes(
                 "half_width_by_class_m",
                 half_width_by_class_m,
                 Real,
+                "metres",
                 "metres of each class of way",
             ),
             Setting("squares", squares, bool),
@@ -151,11 +152,11 @@ def read_routes(
         )
         return replace(classified, attribution=attribution)
     here = lattice.crs, lattice.bounds_m
-    if isinstance(buildings, bool):
+    if isinstance(buildings, bool | np.bool_):
         buildings = read_buildings(map_file, *here) if buildings and map_file else None
     elif not isinstance(buildings, Buildings):
         buildings = read_layer_buildings(buildings, *here)
-    if isinstance(water, bool):
+    if isinstance(water, bool | np.bool_):
         water = read_water(map_file, *here) if water and map_file else None
     elif not isinstance(water, Water):
         water = read_layer_water(water, *here)

@@ -236,8 +236,8 @@ def make_log(
             *items("notes", notes, str, "a text"),
             Argument("imu", imu, ImuNoise | None, "ImuNoise"),
             Setting("vehicle", vehicle, bool | None),
-            Entries("names", names, str, "the name of each table"),
-            Entries("row_numbers", row_numbers, object, "the row numbers of each table"),
+            Entries("names", names, str, "a text", "the name of each table"),
+            Entries("row_numbers", row_numbers, object, "numbers", "the row numbers of each table"),
         ],
     )
     faults, called, numbers = Faults(), names or {}, row_numbers or {}

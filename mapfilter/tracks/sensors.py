@@ -5,6 +5,7 @@ Times are those of the log. Axes are those of the device, right-handed; odometry
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -16,8 +17,9 @@ import pyarrow.parquet as pq
 from mapfilter._arrow import open_parquet
 from mapfilter._inputs import open_input
 from mapfilter._io import read_json, sha256_file, sha256_of
+from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, StoreError, fail
-from mapfilter.tracks.table_files import as_frame
+from mapfilter.tracks.table_files import SEPARATORS, as_frame
 
 FOLDER = "sensors"
 
@@ -46,6 +48,7 @@ counter-clockwise from grid east; ``reckoning`` belongs to motion made of these 
 :class:`mapfilter.tracks.pdr.walk.Reckoned`.
 """
 
+_LONGEST_HEADER_BYTES = 1 << 16
 Form = Literal["parquet", "csv"]
 """Of the tables of a log."""
 
@@ -104,7 +107,7 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
                     hint = "changed or cut off"
                     raise fail(StoreError, str(path), f"SHA-256 {known}", "another", hint)
                 if path.suffix == ".csv":
-                    rows = pd.read_csv(stream)
+                    rows = _csv_rows(stream.read())
                 else:
                     with open_parquet(stream) as source:
                         rows = as_frame(source.read())
@@ -123,3 +126,12 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
         tables[name] = rows
     faults.raise_if_any(InputError)
     return tables
+
+
+def _csv_rows(data: bytes) -> pd.DataFrame:
+    """Read numbers between commas, semicolons or tabs; decimal commas where these separate none."""
+    data = without_separator_line(data)
+    header = data.lstrip()[:_LONGEST_HEADER_BYTES].splitlines()[:1]
+    separator = max(SEPARATORS, key=lambda one: header[0].count(one.encode()) if header else 0)
+    decimal = "," if separator != "," and b"," in data else "."
+    return pd.read_csv(io.BytesIO(data), sep=separator, decimal=decimal)

@@ -141,7 +141,7 @@ def write_log(
         Argument("folder", folder, PATH, "the path of a folder"),
         keywords=[
             Setting("format", format, Form),
-            Entries("sensors", sensors, pd.DataFrame, "the table of each sensor"),
+            Entries("sensors", sensors, pd.DataFrame, "a table", "the table of each sensor"),
         ],
     )
     folder = Path(folder)

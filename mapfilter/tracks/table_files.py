@@ -22,7 +22,7 @@ from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.tracks.schema import SCHEMA
 
-_SEPARATORS = (",", ";", "\t")
+SEPARATORS = (",", ";", "\t")
 _LARGEST_BYTES = 2 << 30
 _LONGEST_ROW_BYTES = 1 << 16
 _BLOCK_BYTES = 1 << 22
@@ -98,7 +98,7 @@ def _read_csv(table: str, path: Path) -> ReadTable:
     blank_lines = len(data[:begin].splitlines())
     first = data[begin : end if end >= 0 else len(data)]
     header = first.splitlines()[0].decode() if first else ""
-    separator = max(_SEPARATORS, key=header.count)
+    separator = max(SEPARATORS, key=header.count)
     names = [name.strip() for name in next(csv.reader([header], delimiter=separator), [])]
     if len(names) > _MOST_COLUMNS:
         expected = f"at most {_MOST_COLUMNS} columns"

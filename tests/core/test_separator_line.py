@@ -13,6 +13,7 @@ from mapfilter.rasters.atoll import find_index
 from mapfilter.roads.landuse import _read_table as read_classes
 from mapfilter.survey.measurement_files import DIALECTS, read_csv
 from mapfilter.tracks.readers.text import read_text
+from mapfilter.tracks.sensors import read_sensors
 
 CRS = "EPSG:32635"
 FIRST = pytest.mark.parametrize(
@@ -66,6 +67,17 @@ def test_a_table_of_a_log(tmp_path, first):
     write(tmp_path, "motion.csv", first + "time_s;step_m\n0;1,5\n1;x\n")
     with pytest.raises(InputError, match="row 4, step_m"):
         mf.read_log(tmp_path)
+
+
+@FIRST
+@pytest.mark.parametrize("text", ["{};count\n0;1,5\n1;2,5\n", "{}\tcount\n0\t1.5\n1\t2.5\n"])
+def test_a_table_of_sensors(tmp_path, first, text):
+    (tmp_path / "sensors").mkdir()
+    write(tmp_path, "sensors/steps.csv", first + text.format("time_s"))
+    assert read_sensors(tmp_path)["steps"]["count"].tolist() == [1.5, 2.5]
+    write(tmp_path, "sensors/steps.csv", first + text.format("time"))
+    with pytest.raises(InputError, match="columns time_s, count, found no time_s"):
+        read_sensors(tmp_path)
 
 
 @FIRST

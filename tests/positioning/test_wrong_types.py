@@ -1,13 +1,18 @@
 """Every parameter of every public function refuses values of a wrong type, by its name."""
 
 import inspect
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+import pandas as pd
 import pytest
 from cross_world import LATTICE, make_database, make_routes, walk_log
 
 import mapfilter as mf
 from mapfilter.errors import ConfigError
+from mapfilter.geodesy import Lattice
+from mapfilter.options import Options
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.roads.osm import read_ways
 from mapfilter.roads.routes import read_roads
@@ -95,11 +100,18 @@ def test_another_type_is_refused_by_the_name_of_the_parameter(good, function, pa
         ("simulate", {"journeys": 2.0}, "simulate, journeys: expected a whole number >= 1"),
         ("simulate", {"profile": "flying"}, "'walking' or 'driving', found 'flying'"),
         ("sweep", {"routes": 1.5}, "sweep, routes: expected a whole number >= 1, found 1.5"),
-        ("sweep", {"filters": {1: mf.BayesFilter()}}, "sweep, filters: expected names and"),
+        (
+            "sweep",
+            {"filters": {1: mf.BayesFilter()}},
+            "sweep, filters, key: expected a text, found 1",
+        ),
+        ("sweep", {"filters": "bayes"}, "sweep, filters: expected names and options, such as"),
         ("sweep", {"noises": [mf.ImuNoise(), 3]}, "sweep, noises[1]: expected ImuNoise, found 3"),
         ("open_rasters", {"crs": 3}, "open_rasters, crs: expected a text"),
         ("open_rasters", {"quantity": "levels"}, "expected 'level', 'loss', 'deviation'"),
         ("open_rasters", {"resampling": "cubic"}, "'nearest' or 'bilinear', found 'cubic'"),
+        ("open_rasters", {"factor": True}, "open_rasters, factor: expected a number, found True"),
+        ("open_rasters", {"nodata": np.False_}, "open_rasters, nodata: expected a number, found F"),
         ("open_database", {"verify": "all"}, "expected 'sizes' or 'full', found 'all'"),
         ("read_cell_plan", {"layout": "Atoll"}, "'plan', 'atoll', or 'opencellid', found 'Atoll'"),
         ("write_log", {"format": "CSV"}, "expected 'parquet' or 'csv', found 'CSV'"),
@@ -111,6 +123,20 @@ def test_the_message_says_what_is_expected(good, function, wrong, expected):
     error = refused(good, function, **wrong)
     assert isinstance(error, ConfigError)
     assert expected in str(error)
+
+
+def test_each_wrong_entry_of_a_mapping_is_named(good):
+    wrong = {"height_m": "30", "eirp_dbm": True, "frequency_mhz": 1800, 3: 4}
+    error = refused(good, "read_cell_plan", defaults=wrong, columns={"cell": 1})
+    assert isinstance(error, ConfigError)
+    assert str(error).splitlines() == [
+        "read_cell_plan, columns['cell']: expected a column's name, found 1",
+        "read_cell_plan, defaults['height_m']: expected a number, found '30'",
+        "read_cell_plan, defaults['eirp_dbm']: expected a number, found True",
+        "read_cell_plan, defaults, key: expected a text, found 3",
+    ]
+    error = refused(good, "read_routes", half_width_by_class_m={"residential": "8"})
+    assert "half_width_by_class_m['residential']: expected metres, found '8'" in str(error)
 
 
 def test_all_wrong_arguments_are_named_together(good):
@@ -129,3 +155,34 @@ def test_numbers_and_truth_values_of_numpy_are_taken(good):
     found = mf.locate(**good["locate"], filter="candidate", ways=np.True_, risk=np.float64(1e-3))
     assert len(found) == len(good["score"]["track"])
     assert mf.make_log("EPSG:32629", vehicle=np.False_).vehicle is False
+    town = Lattice.covering("EPSG:32635", (385500.0, 6671500.0, 385700.0, 6671700.0), 10.0)
+    kept = mf.read_routes("helsinki", town, buildings=np.False_, water=np.False_)
+    assert len(kept) == len(mf.read_routes("helsinki", town, buildings=False, water=False))
+
+
+def test_texts_and_arrays_of_numpy_are_taken(good):
+    assert mf.open_rasters(good["open_rasters"]["path"], np.str_("level")).quantity == "level"
+    whole = mf.read_cell_plan(**good["read_cell_plan"])
+    bounds_m = np.array(LATTICE.bounds_m) + np.array([-1e5, -1e5, 1e5, 1e5])
+    for given in (bounds_m, pd.Series(bounds_m), list(bounds_m), tuple(bounds_m)):
+        assert mf.read_cell_plan(**good["read_cell_plan"], bounds_m=given) == whole
+    for wrong in (bounds_m[:3], bounds_m[None], np.full(4, np.nan), "abcd"):
+        assert "bounds_m: expected west" in str(refused(good, "read_cell_plan", bounds_m=wrong))
+    notes = np.array(["one", "another"])
+    assert mf.make_log("EPSG:32629", notes=notes).notes == ("one", "another")
+
+
+def test_options_hold_values_of_python_for_those_of_numpy():
+    @dataclass(frozen=True, slots=True)
+    class Some(Options):
+        box: tuple[float, float]
+        on: bool
+        how: Literal["a", "b"]
+
+    some = Some(np.array([1.0, 2.0]), np.True_, np.str_("b"))
+    assert (some.box, some.on, some.how) == ((1.0, 2.0), True, "b")
+    assert some.on is True
+    assert [type(one) for one in some.box] == [float, float]
+    with pytest.raises(ConfigError) as caught:
+        Some(np.zeros(3), np.int64(1), np.str_("c"))
+    assert len(caught.value.faults) == 3

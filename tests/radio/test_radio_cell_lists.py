@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fuzz import fuzz
 
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import project
 from mapfilter.radio.cells import CellPlan, read_cell_plan, write_cell_plan
 
@@ -54,6 +55,50 @@ def test_transmitters_of_a_planning_tool(tmp_path: Path) -> None:
         "eirp_dbm = 52 for 1 of 2 cells without one",
         "frequency_mhz = 1800 for 2 of 2 cells without one",
     )
+
+
+@pytest.mark.parametrize("kind", [int, np.int64, np.float32, np.float64])
+def test_defaults_may_be_numbers_of_numpy(tmp_path: Path, kind: type) -> None:
+    usual = {"height_m": kind(25), "eirp_dbm": kind(52), "frequency_mhz": kind(1800)}
+    plan = _read(tmp_path, ATOLL, layout="atoll", defaults=usual)
+    assert plan == _read(tmp_path, ATOLL, layout="atoll")
+    identity = {"mcc": kind(244), "mnc": kind(91), "lac": kind(801), "ci": kind(7), **usual}
+    text = "east,north\n385500,6672000\n"
+    assert _read(tmp_path, text, columns={"east": "east"}, defaults=identity).ids == (
+        "244-91-801-7",
+    )
+
+
+def test_names_that_are_no_fields_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError) as caught:
+        _read(tmp_path, PLAN, columns={"hieght_m": "height_m"}, defaults={"hieght": 3, "east": 0})
+    first, second, third = map(str, caught.value.faults)
+    assert first == (
+        "read_cell_plan, columns: expected fields of a cell, found 'hieght_m' "
+        "(likely: height_m meant)"
+    )
+    assert second.startswith("read_cell_plan, defaults: expected fields of a cell, found 'hieght'")
+    assert third.startswith(
+        "read_cell_plan, defaults: expected fields of a cell (height_m, azimuth"
+    )
+
+
+def test_what_is_filled_in_joins_what_a_row_assumes(tmp_path: Path) -> None:
+    text = "cell,east,north,height_m,azimuth_deg,eirp_dbm,frequency_mhz,antenna,assumed\n"
+    rows = (
+        "A,385500,6672000,30,,,1800,omni,azimuth_deg\n"
+        "B,385500,6672000,,,50,1800,omni,eirp_dbm  azimuth_deg\n"
+        "C,385500,6672000,30,,50,1800,omni,eirp_dbm azimuth_deg\n"
+        "D,385500,6672000,30,,50,,omni,\n"
+    )
+    assert [cell.assumed for cell in _read(tmp_path, text + rows).cells] == [
+        "azimuth_deg eirp_dbm",
+        "height_m azimuth_deg eirp_dbm",
+        "eirp_dbm azimuth_deg",
+        "",
+    ]
+    said = _complaint(tmp_path, text + "A,385500,6672000,30,,,1800,omni,indoor\n")
+    assert "row 2, assumed: expected nothing, or some of" in said
 
 
 def test_without_defaults_what_is_missing_is_told(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.radio.cells import read_cell_plan
+from mapfilter.radio.cells import read_cell_plan, write_cell_plan
 
 CRS = "EPSG:32635"
 HEADER = "TX_ID;SITE_NAME;X;Y;DX;DY;HEIGHT;AZIMUT;EIRP;FREQUENCY\n"
@@ -48,6 +48,27 @@ def test_their_columns_may_be_named(tmp_path):
     # Without that the plan's own layout has no such column.
     with pytest.raises(InputError, match="'right'"):
         read(tmp_path, text, layout="plan")
+
+
+@pytest.mark.parametrize("columns", [None, {"cell": "cell"}])
+def test_they_are_columns_of_an_own_plan(tmp_path, columns):
+    text = "cell,east,north,east_offset_m,north_offset_m,height_m,eirp_dbm,frequency_mhz\n"
+    rows = "A,385500,6672000,3.5,-4.5,30,50,1800\nB,385500,6672000,,,30,50,1800\n"
+    plan = read(tmp_path, text + rows, layout="plan", columns=columns)
+    assert [(cell.east_m, cell.north_m) for cell in plan.cells] == [
+        (385503.5, 6671995.5),
+        (385500.0, 6672000.0),
+    ]
+    assert plan.notes == (
+        "1 cell lies beside the place of the site, by east_offset_m and north_offset_m, "
+        "up to 5.7 m",
+    )
+    write_cell_plan(plan, tmp_path / "again.csv")
+    assert "offset" not in (tmp_path / "again.csv").read_text()
+    again = read_cell_plan(tmp_path / "again.csv", CRS)
+    assert again["A"].east_m == pytest.approx(385503.5, abs=1e-3)
+    with pytest.raises(InputError, match=r"row 2, east_offset_m: expected metres in -1000\.\.1000"):
+        read(tmp_path, text + rows.replace("3.5", "3500"), layout="plan", columns=columns)
 
 
 def test_what_cannot_be_such_an_offset_is_refused(tmp_path):
