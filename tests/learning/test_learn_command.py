@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -144,6 +145,21 @@ def test_suspects_are_named_by_logs_alone(faulty, monkeypatch):
     assert set(told) == {"cells S2B", "cells S1C"}
     assert "+1" in told["cells S2B"]
     assert "log Bayes factor" in told["cells S1C"]
+
+
+def test_journeys_of_no_use_are_warned_of(faulty, monkeypatch):
+    taught = SimpleNamespace(
+        patch=SimpleNamespace(changes=()), unlisted=(), unused=("j1, j2 not used: no motion",)
+    )
+    monkeypatch.setattr(
+        "mapfilter.workflows.check_suspects.study_logs", lambda *_args, **_named: taught
+    )
+    config = configured(*faulty)
+    result = run_check_suspects(config)
+    (finding,) = result.findings
+    assert (finding.code, finding.severity, result.ok) == ("journeys-unused", "warning", True)
+    assert finding.where == str(config.track_path)
+    assert finding.evidence == "J1, j2 not used: no motion."
 
 
 def test_a_cell_that_the_database_lacks_is_named(faulty, tmp_path):

@@ -6,6 +6,8 @@ from unicodedata import normalize
 
 import pytest
 
+from mapfilter.check.findings import Findings
+from mapfilter.check.raster_checks import check_ids
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
@@ -120,3 +122,17 @@ def test_names_in_another_case_are_named_as_that():
     assert [fault.hint for fault in caught.value.faults] == [hint, hint]
     with pytest.raises(InputError, match="different dates or places"):
         check_against_plan(rasters("s1a"), plan("T1A"))
+
+
+def test_a_check_tells_of_another_case_too():
+    findings = Findings()
+    check_ids(rasters("s1a", "X"), plan("S1A", "X"), "cells.csv", findings)
+    told = {finding.code: finding.evidence for finding in findings.result().findings}
+    assert told == {
+        "cell-without-raster": "1 of 2 cells have no raster: S1A. Names differ in upper and lower "
+        "case only: raster 's1a', cell 'S1A'.",
+        "raster-without-cell": "1 of 2 rasters have no cell: s1a.",
+    }
+    findings = Findings()
+    check_ids(rasters("t1a"), plan("S1A"), "cells.csv", findings)
+    assert all("case" not in finding.evidence for finding in findings.result().findings)
