@@ -261,7 +261,7 @@ def _map_of(others: Sequence[Session], folder: Path) -> Path:
     """Make levels, ways and database of sessions, as drive tests without a street map are."""
     files = [str(other.path) for other in others]
     # The trend stays where there is no measurement, which does not mean that nothing is received.
-    survey = {"files": files, "cross_validate": False, "fill": True, "min_points_to_fill": 1}
+    survey = {"files": files, "cross_validate": False, "fill": True}
     config = Config.model_validate(
         {
             "area": {"map": "none"},
