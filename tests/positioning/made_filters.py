@@ -14,7 +14,7 @@ from mapfilter.positioning.bayes.alternative import (
     NullHypothesis,
 )
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
-from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.weighing import Weighing
@@ -84,6 +84,9 @@ class Beliefs:
     lanes: object = None
     held_otherwise: object = field(default_factory=lambda: gaining(-2.0))
     holds: HoldRules = field(default_factory=HoldRules)
+    pulls: PullRules = field(default_factory=PullRules)
+    positions: bool = False
+    asks: bool = False
 
     @property
     def model(self):
@@ -112,12 +115,19 @@ class Beliefs:
     def is_contested(self, _):
         return self.contested
 
+    def used_positions(self, _):
+        return self.positions
+
+    def asks_for_proof(self, _):
+        return self.asks
+
 
 @dataclass
 class Source:
     """A source that knows what to say at first, and of a belief that is just started."""
 
     name: str = "one"
+    is_position: bool = False
     at_first: EvidenceUpdate = field(default_factory=lambda: EvidenceUpdate(None, (TERM,)))
     own: object = "started"
 
@@ -131,6 +141,9 @@ class Source:
 
     def beside_other(self, state):
         return f"{state} anew"
+
+    def distrusted(self, state, time_s):
+        return f"{state} distrusted at {time_s:.0f} s"
 
 
 TERM = FixedTerm(np.full(1, -1.0))

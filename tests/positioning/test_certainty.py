@@ -40,28 +40,28 @@ def test_without_rivals_it_is_the_mass_near_the_leading_hypothesis():
 @pytest.mark.parametrize("log_odds", [-3.0, 0.0, 2.0])
 def test_a_turned_phone_counts_by_its_odds_where_it_is_elsewhere(log_odds):
     main, odds = belief(500.0), exp(log_odds)
-    assert certainty(RULES, main, held=[turned(log_odds, 700.0)]) == pytest.approx(1 / (1 + odds))
-    assert certainty(RULES, main, held=[turned(log_odds, 540.0)]) == pytest.approx(1.0)
+    assert certainty(RULES, main, rivals=[turned(log_odds, 700.0)]) == pytest.approx(1 / (1 + odds))
+    assert certainty(RULES, main, rivals=[turned(log_odds, 540.0)]) == pytest.approx(1.0)
     half = turned(log_odds, 520.0, 600.0)
-    assert certainty(RULES, main, held=[half]) == pytest.approx((1 + odds / 2) / (1 + odds))
+    assert certainty(RULES, main, rivals=[half]) == pytest.approx((1 + odds / 2) / (1 + odds))
     # Two of them add up, and so does what the belief has elsewhere.
     spread = belief(500.0, 500.0, 500.0, 900.0)
     both = [turned(log_odds, 700.0), turned(log_odds, 510.0)]
     expected = (0.75 + odds) / (1 + 2 * odds)
-    assert certainty(RULES, spread, held=both) == pytest.approx(expected)
+    assert certainty(RULES, spread, rivals=both) == pytest.approx(expected)
 
 
 def test_improbable_rivals_make_no_difference():
     improbable = [turned(-12.0, 700.0)]
-    assert certainty(RULES, belief(500.0), held=improbable) == pytest.approx(1.0, abs=1e-5)
-    assert certainty(RULES, belief(500.0), held=[turned(900.0, 700.0)]) < 1e-9
+    assert certainty(RULES, belief(500.0), rivals=improbable) == pytest.approx(1.0, abs=1e-5)
+    assert certainty(RULES, belief(500.0), rivals=[turned(900.0, 700.0)]) < 1e-9
 
 
 @pytest.mark.parametrize(("enough", "looked_at"), [(0.9, False), (0.95, True), (1.0, True)])
 def test_where_a_rival_lies_is_looked_at_only_where_it_may_matter(enough, looked_at):
     """Odds of 0.06 leave 0.94 wherever the rival is; with half of it near there are 0.97."""
     rival, odds = turned(log(0.06), 520.0, 600.0), 0.06
-    found = certainty(RULES, belief(500.0), held=[rival], enough=enough)
+    found = certainty(RULES, belief(500.0), rivals=[rival], enough=enough)
     assert found == pytest.approx((1 + looked_at * odds / 2) / (1 + odds))
     assert ("weight" in rival.belief.__dict__) == looked_at
 
@@ -73,11 +73,11 @@ def rival(log_odds, *places):
 
 def test_limits_that_are_met_exactly():
     main = belief(500.0)
-    assert certainty(RULES, main, held=[rival(-9.0, 700.0)]) == main.summary.mass_50m
+    assert certainty(RULES, main, rivals=[rival(-9.0, 700.0)]) == main.summary.mass_50m
     # As probable as what is enough: where the rival lies is not looked at.
     even, bound = rival(0.0, 500.0), main.summary.mass_50m / 2
-    assert certainty(RULES, main, held=[even], enough=bound) == bound
-    assert certainty(RULES, main, held=[even], enough=bound + 1e-9) == pytest.approx(1.0)
+    assert certainty(RULES, main, rivals=[even], enough=bound) == bound
+    assert certainty(RULES, main, rivals=[even], enough=bound + 1e-9) == pytest.approx(1.0)
 
 
 def test_a_position_is_claimed_again_after_it_has_agreed_for_some_way():
@@ -106,7 +106,7 @@ def test_a_rival_counts_from_one_in_eight_thousand_on_and_at_most_by_thirty_nats
     main = belief(500.0)
     for log_odds, odds in ((-8.9, exp(-8.9)), (-9.1, 0.0), (20.0, exp(20.0)), (31.0, exp(30.0))):
         share = pytest.approx(1 / (1 + odds), rel=1e-6, abs=0.0)
-        assert certainty(RULES, main, held=[turned(log_odds, 700.0)]) == share
+        assert certainty(RULES, main, rivals=[turned(log_odds, 700.0)]) == share
         assert certainty(RULES, main, alternative(8.0 + log_odds, 900.0)) == share
 
 
@@ -136,7 +136,7 @@ def test_the_share_near_a_place_is_that_within_fifty_metres_to_all_sides():
 def test_masses_on_a_grid_are_not_compared_with_turned_phones():
     """Their beliefs are of hypotheses, and a grid has none beside it."""
     grid = SimpleNamespace(summary=SimpleNamespace(mass_50m=0.9))
-    assert certainty(RULES, grid, held=[turned(2.0, 700.0)]) == 0.9
+    assert certainty(RULES, grid, rivals=[turned(2.0, 700.0)]) == 0.9
 
 
 @pytest.mark.parametrize(("switch_mass", "claimed_from"), [(0.995, 0.95), (0.9, 0.9)])

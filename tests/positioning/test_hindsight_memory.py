@@ -25,8 +25,9 @@ def state_at(travelled_m):
         state=np.full((STATES, COUNT), travelled_m, dtype=np.float32), log_weight=np.zeros(COUNT)
     )
     return SimpleNamespace(
-        reckoning=reckoning, belief=belief, alternative=None, takeovers=0, hold=Hold(), held=()
-    )
+        reckoning=reckoning, belief=belief, alternative=None, takeovers=0, hold=Hold(),
+        unaided=(), held=(),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(("room", "expected_m", "every_m"), [

@@ -14,7 +14,7 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
-from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.moving import moved
 from mapfilter.positioning.bayes.pace import Pace
@@ -46,6 +46,8 @@ class Beliefs:
     """Filters that note what they are asked for, and move hypotheses to the east by a step."""
 
     holds: HoldRules = field(default_factory=HoldRules)
+    pulls: PullRules = field(default_factory=PullRules)
+    lead: bool = False
     map_may_start: bool = False
     left: bool = False
     why: Reason = Reason.USED
@@ -67,6 +69,9 @@ class Beliefs:
 
     def may_have_left(self, state):
         return self.left
+
+    def positions_lead(self, state):
+        return self.lead
 
     def carried_on(self, state, given, gone_s, rng):
         self.asked.append(("carried on", gone_s))
@@ -245,6 +250,34 @@ def test_other_beliefs_are_moved_as_they_read_headings():
     assert steps_of(asked, 6) == [replace(STEP, heading_rad=-0.5, turn_rad=-0.1)]
     assert steps_of(asked) == [STEP]
     assert [one.belief.state[EAST, 0] for one in found.held] == [2.0, 2.0]
+
+
+def test_positions_that_lead_begin_a_belief_without_them():
+    for readings in ({"fix": FIX}, {"ranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)}):
+        hold, null = Hold(-1.0, 0.2), NullHypothesis(-9.0)
+        state = walking(belief(log_evidence=-4.0), hold=hold, null=null)
+        beliefs = Beliefs(lead=True)
+        (alone,) = move(state, STEP, beliefs=beliefs, **readings)[0].unaided
+        assert (alone.hold, alone.null, alone.start_m) == (hold, null, 0.0)
+        # One in ten thousand, and what happens from here on.
+        assert alone.log_prior == pytest.approx(-np.log(9999.0))
+        assert alone.belief.log_evidence == -4.0
+        # It is moved as the belief is, from the same epoch on.
+        assert alone.belief.state[EAST].tolist() == [2.0] * 20
+        assert move(state, STEP, **readings)[0].unaided == ()
+    assert move(walking(), STEP, beliefs=Beliefs(lead=True))[0].unaided == ()
+
+
+def test_a_belief_without_positions_is_moved_as_it_reads_headings_with_draws_of_its_own():
+    alone = turned_phone(Hold(-1.0, 0.0), 6)
+    found, _, asked = move(walking(unaided=(alone,)), STEP)
+    assert steps_of(asked, 6) == [replace(STEP, heading_rad=-0.5, turn_rad=-0.1)]
+    assert found.unaided[0].belief.state[EAST, 0] == 2.0
+    rng = np.random.default_rng(1)
+    moved(Beliefs(), walking(unaided=(alone,)), SensorWatch(), Epoch(10.0, (STEP,)), rng)
+    other = np.random.default_rng(1)
+    moved(Beliefs(), walking(), SensorWatch(), Epoch(10.0, (STEP,)), other)
+    assert rng.bit_generator.state == other.bit_generator.state
 
 
 def test_a_measured_position_leaves_no_doubt_of_a_jump():

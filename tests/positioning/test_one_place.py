@@ -48,6 +48,10 @@ class State:
     sources: dict = field(default_factory=dict)
     reckoning: object = field(default_factory=lambda: SimpleNamespace(travelled_m=40.0))
 
+    @property
+    def rivals(self):
+        return self.held
+
 
 def judged(state, *, weighed=True, positioned=False, contested=False, left=False):
     rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0)

@@ -245,6 +245,7 @@ def test_a_session_with_satellites_is_restored(positioner, tmp_path):
     other = replace(receiver.biases, names=(*receiver.biases.names, "G99"))
     edited = [
         replace(state, held=(HeldOtherwise(short, Hold(), 0.0, 0.0),)),
+        replace(state, unaided=(HeldOtherwise(short, Hold(), 0.0, 0.0),)),
         replace(state, twin=MirroredTwin(short, 0.0)),
     ]
     for changed in (

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import radians, sqrt
+from math import isfinite, radians, sqrt
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,8 @@ from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start, any_heading
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.held import is_ahead
-from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.held import HeldOtherwise, is_ahead
+from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules, RivalRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.sensors import spread_m2
 from mapfilter.positioning.bayes.state import BayesState
@@ -33,6 +34,7 @@ MapFilter = BeliefFilter[Start, Any, RadioReading]
 
 _MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
+_FOLLOWED, _SOUGHT = (Status.TRACKING,), (Status.SEARCHING, Status.OUTSIDE)
 _POSITIONED_M = 200.0
 """Distance from the last position that was measured after which the map is the evidence again."""
 
@@ -55,6 +57,8 @@ class BeliefFilters:
         the map locate it.
     holds : HoldRules
         When a phone may have been turned.
+    pulls : PullRules
+        When positions may have been pulled away.
     device : Device
         Where masses on a grid lie.
     """
@@ -66,6 +70,7 @@ class BeliefFilters:
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
     carriageways: CarriagewayFilters | None = None
     holds: HoldRules = field(default_factory=HoldRules)
+    pulls: PullRules = field(default_factory=PullRules)
     device: Device = PROCESSOR
 
     @cached_property
@@ -167,11 +172,46 @@ class BeliefFilters:
         }
 
     def is_contested(self, state: BayesState) -> bool:
-        """Return whether a belief in which the phone was turned is ahead of the belief."""
+        """Return whether a rival that began as the belief is ahead of it."""
+        return self._is_ahead(self.holds, state, state.held) or self.is_pulled(state)
+
+    def is_pulled(self, state: BayesState) -> bool:
+        """Return whether the belief without positions is ahead: they may have been pulled away."""
+        return self._is_ahead(self.pulls, state, state.unaided)
+
+    def _is_ahead(
+        self, rules: RivalRules, state: BayesState, rivals: Sequence[HeldOtherwise]
+    ) -> bool:
         main = state.belief
-        if not state.held or not isinstance(main, ParticleBelief):
+        if not rivals or not isinstance(main, ParticleBelief):
             return False
-        return is_ahead(self.holds, state.held, main, state.reckoning.travelled_m)
+        return is_ahead(rules, rivals, main, state.reckoning.travelled_m)
+
+    def positions_lead(self, state: BayesState) -> bool:
+        """Return whether positions lead the belief, and a rival without them is to be begun."""
+        if any(not one.from_scratch for one in state.unaided):
+            return False
+        return state.status is Status.TRACKING and self._is_led(state)
+
+    def asks_for_proof(self, state: BayesState) -> bool:
+        """Return whether positions weigh a belief that has not been found without them."""
+        if state.proven or any(one.from_scratch for one in state.unaided):
+            return False
+        return self._is_led(state)
+
+    def used_positions(self, state: BayesState) -> bool:
+        """Return whether a position or satellites have been used so far."""
+        gnss: GnssState = state.sources[GnssSource.name]
+        return isfinite(gnss.used_at_m)
+
+    def _is_led(self, state: BayesState) -> bool:
+        if not self.pulls.watched or state.belief is None:
+            return False
+        found = state.belief.status is Status.TRACKING
+        if state.status not in (_FOLLOWED if found else _SOUGHT):
+            return False
+        gnss: GnssState = state.sources[GnssSource.name]
+        return self.used_positions(state) and not gnss.rejecting
 
     def other_unit_m(self, state: BayesState) -> float:
         """Return a further unit in which steps may be given, by their speed; 1 for none.

@@ -1,11 +1,12 @@
 """How certain a tracked position is, with all that competes with its belief.
 
 The share of a belief near its leading hypothesis is a probability given that the belief describes
-what is measured at all. Beside it stand beliefs in which the phone was turned, and an alternative
-from scratch, each with its odds against the belief. The share of all of them together within 50 m
-is the probability that the position is right. With too low a probability a position is reported but
-not claimed. The null hypothesis has no position, and statuses of its own. A position that was lost
-without a new search is claimed again when it has agreed for some way.
+what is measured at all. Beside it stand beliefs in which the phone was turned, one that takes no
+positions, and an alternative from scratch, each with its odds against the belief. The share of all
+of them together within 50 m is the probability that the position is right. With too low a
+probability a position is reported but not claimed. The null hypothesis has no position, and
+statuses of its own. A position that was lost without a new search is claimed again when it has
+agreed for some way.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def certainty(
     rules: AlternativeRules,
     main: MapBelief,
     alternative: AlternativeHypothesis | None = None,
-    held: Iterable[HeldOtherwise] = (),
+    rivals: Iterable[HeldOtherwise] = (),
     enough: float = inf,
 ) -> float:
     """Return the probability that the position lies within 50 m of a belief's leading hypothesis.
@@ -72,8 +73,8 @@ def certainty(
         An alternative has prior odds that its threshold for taking over makes even.
     main : MapBelief
     alternative : AlternativeHypothesis or None
-    held : iterable of HeldOtherwise
-        Beliefs in which the phone was turned.
+    rivals : iterable of HeldOtherwise
+        Beliefs in which the phone was turned, and the one without positions.
     enough : float
         Where even a bound from below is so large, that is returned: where rivals lie takes longer
         than how probable they are.
@@ -83,14 +84,14 @@ def certainty(
         log_odds = alternative.log_bayes_factor(main) - rules.lost_threshold
         if log_odds > _NEGLIGIBLE and _apart_m(alternative.belief, main) > NEAR_M:
             total += exp(min(log_odds, _CERTAIN))
-    rivals: list[tuple[float, ParticleBelief]] = []
+    likely: list[tuple[float, ParticleBelief]] = []
     if isinstance(main, ParticleBelief):
-        by_log_odds = ((one.log_odds(main), one.belief) for one in held)
-        rivals = [(exp(min(k, _CERTAIN)), one) for k, one in by_log_odds if k > _NEGLIGIBLE]
-        total += sum(odds for odds, _ in rivals)
+        by_log_odds = ((one.log_odds(main), one.belief) for one in rivals)
+        likely = [(exp(min(k, _CERTAIN)), one) for k, one in by_log_odds if k > _NEGLIGIBLE]
+        total += sum(odds for odds, _ in likely)
     if near / total >= enough:
         return near / total
-    return (near + sum(odds * _share_near(one, main) for odds, one in rivals)) / total
+    return (near + sum(odds * _share_near(one, main) for odds, one in likely)) / total
 
 
 def _apart_m(one: MapBelief, other: MapBelief) -> float:

@@ -209,11 +209,13 @@ class EvidenceSource(ABC):
     """One source of evidence.
 
     ``kinds`` are the kinds of measurements of a log that it uses. Those that no source of a filter
-    uses are reported as not used.
+    uses are reported as not used. ``is_position`` is whether its readings are positions, or make
+    them.
     """
 
     name: ClassVar[str]
     kinds: ClassVar[frozenset[Kind]] = frozenset()
+    is_position: ClassVar[bool] = False
 
     def begin(self) -> Any:
         """Return the state before the first epoch."""
@@ -244,6 +246,13 @@ class EvidenceSource(ABC):
         a belief.
         """
         return state
+
+    def distrusted(self, state: Any, time_s: float) -> Any:  # noqa: ARG002
+        """Return the state when a belief takes over that was weighed without positions.
+
+        Sources of positions have been rejecting them since.
+        """
+        return self.beside_other(state)
 
     @abstractmethod
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:

@@ -34,7 +34,7 @@ from mapfilter.positioning.bayes.evidence import (
     RadioReading,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
@@ -79,6 +79,7 @@ class BayesPositioner(Filter[BayesState]):
     positioned: tuple[ParticleOptions, AlternativeRules] | None = None
     carriageways: CarriagewayFilters | None = None
     holds: HoldRules = field(default_factory=HoldRules)
+    pulls: PullRules = field(default_factory=PullRules)
     scored: bool = False
     device: Device = PROCESSOR
 
@@ -106,7 +107,7 @@ class BayesPositioner(Filter[BayesState]):
     def beliefs(self) -> BeliefFilters:
         """Filters and rules of single beliefs."""
         known = self.model, self.options, self.rules, self.grid, self.positioned
-        return BeliefFilters(*known, self.carriageways, self.holds, self.device)
+        return BeliefFilters(*known, self.carriageways, self.holds, self.pulls, self.device)
 
     @cached_property
     def sources(self) -> tuple[EvidenceSource, ...]:
@@ -144,7 +145,8 @@ class BayesPositioner(Filter[BayesState]):
         near = -expm1(-0.5 * (NEAR_M / sd_m) ** 2) if sd_m > 0 else 1.0
         least = max(self.options.split_mass, _LEAST_AT_START)
         status = Status.TRACKING if near > least else Status.SEARCHING
-        return replace(self.begin(), belief=replace(belief, status=status), status=status)
+        belief, known = replace(belief, status=status), status is Status.TRACKING
+        return replace(self.begin(), belief=belief, status=status, proven=known)
 
     def step(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
@@ -192,6 +194,9 @@ class BayesPositioner(Filter[BayesState]):
         taken_over = read_anew and not state.hold.is_as_measured
         if motion is Reason.USED and state.contested and self.beliefs.may_have_left(state):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.MOTION_STUCK))
+        elif self.beliefs.is_pulled(state) and state.contested:
+            if epoch.fix is not None:
+                unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REJECTED_BY_EVIDENCE))
         elif motion is Reason.USED and (taken_over or (epoch.motion and state.contested)):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         elif other_unit:

@@ -27,7 +27,7 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import wrap_one_rad, wrap_rad
 from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.alternative import NullHypothesis
-from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.hold_rules import HoldRules, RivalRules
 
 _USUAL_RAD = radians(30.0)
 _MILLISECONDS, _SEEDS = 1000.0, 2**32
@@ -125,6 +125,8 @@ class HeldOtherwise:
         Beside this belief.
     ahead_m : float
         Distance travelled since which it is likely enough, and elsewhere; NaN if not.
+    from_scratch : bool
+        It began with one report alone, and not as the main belief.
     """
 
     belief: ParticleBelief
@@ -133,6 +135,7 @@ class HeldOtherwise:
     start_m: float
     null: NullHypothesis = field(default_factory=NullHypothesis)
     ahead_m: float = nan
+    from_scratch: bool = False
 
     def log_bayes_factor(self, main: ParticleBelief) -> float:
         """Return the logarithm of the Bayes factor against the main belief."""
@@ -211,7 +214,7 @@ def forked(
         probability = rules.around_probability if likely else rules.probability
         log_prior = log(probability / (1 - probability))
         log_prior += log(rules.mirrored_odds) if one.sign != hold.sign else 0.0
-        own = _smaller(rules, belief, white_rad, rng)
+        own = smaller(rules, belief, white_rad, rng)
         found.append(HeldOtherwise(own, one, log_prior, travelled_m, null))
     return tuple(found)
 
@@ -227,15 +230,18 @@ def as_measured(
 ) -> HeldOtherwise:
     """Return the belief in which headings are as measured; parameters as of :func:`forked`."""
     log_prior = log(rules.around_probability / (1 - rules.around_probability))
-    own = _smaller(rules, belief, white_rad, rng)
+    own = smaller(rules, belief, white_rad, rng)
     plain = Hold(step_unit_m=hold.step_unit_m)
     return HeldOtherwise(own, plain, log_prior, travelled_m, null)
 
 
-def _smaller(
-    rules: HoldRules, belief: ParticleBelief, white_rad: float, rng: np.random.Generator
+def smaller(
+    rules: RivalRules, belief: ParticleBelief, white_rad: float, rng: np.random.Generator
 ) -> ParticleBelief:
-    """Return fewer hypotheses of a belief, with the white noise of two headings."""
+    """Return fewer hypotheses of a belief, with the white noise of two headings.
+
+    Parameters as of :func:`forked`.
+    """
     share = np.exp(belief.log_weight - belief.log_weight.max())
     count = min(rules.particles, share.size)
     chosen = rng.choice(share.size, count, p=share / share.sum())
@@ -248,7 +254,7 @@ def _smaller(
 
 
 def still_open(
-    rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
+    rules: RivalRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
 ) -> tuple[HeldOtherwise, ...]:
     """Return the beliefs that are neither refuted nor undecided for too long, most likely first.
 
@@ -256,9 +262,9 @@ def still_open(
 
     Parameters
     ----------
-    rules : HoldRules
+    rules : RivalRules
     held : sequence of HeldOtherwise
-        The beliefs in which the phone was turned, weighed by the same readings as ``main``.
+        Rivals that began as ``main``, weighed by the same readings.
     main : ParticleBelief
     travelled_m : float
         Distance travelled by now, by dead reckoning.
@@ -273,14 +279,14 @@ def still_open(
     return tuple(_compared(rules, one, main, travelled_m) for one in kept[: rules.max_beliefs])
 
 
-def _undecided_m(rules: HoldRules, one: HeldOtherwise, main: ParticleBelief) -> float:
+def _undecided_m(rules: RivalRules, one: HeldOtherwise, main: ParticleBelief) -> float:
     """Return the distance for which a belief may stay undecided."""
     leads = _leads(rules, one, main)
     return max(rules.abandon_after_m, rules.abandon_ahead_after_m if leads else 0.0)
 
 
 def _compared(
-    rules: HoldRules, one: HeldOtherwise, main: ParticleBelief, travelled_m: float
+    rules: RivalRules, one: HeldOtherwise, main: ParticleBelief, travelled_m: float
 ) -> HeldOtherwise:
     """Return a belief with the distance since which it is likely enough."""
     if not _leads(rules, one, main):
@@ -289,7 +295,7 @@ def _compared(
 
 
 def is_ahead(
-    rules: HoldRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
+    rules: RivalRules, held: Sequence[HeldOtherwise], main: ParticleBelief, travelled_m: float
 ) -> bool:
     """Return whether one of the beliefs is likely enough, and elsewhere, for some way."""
     return any(
@@ -297,13 +303,13 @@ def is_ahead(
     )
 
 
-def _leads(rules: HoldRules, one: HeldOtherwise, main: ParticleBelief) -> bool:
+def _leads(rules: RivalRules, one: HeldOtherwise, main: ParticleBelief) -> bool:
     """Return whether a belief is likely enough against the main one, and elsewhere."""
     return one.log_odds(main) > rules.lost_log_odds and one.is_elsewhere(main)
 
 
 def winner(
-    rules: HoldRules,
+    rules: RivalRules,
     held: Sequence[HeldOtherwise],
     main: ParticleBelief,
     max_null_log_odds: float,
@@ -312,9 +318,9 @@ def winner(
 
     Parameters
     ----------
-    rules : HoldRules
+    rules : RivalRules
     held : sequence of HeldOtherwise
-        The beliefs in which the phone was turned, weighed by the same readings as ``main``.
+        Rivals that began as ``main``, weighed by the same readings.
     main : ParticleBelief
     max_null_log_odds : float
         Largest log odds of the null hypothesis beside it.

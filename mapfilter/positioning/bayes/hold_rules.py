@@ -1,8 +1,9 @@
-"""Rules by which a phone is believed to be held otherwise."""
+"""Rules by which a rival of the belief is believed: a turned phone, or positions pulled away."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import log
 from typing import Annotated
 
 from annotated_types import Ge
@@ -11,27 +12,17 @@ from mapfilter.options import NotNegative, Options, Positive, Probability
 
 
 @dataclass(frozen=True, slots=True)
-class HoldRules(Options):
-    """When a phone may have been turned, and when that is believed.
+class RivalRules(Options):
+    """When a belief that began as the main one is believed in its place.
 
-    Log odds of such a belief are against the main one, with the log Bayes factor since.
+    Log odds are against the main belief, with the log Bayes factor since.
 
     Parameters
     ----------
     watched : bool
-        Whether jumps of headings are looked at.
-    jump_deg : float
-        Change of the heading from one row of a walk to the next that may be the phone's.
-    around_deg : float
-        Change from which on it is one right round, which is rare in walks.
-    longest_row_m : float
-        Longer rows may hold a corner, so their changes are no jumps.
-    longest_pause_s : float
-        Who stood for longer may have turned there, so the change over it is no jump.
-    probability, around_probability : float
-        That such a change, or one right round, is that of a phone being turned.
-    mirrored_odds : float
-        Odds of its being mirrored against its being turned.
+        Whether there are such beliefs.
+    probability : float
+        Of what the rival assumes, beforehand.
     lost_log_odds : float
         Log odds from which on the main belief is LOST.
     lost_after_m : float
@@ -39,9 +30,9 @@ class HoldRules(Options):
     win_log_odds : float
         Log odds from which on it is replaced.
     abandon_threshold : float
-        Log Bayes factor at which the phone was not turned.
+        Log Bayes factor at which a rival is refuted.
     abandon_after_m : float
-        Distance after which that stays undecided,
+        Distance after which one that stays undecided is given up,
     abandon_ahead_after_m : float
         and the same where it is likely enough for a LOST position.
     max_beliefs : int
@@ -51,13 +42,7 @@ class HoldRules(Options):
     """
 
     watched: bool = True
-    jump_deg: Positive = 60.0
-    around_deg: Positive = 150.0
-    longest_row_m: Positive = 3.0
-    longest_pause_s: Positive = 3.0
     probability: Probability = 0.006
-    around_probability: Probability = 0.25
-    mirrored_odds: Positive = 0.25
     lost_log_odds: float = -1.0
     lost_after_m: NotNegative = 7.0
     win_log_odds: float = 8.0
@@ -66,3 +51,59 @@ class HoldRules(Options):
     abandon_ahead_after_m: NotNegative = 1200.0
     max_beliefs: Annotated[int, Ge(1)] = 6
     particles: Annotated[int, Ge(10)] = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class HoldRules(RivalRules):
+    """When a phone may have been turned, and when that is believed.
+
+    Parameters
+    ----------
+    jump_deg : float
+        Change of the heading from one row of a walk to the next that may be the phone's.
+    around_deg : float
+        Change from which on it is one right round, which is rare in walks.
+    longest_row_m : float
+        Longer rows may hold a corner, so their changes are no jumps.
+    longest_pause_s : float
+        Who stood for longer may have turned there, so the change over it is no jump.
+    around_probability : float
+        That a change right round is that of a phone being turned; ``probability`` is of others.
+    mirrored_odds : float
+        Odds of its being mirrored against its being turned.
+    """
+
+    jump_deg: Positive = 60.0
+    around_deg: Positive = 150.0
+    longest_row_m: Positive = 3.0
+    longest_pause_s: Positive = 3.0
+    around_probability: Probability = 0.25
+    mirrored_odds: Positive = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class PullRules(RivalRules):
+    """When positions may lead away from where the phone is, and when that is believed.
+
+    A rival without positions is undecided for longer: who leads away slowly takes minutes.
+
+    Parameters
+    ----------
+    search_threshold : float
+        Log Bayes factor at which one that began with a report alone is refuted: to find a place
+        costs it what the others know.
+    """
+
+    probability: Probability = 1e-4
+    abandon_after_m: NotNegative = 1200.0
+    max_beliefs: Annotated[int, Ge(1)] = 1
+    search_threshold: float = -25.0
+
+    @property
+    def log_prior(self) -> float:
+        """Log odds of positions that lead away, beforehand."""
+        return log(self.probability / (1 - self.probability))
+
+    def of(self, *, from_scratch: bool) -> RivalRules:
+        """Return the rules of a rival by how it began."""
+        return replace(self, abandon_threshold=self.search_threshold) if from_scratch else self

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite, nan
+from typing import Any
 
 import numpy as np
 
@@ -12,21 +14,32 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.held import Hold, as_measured, forked, jumps, own_rng, still_open
+from mapfilter.positioning.bayes.held import (
+    HeldOtherwise,
+    Hold,
+    as_measured,
+    forked,
+    jumps,
+    own_rng,
+    still_open,
+)
 from mapfilter.positioning.bayes.mirrored import mirrored_step
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.bayes.unaided import without_positions
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import UnusedReading
 
 _FORKED, _MOVED, _AWAY = 1, 2, 4
 """Salts of the draws of beliefs in which the phone was turned, and of hypotheses carried on."""
+_BEGUN, _UNAIDED = 5, 7
+"""Salts of the draws of the belief without positions."""
 
 
 @dataclass(frozen=True)
 class _OwnDraws:
-    """Generators of an epoch for beliefs in which the phone was turned.
+    """Generators of an epoch for rivals of the belief.
 
     Each is made when it is first asked for, which few epochs do: it takes 10 µs.
     """
@@ -37,6 +50,16 @@ class _OwnDraws:
     def forking(self) -> np.random.Generator:
         """For beliefs that begin."""
         return own_rng(self.time_s, _FORKED)
+
+    @cached_property
+    def beginning(self) -> np.random.Generator:
+        """For a belief without positions that begins."""
+        return own_rng(self.time_s, _BEGUN)
+
+    @cached_property
+    def unaided(self) -> np.random.Generator:
+        """For one that moves."""
+        return own_rng(self.time_s, _UNAIDED)
 
     @cached_property
     def moving(self) -> np.random.Generator:
@@ -91,6 +114,11 @@ def moved(
         gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
         if state.status is belief.status is Status.TRACKING:
             held = (as_measured(rules, belief, state.null, hold, gone_m, white_rad, own.forking),)
+    unaided = state.unaided
+    if positioned and isinstance(belief, ParticleBelief) and beliefs.positions_lead(state):
+        gone_m, pulls = reckoning.travelled_m, beliefs.pulls
+        alone = without_positions(pulls, belief, state.null, hold, gone_m, own.beginning)
+        unaided = (*unaided, alone)
     if belief is not None and watch.rest is None and beliefs.may_have_left(state):
         gone_s = epoch.time_s - state.watch.moving_s
         belief = beliefs.carried_on(state, belief, gone_s, own_rng(epoch.time_s, _AWAY))
@@ -134,6 +162,10 @@ def moved(
                     replace(one, belief=predict(one.belief, one.hold.read(measured), own.moving)[0])
                     for one in held
                 )
+            if unaided:
+                unaided = tuple(
+                    _moved_alone(one, predict, measured, own.unaided) for one in unaided
+                )
             belief, why = predict(belief, _assumed(step, belief), rng)
             belief = beliefs.remounted(belief, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
@@ -174,7 +206,17 @@ def moved(
         walking_rad=walking_rad,
         held=held,
         alternatives=state.alternatives,
+        unaided=unaided,
+        proven=state.proven,
     ), unused
+
+
+def _moved_alone(
+    one: HeldOtherwise, predict: Callable[..., Any], measured: MotionStep, rng: np.random.Generator
+) -> HeldOtherwise:
+    """Return a belief without positions, moved by a step as it reads it."""
+    as_read = one.hold.read(measured)
+    return replace(one, belief=predict(one.belief, _assumed(as_read, one.belief), rng)[0])
 
 
 def _assumed(step: MotionStep, belief: MapBelief) -> MotionStep:

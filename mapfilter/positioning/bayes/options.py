@@ -23,7 +23,7 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.over_survey import (
     SURVEYED,
@@ -302,6 +302,8 @@ class BayesFilter(Options):
             carriageways=carriageways,
             # A vehicle's compass is screwed on; without cells any street may go straight on.
             holds=HoldRules(watched=bool(area.cell_ids) and not self.vehicle),
+            # By ways alone a belief without positions goes astray sooner than they do.
+            pulls=PullRules(watched=bool(area.cell_ids)),
         )
 
 

@@ -88,12 +88,18 @@ class BayesSmoother:
         self.last, now = after, after.reckoning
         self.moved.append((now.east_m, now.north_m, now.travelled_m, now.sampling_m2))
         taken_over, held_anew = after.takeovers > before.takeovers, after.hold != before.hold
+        by_alternative = before.alternative is not None and after.alternative is None
+        pulled = bool(before.unaided) and not by_alternative
         unit = after.hold.step_unit_m / before.hold.step_unit_m
         if taken_over and unit != 1.0:
             self._read_in_another_unit(unit)
-        elif taken_over and held_anew:
-            # The dead reckoning since the start of what has taken over was read otherwise.
+        elif taken_over and (held_anew or pulled):
+            # Since the start of what has taken over dead reckoning was read otherwise, or beliefs
+            # were led astray.
             starts_m = [one.start_m for one in before.held if one.hold == after.hold]
+            if pulled and not held_anew:
+                likeliest = max(before.unaided, key=lambda one: one.belief.log_evidence)
+                starts_m = [likeliest.start_m]
             if not starts_m and before.alternative is not None:
                 starts_m = [before.alternative.start_m]
             since_m = min(starts_m, default=now.travelled_m)

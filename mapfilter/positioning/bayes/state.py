@@ -77,6 +77,11 @@ class BayesState:
         Beliefs in which the phone was turned, tested against the belief.
     alternatives : int
         Number of alternatives that were started.
+    unaided : tuple of HeldOtherwise
+        Beliefs without positions, beside one that is weighed by them: at most one that began as
+        that, and one that began from scratch.
+    proven : bool
+        Whether the belief's place was found without positions, too, or that was tried.
     """
 
     belief: MapBelief | None = None
@@ -99,6 +104,8 @@ class BayesState:
     walking_rad: float = nan
     held: tuple[HeldOtherwise, ...] = ()
     alternatives: int = 0
+    unaided: tuple[HeldOtherwise, ...] = ()
+    proven: bool = False
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -123,7 +130,14 @@ class BayesState:
             walking_rad=self.walking_rad,
             held=self.held,
             alternatives=self.alternatives,
+            unaided=self.unaided,
+            proven=self.proven,
         )
+
+    @property
+    def rivals(self) -> tuple[HeldOtherwise, ...]:
+        """Beliefs that compete with the main one, by what they assume of phone and positions."""
+        return self.held + self.unaided
 
     @property
     def particle_spacing_m(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
-    AlternativeRules,
     MapBelief,
     NullHypothesis,
     doubted,
@@ -22,7 +22,6 @@ from mapfilter.positioning.bayes.alternative import (
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
-from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import (
     Context,
     EvidenceSource,
@@ -31,9 +30,10 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import after_takeover, own_rng, still_open, winner
+from mapfilter.positioning.bayes.held import own_rng
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.rivals import Rivals, challenged, for_belief
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.step_units import (
     asks_for_unit,
@@ -42,10 +42,11 @@ from mapfilter.positioning.bayes.step_units import (
     log_odds_of_unit,
     unit_of_next_m,
 )
+from mapfilter.positioning.bayes.unaided import beside_alternative, searching_alone
 from mapfilter.positioning.epochs import Epoch
 
-_WEIGHED = 3
-"""Salt of the draws of beliefs in which the phone was turned."""
+_ALONE = 8
+"""Salt of the draws of a belief that begins without positions."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,10 @@ class Weighing:
     beliefs: BeliefFilters
     radio: RadioSource
     sources: tuple[EvidenceSource, ...]
+
+    @cached_property
+    def _rivals(self) -> Rivals:
+        return Rivals(self.beliefs, self.sources)
 
     def collected(
         self, state: BayesState, epoch: Epoch, particle_spacing_m: float
@@ -146,7 +151,7 @@ class Weighing:
             return _begun_anew(state), info.reason
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
-        null = _challenged(rules, state.null, reading, before, belief)
+        null = challenged(rules, state.null, reading, before, belief)
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
             other = alternative.belief
@@ -156,7 +161,7 @@ class Weighing:
             doubt = doubt or alternative.null.log_odds > rules.converge_log_odds
             terms = replace(terms, doubted=doubt)
             other, _ = update(alternative.belief, terms, rng)
-            own = _challenged(rules, alternative.null, terms, alternative.belief, other)
+            own = challenged(rules, alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)
         gone = not _holds(area, belief)
         now = resolve_alternative(
@@ -204,51 +209,36 @@ class Weighing:
             walking_rad=state.walking_rad,
             held=() if now.taken_over else state.held,
             alternatives=state.alternatives + (disputed and alternative is not now.alternative),
+            unaided=beside_alternative(state, before) if now.taken_over else state.unaided,
+            proven=self._proven(state, now.status, taken_over=now.taken_over),
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
-        return self._held_otherwise(after, evidence, epoch.time_s, measured=measured), Reason.USED
+        after = self._rivals.turned(after, evidence, epoch.time_s, measured=measured)
+        after = self._rivals.unaided(after, updates, epoch.time_s, measured=measured)
+        if beliefs.asks_for_proof(after):
+            after = self._asked_for_proof(after, epoch)
+        return after, Reason.USED
 
-    def _held_otherwise(
-        self, state: BayesState, evidence: RadioReading, time_s: float, *, measured: bool
-    ) -> BayesState:
-        """Weigh the beliefs in which the phone was turned; one may take over."""
-        main = state.belief
-        if not state.held or not isinstance(main, ParticleBelief):
-            return state
-        beliefs = self.beliefs
-        rules, holds = beliefs.rules_of(state), beliefs.holds
-        found, rng = [], own_rng(time_s, _WEIGHED)
-        # Pseudoranges are compared with the main belief alone, whose total likelihood they leave.
-        evidence = evidence.for_other_hypotheses()
-        for one in state.held:
-            reading = _tracked(evidence, one.belief, measured=measured)
-            belief, info = beliefs.held_otherwise.update(one.belief, reading, rng)
-            if info.reason is Reason.NO_READING:
-                # Nothing but pseudoranges: they say nothing of it.
-                found.append(one)
-                continue
-            if info.reason is not Reason.USED:
-                continue
-            null = _challenged(rules, one.null, reading, one.belief, belief)
-            found.append(replace(one, belief=belief, null=null))
-        held = still_open(holds, found, main, state.reckoning.travelled_m)
-        best = winner(holds, held, main, rules.converge_log_odds)
-        if best is None:
-            return replace(state, held=held)
-        own = {one.name: one.beside_other(state.sources[one.name]) for one in self.sources}
-        return replace(
-            state,
-            belief=best.belief,
-            status=Status.TRACKING,
-            sources={**state.sources, **own},
-            null=best.null,
-            alternative=state.alternative and state.alternative.beside(best.log_prior),
-            takeovers=state.takeovers + 1,
-            recovery=Recovery(),
-            hold=best.hold,
-            held=after_takeover(held, best),
+    def _proven(self, state: BayesState, status: Status, *, taken_over: bool) -> bool:
+        """Return whether the belief was found without positions, once it has converged."""
+        if taken_over:
+            return False
+        return state.proven or (
+            status is Status.CONVERGED and not self.beliefs.used_positions(state)
         )
+
+    def _asked_for_proof(self, state: BayesState, epoch: Epoch) -> BayesState:
+        """Start a belief from this epoch's report alone, without positions."""
+        updates = [one.first_after(state, epoch) for one in self.sources if not one.is_position]
+        reading, main = joined(updates), state.belief
+        if reading is None or not isinstance(main, ParticleBelief):
+            return state
+        filter_ = self.beliefs.filter_of(state)
+        begun = filter_.init(Start(reading, state.compass), own_rng(epoch.time_s, _ALONE))
+        pulls, gone_m = self.beliefs.pulls, state.reckoning.travelled_m
+        one = searching_alone(pulls, main, begun, state.hold, gone_m)
+        return replace(state, unaided=(*state.unaided, one))
 
     def _twin_of(
         self,
@@ -308,12 +298,7 @@ def weighed_by(
 ) -> RadioReading | None:
     """Return the evidence as a belief is weighed by it; None without any."""
     reading = joined(updates, alternative=alternative)
-    return None if reading is None else _tracked(reading, belief, measured=measured)
-
-
-def _tracked(reading: RadioReading, belief: MapBelief, *, measured: bool) -> RadioReading:
-    """Return a reading as a belief is weighed by it."""
-    return replace(reading, tracked=measured and belief.status is Status.TRACKING)
+    return None if reading is None else for_belief(reading, belief, measured=measured)
 
 
 def _holds(area: AreaFrame, belief: MapBelief) -> bool:
@@ -342,21 +327,6 @@ def _begun_anew(state: BayesState) -> BayesState:
         alternative=None,
         recovery=None,
         twin=None,
+        unaided=(),
+        proven=False,
     )
-
-
-def _challenged(
-    rules: AlternativeRules,
-    null: NullHypothesis,
-    reading: RadioReading,
-    before: MapBelief,
-    after: MapBelief,
-) -> NullHypothesis:
-    """Return the null hypothesis beside a belief after a reading."""
-    other = 0.0
-    if reading.levels is not None and after.shared is not None:
-        other = after.shared.other_log_likelihood
-    gained = after.log_evidence - before.log_evidence
-    searching = before.status is Status.SEARCHING
-    least = rules.least_log_odds(searching=searching)
-    return null.after(reading, other, gained, after.travelled_m, rules.map_nats_per_m, least)

@@ -45,6 +45,8 @@ _F = np.float32
 _FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
 _MIN_MOVED_M = 0.1
+_AGREES = -2 * log(0.05)
+"""Squared distance, in standard deviations, that 95 % of two-dimensional errors keep."""
 _MOST_REFUTED_NATS = 5.0
 """The most that one fix takes from the null hypothesis."""
 
@@ -98,6 +100,25 @@ def refutation(fix: GnssFix, total: float, area_m2: float) -> float:
     return min(max(anywhere - total, -_MOST_REFUTED_NATS), 0.0)
 
 
+def agrees_with(belief: MapBelief, fix: GnssFix, origin_m: tuple[float, float]) -> bool:
+    """Return whether a fix lies where 95 % of them would, by the errors of the belief and its own.
+
+    Parameters
+    ----------
+    belief : ParticleBelief or GridBelief
+    fix : GnssFix
+        With its variances.
+    origin_m : tuple of float
+        Of the frame of the hypotheses.
+    """
+    summary, cross_m2 = belief.summary, fix.cov_east_north_m2
+    covariance_m2 = summary.covariance_m2 + np.array(
+        [[fix.var_east_m2, cross_m2], [cross_m2, fix.var_north_m2]]
+    )
+    apart_m = np.array([fix.east_m, fix.north_m]) - np.array(origin_m) - summary.mean[:2]
+    return float(apart_m @ np.linalg.solve(covariance_m2, apart_m)) <= _AGREES
+
+
 def widened(fix: GnssFix, times: float) -> GnssFix:
     """Return a fix with its variance multiplied; 10 m are assumed where it has none."""
     known = isfinite(fix.var_east_m2) and isfinite(fix.var_north_m2)
@@ -122,6 +143,10 @@ class GnssState:
         Nothing is used before.
     rejected_since_s : float
         Start of the present series of rejections; NaN outside one.
+    distrusted : bool
+        Readings have led away: they are not used until they have agreed for some way.
+    agrees_from_m : float
+        Distance travelled since which distrusted readings agree; NaN if they do not.
     """
 
     receiver: Receiver | None = None
@@ -130,6 +155,8 @@ class GnssState:
     compared_at_s: float = -inf
     probation_until_s: float = -inf
     rejected_since_s: float = nan
+    distrusted: bool = False
+    agrees_from_m: float = nan
 
     def due(self, options: GnssOptions, time_s: float, travelled_m: float) -> bool:
         """Return whether to compare again where no radio report asks for it."""
@@ -150,6 +177,13 @@ class GnssState:
     def was_used(self, time_s: float) -> bool:
         """Return whether a fix or pseudoranges of that time were compared, and not rejected."""
         return self.compared_at_s == time_s >= self.probation_until_s and not self.rejecting
+
+    def on_trial(self, options: GnssOptions, travelled_m: float) -> GnssState:
+        """Return the state after distrusted readings that agree; trusted after some way of them."""
+        from_m = self.agrees_from_m if isfinite(self.agrees_from_m) else travelled_m
+        if travelled_m - from_m < options.trial_m:
+            return replace(self, agrees_from_m=from_m)
+        return replace(self, distrusted=False, agrees_from_m=nan)
 
     @property
     def rejecting(self) -> bool:
@@ -219,10 +253,13 @@ class GnssGate:
         searching = belief.status is Status.SEARCHING
         return self.options.search_gate if searching else self.options.gate
 
-    def _rejected(self, state: GnssState, time_s: float) -> GnssState:
+    def rejected(self, state: GnssState, time_s: float) -> GnssState:
+        """Return a state in which all readings of a time are rejected."""
         since_s = state.rejected_since_s if state.rejecting else time_s
         until_s = time_s + self.options.probation_s
-        return replace(state, probation_until_s=until_s, rejected_since_s=since_s)
+        return replace(
+            state, probation_until_s=until_s, rejected_since_s=since_s, agrees_from_m=nan
+        )
 
     def _compare_fix(
         self, found: GnssComparison, fix: GnssFix, time_s: float, travelled_m: float
@@ -230,6 +267,14 @@ class GnssGate:
         belief, state, options = found.belief, found.state, self.options
         if time_s < state.probation_until_s:
             return found.without("gnss", [""], Reason.ON_PROBATION, compared=True)
+        if state.distrusted:
+            if not agrees_with(belief, widened(fix, 1.0), self.origin_m):
+                state, why = self.rejected(state, time_s), Reason.REJECTED_BY_EVIDENCE
+                return found.without("gnss", [""], why, state=state, compared=True)
+            state = state.on_trial(options, travelled_m)
+            if state.distrusted:
+                why = Reason.ON_PROBATION
+                return found.without("gnss", [""], why, state=state, compared=True)
         gone_m = travelled_m - state.fix_used_at_m
         times = max(options.fix_memory_m / max(gone_m, _MIN_MOVED_M), 1.0)
         wide = widened(fix, times)
@@ -237,7 +282,7 @@ class GnssGate:
         gain = term.log_likelihood(belief.state)
         total = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
         if total + 1.0 < -self._gate(belief):
-            state = self._rejected(state, time_s)
+            state = self.rejected(state, time_s)
             why = Reason.REJECTED_BY_EVIDENCE
             return found.without("gnss", [""], why, state=state, compared=True)
         state = replace(state, fix_used_at_m=travelled_m, rejected_since_s=nan)
@@ -273,7 +318,11 @@ class GnssGate:
             used = self._agreeing(sky, sigma, receiver, belief, rows, fresh=fresh)
             why = Reason.REJECTED_BY_EVIDENCE
             if used is None:
-                state = self._rejected(state, epoch.time_s)
+                state = self.rejected(state, epoch.time_s)
+            elif state.distrusted:
+                state = state.on_trial(options, travelled_m)
+                if state.distrusted:
+                    used, why = None, Reason.ON_PROBATION
         if used is None:
             names = sky.names
         else:

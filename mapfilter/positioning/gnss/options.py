@@ -57,6 +57,8 @@ class GnssOptions(Options):
         Time in which ``trust`` grows by one, as spoofing is temporary.
     dispute_s : float
         Duration of a rejection after which an alternative is started.
+    trial_m : float
+        Distance for which readings that have led away must agree before they are used again.
     """
 
     zenith_m: Positive = 2.0
@@ -82,6 +84,7 @@ class GnssOptions(Options):
     trust: NotNegative = 3.0
     trust_grows_s: Positive = 120.0
     dispute_s: NotNegative = 10.0
+    trial_m: NotNegative = 100.0
 
 
 @dataclass(frozen=True, slots=True)

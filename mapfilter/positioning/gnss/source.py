@@ -67,6 +67,7 @@ class FirstFix(EvidenceSource):
     origin_m: tuple[float, float]
     name: ClassVar[str] = "first fix"
     kinds: ClassVar[frozenset[Kind]] = frozenset({"gnss"})
+    is_position: ClassVar[bool] = True
 
     def first(self, epoch: Epoch) -> EvidenceUpdate:
         """Return the fix as it is."""
@@ -89,6 +90,7 @@ class GnssSource(EvidenceSource):
     clock: bool = True
     name: ClassVar[str] = "gnss"
     kinds: ClassVar[frozenset[Kind]] = frozenset({"gnss", "pseudorange"})
+    is_position: ClassVar[bool] = True
 
     @cached_property
     def gate(self) -> GnssGate:
@@ -129,6 +131,10 @@ class GnssSource(EvidenceSource):
         if receiver is None:
             return state
         return replace(state, receiver=begun_anew(self.options, receiver))
+
+    def distrusted(self, state: GnssState, time_s: float) -> GnssState:
+        """Return the state with readings rejected from now on."""
+        return replace(self.gate.rejected(self.beside_other(state), time_s), distrusted=True)
 
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:
         """Compare the epoch's fix and pseudoranges with the belief and the alternative."""
