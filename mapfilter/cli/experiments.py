@@ -32,7 +32,9 @@ from mapfilter.cli.options import (
 )
 from mapfilter.errors import Stopped
 from mapfilter.experiments.papers import PAPERS
-from mapfilter.workflows.terminal import print_message, print_result, rate_bar, stopped_text
+from mapfilter.workflows.guard import stopped_text
+from mapfilter.workflows.progress_bars import rate_bar
+from mapfilter.workflows.terminal import print_message, print_result
 
 *_FIRST, _LAST = PAPERS
 

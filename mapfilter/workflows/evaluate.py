@@ -44,8 +44,8 @@ from mapfilter.workflows.evaluate_recorded import ALL
 from mapfilter.workflows.evaluate_recorded import NAMES as RECORDED
 from mapfilter.workflows.evaluate_runs import run_cases, street_base
 from mapfilter.workflows.filter_choice import filter_choice, option_sections
+from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import World
 
 OF_DATA = (ALL, *RECORDED, "single-reports")

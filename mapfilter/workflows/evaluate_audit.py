@@ -18,7 +18,7 @@ from mapfilter.workflows.evaluate import (
     main_figures,
     run_global_positioning,
 )
-from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.result_text import to_jsonable
 
 _GYRO = {
     "imu.turns": "gyro",

@@ -49,7 +49,7 @@ from mapfilter.tracks.store import write_log
 from mapfilter.workflows.evaluate import TABLE, EvaluateResult, load_benchmark
 from mapfilter.workflows.evaluate_runs import run_cases, street_base
 from mapfilter.workflows.filter_choice import filter_choice
-from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.world import World
 
 _DEFINED = "is part of the world, which has one definition"

@@ -56,6 +56,7 @@ from mapfilter.workflows.replayed import (
     summary_figures,
     summary_of,
 )
+from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.results import (
     ESTIMATES,
     FIGURES,
@@ -65,7 +66,6 @@ from mapfilter.workflows.results import (
     older_results,
 )
 from mapfilter.workflows.served import served_points, street_map
-from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.track_pictures import (
     Handed,
     TrackPictures,

@@ -349,7 +349,7 @@ ALLOWED = {
     # Who calls it is listed here by `open_parquet`.
     ("_arrow.py", "ParquetFile"),
     # The null device, in place of an output that the caller closed.
-    ("workflows/terminal.py", "open"),
+    ("workflows/guard.py", "open"),
     # Parts of the page that come with the package.
     ("viewing/page.py", "read_text"),
     ("experiments/recorded/denver.py", "read_csv"), ("experiments/recorded/mall.py", "open"),
