@@ -21,11 +21,11 @@ from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.estimate import PositionedTrack, Snapshot
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
+from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
