@@ -15,7 +15,8 @@ from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs, short_crs, unproject
 from mapfilter.radio.antenna import MeasuredAntenna
-from mapfilter.radio.cells import CellPlan, read_cell_plan
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters

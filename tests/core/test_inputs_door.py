@@ -208,7 +208,7 @@ from mapfilter.config.load import load_config
 from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.learning.patch import read_patch
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.radio.cells import read_cell_plan
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.radio.msi import read_msi
 from mapfilter.radio.tables import read_table
 from mapfilter.rasters.opening import open_rasters
