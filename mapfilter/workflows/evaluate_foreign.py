@@ -37,8 +37,8 @@ from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.roads.index import inside_areas
 from mapfilter.roads.network import street_network
+from mapfilter.roads.route_points import inside_areas
 from mapfilter.simulation.reports import array_sampler
 from mapfilter.simulation.worlds.faults import GivenInputs, given_inputs
 from mapfilter.simulation.worlds.open_ground import OpenGround

@@ -24,7 +24,7 @@ from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.maps import map_bounds_deg, resolve_map
-from mapfilter.roads.routes import route_lattice_from_landuse
+from mapfilter.roads.route_points import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX

@@ -18,8 +18,8 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.corridors import CORRIDOR_HALF_WIDTH_M, Positions, corridors
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.route_points import RouteSource
 
 _RESOLUTION_M = 5.0
 
