@@ -214,7 +214,6 @@ def evaluate(
     from mapfilter.workflows.evaluate import (
         RUNS,
         check_benchmark,
-        load_benchmark,
         main_table,
         run_global_positioning,
     )
@@ -223,6 +222,7 @@ def evaluate(
     from mapfilter.workflows.evaluate_ottawa import RUNS as OTTAWA_RUNS
     from mapfilter.workflows.evaluate_ottawa import run_ottawa
     from mapfilter.workflows.evaluate_recorded import ALL, BENCHMARKS, run_all, run_recorded
+    from mapfilter.workflows.evaluate_settings import load_benchmark
     from mapfilter.workflows.evaluate_single_reports import SETS, run_single_reports
 
     check_benchmark(name, data)

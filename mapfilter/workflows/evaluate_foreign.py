@@ -46,8 +46,9 @@ from mapfilter.simulation.worlds.radio import planners_offsets_db
 from mapfilter.simulation.worlds.sensor_faults import NO_FAULT
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.tracks.store import write_log
-from mapfilter.workflows.evaluate import TABLE, EvaluateResult, load_benchmark
+from mapfilter.workflows.evaluate import TABLE, EvaluateResult
 from mapfilter.workflows.evaluate_runs import run_cases, street_base
+from mapfilter.workflows.evaluate_settings import load_benchmark
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.world import World
