@@ -354,7 +354,7 @@ ALLOWED = {
     ("viewing/page.py", "read_text"),
     ("experiments/recorded/denver.py", "read_csv"), ("experiments/recorded/mall.py", "open"),
     # New files; journeys; the kernel's own; the code of a custom filter, which runs anyway.
-    ("workflows/replay.py", "open"), ("rasters/geotiff.py", "open"), ("_io.py", "open"),
+    ("workflows/replay_logs.py", "open"), ("rasters/geotiff.py", "open"), ("_io.py", "open"),
     ("database/estimate.py", "read_text"), ("_code.py", "read_bytes"), ("_replace.py", "read_text"),
     ("_workers.py", "open"), ("database/parquet.py", "open"), ("serving/store.py", "open"),
     ("positioning/custom_filter.py", "read_bytes"),
