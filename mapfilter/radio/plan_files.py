@@ -8,12 +8,12 @@ from numbers import Real
 from pathlib import Path
 from typing import Annotated
 
+from mapfilter._annotations import Words
 from mapfilter._arguments import Entries, Setting, check_arguments, path_argument
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import projected_crs
-from mapfilter.options import Words
 from mapfilter.radio.cell_layouts import LAYOUTS, Layout
 from mapfilter.radio.cell_rules import STATED, check_fields
 from mapfilter.radio.cell_table import read_plan

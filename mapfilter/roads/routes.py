@@ -14,10 +14,10 @@ import numpy as np
 import shapely
 from geopandas import GeoDataFrame
 
+from mapfilter._annotations import Words
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.options import Words
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.index import HALF_WIDTH_M
 from mapfilter.roads.landuse import read_landuse
