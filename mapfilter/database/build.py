@@ -36,7 +36,7 @@ from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.measured import MeasuredParts, Readings, deviations_at_points
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.sources import LatticeRoutes, Routes
+from mapfilter.database.sources import LatticeRoutes, Routes, cut_by_tile
 from mapfilter.database.store import open_written
 from mapfilter.database.tiles import roads_tile, tile_windows
 from mapfilter.errors import Faults, InputError, fail
@@ -220,7 +220,7 @@ def build_roads(
     :func:`build`.
     """
     check_parameters(MARGIN_DB, FLOOR_DBM, tile_px)
-    source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
+    source = cut_by_tile(routes)
     lattice, out = source.lattice, Path(out)
     windows = [w for w in tile_windows(lattice, tile_px) if source.holds(lattice.window(*w))]
     check_database_replaceable(out)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from mapfilter._parallel import SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.database.parquet import Window
-from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
+from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, cut_by_tile, overlap
 from mapfilter.database.tiles import TileRows, TileTask, grouped, read_tiles, tile_windows
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
@@ -49,7 +49,7 @@ class BuildJob:
 
         Errors are those of :func:`mapfilter.database.build.build`.
         """
-        source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
+        source = cut_by_tile(routes)
         rasters = named_by_plan(rasters, plan)
         check_against_plan(rasters, plan)
         check_aligned(rasters.lattice, source.lattice, f"{rasters.path} and roads")

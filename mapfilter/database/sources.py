@@ -139,6 +139,11 @@ Routes = LatticeRoutes | LayerRoutes
 """The points of an area, tile by tile."""
 
 
+def cut_by_tile(routes: RouteLattice | Routes) -> Routes:
+    """Return routes whose points are taken tile by tile; a route lattice is cut."""
+    return LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
+
+
 def check_aligned(raster: Lattice, lattice: Lattice, where: str) -> None:
     """Check that a route lattice lies on the pixels of the rasters, and overlaps them."""
     faults = Faults()

@@ -13,7 +13,6 @@ from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build
-from mapfilter.database.sources import LatticeRoutes
 from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
@@ -216,7 +215,7 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
         database = build(
             rasters,
             world.plan,
-            LatticeRoutes(routes),
+            routes,
             folder / name,
             margin_db=config.database.margin_db,
             floor_dbm=config.database.floor_dbm,

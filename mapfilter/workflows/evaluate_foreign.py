@@ -16,7 +16,6 @@ from mapfilter._types import Floats
 from mapfilter.config.load import given_keys
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build
-from mapfilter.database.sources import LatticeRoutes
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.experiments.benchmarks.foreign import (
@@ -267,7 +266,7 @@ def _database(world: World, given: GivenInputs, folder: Path, seed: int, variant
     database = build(
         open_rasters(rasters_path),
         given.plan,
-        LatticeRoutes(routes),
+        routes,
         folder,
         margin_db=config.database.margin_db,
         floor_dbm=config.database.floor_dbm,
