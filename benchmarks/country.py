@@ -44,7 +44,8 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.roads.index import HALF_WIDTH_M, RouteSource
+from mapfilter.roads.index import HALF_WIDTH_M
+from mapfilter.roads.route_points import RouteSource
 
 REACH_PX = 400
 CELLS_PER_KM2 = 1.0

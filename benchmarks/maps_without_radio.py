@@ -24,8 +24,8 @@ from mapfilter.database.sources import LayerRoutes
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import Filter, locate
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.raster import raster_lattice, read_raster_ways
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.tracks.log import TrackLog, make_log
 
 DRIVES = ("00", "01", "02", "04", "05", "06", "07")

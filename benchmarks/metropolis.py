@@ -37,9 +37,10 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 from mapfilter.positioning.epochs import epochs
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.roads.index import HALF_WIDTH_M, RouteSource
+from mapfilter.roads.index import HALF_WIDTH_M
 from mapfilter.roads.network import street_network
 from mapfilter.roads.osm import read_ways
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Ways
 from mapfilter.simulation.journeys import JourneyPlan, journey
 from mapfilter.simulation.reports import ReportModel

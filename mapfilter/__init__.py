@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     )
     from mapfilter.positioning.kalman.filter import KalmanFilter as KalmanFilter
     from mapfilter.radio.cells import CellPlan as CellPlan
-    from mapfilter.radio.cells import read_cell_plan as read_cell_plan
+    from mapfilter.radio.plan_files import read_cell_plan as read_cell_plan
     from mapfilter.rasters.opening import open_rasters as open_rasters
     from mapfilter.rasters.raster_set import RxLevRasters as RxLevRasters
     from mapfilter.roads.lattice import RouteLattice as RouteLattice
@@ -88,7 +88,8 @@ _NAMES = {
     "positioning.fingerprints.reports": "Reports",
     "positioning.fingerprints.tables": "read_fingerprint_table",
     "positioning.kalman.filter": "KalmanFilter",
-    "radio.cells": "CellPlan read_cell_plan",
+    "radio.cells": "CellPlan",
+    "radio.plan_files": "read_cell_plan",
     "rasters.opening": "open_rasters",
     "rasters.raster_set": "RxLevRasters",
     "roads.lattice": "RouteLattice",

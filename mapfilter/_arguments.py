@@ -15,8 +15,8 @@ from typing import Annotated, Any, NamedTuple, Protocol, get_args, runtime_check
 import numpy as np
 from annotated_types import Ge
 
+from mapfilter._annotations import expected, fits, items_of, plain_types
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.options import expected, fits, items_of, plain_types
 
 # As a call, since type checkers want to know of what texts a PathLike is, and isinstance must not.
 PATH: UnionType = operator.or_(Path | str, os.PathLike)

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 from mapfilter.workflows.build import run_build
+from mapfilter.workflows.pipeline import Stage, run_pipeline
 from mapfilter.workflows.predict import run_predict
-from mapfilter.workflows.terminal import Stage, run_pipeline
 
 if __name__ == "__main__":
     stages: dict[str, Stage] = {"predict": run_predict, "build": run_build}

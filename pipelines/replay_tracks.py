@@ -11,10 +11,10 @@ Run ``build_database.py`` first, with the same area; the settings are in ``repla
 import sys
 from pathlib import Path
 
+from mapfilter.workflows.pipeline import Stage, run_pipeline
 from mapfilter.workflows.replay import run_replay
 from mapfilter.workflows.replayed import replay_figures
 from mapfilter.workflows.simulate import run_simulate
-from mapfilter.workflows.terminal import Stage, run_pipeline
 
 if __name__ == "__main__":
     stages: dict[str, Stage] = {

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from mapfilter.config.sections import Config
+from mapfilter.workflows.pipeline import Stage, run_pipeline
 from mapfilter.workflows.reproduce import run_reproduce
-from mapfilter.workflows.terminal import Stage, run_pipeline
 
 WORKERS = 2
 

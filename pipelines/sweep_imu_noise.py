@@ -8,8 +8,8 @@ Run ``build_database.py`` first, with the same area; the settings are in ``sweep
 import sys
 from pathlib import Path
 
+from mapfilter.workflows.pipeline import Stage, run_pipeline
 from mapfilter.workflows.sweep import run_sweep
-from mapfilter.workflows.terminal import Stage, run_pipeline
 
 WORKERS = 2
 

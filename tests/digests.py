@@ -25,7 +25,10 @@ import pyarrow.parquet as pq
 
 ROOT = Path(__file__).resolve().parents[1]
 OWN_FILTER = "my_filter_of_the_digests"
-TIMES = ("seconds", "seconds_per_track", "out", "outputs")
+TIMES = (
+    *("seconds", "seconds_per_track", "seconds_per_track_low", "seconds_per_track_high"),
+    *("out", "outputs"),
+)
 """Figures that differ from run to run, and paths."""
 
 BARE = "bayes --without gnss,ta"

@@ -20,8 +20,8 @@ from mapfilter.config.load import load_config
 from mapfilter.geodesy import Lattice
 from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
-from mapfilter.radio.cells import read_cell_plan
 from mapfilter.radio.msi import read_msi
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.landuse import read_landuse

@@ -17,10 +17,11 @@ from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
 from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
-from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.integrity import DEFAULT_RISK
 from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
+from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.placeless import in_frame

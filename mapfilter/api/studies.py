@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from mapfilter._annotations import items_of
 from mapfilter._arguments import (
     PATH,
     Argument,
@@ -36,7 +37,7 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.options import Positive, items_of
+from mapfilter.options import Positive
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.cells import CellPlan

@@ -27,12 +27,8 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
-from mapfilter.workflows.terminal import (
-    print_message,
-    print_result,
-    print_text,
-    progress_bar,
-)
+from mapfilter.workflows.progress_bars import progress_bar
+from mapfilter.workflows.terminal import print_message, print_result, print_text
 
 
 def check(

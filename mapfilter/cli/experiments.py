@@ -32,7 +32,9 @@ from mapfilter.cli.options import (
 )
 from mapfilter.errors import Stopped
 from mapfilter.experiments.papers import PAPERS
-from mapfilter.workflows.terminal import print_message, print_result, rate_bar, stopped_text
+from mapfilter.workflows.guard import stopped_text
+from mapfilter.workflows.progress_bars import rate_bar
+from mapfilter.workflows.terminal import print_message, print_result
 
 *_FIRST, _LAST = PAPERS
 
@@ -212,7 +214,6 @@ def evaluate(
     from mapfilter.workflows.evaluate import (
         RUNS,
         check_benchmark,
-        load_benchmark,
         main_table,
         run_global_positioning,
     )
@@ -221,6 +222,7 @@ def evaluate(
     from mapfilter.workflows.evaluate_ottawa import RUNS as OTTAWA_RUNS
     from mapfilter.workflows.evaluate_ottawa import run_ottawa
     from mapfilter.workflows.evaluate_recorded import ALL, BENCHMARKS, run_all, run_recorded
+    from mapfilter.workflows.evaluate_settings import load_benchmark
     from mapfilter.workflows.evaluate_single_reports import SETS, run_single_reports
 
     check_benchmark(name, data)

@@ -9,7 +9,7 @@ import typer
 
 from mapfilter.cli.options import ConfigOption, SetOption, given_path
 from mapfilter.errors import ConfigError, fail
-from mapfilter.workflows.terminal import progress_bar
+from mapfilter.workflows.progress_bars import progress_bar
 
 
 def serve(

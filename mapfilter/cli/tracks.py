@@ -32,13 +32,8 @@ from mapfilter.cli.options import (
 )
 from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.schema import Without
-from mapfilter.workflows.terminal import (
-    print_message,
-    print_result,
-    print_text,
-    progress_bar,
-    stage_bar,
-)
+from mapfilter.workflows.progress_bars import progress_bar, stage_bar
+from mapfilter.workflows.terminal import print_message, print_result, print_text
 
 
 def demo(

@@ -9,11 +9,11 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from mapfilter._annotations import expected, fits, plain_types
 from mapfilter.config.fields import field_annotation
 from mapfilter.config.load import faults_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults, MapfilterError, fail
-from mapfilter.options import expected, fits, plain_types
 
 SECTIONS = ("filter", "imu", "journeys", "database")
 """Sections whose numeric options can be varied, but for those that a sweep does not use."""

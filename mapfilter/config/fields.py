@@ -21,15 +21,9 @@ from pydantic import (
     create_model,
 )
 
+from mapfilter._annotations import Words, plain_types
 from mapfilter._inputs import path_fault
-from mapfilter.options import (
-    Options,
-    Positive,
-    Words,
-    annotations_of,
-    describe_options,
-    plain_types,
-)
+from mapfilter.options import Options, Positive, annotations_of, describe_options
 from mapfilter.positioning.locators import BUILT_IN
 
 EMBEDDED_MAP = "helsinki"

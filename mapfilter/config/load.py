@@ -11,12 +11,12 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ValidationError
 
+from mapfilter._annotations import expected, likely, without_none
 from mapfilter._inputs import path_fault, read_input, shown, toml_values
 from mapfilter.config.fields import MAP_NAMES, field_annotation, resolve_map, resolve_path
 from mapfilter.config.mistakes import mistake_in_toml, mistake_in_value
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Fault, Faults, fail
-from mapfilter.options import expected, likely, without_none
 
 _LARGEST_BYTES = 16 << 20
 _RESOLVERS = (resolve_path, resolve_map)

@@ -14,9 +14,10 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import Any
 
+from mapfilter._annotations import expected, without_none
 from mapfilter.config.fields import Section, field_annotation
 from mapfilter.config.sections import Config
-from mapfilter.options import descriptions, expected, without_none
+from mapfilter.options import descriptions
 
 _COLUMN = 38
 _WIDTH = 100

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from numbers import Real
 from pathlib import Path
 from threading import Thread
@@ -27,34 +27,23 @@ from mapfilter._arguments import (
     items,
 )
 from mapfilter._io import atomic_dir
-from mapfilter._parallel import Progress, SerialExecutor, ordered_results
+from mapfilter._parallel import Progress, SerialExecutor
 from mapfilter._resume import FinishedParts
+from mapfilter.database.build_job import BuildJob
 from mapfilter.database.defaults import MARGIN_DB, TILE_PX
 from mapfilter.database.floor import FLOOR_DBM, floor_of
 from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.measured import MeasuredParts, Readings, deviations_at_points
-from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
+from mapfilter.database.sources import LatticeRoutes, Routes, cut_by_tile
 from mapfilter.database.store import open_written
-from mapfilter.database.tiles import (
-    TileRows,
-    TileTask,
-    grouped,
-    read_tiles,
-    roads_tile,
-    tile_windows,
-)
+from mapfilter.database.tiles import roads_tile, tile_windows
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.names import named_by_plan
-from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
-TASKS_A_WORKER = 4
-"""Tasks in flight for each worker, which keep all of them busy."""
 PIXELS_A_TASK = 16_000_000
 """Pixels of a task: some eight tiles of 30 cells, which share most of their files."""
 
@@ -129,7 +118,8 @@ def build(
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     in_flight : int
-        Tasks submitted at a time, :data:`TASKS_A_WORKER` for each worker.
+        Tasks submitted at a time, :data:`mapfilter.database.build_job.TASKS_A_WORKER` for each
+        worker.
     pixels_a_task : int
         Most pixels that a task reads, of all cells that reach its tiles; with 0 it has one tile.
         Tiles of a task read a file that reaches several of them once. The last tasks are smaller.
@@ -230,7 +220,7 @@ def build_roads(
     :func:`build`.
     """
     check_parameters(MARGIN_DB, FLOOR_DBM, tile_px)
-    source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
+    source = cut_by_tile(routes)
     lattice, out = source.lattice, Path(out)
     windows = [w for w in tile_windows(lattice, tile_px) if source.holds(lattice.window(*w))]
     check_database_replaceable(out)
@@ -248,87 +238,6 @@ def build_roads(
         head = Head(lattice, plan, parameters, stated, tuple(inputs), counts)
         head.write(folder, written.parts)
     return open_written(out)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BuildJob:
-    """A build cut into tiles; no tile's points are laid before its turn.
-
-    The plan is in the rasters' CRS; ``windows`` are the tiles on the rasters' lattice that may hold
-    points, along the Z-order curve.
-    """
-
-    rasters: RxLevRasters
-    plan: CellPlan
-    routes: Routes
-    floor_dbm: float
-    windows: tuple[Window, ...]
-
-    @classmethod
-    def of(
-        cls,
-        rasters: RxLevRasters,
-        plan: CellPlan,
-        routes: RouteLattice | Routes,
-        floor_dbm: float,
-        tile_px: int,
-    ) -> BuildJob:
-        """Check that the inputs fit each other, and cut them; errors as of :func:`build`."""
-        source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
-        rasters = named_by_plan(rasters, plan)
-        check_against_plan(rasters, plan)
-        check_aligned(rasters.lattice, source.lattice, f"{rasters.path} and roads")
-        lattice, windows = rasters.lattice, []
-        for window in tile_windows(lattice, tile_px):
-            inside = overlap(lattice, source.lattice, window)
-            if inside is not None and source.holds(lattice.window(*inside)):
-                windows.append(window)
-        if not windows:
-            hint = "files of different areas"
-            raise fail(InputError, str(rasters.path), "points of the roads", "none", hint)
-        return cls(rasters, plan.to_crs(lattice.crs), source, floor_dbm, tuple(windows))
-
-    def task(self, number: int) -> TileTask:
-        """Return the task that makes a tile."""
-        window = self.windows[number]
-        part = self.routes.part(self.covered(window))
-        rasters, plan = self.rasters.reaching(window), self.plan
-        numbers = tuple(range(len(plan)))
-        if rasters is not self.rasters:
-            numbers = tuple(sorted(plan.index(cell_id) for cell_id in rasters.cell_ids))
-            # A plan of no cells is none.
-            plan = CellPlan(plan.crs, tuple(plan.cells[n] for n in numbers or (0,)))
-        return TileTask(rasters, plan, numbers, window, part, self.floor_dbm)
-
-    def covered(self, window: Window) -> Lattice:
-        """Return the part of a tile that the roads cover."""
-        inside = overlap(self.rasters.lattice, self.routes.lattice, window)
-        assert inside is not None
-        return self.rasters.lattice.window(*inside)
-
-    def made(
-        self, executor: Executor, finished: FinishedParts, in_flight: int, pixels_a_task: int
-    ) -> Iterator[TileRows]:
-        """Yield the tiles in order, finished ones from disk."""
-        every = range(len(self.windows))
-        missing = [n for n in every if not finished.keep or finished.load(n) is None]
-        shares = 1 if isinstance(executor, SerialExecutor) else max(in_flight // TASKS_A_WORKER, 1)
-        todo = tuple(missing)
-        tasks = grouped(map(self.task, todo), pixels_a_task, len(todo), shares)
-        results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)
-        made = (rows for group in results for rows in group)
-        for number in every:
-            if missing and number == missing[0]:
-                rows = next(made)
-                finished.save(missing.pop(0), rows)
-            else:
-                # A file that was removed or damaged meanwhile is made again.
-                rows = finished.load(number) or read_tiles([self.task(number)])[0]
-            yield TileRows.from_bytes(rows)
-
-    def off_rasters(self, points: int) -> int:
-        """Return how many points of a route lattice lie beyond the rasters."""
-        return len(self.routes.points) - points if isinstance(self.routes, LatticeRoutes) else 0
 
 
 def _attribution(routes: RouteLattice | Routes) -> str:

@@ -11,7 +11,8 @@ from scipy.ndimage import distance_transform_edt
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.database.checked import Part
 from mapfilter.database.parquet import Window, WindowReader, opened, part_ranges, read_columns
-from mapfilter.database.radioroutes import RadioRouteDatabase, way_columns
+from mapfilter.database.points import way_columns
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import StoreError, fail
 from mapfilter.geodesy import Lattice
 

@@ -104,6 +104,12 @@ class Part:
         return fail(StoreError, str(self.file), expected, got, "changed after it was written")
 
 
+def part_named(name: str, folder: Path, manifest: Mapping[str, Any], generation: str) -> Part:
+    """Return a part of a database that belongs to no cell."""
+    (entry,) = (part for part in manifest["parts"] if part["path"] == name)
+    return Part.of(folder, entry, generation)
+
+
 @dataclass(frozen=True, slots=True)
 class HeldPart:
     """The bytes of a part that were compared with their checksum, and where they come from."""

@@ -13,7 +13,8 @@ import numpy as np
 import pyarrow as pa
 
 from mapfilter._types import Floats
-from mapfilter.database.build import BuildJob, check_parameters
+from mapfilter.database.build import check_parameters
+from mapfilter.database.build_job import BuildJob
 from mapfilter.database.defaults import MARGIN_DB, TILE_PX
 from mapfilter.database.floor import floor_of
 from mapfilter.database.parquet import geo_metadata, write_columns

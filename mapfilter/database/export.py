@@ -18,7 +18,8 @@ from rasterio.windows import Window as RasterWindow
 from mapfilter._io import atomic_file
 from mapfilter.database.manifest import apart
 from mapfilter.database.parquet import WindowReader, read_columns
-from mapfilter.database.radioroutes import Points, RadioRouteDatabase
+from mapfilter.database.points import Points
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.tiles import tile_windows
 from mapfilter.errors import InputError, OutputError, fail
 from mapfilter.rasters.geotiff import new_geotiff

@@ -22,7 +22,7 @@ from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Floats32, Ints32
 from mapfilter.database.checked import HeldPart
 from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS, describe_part
-from mapfilter.database.parquet import Source, dictionary, read_columns, write_columns
+from mapfilter.database.parquet import Source, dictionary, read_columns, text_codes, write_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -293,11 +293,7 @@ def _codes(source: Source, column: Any) -> tuple[Ints32, tuple[str, ...]]:
         if not len(column):
             return np.empty(0, dtype=np.int32), ()
         raise fail(StoreError, str(source), "a cell in each row", "none", "damaged")
-    joined = column.dictionary_encode().unify_dictionaries().combine_chunks()
-    if hasattr(joined, "chunks"):
-        joined = joined.chunk(0)
-    names = tuple(str(name) for name in joined.dictionary.to_pylist())
-    return joined.indices.to_numpy().astype(np.int32), names
+    return text_codes(column)
 
 
 def _joined(parts: Sequence[Any], kind: type) -> Any:

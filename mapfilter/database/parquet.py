@@ -16,7 +16,7 @@ from pyproj import CRS
 
 from mapfilter._arrow import ParquetReader, open_parquet
 from mapfilter._inputs import json_value
-from mapfilter._types import Floats
+from mapfilter._types import Floats, Ints32
 from mapfilter.database.checked import HeldPart, Part
 from mapfilter.errors import MapfilterError, StoreError, fail
 from mapfilter.geodesy import Lattice, same_crs
@@ -189,6 +189,15 @@ def dictionary(codes: NDArray[Any], names: tuple[str, ...]) -> pa.Array:
     return pa.DictionaryArray.from_arrays(
         pa.array(np.asarray(codes, dtype=np.int32)), pa.array(names, type=pa.string())
     )
+
+
+def text_codes(column: Any) -> tuple[Ints32, tuple[str, ...]]:
+    """Return codes and names of a column of text."""
+    joined = column.dictionary_encode().unify_dictionaries().combine_chunks()
+    if hasattr(joined, "chunks"):
+        joined = joined.chunk(0)
+    names = tuple(str(name) for name in joined.dictionary.to_pylist())
+    return joined.indices.to_numpy().astype(np.int32), names
 
 
 class WindowReader:

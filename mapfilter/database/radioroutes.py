@@ -15,14 +15,15 @@ from scipy.ndimage import distance_transform_edt
 
 from mapfilter._html import html_table, shortened
 from mapfilter._types import Bools, Floats32, Ints, Ints32
-from mapfilter.database.checked import Part
+from mapfilter.database.checked import Part, part_named
 from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS
 from mapfilter.database.measured import MeasuredParts, read_measured
 from mapfilter.database.parquet import WindowReader, check_places, read_columns
-from mapfilter.errors import InputError, StoreError, fail
+from mapfilter.database.points import Points, read_points, way_columns
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.roads.ways import Bounds, half_width_of
+from mapfilter.roads.ways import Bounds
 
 Rows = Ints32
 
@@ -99,42 +100,6 @@ def fill_field(
         ways[row, col],
         on_way,
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Points:
-    """All points of a database in row-major order, as columns of length N.
-
-    Parameters
-    ----------
-    point : numpy.ndarray of int64
-        ``row * lattice.cols + col``: the same in every rebuild on the same lattice.
-    way_id : numpy.ndarray of int64
-        0 where the point belongs to no way.
-    way_class : tuple of (numpy.ndarray of int32, tuple of str)
-        Codes and the names that they stand for.
-    best_server : numpy.ndarray of int32
-        Index into the database's ``cell_ids``; -1 where it has none.
-    margin_db : numpy.ndarray of float32
-        Best level above the second best, NaN where only one cell is predicted.
-    """
-
-    point: Ints
-    row: Rows
-    col: Rows
-    way_id: Ints
-    way_class: tuple[Rows, tuple[str, ...]]
-    on_square: Bools
-    distance_to_way_m: Floats32
-    best_server: Rows
-    best_level_dbm: Floats32
-    margin_db: Floats32
-
-    def __len__(self) -> int:
-        return int(self.point.size)
-
-    def __repr__(self) -> str:
-        return f"Points({len(self)} of {', '.join(self.__dataclass_fields__)})"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -221,24 +186,7 @@ class RadioRouteDatabase:
 
     @cached_property
     def _points(self) -> Points:
-        file = self.points_part
-        table = read_columns(file, tuple(Points.__dataclass_fields__))
-        check_places(file, table, self.lattice)
-        order = np.argsort(table["point"].to_numpy())
-        server, names = _codes(table["best_server"])
-        try:
-            known = [self.plan.index(name) if self.cell_ids else -1 for name in names]
-            rank = np.array(known, dtype=np.int32)
-        except InputError as error:
-            expected = "best servers among the cells"
-            raise fail(StoreError, str(file), expected, names, "parts mixed up") from error
-        way_class, classes = _codes(table["way_class"])
-        plain = table.drop_columns(["best_server", "way_class"])
-        return Points(
-            **{name: plain[name].to_numpy()[order] for name in plain.column_names},
-            best_server=rank[server[order]],
-            way_class=(way_class[order], classes),
-        )
+        return read_points(self.points_part, self.lattice, self.plan)
 
     def measured(self) -> MeasuredParts | None:
         """Return what its survey measured; None where levels were predicted.
@@ -367,30 +315,3 @@ class RadioRouteDatabase:
             hint = "degrees given for metres, or another CRS"
             raise fail(InputError, "area", f"an area within {covered}", bounds_m, hint)
         return top, left, self.lattice.window(top, left, rows, cols)
-
-
-def way_columns(points: Mapping[str, Any]) -> tuple[Floats32, Floats32]:
-    """Return half the usual width of each point's way (0 without one), and the distance to it.
-
-    ``points`` has the columns way_id, way_class, on_square and distance_to_way_m; distances are 0
-    in squares.
-    """
-    code, classes = _codes(points["way_class"])
-    by_class_m = np.array([half_width_of(name) for name in classes], dtype=np.float32)[code]
-    half_width_m = np.where(points["way_id"] == 0, np.float32(0), by_class_m)
-    return half_width_m, np.where(points["on_square"], np.float32(0), points["distance_to_way_m"])
-
-
-def part_named(name: str, folder: Path, manifest: Mapping[str, Any], generation: str) -> Part:
-    """Return a part of a database that belongs to no cell."""
-    (entry,) = (part for part in manifest["parts"] if part["path"] == name)
-    return Part.of(folder, entry, generation)
-
-
-def _codes(column: Any) -> tuple[Rows, tuple[str, ...]]:
-    """Return codes and names of a column of text."""
-    joined = column.dictionary_encode().unify_dictionaries().combine_chunks()
-    if hasattr(joined, "chunks"):
-        joined = joined.chunk(0)
-    names = tuple(str(name) for name in joined.dictionary.to_pylist())
-    return joined.indices.to_numpy().astype(np.int32), names

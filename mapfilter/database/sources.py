@@ -17,8 +17,9 @@ from shapely import STRtree
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.roads.index import RouteSource, WayIndex, areas_near
+from mapfilter.roads.index import WayIndex
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.route_points import RouteSource, areas_near
 
 _ALIGNED_PX = 1e-3
 
@@ -136,6 +137,11 @@ class LayerRoutes:
 
 Routes = LatticeRoutes | LayerRoutes
 """The points of an area, tile by tile."""
+
+
+def cut_by_tile(routes: RouteLattice | Routes) -> Routes:
+    """Return routes whose points are taken tile by tile; a route lattice is cut."""
+    return LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
 
 
 def check_aligned(raster: Lattice, lattice: Lattice, where: str) -> None:

@@ -16,16 +16,10 @@ import pyarrow as pa
 
 from mapfilter._arguments import Setting, check_arguments, path_argument
 from mapfilter._io import check_part, left_aside
-from mapfilter.database.checked import Part, generation_of
+from mapfilter.database.checked import Part, generation_of, part_named
 from mapfilter.database.manifest import CELLS, MANIFEST, POINTS, read_manifest
-from mapfilter.database.parquet import (
-    Source,
-    check_extent,
-    count_rows,
-    read_columns,
-    write_columns,
-)
-from mapfilter.database.radioroutes import RadioRouteDatabase, part_named
+from mapfilter.database.parquet import Source, check_extent, count_rows, read_columns, write_columns
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, MapfilterError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cell_layouts import SELDOM

@@ -18,8 +18,8 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.sampling import Places, levels_at
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Ways
 
 _MAX_TILES = 64

@@ -27,9 +27,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
+from mapfilter._kernels import cos_sin32, exp32, hashed, normals, uniforms, wrap32
 from mapfilter._threads import ONE, Call
-from mapfilter._types import Floats, Floats32
+from mapfilter._types import Floats32
 from mapfilter.geodesy import wrap_rad
 from mapfilter.options import NotNegative, Options, Positive, Share
 
@@ -328,61 +328,3 @@ def moved_back(state: Floats32, east_m: float, north_m: float) -> Floats32:
     before[EAST] -= stretch * (_F(east_m) * cosine - _F(north_m) * sine)
     before[NORTH] -= stretch * (_F(east_m) * sine + _F(north_m) * cosine)
     return before
-
-
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def interpolate(
-    east: Floats32, north: Floats32, raster: Floats32, west_m: float, north_m: float, per_m: float
-) -> Floats32:
-    """Return a raster's values at places (N,), in metres, bilinear between the pixels' centres.
-
-    ``west_m`` and ``north_m`` are the centre of the first pixel, ``per_m`` the pixels per metre.
-    Beyond the raster's edge values are those of the edge.
-    """
-    rows, cols = raster.shape
-    flat, count = raster.ravel(), east.size
-    zero, one = _F(0.0), _F(1.0)
-    west, top, k = _F(west_m), _F(north_m), _F(per_m)
-    last_col, last_row = np.int32(cols - 2), np.int32(rows - 2)
-    below, width = np.uint32(cols), np.int32(cols)
-    first = np.empty(count, dtype=np.int32)
-    along, down = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
-    found = np.empty(count, dtype=np.float32)
-    # Loops that look up are apart from the one that computes, which is vectorised.
-    for i in range(count):
-        # Plain comparisons vectorise; min and max, which care for NaN, do not.
-        x = (east[i] - west) * k
-        y = (top - north[i]) * k
-        x = x if x > zero else zero
-        y = y if y > zero else zero
-        col, row = np.int32(x), np.int32(y)
-        col = col if col < last_col else last_col
-        row = row if row < last_row else last_row
-        u, v = x - _F(col), y - _F(row)
-        along[i] = u if u < one else one
-        down[i] = v if v < one else one
-        first[i] = np.int32(row * width) + col
-    for i in range(count):
-        at, u = np.uint32(first[i]), along[i]
-        upper = flat[at] + u * (flat[at + np.uint32(1)] - flat[at])
-        under = flat[at + below] + u * (flat[at + below + np.uint32(1)] - flat[at + below])
-        found[i] = upper + down[i] * (under - upper)
-    return found
-
-
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def weigh_by_map(log_map: Floats32, off: Floats32, factors: MapFactors, log_weight: Floats) -> None:
-    """Add the map's log-likelihood to weights and update the probability of being off, in place.
-
-    ``log_map`` is the map's log-likelihood at the hypotheses; the factors are those of the length
-    of the step.
-    """
-    one, weight, off_cost = _F(1.0), _F(factors.exponent), _F(factors.off)
-    leave, come_back = _F(factors.leave), _F(factors.come_back)
-    for i in range(off.size):
-        on = exp32(weight * log_map[i])
-        before = off[i]
-        away = before * (one - come_back) + (one - before) * leave
-        total = away * off_cost + (one - away) * on
-        off[i] = away * off_cost / total
-        log_weight[i] += log32(total)

@@ -6,51 +6,23 @@ of building heights decides where there is line of sight and how high the roofs 
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from mapfilter._parallel import Progress
-from mapfilter._types import Bools, Floats, Floats32
-from mapfilter.errors import Faults, InputError, listed
-from mapfilter.geodesy import Lattice, grid_convergence_rad, heading_from_azimuth_rad, unproject
-from mapfilter.propagation.line_of_sight import (
-    check_heights,
-    line_of_sight,
-    mean_roof_height,
-    own_building,
-)
-from mapfilter.propagation.models import (
-    GroundTruthErrors,
-    PredictionModel,
-    needs_sight,
-    outside_published_range,
-    path_loss_db,
-    probability_of_sight,
-    shortest_distance_m,
-)
+from mapfilter._types import Floats32
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import Lattice
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.shadowing import correlated_field, named_rng, site_shadowing
-from mapfilter.radio.antenna import (
-    MeasuredAntenna,
-    combined_gain_db,
-    leaning,
-    sector_gain_db,
-    vertical_gain_db,
-)
+from mapfilter.propagation.surroundings import Antennas, Surroundings
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import Cell, CellPlan
 
-Antennas = Mapping[str, MeasuredAntenna]
-
-_MOST_NAMED = 3
 _ROUND_DB = 3.0
-_NEAR_FREQUENCY = 0.2
 _BLOCK_M = 60.0
-_ROOF_RADIUS_M = 100.0
-_SLOPE_REFERENCE_M = 100.0
-_VERTICAL_BEAMWIDTH_DEG = 10.0
 
 
 def predict(
@@ -197,158 +169,6 @@ def _shadowing(plan: CellPlan, lattice: Lattice, errors: GroundTruthErrors) -> I
             fields.append(site_shadowing(plan, lattice, *drawn, errors.seed, stream=stream))
     for both in zip(*fields, strict=True):
         yield np.sum([field_db for _, field_db in both], axis=0, dtype=np.float32)
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """The buildings of an area, and the model by which cells are received there."""
-
-    lattice: Lattice
-    heights_m: Floats32 | None
-    roof_height_m: Floats32
-    model: PredictionModel
-    antennas: Antennas = field(default_factory=dict)
-
-    @classmethod
-    def of(
-        cls,
-        lattice: Lattice,
-        heights_m: Floats32 | None,
-        model: PredictionModel,
-        antennas: Antennas | None = None,
-    ) -> Surroundings:
-        """Check the heights, and average the roofs around every pixel."""
-        default_m = model.default_roof_height_m
-        if heights_m is None:
-            roofs = np.full((lattice.rows, lattice.cols), default_m, dtype=np.float32)
-            return cls(lattice, None, roofs, model, antennas or {})
-        heights = check_heights(heights_m, lattice)
-        roofs = mean_roof_height(heights, lattice, _ROOF_RADIUS_M, default_m)
-        return cls(lattice, heights, roofs, model, antennas or {})
-
-    def sights(self, plan: CellPlan) -> Iterator[Floats32]:
-        """Yield the line of sight of each cell, computed once for all cells of a mast."""
-        masts = [(cell.east_m, cell.north_m, cell.height_m) for cell in plan.cells]
-        waiting = Counter(masts)
-        known: dict[tuple[float, float, float], Floats32] = {}
-        for mast in masts:
-            if mast not in known:
-                known[mast] = self.sight(mast)
-            waiting[mast] -= 1
-            yield known[mast] if waiting[mast] else known.pop(mast)
-
-    def sight(self, mast: tuple[float, float, float]) -> Floats32:
-        """Return 1 where there is line of sight to a mast, 0 elsewhere, or its probability."""
-        if not needs_sight(self.model):
-            return np.zeros((self.lattice.rows, self.lattice.cols), dtype=np.float32)
-        if self.heights_m is None or self.model.line_of_sight == "probability":
-            probability = probability_of_sight(self.model, np.hypot(*self._offsets_m(*mast[:2])))
-            return np.asarray(probability, dtype=np.float32)
-        seen = line_of_sight(self.heights_m, self.lattice, mast, self.model.mobile_height_m)
-        return seen.astype(np.float32)
-
-    def median_level_dbm(self, cell: Cell, slope_factor: float, sight: Floats32) -> Floats:
-        """Return the level without shadowing.
-
-        Parameters
-        ----------
-        slope_factor : float
-            Multiplies the path loss per decade of distance; the loss at 100 m stays.
-        sight : ndarray of float32, shape (rows, cols)
-            From :meth:`sight`.
-        """
-        right_m, up_m = self._offsets_m(cell.east_m, cell.north_m)
-        distance_m = np.maximum(np.hypot(right_m, up_m), shortest_distance_m(self.model))
-        # The loss goes by lg d, so stretching lg(d / 100 m) stretches its slope alone.
-        stretched_m = _SLOPE_REFERENCE_M * (distance_m / _SLOPE_REFERENCE_M) ** slope_factor
-        loss_db = path_loss_db(
-            self.model, stretched_m, cell.frequency_mhz, cell.height_m, self.roof_height_m, sight
-        )
-        level_dbm = cell.eirp_dbm - loss_db + self._gain_db(cell, right_m, up_m)
-        if cell.indoor:
-            inside: Bools = np.zeros((self.lattice.rows, self.lattice.cols), dtype=np.bool_)
-            if self.heights_m is not None:
-                inside = own_building(self.heights_m, self.lattice, cell.east_m, cell.north_m)
-            level_dbm -= np.where(inside, 0.0, cell.penetration_loss_db)
-        return np.asarray(level_dbm)
-
-    def _offsets_m(self, east_m: float, north_m: float) -> tuple[Floats, Floats]:
-        """Return how far east and north of a place the columns and rows are."""
-        column_m, _ = self.lattice.east_north(0, np.arange(self.lattice.cols))
-        _, row_m = self.lattice.east_north(np.arange(self.lattice.rows), 0)
-        return (column_m - east_m)[None, :], (row_m - north_m)[:, None]
-
-    def _gain_db(self, cell: Cell, right_m: Floats, up_m: Floats) -> Floats:
-        """Return the antenna's gain against its boresight."""
-        if cell.antenna == "omni":
-            return np.zeros(())
-        lon_deg, lat_deg = unproject(self.lattice.crs, cell.east_m, cell.north_m)
-        convergence = grid_convergence_rad(self.lattice.crs, float(lon_deg), float(lat_deg))
-        # Without an azimuth the antenna is round, and any boresight will do.
-        heading_rad = heading_from_azimuth_rad(cell.azimuth_deg or 0.0, convergence)
-        offset_rad = np.arctan2(up_m, right_m) - heading_rad
-        below_m = cell.height_m - self.model.mobile_height_m
-        depression_rad = np.arctan2(below_m, np.hypot(right_m, up_m))
-        own = leaning(offset_rad, depression_rad, np.radians(cell.mechanical_downtilt_deg))
-        measured = self.antennas.get(cell.antenna)
-        if measured is not None:
-            return measured.gain_db(*own, cell.downtilt_deg or None)
-        beamwidth_rad = np.radians(cell.beamwidth_deg)
-        vertical_deg = cell.vertical_beamwidth_deg
-        if vertical_deg is None and cell.antenna == "3gpp":
-            vertical_deg = _VERTICAL_BEAMWIDTH_DEG
-        if vertical_deg is None:
-            return sector_gain_db(offset_rad, beamwidth_rad, cell.max_attenuation_db)
-        tilt_rad, vertical_rad = np.radians(cell.downtilt_deg), np.radians(vertical_deg)
-        return combined_gain_db(
-            sector_gain_db(own[0], beamwidth_rad, cell.max_attenuation_db),
-            vertical_gain_db(own[1], tilt_rad, vertical_rad, cell.side_lobe_db),
-            cell.max_attenuation_db,
-        )
-
-
-def outside_validity(plan: CellPlan, lattice: Lattice, model: PredictionModel) -> tuple[str, ...]:
-    """Return remarks on what lies outside the model's published range, and for which cells."""
-    alike: dict[tuple[float, float], list[Cell]] = defaultdict(list)
-    for cell in plan.to_crs(lattice.crs).cells:
-        alike[cell.frequency_mhz, cell.height_m].append(cell)
-    west, south, east, north = lattice.bounds_m
-    ids: dict[str, list[str]] = defaultdict(list)
-    for (frequency_mhz, height_m), cells in alike.items():
-        east_m, north_m = np.array([(cell.east_m, cell.north_m) for cell in cells]).T
-        beside_m, below_m = east_m - east_m.clip(west, east), north_m - north_m.clip(south, north)
-        across_m = np.maximum(abs(east_m - west), abs(east_m - east))
-        along_m = np.maximum(abs(north_m - south), abs(north_m - north))
-        used = {
-            "frequency_mhz": frequency_mhz,
-            "base_height_m": height_m,
-            "mobile_height_m": model.mobile_height_m,
-            "distance_m": round(float(np.hypot(across_m, along_m).max())),
-        }
-        closest_m = round(float(np.hypot(beside_m, below_m).min()))
-        nearest_m = max(closest_m, shortest_distance_m(model))
-        for note in outside_published_range(model.model, used, nearest_m):
-            ids[note].extend(cell.id for cell in cells)
-    return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
-
-
-def off_frequency(plan: CellPlan, antennas: Antennas) -> tuple[str, ...]:
-    """Return remarks on cells whose antenna was measured at a frequency far from theirs."""
-    ids: dict[str, list[str]] = defaultdict(list)
-    for cell in plan.cells:
-        measured = antennas.get(cell.antenna)
-        if measured is None or measured.frequency_mhz is None:
-            continue
-        if abs(cell.frequency_mhz / measured.frequency_mhz - 1) > _NEAR_FREQUENCY:
-            note = f"antenna {cell.antenna!r} was measured at {measured.frequency_mhz:g} MHz"
-            ids[note].append(cell.id)
-    return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
-
-
-def _named(ids: list[str]) -> str:
-    if len(ids) == 1:
-        return f"cell {ids[0]!r}"
-    return f"{len(ids)} cells ({listed([repr(name) for name in ids], _MOST_NAMED)})"
 
 
 def _check_antennas(plan: CellPlan, antennas: Antennas | None) -> None:

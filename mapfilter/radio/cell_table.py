@@ -16,18 +16,8 @@ from pyproj import CRS
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.geodesy import degree_fault, project, projected_crs, unproject
-from mapfilter.radio.cell_layouts import (
-    ALIASES,
-    ATOLL,
-    COLUMNS,
-    LAYOUTS,
-    OFFSETS,
-    Arranged,
-    Layout,
-    arrange,
-    none_of,
-    recognised,
-)
+from mapfilter.radio.arrange_cells import Arranged, arrange, none_of, recognised
+from mapfilter.radio.cell_layouts import ALIASES, ATOLL, COLUMNS, LAYOUTS, OFFSETS, Layout
 from mapfilter.radio.cell_rules import (
     ANTENNAS,
     OFFSET,

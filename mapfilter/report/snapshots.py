@@ -16,7 +16,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.estimate import Snapshot
+from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.basemap import (
     BaseMap,
     Bounds,

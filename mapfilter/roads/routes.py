@@ -1,4 +1,4 @@
-"""From maps, vector layers and land use to the route lattice, whole or tile by tile."""
+"""Read roads from maps, vector layers and land use, and make the route lattice of an area."""
 
 from __future__ import annotations
 
@@ -14,28 +14,21 @@ import numpy as np
 import shapely
 from geopandas import GeoDataFrame
 
+from mapfilter._annotations import Words
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments
-from mapfilter._types import Bools
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.options import Words
 from mapfilter.roads.buildings import read_buildings
-from mapfilter.roads.index import (
-    HALF_WIDTH_M,
-    TILE_PX,
-    RouteSource,
-    WayIndex,
-    described,
-)
+from mapfilter.roads.index import HALF_WIDTH_M
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.maps import OSM_ATTRIBUTION, is_map
 from mapfilter.roads.osm import Profile, read_squares, read_water, read_ways
+from mapfilter.roads.route_points import route_lattice, route_lattice_from_landuse
 from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways, clip_ways
 
-LANDUSE_CLASS = "land use"
 _LANDUSE = Annotated[tuple[Path, Path] | None, Words("two paths: of a raster and of its table")]
 _CUT_OUT = "a layer, or true or false"
 
@@ -260,83 +253,3 @@ def gaps(ways: Ways, side_m: float, half_width_m: float, by_class_m: Mapping[str
         f"{gappy_m / length_m.sum():.0%} of the ways, down to {least_m:g} m wide, are narrower "
         f"than the pixels of {side_m:g} m: their points have gaps"
     )
-
-
-def route_lattice(
-    ways: Ways,
-    squares: Squares | None,
-    buildings: Buildings | None,
-    lattice: Lattice,
-    half_width_m: float = HALF_WIDTH_M,
-    *,
-    half_width_by_class_m: Mapping[str, float] | None = None,
-    water: Water | None = None,
-    tile_px: int = TILE_PX,
-) -> RouteLattice:
-    """Return the lattice points near a way or in a square, outside buildings and water.
-
-    Parameters
-    ----------
-    ways, squares, buildings
-        Of the lattice's area, in its CRS. Ways just outside count for points inside; of several
-        near a point it belongs to the nearest.
-    lattice, half_width_m, half_width_by_class_m
-        As for :func:`read_routes`.
-    water : Water, optional
-        Cut out except on ways that cross it and within their half width: where a way runs through
-        water there is a bridge, a pier or a ford.
-    tile_px : int
-        Side of the tiles that are processed at a time; it bounds the memory, not the result.
-
-    Raises
-    ------
-    InputError
-        The CRS differ, a half width is no length, or no point is left.
-    """
-    source = RouteSource.of(
-        ways,
-        squares,
-        buildings,
-        half_width_m,
-        half_width_by_class_m=half_width_by_class_m,
-        water=water,
-        crs=lattice.crs,
-    )
-    return source.over(lattice, tile_px)
-
-
-def route_lattice_from_landuse(
-    mask: Bools,
-    lattice: Lattice,
-    ways: Ways | None = None,
-    half_width_m: float = HALF_WIDTH_M,
-    *,
-    half_width_by_class_m: Mapping[str, float] | None = None,
-) -> RouteLattice:
-    """Return the lattice points in walkable classes of land use, the paper's second database.
-
-    Parameters
-    ----------
-    mask : numpy.ndarray of bool, shape (lattice.rows, lattice.cols)
-        Accessible points, such as ``LandUse.walkable``.
-    lattice : Lattice
-        Of the mask.
-    ways : Ways, optional
-        Name the way of points within its half width, and give all points their distance; they
-        add no point.
-    half_width_m, half_width_by_class_m
-        As for :func:`route_lattice`.
-
-    Raises
-    ------
-    InputError
-        The mask has another shape or is empty.
-    """
-    if mask.shape != (lattice.rows, lattice.cols):
-        shape = f"{(lattice.rows, lattice.cols)}"
-        raise fail(InputError, "land-use mask", f"shape {shape}", mask.shape)
-    if not mask.any():
-        raise fail(InputError, "land use", "a walkable point", "none", "no class is walkable")
-    ways = Ways.none(lattice.crs) if ways is None else ways
-    index = WayIndex.of(ways, half_width_m, half_width_by_class_m)
-    return described(mask, lattice, mask, index, index.reaching(lattice), LANDUSE_CLASS)

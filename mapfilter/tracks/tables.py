@@ -3,69 +3,27 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import ArrayLike
 
-from mapfilter._types import Bools, Floats, Ints
+from mapfilter._types import Bools
 from mapfilter._words import number_of
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.identities import LIMITS
-from mapfilter.tracks.schema import (
-    MISSING_SIGNS,
-    NEIGHBOUR,
-    PLACE,
-    SATELLITE,
-    SCHEMA,
-    SERVING,
-    Column,
-)
+from mapfilter.tracks.column_values import TableFaults, column_values, note_values
+from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SATELLITE, SCHEMA, SERVING, Column
 
-_SHOWN_ROWS = 3
 _LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
 _SELDOM_S = 10.0
 _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
 _ROWS_AT_ONCE = 100_000
 _MOVING = ("motion", "gnss", "truth")
-_PLAIN_NUMBER = r"^-?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?$"
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Door:
-    """A table's name and its rows' numbers in messages, and the faults found in it."""
-
-    where: str
-    row_numbers: Ints
-    faults: Faults
-
-    def add(self, field: str, expected: str, got: object, hint: str = "") -> None:
-        self.faults.add(f"{self.where}{field}", expected, got, hint)
-
-    def add_rows(
-        self,
-        bad: Bools,
-        field: str,
-        expected: str,
-        got: Callable[[int], object],
-        hint: Callable[[int], str],
-    ) -> None:
-        """Note the first rows that are bad, and how many more there are."""
-        rows = np.flatnonzero(bad)
-        for row in rows[:_SHOWN_ROWS]:
-            self.add(f" row {self.row_numbers[row]}, {field}", expected, got(row), hint(row))
-        if len(rows) > _SHOWN_ROWS:
-            more = f"{number_of(len(rows) - _SHOWN_ROWS, 'more row')} like these"
-            self.add(f", {field}", expected, more, hint(rows[-1]))
 
 
 def tidy_table(
@@ -93,25 +51,25 @@ def tidy_table(
         return _empty_table(table).copy(), ()
     given = given.reset_index(drop=True)
     numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
-    door = _Door(where, numbers, faults)
-    notes = _check_columns(table, given, door)
+    found = TableFaults(where, numbers, faults)
+    notes = _check_columns(table, given, found)
     columns = [c for c in SCHEMA[table] if c.name in given.columns or not c.optional]
-    tidy = pd.DataFrame({column.name: _column(column, given, door) for column in columns})
+    tidy = pd.DataFrame({column.name: column_values(column, given, found) for column in columns})
     if table == "radio":
         role = tidy["role"]
         bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
-        _add_rows(door, bad, SCHEMA["radio"][1], role)
-        _check_technologies(tidy, door)
+        note_values(found, bad, SCHEMA["radio"][1], role)
+        _check_technologies(tidy, found)
         tidy["censored"] = tidy["censored"].fillna(0)
     if table == "gnss":
-        _check_covariance(tidy, door)
+        _check_covariance(tidy, found)
     if table == "pseudoranges":
-        _check_satellites(tidy, door)
+        _check_satellites(tidy, found)
     if table == "motion":
         tidy["heading_rad"] = wrap_rad(tidy["heading_rad"])
     else:
-        _check_degrees(tidy, door)
-    _check_milliseconds(table, tidy, door)
+        _check_degrees(tidy, found)
+    _check_milliseconds(table, tidy, found)
     return _sorted_unique(tidy, where, notes)
 
 
@@ -121,145 +79,23 @@ def _empty_table(table: str) -> pd.DataFrame:
     return tidy_table(table, columns, table, Faults())[0]
 
 
-def _check_columns(table: str, given: pd.DataFrame, door: _Door) -> tuple[str, ...]:
+def _check_columns(table: str, given: pd.DataFrame, found: TableFaults) -> tuple[str, ...]:
     names = [column.name for column in SCHEMA[table]]
     usual = [c.name for c in SCHEMA[table] if not c.optional and c.name not in given.columns]
     notes = []
     for name in (str(name) for name in given.columns if name not in names):
         near = get_close_matches(name, usual, 1, 0.6)
         if near:
-            door.add(f", column {name}", f"columns {', '.join(names)}", name, near[0])
+            found.add(f", column {name}", f"columns {', '.join(names)}", name, near[0])
         else:
-            notes.append(f"{door.where}: column {name} is not used")
+            notes.append(f"{found.where}: column {name} is not used")
     for column in SCHEMA[table]:
         if column.required and column.name not in given.columns:
-            door.add("", f"a column {column.name}", "none")
+            found.add("", f"a column {column.name}", "none")
     return tuple(notes)
 
 
-def _column(column: Column, given: pd.DataFrame, door: _Door) -> Any:
-    values = given.get(column.name)
-    if values is None:
-        values = pd.Series([None] * len(given), dtype=object)
-    if column.kind == "text":
-        return _texts(column, values, door)
-    number, readable = _numbers(values)
-    missing = np.isnan(number)
-    bad = ~readable | np.isinf(number) | (number < column.low) | (number > column.high)
-    if column.kind == "integer":
-        bad |= ~missing & np.isfinite(number) & (number != np.round(number))
-    if column.required and column.name in given.columns:
-        bad |= missing
-    elif not column.required:
-        bad |= np.isin(number, MISSING_SIGNS)
-    _add_rows(door, bad, column, values)
-    if column.kind == "number":
-        return number
-    kept = np.where(bad | missing, 0.0, number).astype(np.int64)
-    if pd.api.types.is_integer_dtype(values.dtype):
-        kept = values.fillna(0).to_numpy(dtype=np.int64)
-    return pd.arrays.IntegerArray(kept, bad | missing)
-
-
-def _texts(column: Column, values: pd.Series, door: _Door) -> Any:
-    if isinstance(values.dtype, pd.StringDtype):
-        # Few texts repeat in many rows; each is kept once.
-        codes, words = pd.factorize(values)
-        known = [*(str(word) or None for word in words), None]
-    else:
-        codes = np.arange(len(values))
-        # Not as text of pandas, which cannot hold half of a surrogate pair.
-        filled = np.array([str(value) != "" for value in values], dtype=np.bool_)
-        present = values.notna().to_numpy() & filled
-        known = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
-    texts = np.array([*known, None], dtype=object)[:-1][codes]
-    if column.required:
-        missing = np.array([*(text is None for text in known), True])[:-1]
-        _add_rows(door, missing[codes], column, values)
-    broken = np.array([*(text is not None and not _is_unicode(text) for text in known), True])[:-1]
-    if broken.any():
-        hint = "half of a surrogate pair: text cut off, or decoded twice"
-        door.add_rows(
-            broken[codes],
-            column.name,
-            column.expected,
-            lambda row: repr(texts[row]),
-            lambda _: hint,
-        )
-    # Without the dtype pandas 3 makes these strings, and None becomes NaN.
-    return pd.Series(texts, dtype=object)
-
-
-def _is_unicode(text: str) -> bool:
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
-
-
-def _numbers(values: pd.Series) -> tuple[Floats, Bools]:
-    """Return values as floats, and which of them could be read as a number or as missing."""
-    if pd.api.types.is_numeric_dtype(values.dtype):
-        number = values.to_numpy(dtype=np.float64, na_value=np.nan)
-        return number, np.ones(len(number), dtype=bool)
-    number = np.full(len(values), np.nan)
-    readable = np.ones(len(values), dtype=bool)
-    left: Any = range(len(values))
-    if isinstance(values.dtype, pd.StringDtype):
-        number, left = _plain_numbers(values)
-    given = values.to_numpy(dtype=object) if len(left) else values
-    for row in left:
-        if _is_empty(given[row]):
-            continue
-        try:
-            number[row] = _number(given[row])
-        except (TypeError, ValueError, OverflowError):
-            readable[row] = False
-    return number, readable
-
-
-def _plain_numbers(values: pd.Series) -> tuple[Floats, Ints]:
-    """Return texts as floats, and the rows that hold anything but digits, point and exponent."""
-    texts = pa.array(values, type=pa.string(), from_pandas=True)
-    plain = pc.fill_null(pc.match_substring_regex(texts, _PLAIN_NUMBER), False)
-    try:
-        numbers = pc.cast(pc.if_else(plain, texts, None), pa.float64())
-    except pa.ArrowInvalid:
-        # Such as 1e400.
-        return np.full(len(values), np.nan), np.arange(len(values))
-    number = np.array(numbers.to_numpy(zero_copy_only=False), dtype=np.float64)
-    return number, np.flatnonzero(~plain.to_numpy(zero_copy_only=False))
-
-
-def _number(value: object) -> float:
-    """Return a number; ValueError for what only Python takes for one: 1_0, digits of others."""
-    if isinstance(value, str) and (not value.isascii() or "_" in value):
-        raise ValueError
-    return float(value)  # type: ignore[arg-type]
-
-
-def _add_rows(door: _Door, bad: Bools, column: Column, values: pd.Series) -> None:
-    def got(row: int) -> object:
-        return "nothing" if _is_empty(values.iloc[row]) else values.iloc[row]
-
-    def hint(row: int) -> str:
-        try:
-            number = _number(values.iloc[row])
-        except (TypeError, ValueError, OverflowError):
-            return ""
-        if number in MISSING_SIGNS:
-            return "a sign for a missing value; leave the field empty"
-        return column.hint if np.isfinite(number) else ""
-
-    door.add_rows(bad, column.name, column.expected, got, hint)
-
-
-def _is_empty(value: Any) -> bool:
-    return value is None or value is pd.NA or (isinstance(value, str) and value == "")
-
-
-def _check_technologies(radio: pd.DataFrame, door: _Door) -> None:
+def _check_technologies(radio: pd.DataFrame, found: TableFaults) -> None:
     """Note carriers, codes and timing advances that the row's technology does not have."""
     if "technology" not in radio:
         return
@@ -270,34 +106,34 @@ def _check_technologies(radio: pd.DataFrame, door: _Door) -> None:
             if of.any() and name in radio:
                 value = radio[name].to_numpy(dtype=np.float64, na_value=np.nan)
                 column = Column(name, 0, most, f"0..{most} in {family}")
-                _add_rows(door, of & (value > most), column, radio[name])
+                note_values(found, of & (value > most), column, radio[name])
 
 
-def _check_covariance(gnss: pd.DataFrame, door: _Door) -> None:
+def _check_covariance(gnss: pd.DataFrame, found: TableFaults) -> None:
     with np.errstate(invalid="ignore"):  # Variances below 0 are a fault of their own.
         sd_east_m = np.sqrt(gnss["var_east_m2"].to_numpy())
         sd_north_m = np.sqrt(gnss["var_north_m2"].to_numpy())
     # Squares and products of the largest numbers would be infinite.
     bad = np.abs(gnss["cov_east_north_m2"].to_numpy()) > sd_east_m * sd_north_m * (1 + 1e-9)
     column = Column("cov_east_north_m2", expected="a covariance of at most √(var_east·var_north)")
-    _add_rows(door, bad, column, gnss["cov_east_north_m2"])
+    note_values(found, bad, column, gnss["cov_east_north_m2"])
 
 
-def _check_satellites(rows: pd.DataFrame, door: _Door) -> None:
+def _check_satellites(rows: pd.DataFrame, found: TableFaults) -> None:
     """Note satellites not named as in RINEX, or not as high as satellites are."""
     name = rows["satellite"]
     wrong = name.notna().to_numpy() & ~name.astype(str).str.fullmatch(SATELLITE).to_numpy(bool)
     hint = "its constellation's letter (G, R, E, C, J, I, S) and two digits"
-    door.add_rows(
+    found.add_rows(
         wrong, "satellite", "a name such as G07", lambda row: repr(name.iloc[row]), lambda _: hint
     )
     place, field = rows[list(PLACE)].to_numpy(dtype=np.float64), ", ".join(PLACE)
     known = np.isfinite(place)
     some = known.any(axis=1) & ~known.all(axis=1)
-    door.add_rows(some, field, "all three, or none", lambda _: "some of them", lambda _: "")
+    found.add_rows(some, field, "all three, or none", lambda _: "some of them", lambda _: "")
     away_m = np.sqrt(np.sum(place**2, axis=1))
     bad = known.all(axis=1) & ~((away_m >= _LOWEST_M) & (away_m <= _HIGHEST_M))
-    door.add_rows(
+    found.add_rows(
         bad,
         field,
         "20 000 to 55 000 km from the earth's centre",
@@ -306,7 +142,7 @@ def _check_satellites(rows: pd.DataFrame, door: _Door) -> None:
     )
 
 
-def _check_degrees(table: pd.DataFrame, door: _Door) -> None:
+def _check_degrees(table: pd.DataFrame, found: TableFaults) -> None:
     """Find positions that are longitudes and latitudes: near zero, and hardly moving for long."""
     if "east_m" not in table or len(table) < 2:
         return
@@ -315,10 +151,10 @@ def _check_degrees(table: pd.DataFrame, door: _Door) -> None:
     extent = max(np.ptp(east), np.ptp(north))
     if small and 0 < extent < 0.5 and np.ptp(table["time_s"].to_numpy()) >= 10:
         got = f"all within {extent:.4g} of ({east[0]:.6g}, {north[0]:.6g})"
-        door.add(", east_m and north_m", "metres", got, "degrees given for metres")
+        found.add(", east_m and north_m", "metres", got, "degrees given for metres")
 
 
-def _check_milliseconds(table: str, rows: pd.DataFrame, door: _Door) -> None:
+def _check_milliseconds(table: str, rows: pd.DataFrame, found: TableFaults) -> None:
     """Find times in milliseconds: rows seldom come, and what gets somewhere goes very slowly."""
     time = np.unique(rows["time_s"].to_numpy())
     if len(time) < 3 or table not in _MOVING or not np.isfinite(time).all():
@@ -332,7 +168,7 @@ def _check_milliseconds(table: str, rows: pd.DataFrame, door: _Door) -> None:
     speed_mps = moved_m / (time[-1] - time[0])
     if between_s >= _SELDOM_S and moved_m >= _SOMEWHERE_M and speed_mps < _SLOW_MPS:
         got = f"{between_s:g} between rows, hence {speed_mps:.2g} m/s"
-        door.add(", time_s", "seconds", got, "milliseconds for s")
+        found.add(", time_s", "seconds", got, "milliseconds for s")
 
 
 def _sorted_unique(

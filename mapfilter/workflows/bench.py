@@ -17,7 +17,8 @@ import numpy as np
 from mapfilter._device import open_device
 from mapfilter._parallel import local_executor
 from mapfilter._types import Floats
-from mapfilter.database.build import BuildJob, build
+from mapfilter.database.build import build
+from mapfilter.database.build_job import BuildJob
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail

@@ -11,7 +11,8 @@ from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, executor_of, made_ready
 from mapfilter._partial import nothing_left
 from mapfilter.config.sections import Config
-from mapfilter.database.build import TASKS_A_WORKER, build, build_roads
+from mapfilter.database.build import build, build_roads
+from mapfilter.database.build_job import TASKS_A_WORKER
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.floor import floor_notes
 from mapfilter.database.manifest import InputFile

@@ -18,8 +18,8 @@ from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, MapfilterError, listed
 from mapfilter.geodesy import Lattice
-from mapfilter.propagation.predict import off_frequency
-from mapfilter.radio.cell_layouts import UNUSED_COLUMNS
+from mapfilter.propagation.remarks import off_frequency
+from mapfilter.radio.arrange_cells import UNUSED_COLUMNS
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan

@@ -11,14 +11,9 @@ from typing import Any
 from mapfilter._io import write_json
 from mapfilter._parallel import Progress, part_of
 from mapfilter.experiments.benchmarks.results import CaseResult
-from mapfilter.workflows.evaluate import (
-    TABLE,
-    check_names,
-    load_benchmark,
-    main_figures,
-    run_global_positioning,
-)
-from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.evaluate import TABLE, check_names, main_figures, run_global_positioning
+from mapfilter.workflows.evaluate_settings import load_benchmark
+from mapfilter.workflows.result_text import to_jsonable
 
 _GYRO = {
     "imu.turns": "gyro",
@@ -170,7 +165,7 @@ def run_audit(
     Parameters
     ----------
     config, settings
-        As for :func:`mapfilter.workflows.evaluate.load_benchmark`; each row's change comes
+        As for :func:`mapfilter.workflows.evaluate_settings.load_benchmark`; each row's change comes
         after them.
     out : Path
         Gets a folder for each row, and ``table.json``.

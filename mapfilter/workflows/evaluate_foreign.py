@@ -16,7 +16,6 @@ from mapfilter._types import Floats
 from mapfilter.config.load import given_keys
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build
-from mapfilter.database.sources import LatticeRoutes
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.experiments.benchmarks.foreign import (
@@ -37,8 +36,8 @@ from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.roads.index import inside_areas
 from mapfilter.roads.network import street_network
+from mapfilter.roads.route_points import inside_areas
 from mapfilter.simulation.reports import array_sampler
 from mapfilter.simulation.worlds.faults import GivenInputs, given_inputs
 from mapfilter.simulation.worlds.open_ground import OpenGround
@@ -46,10 +45,11 @@ from mapfilter.simulation.worlds.radio import planners_offsets_db
 from mapfilter.simulation.worlds.sensor_faults import NO_FAULT
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.tracks.store import write_log
-from mapfilter.workflows.evaluate import TABLE, EvaluateResult, load_benchmark
+from mapfilter.workflows.evaluate import TABLE, EvaluateResult
 from mapfilter.workflows.evaluate_runs import run_cases, street_base
+from mapfilter.workflows.evaluate_settings import load_benchmark
 from mapfilter.workflows.filter_choice import filter_choice
-from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.world import World
 
 _DEFINED = "is part of the world, which has one definition"
@@ -266,7 +266,7 @@ def _database(world: World, given: GivenInputs, folder: Path, seed: int, variant
     database = build(
         open_rasters(rasters_path),
         given.plan,
-        LatticeRoutes(routes),
+        routes,
         folder,
         margin_db=config.database.margin_db,
         floor_dbm=config.database.floor_dbm,

@@ -48,8 +48,8 @@ from mapfilter.report.canvas import BLUE, GREEN, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.recorded_pictures import WorstUnit, draw_journey
+from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.survey import run_survey
-from mapfilter.workflows.terminal import to_jsonable
 
 HEAD, TABLE, FOUND = "benchmark.json", "table.json", "found.json"
 PICTURE, WORST, DATABASE = "errors.png", "worst.png", "database"

@@ -39,7 +39,7 @@ from mapfilter.experiments.recorded.rows import (
 from mapfilter.experiments.row_intervals import RowInterval
 from mapfilter.workflows.evaluate_ottawa import OttawaResult, run_ottawa
 from mapfilter.workflows.recorded_pictures import WorstUnit, draw_worst
-from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.result_text import to_jsonable
 
 OTTAWA = "ottawa"
 ALL = "all"

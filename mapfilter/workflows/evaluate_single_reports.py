@@ -30,7 +30,7 @@ from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.report.canvas import BLACK, GREEN, GREY, ORANGE, PURPLE, SKY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.evaluate_ottawa import session_files
-from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.result_text import to_jsonable
 
 TABLE = "table.json"
 SETS = (*WIFI, *PARTS)

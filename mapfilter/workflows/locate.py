@@ -27,8 +27,8 @@ from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.report.canvas import BLUE, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.fingerprints import read_database, read_reports
+from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.results import FIGURES, POSITIONS, check_figures_of_reports
-from mapfilter.workflows.terminal import to_jsonable
 
 PICTURE = "errors.png"
 _SHARE = 0.95

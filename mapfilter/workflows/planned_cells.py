@@ -7,8 +7,9 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
-from mapfilter.radio.cells import CellPlan, read_cell_plan
+from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.msi import read_antennas
+from mapfilter.radio.plan_files import read_cell_plan
 
 _DEFAULTS = ("height_m", "eirp_dbm", "frequency_mhz")
 

@@ -15,12 +15,8 @@ from mapfilter._partial import nothing_left
 from mapfilter.config.sections import Config
 from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
-from mapfilter.propagation.predict import (
-    off_frequency,
-    outside_validity,
-    predict,
-    simulate_ground_truth,
-)
+from mapfilter.propagation.predict import predict, simulate_ground_truth
+from mapfilter.propagation.remarks import off_frequency, outside_validity
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.plan_notes import carrier_notes
 from mapfilter.rasters.geotiff import is_as_written, write_rasters

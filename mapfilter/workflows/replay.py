@@ -9,23 +9,22 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, cast
 
-from mapfilter._inputs import path_fault, shown
+from mapfilter._inputs import shown
 from mapfilter._io import atomic_file, replaced_files, write_json
 from mapfilter._parallel import Progress, SerialExecutor
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
+from mapfilter.errors import ConfigError, fail
 from mapfilter.evaluation.accuracy import Truth, accuracy, truth_notes
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
-from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.estimate import PositionedTrack, Snapshot
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
+from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
@@ -33,9 +32,6 @@ from mapfilter.report.ground import BaseMap
 from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
-from mapfilter.tracks.open_log import OpenedLog
-from mapfilter.tracks.placeless import in_frame
-from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log
 from mapfilter.viewing.bundle import replay_bundle
 from mapfilter.viewing.page import write_page
@@ -44,10 +40,10 @@ from mapfilter.viewing.trace import TraceRecorder
 from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
-from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.planned_cells import plan_antennas, planned_cells
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
-from mapfilter.workflows.replay_lacks import advice_of, check_log, fixes_note, lack_of
+from mapfilter.workflows.replay_lacks import advice_of, fixes_note, lack_of
+from mapfilter.workflows.replay_logs import ReplayLogs
 from mapfilter.workflows.replayed import (
     ReplayedLog,
     ReplayResult,
@@ -56,6 +52,7 @@ from mapfilter.workflows.replayed import (
     summary_figures,
     summary_of,
 )
+from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.results import (
     ESTIMATES,
     FIGURES,
@@ -65,7 +62,6 @@ from mapfilter.workflows.results import (
     older_results,
 )
 from mapfilter.workflows.served import served_points, street_map
-from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.track_pictures import (
     Handed,
     TrackPictures,
@@ -74,62 +70,6 @@ from mapfilter.workflows.track_pictures import (
     drawn_beside,
     with_error_picture,
 )
-
-
-class _Logs:
-    """The logs of a configuration, which are read for checks first.
-
-    They are kept for what follows: recordings, as reading them may take long, and of others so many
-    that they need little memory.
-    """
-
-    def __init__(self, config: Config, database: RadioRouteDatabase | None) -> None:
-        self.config, self.paths = config, journeys_of(config)
-        self._crs = "" if database is None else database.lattice.crs
-        self._kept: dict[Path, OpenedLog] = {}
-        self._left_rows = _MOST_KEPT_ROWS
-
-    def open(self, path: Path) -> OpenedLog:
-        if path in self._kept:
-            return self._kept[path]
-        opened = open_journey(self.config, path, self._crs)
-        if self._crs:
-            opened = replace(opened, log=in_frame(opened.log, self._crs))
-        tables = [getattr(opened.log, table) for table in TABLES]
-        rows = sum(map(len, (*tables, *opened.sensors.values())))
-        if opened.recordings or rows <= self._left_rows:
-            self._kept[path] = opened
-            self._left_rows -= rows
-        return opened
-
-    def check(self, lattice: Lattice) -> None:
-        """Read every log before any is located, so that all faults come before any result."""
-        faults = Faults()
-        for path in self.paths:
-            if wrong := path_fault(path):
-                faults.add("logs", wrong, shown(str(path)))
-                continue
-            try:
-                check_log(path, self.open(path).log, lattice, faults)
-            except ConfigError:
-                raise
-            except MapfilterError as error:
-                faults.found.extend(error.faults)
-        faults.raise_if_any(InputError)
-
-    def check_siteless(self) -> None:
-        """Refuse logs of which a filter without a map would need sites."""
-        for path in self.paths:
-            log = leave_out(self.open(path).log, self.config.track.without)
-            if len(log.radio) or len(log.tdoa):
-                hint = (
-                    "filters without a map take the sites from there, or from a database (--db); "
-                    "--without radio,tdoa leaves positions and dead reckoning"
-                )
-                raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
-
-
-_MOST_KEPT_ROWS = 1_000_000
 
 
 def run_replay(
@@ -170,7 +110,7 @@ def run_replay(
     compiles = beside and isinstance(options, BayesFilter)
     with compiled_beside() if compiles else nullcontext():
         database = _database(config, options)
-        journeys = _Logs(config, database)
+        journeys = ReplayLogs(config, database)
 
     @cache
     def sites(crs: str) -> CellPlan:

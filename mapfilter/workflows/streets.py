@@ -18,12 +18,12 @@ from mapfilter.errors import ConfigError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.corridors import Positions, corridors
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.landuse import LandUse, read_landuse
 from mapfilter.roads.layers import read_layer_buildings, read_layer_water
 from mapfilter.roads.maps import OSM_ATTRIBUTION, resolve_map
 from mapfilter.roads.osm import read_water
 from mapfilter.roads.raster import read_raster_ways
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.routes import Roads, gaps, read_roads, unused_classes, within_reach_m
 from mapfilter.roads.ways import Bounds, Buildings, Water, Ways, clip_ways
 from mapfilter.simulation.synthetic_city import SyntheticCity, manhattan, synthetic_city

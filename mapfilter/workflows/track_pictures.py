@@ -19,7 +19,8 @@ import numpy as np
 from mapfilter._parallel import begun
 from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import Truth
-from mapfilter.positioning.estimate import Snapshot, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.ground import MAX_PANELS, BaseMap
 from mapfilter.workflows.drawer import DRAWING_LIBRARY, drawer_process
 from mapfilter.workflows.results import PICTURES

@@ -15,7 +15,8 @@ from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs, short_crs, unproject
 from mapfilter.radio.antenna import MeasuredAntenna
-from mapfilter.radio.cells import CellPlan, read_cell_plan
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -23,7 +24,7 @@ from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.maps import map_bounds_deg, resolve_map
-from mapfilter.roads.routes import route_lattice_from_landuse
+from mapfilter.roads.route_points import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX

@@ -208,7 +208,7 @@ from mapfilter.config.load import load_config
 from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.learning.patch import read_patch
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.radio.cells import read_cell_plan
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.radio.msi import read_msi
 from mapfilter.radio.tables import read_table
 from mapfilter.rasters.opening import open_rasters
@@ -349,12 +349,12 @@ ALLOWED = {
     # Who calls it is listed here by `open_parquet`.
     ("_arrow.py", "ParquetFile"),
     # The null device, in place of an output that the caller closed.
-    ("workflows/terminal.py", "open"),
+    ("workflows/guard.py", "open"),
     # Parts of the page that come with the package.
     ("viewing/page.py", "read_text"),
     ("experiments/recorded/denver.py", "read_csv"), ("experiments/recorded/mall.py", "open"),
     # New files; journeys; the kernel's own; the code of a custom filter, which runs anyway.
-    ("workflows/replay.py", "open"), ("rasters/geotiff.py", "open"), ("_io.py", "open"),
+    ("workflows/replay_logs.py", "open"), ("rasters/geotiff.py", "open"), ("_io.py", "open"),
     ("database/estimate.py", "read_text"), ("_code.py", "read_bytes"), ("_replace.py", "read_text"),
     ("_workers.py", "open"), ("database/parquet.py", "open"), ("serving/store.py", "open"),
     ("positioning/custom_filter.py", "read_bytes"),

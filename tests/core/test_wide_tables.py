@@ -3,7 +3,7 @@
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.radio.cells import read_cell_plan
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.tracks.table_files import read_table
 
 NAMES = ",".join(f"c{i}" for i in range(20_000))

@@ -12,7 +12,7 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.routes import route_lattice
+from mapfilter.roads.route_points import route_lattice
 from mapfilter.roads.ways import Squares, Ways
 
 CRS = "EPSG:32629"

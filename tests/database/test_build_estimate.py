@@ -12,7 +12,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.roads.index import RouteSource
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 
 CRS = "EPSG:32629"

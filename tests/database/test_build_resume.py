@@ -24,8 +24,7 @@ from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, MapfilterError
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.roads.index import RouteSource
-from mapfilter.roads.routes import route_lattice
+from mapfilter.roads.route_points import RouteSource, route_lattice
 from mapfilter.roads.ways import Buildings, Squares, Water, Ways
 
 OPTIONS = {"floor_dbm": FLOOR_DBM, "tile_px": 8}

@@ -18,8 +18,8 @@ from mapfilter.database.sources import (
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.buildings import Buildings
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 
 LATTICE = Lattice(CRS, 1000.0, 2000.0, 5.0, 12, 17)

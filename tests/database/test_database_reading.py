@@ -6,8 +6,8 @@ import pytest
 from small_world import FLOOR_DBM, IDS, LATTICE, make_database, make_world
 
 from mapfilter.database.merge import merge
+from mapfilter.database.parquet import text_codes
 from mapfilter.database.parts import PartWriter
-from mapfilter.database.radioroutes import _codes
 from mapfilter.errors import InputError
 
 
@@ -97,7 +97,7 @@ def test_points_by_the_rasters(world, database):
 
 def test_codes_of_text_in_several_pieces():
     column = pa.chunked_array([["b", "a"], ["c", "b"]]).dictionary_encode()
-    codes, names = _codes(column)
+    codes, names = text_codes(column)
     assert [names[code] for code in codes] == ["b", "a", "c", "b"]
     assert codes.dtype == np.int32
 

@@ -20,8 +20,8 @@ from mapfilter.errors import InputError, OutputError
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.buildings import Buildings
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.osm import Water
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 
 FINISHED = 3

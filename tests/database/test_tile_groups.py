@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from mapfilter.database.build import BuildJob
+from mapfilter.database.build_job import BuildJob
 from mapfilter.database.tiles import grouped, tile_windows
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan

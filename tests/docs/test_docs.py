@@ -106,7 +106,7 @@ def test_files_name_every_column():
 
 
 def test_files_name_every_column_of_a_database():
-    from mapfilter.database.radioroutes import Points
+    from mapfilter.database.points import Points
 
     listed = named(page("file-formats.rst"))
     assert {field.name for field in fields(Points)} <= listed

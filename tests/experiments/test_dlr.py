@@ -8,8 +8,8 @@ import pytest
 
 from mapfilter._parallel import SerialExecutor
 from mapfilter.experiments.papers.dlr import experiment as dlr
+from mapfilter.experiments.papers.dlr import filters, scene
 from mapfilter.experiments.papers.dlr import paper as dlr_table
-from mapfilter.experiments.papers.dlr import scene
 from mapfilter.experiments.papers.dlr.paper import over_threshold
 from mapfilter.experiments.papers.dlr.scene import ASSUMPTIONS
 from mapfilter.experiments.papers.paper import PaperSettings
@@ -83,47 +83,47 @@ def test_readings_are_what_the_models_say(place, track):
 
 
 def test_differences_refer_to_the_best_station():
-    layout, times = dlr.FLAT, np.arange(4.0)[None] * 100
+    layout, times = filters.FLAT, np.arange(4.0)[None] * 100
     sinr = np.array([[-12.0, -3.0, -20.0, -15.0]])
-    three = dlr.differences(layout, STATIONS, sinr, times)[0]
+    three = filters.differences(layout, STATIONS, sinr, times)[0]
     assert three.reading.tolist() == [-100.0, 200.0]
     sigma = np.hypot(scene.ARRIVAL.sigma_m(sinr[0]), scene.DETOUR_M)
     # As in the reference: the reference's variance is common to all.
     np.testing.assert_allclose(
         three.model.covariance(), np.diag(sigma[[0, 3]] ** 2) + sigma[1] ** 2, rtol=1e-12
     )
-    above = dlr.differences(layout, STATIONS, sinr, times, -17.0)[0]
+    above = filters.differences(layout, STATIONS, sinr, times, -17.0)[0]
     assert above.reading.size == 2
-    assert dlr.differences(layout, STATIONS, sinr, times, -5.0)[0].model is None
+    assert filters.differences(layout, STATIONS, sinr, times, -5.0)[0].model is None
 
 
 def test_two_satellites_and_two_stations_are_not_enough():
-    seen = dlr.satellites(
+    seen = filters.satellites(
         POSITION_CLOCK_3D, SATELLITES[:2], np.array(CASE["s_pr"][:2]), np.array([CASE["y"][:2]])
     )
-    heard = dlr.differences(
+    heard = filters.differences(
         POSITION_CLOCK_3D, STATIONS[:2], np.zeros((1, 2)), np.array([[0.0, CASE["y"][5]]])
     )
-    fix = dlr.run_static(POSITION_CLOCK_3D, dlr.joined(seen, heard))[0]
+    fix = filters.run_static(POSITION_CLOCK_3D, filters.joined(seen, heard))[0]
     assert fix.ok is CASES["dlr_two_sats_two_bs_underdetermined_ok"]
     assert fix.problem == TOO_FEW
 
 
 def test_pseudoranges_and_differences_give_the_reference_fix():
-    seen = dlr.satellites(
+    seen = filters.satellites(
         POSITION_CLOCK_3D, SATELLITES, np.array(CASE["s_pr"]), np.array([CASE["y"][:5]])
     )
-    fix = dlr.run_static(POSITION_CLOCK_3D, seen)[0]
+    fix = filters.run_static(POSITION_CLOCK_3D, seen)[0]
     np.testing.assert_allclose(fix.state, CASE["gnss_only"]["x"], rtol=1e-10, atol=5e-8)
 
 
 @pytest.mark.parametrize("mobility", ["diagonal", "discretised"])
 def test_mobility(mobility):
-    moving = dlr.motion(dlr.HYBRID, mobility)
+    moving = filters.motion(filters.HYBRID, mobility)
     np.testing.assert_allclose(moving.transition[0, :2], [1.0, 1.0])
     assert moving.transition[6, 6] == 1
-    block = moving.noise[:2, :2] / dlr.DRIFT_MPS**2
-    expected = np.diag([(dlr.DRIFT_M / dlr.DRIFT_MPS) ** 2, 1.0])
+    block = moving.noise[:2, :2] / filters.DRIFT_MPS**2
+    expected = np.diag([(filters.DRIFT_M / filters.DRIFT_MPS) ** 2, 1.0])
     np.testing.assert_allclose(
         block, expected if mobility == "diagonal" else [[1 / 3, 1 / 2], [1 / 2, 1]]
     )

@@ -6,7 +6,8 @@ import pandas as pd
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.positioned_track import PositionedTrack
 
 CRS = "EPSG:32629"
 STATUS = {

@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from mapfilter.models.street_motion import OFF, STATES, MapWeights, interpolate, weigh_by_map
-from mapfilter.models.way_map import WayMap, all_inside, places_beyond, weigh_by_ways
+from mapfilter.models.street_motion import OFF, STATES, MapWeights
+from mapfilter.models.way_map import (
+    WayMap,
+    all_inside,
+    interpolate,
+    places_beyond,
+    weigh_by_map,
+    weigh_by_ways,
+)
 
 ROWS, COLS, PIXEL_M = 12, 9, 5.0
 WIDTH_M, HEIGHT_M = COLS * PIXEL_M, ROWS * PIXEL_M

@@ -20,8 +20,8 @@ from mapfilter.positioning.bayes.path import LEG_M, PATH_M, RecentPath
 from mapfilter.positioning.bayes.path_start import ends_of_path, possible_turns_rad
 from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
 from mapfilter.positioning.filter import locate
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.raster import read_raster_ways
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.testing import check_filter
 from mapfilter.tracks.log import make_log
 

@@ -25,7 +25,7 @@ from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.radio.cells import CellPlan
-from mapfilter.roads.index import RouteSource
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
 

@@ -20,7 +20,8 @@ from mapfilter.geodesy import Lattice
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time
 from mapfilter.models.level_errors import LevelErrors, LevelReport
-from mapfilter.models.street_motion import STATES, interpolate
+from mapfilter.models.street_motion import STATES
+from mapfilter.models.way_map import interpolate
 from mapfilter.positioning.bayes import options
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.area_tiles import HELD_BYTES

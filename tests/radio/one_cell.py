@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.models import PredictionModel
-from mapfilter.propagation.predict import Surroundings, predict
+from mapfilter.propagation.predict import predict
+from mapfilter.propagation.surroundings import Surroundings
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
 

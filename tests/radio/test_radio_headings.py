@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.radio.cells import CellPlan, read_cell_plan
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.plan_files import read_cell_plan
 
 CRS = "EPSG:32635"
 DEFAULTS = {"height_m": 25.0, "eirp_dbm": 52.0, "frequency_mhz": 1800.0}

@@ -5,8 +5,8 @@ from msi_files import panel
 
 from mapfilter.errors import InputError
 from mapfilter.gnss.almanacs import read_yuma
-from mapfilter.radio.cells import read_cell_plan
 from mapfilter.radio.msi import read_msi
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.radio.tables import number
 
 OTHER = ["٦٠", "６０", "1_0", "६0", "6٫5"]

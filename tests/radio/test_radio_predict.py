@@ -12,7 +12,8 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice, project, unproject
 from mapfilter.propagation.empirical import cost231_hata_db, cost231_walfisch_ikegami_db
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
-from mapfilter.propagation.predict import outside_validity, predict, simulate_ground_truth
+from mapfilter.propagation.predict import predict, simulate_ground_truth
+from mapfilter.propagation.remarks import outside_validity
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"

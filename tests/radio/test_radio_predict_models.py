@@ -13,7 +13,8 @@ from mapfilter.geodesy import Lattice
 from mapfilter.propagation.empirical import friis_db, log_distance_db, okumura_hata_db
 from mapfilter.propagation.line_of_sight import line_of_sight
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
-from mapfilter.propagation.predict import off_frequency, predict, simulate_ground_truth
+from mapfilter.propagation.predict import predict, simulate_ground_truth
+from mapfilter.propagation.remarks import off_frequency
 from mapfilter.propagation.tr38901 import hidden_loss_db, seen_loss_db, sight_probability
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan

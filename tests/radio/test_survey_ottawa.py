@@ -9,7 +9,7 @@ import shapely
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.roads.routes import route_lattice
+from mapfilter.roads.route_points import route_lattice
 from mapfilter.roads.ways import Ways
 from mapfilter.survey import measured_map
 from mapfilter.survey.cell_model import learn_shadowing

@@ -10,7 +10,8 @@ from matplotlib.image import imread
 from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate, TrackEvidence
+from mapfilter.positioning.estimate import Fix, TrackEstimate, TrackEvidence
+from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLUE, save
 from mapfilter.report.errors import plot_error_over_distance, plot_evidence

@@ -19,7 +19,7 @@ from mapfilter.report.canvas import BLUE, ORANGE, new_figure, png_of, save
 from mapfilter.report.coverage import plot_landuse, plot_margin
 from mapfilter.report.network import plot_points_per_cell
 from mapfilter.roads.landuse import LandUse
-from mapfilter.roads.routes import route_lattice_from_landuse
+from mapfilter.roads.route_points import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings
 from mapfilter.workflows import pictures as network_pictures
 from mapfilter.workflows import served

@@ -6,7 +6,8 @@ from matplotlib.axes import Axes
 
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.snapshots import plot_candidates

@@ -15,7 +15,8 @@ from mapfilter.errors import InputError, OutputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import Lattice, grid_convergence_rad, unproject
-from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base, local_frame
 from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION, save

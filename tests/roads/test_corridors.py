@@ -8,7 +8,7 @@ from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.corridors import Positions, corridors
 from mapfilter.roads.network import street_network
-from mapfilter.roads.routes import route_lattice
+from mapfilter.roads.route_points import route_lattice
 
 CRS = "EPSG:32618"
 MAIN = shapely.LineString([(0, 0), (400, 0), (400, 300)])

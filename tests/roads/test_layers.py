@@ -12,7 +12,7 @@ from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.osm import read_water
-from mapfilter.roads.routes import route_lattice
+from mapfilter.roads.route_points import route_lattice
 
 FORMATS = ("roads.shp", "roads.gpkg", "roads.geojson", "roads.fgb", "roads.parquet", "roads.gml",
            "roads.sqlite", "roads.shp.zip")  # fmt: skip

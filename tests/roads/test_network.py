@@ -10,7 +10,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.network import street_network
 from mapfilter.roads.osm import read_ways
-from mapfilter.roads.routes import route_lattice
+from mapfilter.roads.route_points import route_lattice
 from mapfilter.roads.ways import Buildings, Ways
 
 CRS = "EPSG:32629"

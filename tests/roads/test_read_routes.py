@@ -23,7 +23,8 @@ from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.corridors import Positions, corridors
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.osm import read_squares, read_water, read_ways
-from mapfilter.roads.routes import read_routes, route_lattice
+from mapfilter.roads.route_points import route_lattice
+from mapfilter.roads.routes import read_routes
 
 MAP = Lattice.covering("EPSG:32635", (385_500.0, 6_671_500.0, 385_900.0, 6_671_800.0), 10.0)
 WEST, SOUTH, EAST, NORTH = box(0, 0, 400, 300).bounds

@@ -10,8 +10,8 @@ from hypothesis.extra.numpy import arrays
 from rasterio import Affine
 
 from mapfilter.errors import InputError
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.raster import joined_pixels, raster_lattice, read_raster_ways
+from mapfilter.roads.route_points import RouteSource
 
 CRS = "EPSG:32632"
 WEST_M, NORTH_M = 455_000.0, 5_433_000.0

@@ -15,7 +15,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.osm import read_squares, read_water, read_ways
-from mapfilter.roads.routes import route_lattice
+from mapfilter.roads.route_points import route_lattice
 
 LATTICE = Lattice.covering(CRS, AREA[1], 5.0)
 

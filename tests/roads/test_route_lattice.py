@@ -11,7 +11,7 @@ from mapfilter.geodesy import Lattice, project
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.routes import route_lattice, route_lattice_from_landuse
+from mapfilter.roads.route_points import route_lattice, route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Squares, Ways
 
 CRS = "EPSG:32629"

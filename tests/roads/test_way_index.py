@@ -11,8 +11,8 @@ from test_route_lattice import CRS, LATTICE, boxes, lines, same, ways_of
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.roads.index import RouteSource, WayIndex
-from mapfilter.roads.routes import route_lattice
+from mapfilter.roads.index import WayIndex
+from mapfilter.roads.route_points import RouteSource, route_lattice
 from mapfilter.roads.ways import Water
 
 ROW, COL = np.divmod(np.arange(LATTICE.rows * LATTICE.cols), LATTICE.cols)

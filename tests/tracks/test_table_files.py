@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError, MapfilterError
+from mapfilter.tracks.column_values import _numbers
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import read_log
 from mapfilter.tracks.table_files import read_table
-from mapfilter.tracks.tables import _numbers, _repeated
+from mapfilter.tracks.tables import _repeated
 
 ROWS = "0,1.0\n1,1.0\n2,1.0\n"
 

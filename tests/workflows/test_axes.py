@@ -2,11 +2,11 @@
 
 import pytest
 
+from mapfilter._annotations import fits
 from mapfilter.config.axes import check_axis, numeric_keys, parse_axis, vary
 from mapfilter.config.load import load_config
 from mapfilter.config.sections import Config, FilterSection
 from mapfilter.errors import ConfigError
-from mapfilter.options import fits
 from mapfilter.positioning import BUILT_IN
 from mapfilter.positioning.locators import filter_options
 from mapfilter.workflows.filter_choice import filter_choice, option_sections

@@ -15,7 +15,8 @@ from mapfilter._parallel import SerialExecutor, begun
 from mapfilter.cli.options import undrawn
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.estimate import Snapshot, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.ground import BaseMap
 from mapfilter.workflows import track_pictures
 from mapfilter.workflows.track_pictures import (

@@ -13,8 +13,8 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.evaluate import load_benchmark
 from mapfilter.workflows.evaluate_audit import CHANGES
+from mapfilter.workflows.evaluate_settings import load_benchmark
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World

@@ -32,8 +32,8 @@ from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
+from mapfilter.workflows.evaluate_settings import _refused, load_benchmark
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.world import World
 

@@ -8,7 +8,8 @@ import time
 import pytest
 
 from mapfilter.errors import InputError, fail
-from mapfilter.workflows.terminal import guarded, run_pipeline
+from mapfilter.workflows.guard import guarded
+from mapfilter.workflows.pipeline import run_pipeline
 
 RAISED = [
     (fail(InputError, "cells.csv", "a plan", "none"), "cells.csv: expected a plan, found none"),

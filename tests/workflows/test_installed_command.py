@@ -9,8 +9,8 @@ import pytest
 from command_line import contents
 
 from mapfilter.workflows.build import run_build
+from mapfilter.workflows.pipeline import run_pipeline
 from mapfilter.workflows.predict import run_predict
-from mapfilter.workflows.terminal import run_pipeline
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import rasterio
 from command_line import assert_done, assert_refused, mapfilter, settings
 from rasterio.warp import Resampling, reproject
 
-from mapfilter.radio.cells import read_cell_plan
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import check_against_plan

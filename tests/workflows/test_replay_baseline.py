@@ -11,7 +11,7 @@ import mapfilter as mf
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by, usual_readings
 from mapfilter.positioning.fingerprints.options import Probabilistic
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
-from mapfilter.workflows import replay as workflow
+from mapfilter.workflows import replay_logs
 from mapfilter.workflows.replay_baseline import MOST_REPORTS, Baselines, SingleReports, together
 
 
@@ -89,14 +89,14 @@ def test_reports_of_several_logs_are_put_together():
 def test_small_logs_are_read_once_and_large_ones_again(
     kept_rows, times, log, replay, tmp_path, monkeypatch
 ):
-    read, open_journey = [], workflow.open_journey
+    read, open_journey = [], replay_logs.open_journey
 
     def counted(config, path, crs):
         read.append(path)
         return open_journey(config, path, crs)
 
-    monkeypatch.setattr(workflow, "open_journey", counted)
-    monkeypatch.setattr(workflow, "_MOST_KEPT_ROWS", kept_rows)
+    monkeypatch.setattr(replay_logs, "open_journey", counted)
+    monkeypatch.setattr(replay_logs, "_MOST_KEPT_ROWS", kept_rows)
     assert_done(replay(log))
     assert read == [log] * times
     figures = json.loads((tmp_path / "out" / "figures.json").read_text())

@@ -1,8 +1,8 @@
 """Results as people read them: a short table in place of a line for each cell of a grid."""
 
 from mapfilter.evaluation.success import SuccessCell
+from mapfilter.workflows.result_text import text_lines
 from mapfilter.workflows.sweep import brief
-from mapfilter.workflows.terminal import text_lines
 
 
 def cell(**place):

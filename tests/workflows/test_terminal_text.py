@@ -12,7 +12,7 @@ import rasterio
 
 from mapfilter._printing import quiet_callbacks
 from mapfilter.errors import InputError, fail
-from mapfilter.workflows import terminal
+from mapfilter.workflows import guard, terminal
 
 ACTING = "cell \x1b[2J\x07\x00\x9b31m\u202e\x7f"
 
@@ -21,7 +21,7 @@ def test_messages_show_escapes_and_do_not_send_them(capsys):
     def refuse():
         raise fail(InputError, "a\x1b]0;title\x07.csv row 1", "a number", ACTING)
 
-    assert terminal.guarded(refuse) == 2
+    assert guard.guarded(refuse) == 2
     said = capsys.readouterr().err
     assert r"\x1b[2J\x07\x00\x9b31m\u202e\x7f" in said
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202e]", said)
@@ -41,7 +41,7 @@ def test_long_messages_are_cut(capsys):
     def refuse():
         raise fail(InputError, "a.csv", "a number", "9" * 1_000_000)
 
-    assert terminal.guarded(refuse) == 2
+    assert guard.guarded(refuse) == 2
     said = capsys.readouterr().err
     assert len(said) < 3000
     assert "more characters" in said

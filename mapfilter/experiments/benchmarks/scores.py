@@ -28,7 +28,8 @@ from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import WINDOW_S, Walk
 from mapfilter.experiments.sweep.journeys import truth_of
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.positioned_track import PositionedTrack
 
 _STAY_S = 10.0
 _ERRORS = ("error_mean_m", "error_67_m", "error_95_m")

@@ -28,7 +28,7 @@ from mapfilter.experiments.recorded.street_graph import StreetGraph, match_point
 from mapfilter.geodesy import Lattice, project, utm_crs
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.roads.index import RouteSource
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import half_width_of
 from mapfilter.tracks.deadreckoning import steps_between
 from mapfilter.tracks.log import TrackLog, make_log

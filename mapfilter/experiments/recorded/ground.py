@@ -10,7 +10,7 @@ import pandas as pd
 
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.sources import LatticeRoutes, LayerRoutes
+from mapfilter.database.sources import LayerRoutes
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
@@ -18,8 +18,8 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.corridors import CORRIDOR_HALF_WIDTH_M, Positions, corridors
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.route_points import RouteSource
 
 _RESOLUTION_M = 5.0
 
@@ -88,5 +88,4 @@ def predicted(
     raster = folder.with_suffix(".tif")
     levels = predict(plan, lattice, None, model or PredictionModel())
     write_rasters(raster, lattice, levels, plan.ids)
-    source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
-    return build(open_rasters(raster), plan, source, folder, floor_dbm=floor_dbm)
+    return build(open_rasters(raster), plan, routes, folder, floor_dbm=floor_dbm)

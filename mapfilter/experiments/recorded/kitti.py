@@ -26,8 +26,8 @@ from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.roads.index import RouteSource
 from mapfilter.roads.raster import raster_lattice, read_raster_ways
+from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import half_width_of
 from mapfilter.tracks.deadreckoning import dead_reckon
 from mapfilter.tracks.log import TrackLog, make_log

@@ -43,7 +43,8 @@ from mapfilter.experiments.recorded.outages import (
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import unproject
-from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.corridors import Positions
 from mapfilter.tracks.combine import CombineOptions

@@ -13,6 +13,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
+from mapfilter._annotations import Words
 from mapfilter._inputs import read_input, toml_values
 from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, Faults, InputError, fail
@@ -28,7 +29,7 @@ from mapfilter.models.motion import (
 from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import MOVING, MOVING_CLOCK, StateLayout
-from mapfilter.options import Options, Positive, Words
+from mapfilter.options import Options, Positive
 
 Combination = Literal["gsm", "hybrid1", "hybrid2"]
 COMBINATIONS: tuple[Combination, ...] = ("gsm", "hybrid1", "hybrid2")

@@ -1,0 +1,64 @@
+"""Remarks on predictions outside the published range of a model, or of an antenna's frequency."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+
+from mapfilter.errors import listed
+from mapfilter.geodesy import Lattice
+from mapfilter.propagation.models import (
+    PredictionModel,
+    outside_published_range,
+    shortest_distance_m,
+)
+from mapfilter.propagation.surroundings import Antennas
+from mapfilter.radio.cells import Cell, CellPlan
+
+_MOST_NAMED = 3
+_NEAR_FREQUENCY = 0.2
+
+
+def outside_validity(plan: CellPlan, lattice: Lattice, model: PredictionModel) -> tuple[str, ...]:
+    """Return remarks on what lies outside the model's published range, and for which cells."""
+    alike: dict[tuple[float, float], list[Cell]] = defaultdict(list)
+    for cell in plan.to_crs(lattice.crs).cells:
+        alike[cell.frequency_mhz, cell.height_m].append(cell)
+    west, south, east, north = lattice.bounds_m
+    ids: dict[str, list[str]] = defaultdict(list)
+    for (frequency_mhz, height_m), cells in alike.items():
+        east_m, north_m = np.array([(cell.east_m, cell.north_m) for cell in cells]).T
+        beside_m, below_m = east_m - east_m.clip(west, east), north_m - north_m.clip(south, north)
+        across_m = np.maximum(abs(east_m - west), abs(east_m - east))
+        along_m = np.maximum(abs(north_m - south), abs(north_m - north))
+        used = {
+            "frequency_mhz": frequency_mhz,
+            "base_height_m": height_m,
+            "mobile_height_m": model.mobile_height_m,
+            "distance_m": round(float(np.hypot(across_m, along_m).max())),
+        }
+        closest_m = round(float(np.hypot(beside_m, below_m).min()))
+        nearest_m = max(closest_m, shortest_distance_m(model))
+        for note in outside_published_range(model.model, used, nearest_m):
+            ids[note].extend(cell.id for cell in cells)
+    return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
+
+
+def off_frequency(plan: CellPlan, antennas: Antennas) -> tuple[str, ...]:
+    """Return remarks on cells whose antenna was measured at a frequency far from theirs."""
+    ids: dict[str, list[str]] = defaultdict(list)
+    for cell in plan.cells:
+        measured = antennas.get(cell.antenna)
+        if measured is None or measured.frequency_mhz is None:
+            continue
+        if abs(cell.frequency_mhz / measured.frequency_mhz - 1) > _NEAR_FREQUENCY:
+            note = f"antenna {cell.antenna!r} was measured at {measured.frequency_mhz:g} MHz"
+            ids[note].append(cell.id)
+    return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
+
+
+def _named(ids: list[str]) -> str:
+    if len(ids) == 1:
+        return f"cell {ids[0]!r}"
+    return f"{len(ids)} cells ({listed([repr(name) for name in ids], _MOST_NAMED)})"

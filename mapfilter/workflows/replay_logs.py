@@ -1,0 +1,74 @@
+"""The logs of a replay: read and checked before any is located, and kept where they are small."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from mapfilter._inputs import path_fault, shown
+from mapfilter.config.sections import Config
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
+from mapfilter.geodesy import Lattice
+from mapfilter.tracks.log import leave_out
+from mapfilter.tracks.open_log import OpenedLog
+from mapfilter.tracks.placeless import in_frame
+from mapfilter.tracks.schema import TABLES
+from mapfilter.workflows.logs import journeys_of, open_journey
+from mapfilter.workflows.replay_lacks import check_log
+
+_MOST_KEPT_ROWS = 1_000_000
+
+
+class ReplayLogs:
+    """The logs of a configuration, which are read for checks first.
+
+    They are kept for what follows: recordings, as reading them may take long, and of others so many
+    that they need little memory.
+    """
+
+    def __init__(self, config: Config, database: RadioRouteDatabase | None) -> None:
+        self.config, self.paths = config, journeys_of(config)
+        self._crs = "" if database is None else database.lattice.crs
+        self._kept: dict[Path, OpenedLog] = {}
+        self._left_rows = _MOST_KEPT_ROWS
+
+    def open(self, path: Path) -> OpenedLog:
+        """Return a log in the database's frame: one that is kept, or read again."""
+        if path in self._kept:
+            return self._kept[path]
+        opened = open_journey(self.config, path, self._crs)
+        if self._crs:
+            opened = replace(opened, log=in_frame(opened.log, self._crs))
+        tables = [getattr(opened.log, table) for table in TABLES]
+        rows = sum(map(len, (*tables, *opened.sensors.values())))
+        if opened.recordings or rows <= self._left_rows:
+            self._kept[path] = opened
+            self._left_rows -= rows
+        return opened
+
+    def check(self, lattice: Lattice) -> None:
+        """Read every log before any is located, so that all faults come before any result."""
+        faults = Faults()
+        for path in self.paths:
+            if wrong := path_fault(path):
+                faults.add("logs", wrong, shown(str(path)))
+                continue
+            try:
+                check_log(path, self.open(path).log, lattice, faults)
+            except ConfigError:
+                raise
+            except MapfilterError as error:
+                faults.found.extend(error.faults)
+        faults.raise_if_any(InputError)
+
+    def check_siteless(self) -> None:
+        """Refuse logs of which a filter without a map would need sites."""
+        for path in self.paths:
+            log = leave_out(self.open(path).log, self.config.track.without)
+            if len(log.radio) or len(log.tdoa):
+                hint = (
+                    "filters without a map take the sites from there, or from a database (--db); "
+                    "--without radio,tdoa leaves positions and dead reckoning"
+                )
+                raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
