@@ -38,6 +38,7 @@ from mapfilter.survey.cell_model import (
 )
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.weakest_reported import WeakestReported, weakest_reported
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -118,6 +119,11 @@ class SurveyedCell:
     estimated: bool
     measured: cKDTree
 
+    @property
+    def has_given_trend(self) -> bool:
+        """Whether the trend is about a given antenna or prediction."""
+        return self.trend.covariate is not None and not self.estimated
+
     def distance_m(self, east_m: Floats, north_m: Floats, beyond_m: float = np.inf) -> Floats:
         """Return how far places are from the nearest reading; infinite beyond ``beyond_m``."""
         # The bound itself must still count.
@@ -142,6 +148,11 @@ class Survey:
         Learnt from all cells together.
     cells : mapping of str to SurveyedCell
         In the order of their ids.
+    weakest : mapping of str to WeakestReported
+        What bounds the levels of cells that are not in the reports, by
+        :func:`~mapfilter.survey.weakest_reported.scale_of` their technology.
+    technologies : mapping of str to str
+        Of the cells of which it is known.
     notes : tuple of str
         What was left out or estimated.
     """
@@ -150,6 +161,8 @@ class Survey:
     options: SurveyOptions
     shadowing: Shadowing
     cells: Mapping[str, SurveyedCell]
+    weakest: Mapping[str, WeakestReported]
+    technologies: Mapping[str, str]
     notes: tuple[str, ...]
 
     def can_fill(self, cell: SurveyedCell) -> bool:
@@ -158,7 +171,7 @@ class Survey:
         That about a given antenna or prediction does. That of few levels does not, nor of levels
         which are all the same, as those at the end of a phone's scale.
         """
-        if cell.trend.covariate is not None and not cell.estimated:
+        if cell.has_given_trend:
             return True
         count = len(cell.points)
         if count < self.options.min_points_to_fill:
@@ -274,4 +287,5 @@ def fit_survey(
             f"{number_of(unknown, 'antenna')} not located (fewer than "
             f"{options.min_points_to_locate} squares): the trend is their mean level"
         )
-    return Survey(measurements.crs, options, shadowing, cells, tuple(notes))
+    weakest, kinds = weakest_reported(measurements), measurements.technologies
+    return Survey(measurements.crs, options, shadowing, cells, weakest, kinds, tuple(notes))

@@ -120,6 +120,8 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
         if not cell:
             continue
         family = found["technology"].upper()
+        if kind := technology(family):
+            rows.technologies.setdefault(cell, kind)
         signs.add(line, found["level_dbm"], family)
         dbm = _from_asu(found["level_dbm"], family)
         if dbm is not None:
@@ -271,6 +273,7 @@ def _add_logged(
         rows.aside["levels given only as bounds (>)"] += 1
     elif name and level is not None:
         neighbour = cell["neighbour"]
+        rows.technologies[name] = "GSM"
         rows.add(line, name, {**found, "level_dbm": level[2], "neighbour": neighbour})
 
 

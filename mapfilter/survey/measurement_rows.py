@@ -50,7 +50,8 @@ Identity = tuple[int, int, int, int]
 class Rows:
     """Good rows as columns, the faults of bad ones, and counts of what is set aside.
 
-    ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``identified`` is the
+    ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``technologies`` has
+    GSM, UMTS, LTE or NR of cells where that is known; ``identified`` is the
     cell of identities that were looked at before, ``odd_time`` the first time not understood;
     ``remarks`` are on the file as a whole.
     """
@@ -63,6 +64,7 @@ class Rows:
     session: array[int] = field(default_factory=lambda: array("i"))
     values: array[float] = field(default_factory=lambda: array("d"))
     identities: dict[str, Identity] = field(default_factory=dict)
+    technologies: dict[str, str] = field(default_factory=dict)
     identified: dict[tuple[str, ...], str] = field(default_factory=dict)
     refused: int = 0
     faults: list[Fault] = field(default_factory=list)

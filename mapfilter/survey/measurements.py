@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -40,6 +40,8 @@ class Measurements:
         was. None where this is not known of any row.
     timing_advance : numpy.ndarray, shape (N,)
         Steps, NaN where it was not reported; None as for ``serving``.
+    technologies : mapping of str to str
+        GSM, UMTS, LTE or NR of the cells of which it is known. Their levels are other quantities.
     """
 
     crs: str
@@ -56,9 +58,18 @@ class Measurements:
     notes: tuple[str, ...] = ()
     serving: Bools | None = None
     timing_advance: Floats | None = None
+    technologies: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.level_dbm)
+
+    @property
+    def report(self) -> Ints32:
+        """Number of the report of each row, shape (N,): rows of one session and time are one."""
+        # A row without a time is a report of its own.
+        number = np.where(np.isfinite(self.time_s), -1, np.arange(len(self)))
+        keys = np.column_stack([self.session, np.nan_to_num(self.time_s), number])
+        return np.unique(keys, axis=0, return_inverse=True)[1].astype(np.int32)
 
     def where(self, kept: Bools, *notes: str) -> Measurements:
         """Return some of the rows; cells and sessions keep their places."""
@@ -89,13 +100,15 @@ def named_after(measurements: Measurements, plan: CellPlan) -> Measurements:
         for cell_id in measurements.cell_ids
     ]
     names, places = np.unique(np.array(new), return_inverse=True)
-    known = zip(measurements.cell_ids, new, strict=True)
+    known = list(zip(measurements.cell_ids, new, strict=True))
     identities = {
         name: measurements.identities[old] for old, name in known if old in measurements.identities
     }
+    kinds = measurements.technologies
     return replace(
         measurements,
         cell_ids=tuple(names.tolist()),
         identities=identities,
+        technologies={name: kinds[old] for old, name in known if old in kinds},
         cell=places[measurements.cell].astype(np.int32),
     )

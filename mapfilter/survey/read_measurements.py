@@ -183,6 +183,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         _notes(tables),
         np.where(np.isnan(role), _alone(of_session, time_s), role > 0).astype(np.bool_),
         timing_advance,
+        {cell: name for table in tables for cell, name in table.technologies.items()},
     )
     placed = np.isfinite(east_m) & np.isfinite(north_m)
     if not placed.all():

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress
-from mapfilter._types import Floats, Ints
+from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
@@ -22,10 +22,13 @@ from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.cell_model import Covariate
 from mapfilter.survey.measured_map import Survey, SurveyedCell
 from mapfilter.survey.measurement_rows import Identity
+from mapfilter.survey.weakest_reported import WeakestReported, mean_below, scale_of
 
 _FIELD_LENGTHS = 4.0
 _LARGEST_WINDOW_PX = 1_000_000
 _STRONGEST = 0.25
+_BOUNDED_BEYOND_M = 500.0
+"""Nearer to readings of a cell another one may serve although this one is as strong."""
 
 
 def write_survey(
@@ -44,7 +47,10 @@ def write_survey(
     Pixels farther from every reading of a cell than the survey's reach are NaN in both files; with
     ``fill`` the first has the trend (the calibrated prediction) there where that holds so far
     (:meth:`~mapfilter.survey.measured_map.Survey.can_fill`), and the NaN of the second still marks
-    them. Cells not measured on the lattice, in the survey's CRS, are left out.
+    them. Farther than 500 m from every reading, a trend that is not about a given antenna or
+    prediction is bounded by the reports of its technology without it
+    (:class:`~mapfilter.survey.weakest_reported.WeakestReported`). Cells not measured on the
+    lattice, in the survey's CRS, are left out.
     ``deviation_factor`` multiplies the deviations.
 
     Raises
@@ -53,9 +59,16 @@ def write_survey(
         No cell was measured on the lattice.
     """
     ids: list[str] = []
+    bounds_dbm = {
+        kind: _bound_dbm(weakest, lattice, survey.options.reach_m)
+        for kind, weakest in (survey.weakest.items() if fill else ())
+    }
     with tempfile.TemporaryFile() as spool:
         for done, (cell_id, cell) in enumerate(survey.cells.items(), start=1):
-            found = _on_lattice(survey, cell, lattice, fill and survey.can_fill(cell))
+            filled = fill and survey.can_fill(cell)
+            kind = scale_of(survey.technologies.get(cell_id))
+            bound = bounds_dbm[kind] if filled and not cell.has_given_trend else None
+            found = _on_lattice(survey, cell, lattice, filled, bound)
             if found is not None:
                 ids.append(cell_id)
                 pixels, levels = found
@@ -127,21 +140,28 @@ def _predicted(
 
 
 def _on_lattice(
-    survey: Survey, cell: SurveyedCell, lattice: Lattice, fill: bool
+    survey: Survey, cell: SurveyedCell, lattice: Lattice, fill: bool, bound_dbm: Floats32 | None
 ) -> tuple[Ints, Floats] | None:
-    """Return the pixels with a value, and mean and deviation there; None if none was measured."""
+    """Return the pixels with a value, and mean and deviation there; None if none was measured.
+
+    Levels far from every reading are less than ``bound_dbm``, a value for each pixel.
+    """
     reach_m = survey.options.reach_m
     field_m = max(reach_m, _FIELD_LENGTHS * survey.shadowing.correlation_m) if fill else reach_m
     pixels, levels, measured = [], [], False
     for row, col, rows, cols in _windows(cell, lattice, reach_m, fill):
         grid = np.mgrid[row : row + rows, col : col + cols].reshape(2, -1)
         east_m, north_m = lattice.east_north(grid[0], grid[1])
-        distance_m = cell.distance_m(east_m, north_m, field_m)
+        distance_m = cell.distance_m(east_m, north_m, max(field_m, _BOUNDED_BEYOND_M))
         level = np.full((2, len(east_m)), np.nan)
         near = distance_m <= field_m
         level[:, near] = cell.predict(east_m[near], north_m[near])
         if fill:
             level[0, ~near] = cell.trend.level_dbm(east_m[~near], north_m[~near])
+        if bound_dbm is not None:
+            far = distance_m > max(reach_m, _BOUNDED_BEYOND_M)
+            bound = bound_dbm[grid[0][far], grid[1][far]]
+            level[0, far] = mean_below(level[0, far], bound, survey.shadowing.variance_db2**0.5)
         level[1, distance_m > reach_m] = np.nan
         some = np.isfinite(level[0])
         measured = measured or bool(np.isfinite(level[1]).any())
@@ -150,6 +170,18 @@ def _on_lattice(
     if not measured:
         return None
     return np.concatenate(pixels), np.concatenate(levels, axis=1)
+
+
+def _bound_dbm(weakest: WeakestReported, lattice: Lattice, within_m: float) -> Floats32:
+    """Return the bound of what was not reported at each pixel, infinite without reports."""
+    bound_dbm = np.empty((lattice.rows, lattice.cols), dtype=np.float32)
+    step = max(_LARGEST_WINDOW_PX // lattice.cols, 1)
+    for row in range(0, lattice.rows, step):
+        strip = bound_dbm[row : row + step]
+        grid = np.mgrid[row : row + len(strip), : lattice.cols].reshape(2, -1)
+        east_m, north_m = lattice.east_north(grid[0], grid[1])
+        strip[:] = weakest.bound_dbm(east_m, north_m, within_m).reshape(strip.shape)
+    return bound_dbm
 
 
 def _windows(

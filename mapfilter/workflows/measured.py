@@ -112,6 +112,10 @@ def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: 
     for cell, identity in zip(cells[whole], parts[whole].tolist(), strict=True):
         mcc, mnc, lac, ci = identity
         rows.identities.setdefault(cell, (mcc, mnc, lac, ci))
+    if "technology" in radio:
+        kinds = radio["technology"].fillna("").astype(object).to_numpy()[kept]
+        pairs = zip(cells, kinds, strict=True)
+        rows.technologies.update({cell: kind for cell, kind in pairs if kind})
 
 
 def _places(positions: pd.DataFrame, time_s: Floats) -> tuple[Floats, Bools]:

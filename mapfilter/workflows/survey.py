@@ -235,15 +235,11 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
 def readings_of(measurements: Measurements) -> Readings:
     """Return the readings of a survey, in its CRS; those of one session and time are one report."""
     count = len(measurements)
-    # A row without a time is a report of its own.
-    number = np.where(np.isfinite(measurements.time_s), -1, np.arange(count))
-    keys = np.column_stack([measurements.session, np.nan_to_num(measurements.time_s), number])
-    report = np.unique(keys, axis=0, return_inverse=True)[1]
     serving, advance = measurements.serving, measurements.timing_advance
     return Readings(
         measurements.cell_ids,
         measurements.cell,
-        report.astype(np.int32),
+        measurements.report,
         measurements.session,
         measurements.east_m,
         measurements.north_m,

@@ -35,6 +35,7 @@ def test_real_uploads_are_read_whole(walks, rides):
     assert walks.crs == rides.crs == "EPSG:32618"
     assert walks.notes == ("10 rows left out: positions less accurate than 50 m",)
     assert walks.level_dbm.min() >= -117
+    assert set(walks.technologies.values()) == {"LTE"}
 
 
 def test_real_logs_of_neighbours_are_read(shared_data):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import truncnorm
 from test_survey_fit import ANTENNA, CRS, LATTICE, law, measured, shadowed, somewhere
 
 from mapfilter.errors import InputError
@@ -13,8 +14,10 @@ from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import check_against_plan
+from mapfilter.survey.cell_model import DistanceLoss
 from mapfilter.survey.measured_map import SurveyOptions, fit_survey
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
+from mapfilter.survey.weakest_reported import WeakestReported, mean_below
 
 
 def along_a_street(count=120, cell_ids=("A",)):
@@ -69,6 +72,47 @@ def test_filled_rasters_keep_the_trend_and_still_mark(tmp_path, monkeypatch):
     trend = survey.cells["A"].trend.level_dbm(*(a.ravel() for a in centres(LATTICE)))
     far = (slice(0, 20), slice(0, 20))
     np.testing.assert_allclose(level[far], trend.reshape(level.shape)[far], atol=0.006)
+
+
+@pytest.mark.parametrize("kind", ["estimated", "LTE and NR", "in the plan", "LTE and UMTS"])
+def test_a_cell_is_not_stronger_where_another_one_was_reported_without_it(tmp_path, kind):
+    """A is received in the west, its trend rises to the east, and there B alone is reported."""
+    lattice = Lattice(CRS, 384_000.0, 6_673_000.0, 20.0, 50, 150)
+    east_m = np.r_[np.linspace(384_100.0, 384_900.0, 40), np.linspace(385_700.0, 386_500.0, 40)]
+    cell = np.repeat([0, 1], 40)
+    mast = Cell("A", "A", 386_000.0, 6_672_450.0, 30.0, None, 50.0, 1800.0, "omni")
+    level = DistanceLoss(mast.east_m, mast.north_m)(east_m, np.full(80, 6_672_500.0)) * 3.5 + 20
+    level[cell == 1] = -80.0 + np.random.default_rng(1).normal(0, 1, 40)
+    rows = measured(east_m, np.full(80, 6_672_500.0), level, cell, cell, ("A", "B"))
+    plan = CellPlan(CRS, (mast,)) if kind == "in the plan" else None
+    if kind.startswith("LTE and"):
+        rows = replace(rows, technologies={"A": kind.split()[-1], "B": "LTE"})
+    survey = fit_survey(rows, SurveyOptions(), plan=plan)
+    _, mean, _ = written(tmp_path, survey, lattice, fill=True)
+    row, col = lattice.row_col(east_m[cell == 1], np.full(40, 6_672_500.0))
+    of_a, of_b = mean.read()[:, row, col]
+    assert (of_a < of_b).all() == (kind in ("estimated", "LTE and NR"))
+    trend = survey.cells["A"].trend.level_dbm(east_m, np.full(80, 6_672_500.0))
+    assert (trend[cell == 1] > -80).mean() > 0.5
+    # Far from all reports the trend stands.
+    corner = lattice.east_north(np.array([0]), np.array([149]))
+    told = mean.read()[0, 0, 149]
+    assert told == pytest.approx(survey.cells["A"].trend.level_dbm(*corner)[0], abs=0.01)
+
+
+def test_the_bound_of_what_was_not_reported_is_the_weakest_level_of_the_reports_about():
+    at, cell = np.array([0.0, 0.0, 30.0, 500.0]), np.array([0, 1, 0, 0])
+    rows = measured(at, np.zeros(4), [-70.0, -90.0, -60.0, -50.0], cell=cell, cell_ids=("A", "B"))
+    rows = replace(rows, time_s=np.array([1.0, 1.0, 2.0, np.nan]))
+    weakest = WeakestReported.of(rows)
+    found = weakest.bound_dbm(np.array([0.0, 400.0, 250.0]), np.zeros(3), 100.0)
+    by_hand = (-90 / 20 - 60 / 50) / (1 / 20 + 1 / 50)
+    assert found == pytest.approx([by_hand, -50.0, np.inf])
+    level, bound = np.array([-60.0, -90.0, -85.0, -90.0]), np.array([-80.0, -80.0, -80.0, np.inf])
+    given = np.minimum(level, bound)
+    below = truncnorm.mean(-np.inf, (bound - given) / 6.0, given, 6.0)
+    np.testing.assert_allclose(mean_below(level, bound, 6.0), below)
+    assert mean_below(level, bound, 6.0)[3] == -90.0
 
 
 @pytest.mark.parametrize("kind", ["few", "one level", "in the plan", "few are enough"])

@@ -34,6 +34,7 @@ def test_a_drive_test_of_gnettrack(made):
     found = read(made("gnettrack"))
     assert found.cell_ids == ("244-91-2124-102764173",)
     assert found.identities == {"244-91-2124-102764173": (244, 91, 2124, 102764173)}
+    assert found.technologies == {"244-91-2124-102764173": "LTE"}
     assert found.level_dbm.tolist() == np.asarray(LEVEL_DBM, dtype=float).tolist()
     assert len(np.unique(found.session)) == 1
     assert any(f"{COUNT} levels of cells without identity" in note for note in found.notes)
