@@ -159,7 +159,8 @@ def test_the_likelihood_of_a_fix_is_normal_about_its_place_and_clipped(given, us
 def test_a_fix_is_widened_by_its_variance():
     fix = GnssFix(3.0, 4.0, 36.0, 9.0, -5.0)
     assert widened(fix, 2.0) == GnssFix(3.0, 4.0, 72.0, 18.0, -10.0)
-    for missing in (replace(fix, var_east_m2=nan), replace(fix, var_north_m2=inf)):
+    known = {"var_east_m2": nan}, {"var_north_m2": inf}, {"var_east_m2": 0.0}, {"var_north_m2": 0.0}
+    for missing in (replace(fix, **changes) for changes in known):
         assert widened(missing, 3.0) == GnssFix(3.0, 4.0, 300.0, 300.0, 0.0)
 
 

@@ -120,8 +120,8 @@ def agrees_with(belief: MapBelief, fix: GnssFix, origin_m: tuple[float, float]) 
 
 
 def widened(fix: GnssFix, times: float) -> GnssFix:
-    """Return a fix with its variance multiplied; 10 m are assumed where it has none."""
-    known = isfinite(fix.var_east_m2) and isfinite(fix.var_north_m2)
+    """Return a fix with its variance multiplied; 10 m are assumed where it has none, or 0."""
+    known = 0 < fix.var_east_m2 < inf and 0 < fix.var_north_m2 < inf
     east_m2, north_m2 = (fix.var_east_m2, fix.var_north_m2) if known else (_FIX_SD_M**2,) * 2
     cross_m2 = fix.cov_east_north_m2 if known else 0.0
     return GnssFix(fix.east_m, fix.north_m, times * east_m2, times * north_m2, times * cross_m2)
