@@ -162,7 +162,7 @@ def _check(value: Mapping[str, Any], where: str) -> None:
         if not isinstance(value.get(name), kind):
             raise fail(StoreError, where, f"{name}, as it was saved", "something else", "edited")
     state = value["state"]
-    beliefs, sources = [state.belief, *(one.belief for one in state.rivals)], [state.sources]
+    beliefs, sources = [state.belief, *(one.belief for one in state.held + state.unaided)], [state.sources]
     if state.alternative is not None:
         beliefs.append(state.alternative.belief)
         sources.append(state.alternative.sources)

@@ -177,7 +177,7 @@ class BeliefFilters:
 
     def is_pulled(self, state: BayesState) -> bool:
         """Return whether the belief without positions is ahead: they may have been pulled away."""
-        return self._is_ahead(self.pulls, state, state.unaided)
+        return self._is_ahead(self.pulls, state, state.found_alone)
 
     def _is_ahead(
         self, rules: RivalRules, state: BayesState, rivals: Sequence[HeldOtherwise]

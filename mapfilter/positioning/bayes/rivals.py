@@ -107,7 +107,10 @@ class Rivals:
                 proven = True
             elif weighed is not None:
                 kind = pulls.of(from_scratch=one.from_scratch)
-                left += still_open(kind, (weighed,), main, gone_m)
+                still = still_open(kind, (weighed,), main, gone_m)
+                left += still
+                # What has not come out ahead for so long has been tried.
+                proven = proven or (one.from_scratch and not still)
         best = winner(pulls, left, main, rules.converge_log_odds)
         if best is None:
             return replace(state, unaided=tuple(left), proven=proven)

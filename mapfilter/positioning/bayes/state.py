@@ -137,7 +137,12 @@ class BayesState:
     @property
     def rivals(self) -> tuple[HeldOtherwise, ...]:
         """Beliefs that compete with the main one, by what they assume of phone and positions."""
-        return self.held + self.unaided
+        return (*self.held, *self.found_alone)
+
+    @property
+    def found_alone(self) -> tuple[HeldOtherwise, ...]:
+        """Beliefs without positions that have a place: a search gains and loses by chance."""
+        return tuple(one for one in self.unaided if one.belief.status is Status.TRACKING)
 
     @property
     def particle_spacing_m(self) -> float:
