@@ -13,7 +13,7 @@ import pandas as pd
 from mapfilter._arguments import Argument, Setting, check_arguments, generator
 from mapfilter.api.given import database_argument, log_argument, opened, read
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
 from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
@@ -25,6 +25,7 @@ from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.placeless import in_frame
+from mapfilter.tracks.tables import tidy_table
 from mapfilter.viewing.notebook import View
 from mapfilter.viewing.runs import ViewedRun
 from mapfilter.viewing.trace import TraceRecorder
@@ -230,12 +231,14 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
     ----------
     truth : DataFrame or Truth
         Columns ``time_s``, ``east_m`` and ``north_m``, as the table ``truth`` of a log, in the CRS
-        of the track.
+        of the track. As in :func:`mapfilter.make_log`, rows are sorted by time, and exact
+        duplicates dropped.
 
     Raises
     ------
     InputError
-        The ground truth has fewer than two positions, or lacks a column.
+        The ground truth has fewer than two positions, lacks a column, or has values that no log may
+        have, such as NaN.
     ConfigError
         There is no track, or no table of ground truth.
     """
@@ -250,7 +253,10 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
         if lacking:
             expected = "columns time_s, east_m and north_m"
             raise fail(InputError, "truth", expected, ", ".join(map(str, truth.columns)))
-        known = Truth.of_table(truth)
+        faults = Faults()
+        tidy, _ = tidy_table("truth", truth, "truth", faults)
+        faults.raise_if_any(InputError)
+        known = Truth.of_table(tidy)
         if known is None:
             raise fail(InputError, "truth", "two positions or more", len(truth))
         truth = known
