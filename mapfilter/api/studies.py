@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from html import escape
 from math import nan
 from pathlib import Path
@@ -27,7 +27,7 @@ from mapfilter._arguments import (
 from mapfilter.api.given import database_argument, opened
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.evaluation.success import success_cells
+from mapfilter.evaluation.success import HEADING, READING, success_cells
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
     NOISE_AXES,
@@ -38,6 +38,7 @@ from mapfilter.experiments.sweep.plan import (
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.options import Positive
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.cells import CellPlan
@@ -161,23 +162,33 @@ class Sweep:
         return f"<p>{escape(repr(self))}</p>{self.to_dataframe().head(20).to_html()}"
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return success rates with 95 % intervals and mean errors, one row for each grid cell."""
-        return pd.DataFrame([asdict(cell) for cell in success_cells(self.runs)])
+        """Return success rates with 95 % intervals and mean errors, one row for each grid cell.
+
+        Columns are those of :class:`mapfilter.evaluation.success.SuccessCell`, with one for each
+        varied option in place of ``varied``, named by its key as in ``runs``.
+        """
+        return pd.DataFrame([cell.row for cell in success_cells(self.runs)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw success over the deviation of headings.
+        """Draw success over the deviation of headings, or over another value that differs.
 
-        There is a curve for each filter, and for each other noise or option that differs.
+        There is a curve for each filter, and for each other noise or option that differs. With one
+        deviation of headings the first of these is drawn along the axis; where nothing but the
+        filters differs, they stand side by side.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; a new figure when left out.
         """
-        from mapfilter.report.success import plot_success_curves, success_curves
+        from mapfilter.report.success import curve_axis, plot_success_curves, success_curves
 
-        curves = success_curves(success_cells(self.runs))
-        return plot_success_curves(curves, ax, title="Success over the noise of headings")
+        cells = success_cells(self.runs)
+        axis = curve_axis(cells)
+        title = "Success of filters" if axis == READING else f"Success over {axis}"
+        if axis == HEADING:
+            title = "Success over the noise of headings"
+        return plot_success_curves(success_curves(cells, axis), ax, title=title, axis=axis)
 
 
 def sweep(
@@ -278,7 +289,8 @@ def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
                 f"filters, {name}", expected, type(options).__name__, "custom filters by name"
             )
         else:
-            found.append(Reading(name, options))
+            own_m = options.update_length_m if isinstance(options, CandidateFilter) else nan
+            found.append(Reading(name, options, float(own_m)))
     faults.raise_if_any(ConfigError)
     return tuple(found)
 

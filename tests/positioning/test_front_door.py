@@ -5,11 +5,13 @@ import subprocess
 import sys
 
 import geopandas as gpd
+import numpy as np
 import pandas as pd
 import pytest
 from cross_world import make_database, walk_log
 
 import mapfilter as mf
+from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.locators import as_filter
 
@@ -72,6 +74,16 @@ def test_a_score_has_the_error_of_each_epoch(track):
     assert score.error_m.shape == (len(track),)
     assert list(score.to_dataframe()["success"]) == [score.success]
     assert repr(mf.score(track.estimate, walk_log().truth)) == repr(score)
+
+
+def test_a_score_takes_ground_truth_in_any_order_and_each_row_once(track):
+    truth = walk_log().truth
+    expected = repr(mf.score(track, truth))
+    for other in (truth.sample(frac=1, random_state=0), pd.concat([truth, truth]), truth[::-1]):
+        assert repr(mf.score(track, other)) == expected
+        assert repr(mf.score(track, Truth.of_table(other))) == expected
+    with pytest.raises(mf.MapfilterError, match="truth row 6, east_m"):
+        mf.score(track, truth.assign(east_m=truth["east_m"].where(truth.index != 5)))
 
 
 def test_a_score_says_what_the_ground_truth_does_not_tell(track):
@@ -173,6 +185,39 @@ def test_noises_of_any_field_have_cells_of_their_own(database, rasters, streets)
     assert repr(found) == "Sweep: 8 runs in 4 cells of its grid"
     assert {"imu.heading_correlation_s", "imu.step_scale_wander"} <= set(found.runs)
     assert found.plot().get_title()
+
+
+def test_cells_of_a_sweep_are_a_table_of_plain_columns(database, rasters, streets):
+    noises = (mf.ImuNoise(), mf.ImuNoise(heading_correlation_s=20.0))
+    filters = {"c": mf.CandidateFilter(update_length_m=5.0), "b": mf.BayesFilter()}
+    given = {"routes": 1, "length_m": 200.0, "noises": noises}
+    found = mf.sweep(database, rasters, streets, filters, **given)
+    table = found.to_dataframe()
+    assert "varied" not in table
+    assert table["imu.heading_correlation_s"].tolist() == [0.0, 0.0, 20.0, 20.0]
+    assert len(table.drop_duplicates()) == 4
+    assert table.groupby("imu.heading_correlation_s").size().tolist() == [2, 2]
+    by_name = table.groupby("reading")["update_length_m"].first()
+    assert by_name["c"] == 5.0
+    assert np.isnan(by_name["b"])
+    coordinates = list(found.runs)[: list(found.runs).index("route")]
+    assert list(table)[: len(coordinates)] == coordinates
+
+
+def ticks_of(axes):
+    return [label.get_text() for label in axes.get_xticklabels()]
+
+
+def test_a_sweep_is_drawn_over_what_it_varies(database, rasters, streets):
+    noises = (mf.ImuNoise(scale=0.0), mf.ImuNoise(scale=0.05))
+    axes = swept(database, rasters, streets, noises=noises).plot()
+    assert axes.get_xlabel() == "standard deviation of the step scale"
+    assert ticks_of(axes) == ["0", "0.05"]
+    filters_alone = swept(database, rasters, streets)
+    axes = filters_alone.plot()
+    assert (axes.get_xlabel(), ticks_of(axes)) == ("filter", ["c", "again"])
+    at = {float(x) for line in axes.lines for x in line.get_xdata()}
+    assert at == {0.0, 1.0}
 
 
 def test_what_cannot_be_swept_is_refused(database, rasters, streets):
