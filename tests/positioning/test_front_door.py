@@ -68,6 +68,22 @@ def test_a_filter_is_given_by_options_or_name(filter_, database, track):
     pd.testing.assert_frame_equal(found.to_dataframe(), track.to_dataframe())
 
 
+def test_a_track_says_what_a_log_lacks_that_was_not_located(database):
+    walk = walk_log()
+    fixes = walk.truth[["time_s", "east_m", "north_m"]]
+    still = mf.make_log(walk.crs, radio=walk.radio, truth=walk.truth)
+    (note,) = mf.locate(still, database).log.notes
+    assert note.startswith("nothing is located: no motion (mf.read_log makes it of")
+    assert note.endswith("mf.locate_reports needs none)")
+    placed = mf.make_log(walk.crs, radio=walk.radio, gnss=fixes)
+    lost = mf.locate(placed, database, "candidate")
+    assert any("nothing is located: no motion" in one for one in lost.log.notes)
+    alone = mf.make_log(walk.crs, motion=walk.motion[:40])
+    notes = mf.locate(alone, database).log.notes
+    assert any("never converged in" in one for one in notes)
+    assert mf.locate(walk, database, "candidate").log.notes == walk.notes
+
+
 def test_a_score_has_the_error_of_each_epoch(track):
     score = mf.score(track, walk_log().truth)
     assert score.switched
