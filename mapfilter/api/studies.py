@@ -30,6 +30,8 @@ from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.evaluation.success import HEADING, READING, success_cells
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
+    GYRO_ERRORS,
+    NO_TURNS,
     NOISE_AXES,
     Radio,
     Reading,
@@ -217,7 +219,8 @@ def sweep(
     filters : mapping of str to options
         Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``.
     noises : sequence of ImuNoise, or one, optional
-        See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations.
+        See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations. Errors of a
+        gyro may differ only where a custom filter uses turns (``turns="gyro"``).
     routes, draws : int
         Routes, and runs on each of them with every noise.
     length_m : float
@@ -272,6 +275,7 @@ def sweep(
         )
         for noise, varied in _distinguished(items_of(several) or [ImuNoise()])
     ]
+    _check_turns(plans)
     network = _network(roads, rasters, "walking")
     named = named_by_plan(rasters, database.plan)
     world = SweepWorld.of(network, database.plan, {radio.name: named})
@@ -316,6 +320,19 @@ def _distinguished(
         (noise, tuple((f"imu.{name}", float(getattr(noise, name))) for name in other))
         for noise in noises
     ]
+
+
+def _check_turns(plans: Sequence[SweepPlan]) -> None:
+    """Refuse errors of turns in which noises differ, and which no filter uses."""
+    faults = Faults()
+    for name in GYRO_ERRORS:
+        given, used = (
+            {getattr(noise, name) for plan in group for noise in plan.noises}
+            for group in (plans, [plan.effective for plan in plans])
+        )
+        if len(given) > 1 and given != used:
+            faults.add(f"noises, {name}", "one value for all", "one without effect", NO_TURNS)
+    faults.raise_if_any(ConfigError)
 
 
 def _reports(value: object) -> Argument:

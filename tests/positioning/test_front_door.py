@@ -241,5 +241,8 @@ def test_what_cannot_be_swept_is_refused(database, rasters, streets):
         swept(database, rasters, streets, noises=(mf.ImuNoise(), mf.ImuNoise()))
     with pytest.raises(mf.MapfilterError, match="noises, turns: expected one value for all"):
         swept(database, rasters, streets, noises=(mf.ImuNoise(), mf.ImuNoise(turns="gyro")))
+    gyro = mf.ImuNoise(turns="gyro"), mf.ImuNoise(turns="gyro", gyro_bias_deg_per_s=1.0)
+    with pytest.raises(mf.MapfilterError, match=r"gyro_bias_deg_per_s: .*one without effect"):
+        swept(database, rasters, streets, noises=gyro)
     with pytest.raises(mf.MapfilterError, match="filters, mine: expected options, or the name"):
         mf.sweep(database, rasters, streets, {"mine": Recording})
