@@ -203,13 +203,14 @@ def generator(function: str, seed: int | np.random.Generator) -> np.random.Gener
     Raises
     ------
     ConfigError
-        The seed is neither a whole number >= 0 nor a generator.
+        The seed is neither a whole number >= 0 nor a generator. None would be another seed in each
+        call.
     """
-    try:
+    whole = Setting("seed", seed, WholeNumber)
+    if isinstance(seed, np.random.Generator) or whole.accepts(seed):
         return np.random.default_rng(seed)
-    except (TypeError, ValueError):
-        expected = "a whole number >= 0 or a numpy.random.Generator"
-        raise fail(ConfigError, f"{function}, seed", expected, shown(seed)) from None
+    expected = f"{whole.expected} or a numpy.random.Generator"
+    raise fail(ConfigError, f"{function}, seed", expected, shown(seed))
 
 
 def shown(value: object) -> str:

@@ -14,7 +14,7 @@ import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass, replace
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ from mapfilter.positioning.filter import Filter, estimate_of, kinds_of, locate, 
 from mapfilter.positioning.locators import as_filter
 from mapfilter.tracks.log import TrackLog
 
+_ROUNDING = 1e-9
 _PLACE = ("east_m", "north_m", "covariance_m2")
 _TRACKED = {Status.TRACKING, Status.UNCERTAIN}
 _ORDER = {
@@ -95,10 +96,12 @@ def check_filter(
     Raises
     ------
     ContractError
-        With the clause that is broken: a fix for every epoch, statuses in order, radii that grow,
-        finite positions once converged, states that are never changed in place, an epoch without
-        measurements that moves nothing, a result that only the generator decides, one epoch at a
-        time the same as the whole log, functions that return what they have to.
+        With the clause that is broken: a fix for every epoch, statuses in order, covariances that
+        are symmetric without negative eigenvalues, radii that grow and, as protection levels, are
+        not negative, shares between 0 and 1, finite positions once converged, states that are never
+        changed in place, an epoch without measurements that moves nothing, a result that only the
+        generator decides, one epoch at a time the same as the whole log, functions that return what
+        they have to.
     ConfigError
         The code of a custom filter ends in an error, with its file and line.
     """
@@ -126,7 +129,12 @@ def _check_filter(filter_: Any, database: RadioRouteDatabase, log: TrackLog, see
     merged = epochs(log)
     if len(merged) < 10:
         raise ValueError("a log of at least ten epochs")
-    replayed = locate(log, bound, np.random.default_rng(seed)).estimate
+    try:
+        replayed = locate(log, bound, np.random.default_rng(seed)).estimate
+    except (TypeError, ValueError):
+        # Of arrays in other shapes no estimate can be made; step by step their clause is named.
+        _step_by_step(bound, merged, kinds_of(log), seed)
+        raise
     again = locate(log, as_filter(filter_, database), np.random.default_rng(seed)).estimate
     _require(same(replayed, again), "the generator alone decides the result")
     outputs = _step_by_step(bound, merged, kinds_of(log), seed)
@@ -166,13 +174,36 @@ def _check_output(output: StepOutput, epoch: Epoch, last: Status) -> None:
     known = np.isfinite([fix.east_m, fix.north_m])
     if fix.status is not Status.SEARCHING:
         _require(bool(known.all()), "a filter that has converged gives a position")
+    _require(known[0] == known[1], "east and north are both known, or neither")
+    _check_spread(fix.covariance_m2, fix.radii_m)
     radii = fix.radii_m[np.isfinite(fix.radii_m)]
-    _require(bool(np.all(np.diff(radii) >= 0)), "radii for 50, 67 and 95 % do not shrink")
     wide = not fix.radius_99_m < radii.max(initial=0.0)
     _require(wide, "the radius for 99 % is not below that for 95 %")
     _require(not fix.protection_m < 0, "a protection level is not negative")
+    _require(fix.hypotheses >= 0, "hypotheses are counted from 0")
+    for name in ("mass_50m", "way_probability"):
+        outside = not -_ROUNDING <= getattr(fix, name) <= 1 + _ROUNDING
+        _require(not outside or isnan(getattr(fix, name)), f"{name} lies between 0 and 1")
     for reading in output.unused:
         _require(reading.reason is not Reason.USED, "unused readings have a reason")
+
+
+def _check_spread(covariance_m2: Any, radii_m: Any) -> None:
+    """Check a covariance, and radii for 50, 67 and 95 %, where they are known."""
+    _require(np.shape(covariance_m2) == (2, 2), "covariance_m2 has the shape (2, 2)")
+    _require(np.shape(radii_m) == (3,), "radii_m has the shape (3,)")
+    covariance = np.asarray(covariance_m2, dtype=np.float64)
+    if np.isfinite(covariance).all():
+        # Beliefs of an area come with variances of millions of square metres.
+        size = 1.0 + float(np.abs(covariance).max())
+        skew = float(abs(covariance[0, 1] - covariance[1, 0]))
+        _require(skew <= _ROUNDING * size, "covariance_m2 is symmetric")
+        least = float(np.linalg.eigvalsh(covariance).min())
+        _require(least >= -_ROUNDING * size, "covariance_m2 has no negative eigenvalue")
+    radii = np.asarray(radii_m, dtype=np.float64)
+    radii = radii[np.isfinite(radii)]
+    _require(bool(np.all(radii >= 0)), "radii are not negative")
+    _require(bool(np.all(np.diff(radii) >= 0)), "radii for 50, 67 and 95 % do not shrink")
 
 
 def _check_idle(bound: Filter[Any], state: Any, output: StepOutput, epoch: Epoch) -> None:
@@ -209,10 +240,10 @@ def check_belief_filter(
     Raises
     ------
     ContractError
-        With the clause that is broken: types, statuses in order, estimates with a positive
-        covariance and growing radii, beliefs, readings and prior that are never changed in place,
-        steps of unknown length or of length 0 that change nothing, results that only the generator
-        decides.
+        With the clause that is broken: types, statuses in order, estimates with a symmetric
+        covariance without negative eigenvalues and growing radii, beliefs, readings and prior that
+        are never changed in place, steps of unknown length or of length 0 that change nothing,
+        results that only the generator decides.
     """
     if len(motions) < 10 or len(readings) != len(motions):
         raise ValueError("at least ten steps, and one reading (or None) for each")
@@ -273,16 +304,9 @@ def _follow(
 
 def _check_estimate(located: Any) -> None:
     _require(isinstance(located, Estimate), "locate returns an Estimate")
-    _require(np.shape(located.covariance_m2) == (2, 2), "covariance_m2 has the shape (2, 2)")
-    _require(np.shape(located.radii_m) == (3,), "radii_m has the shape (3,)")
     known = isfinite(located.east_m)
     _require(known == isfinite(located.north_m), "east and north are both known, or neither")
-    if known and np.all(np.isfinite(located.covariance_m2)):
-        least = float(np.linalg.eigvalsh(located.covariance_m2).min())
-        _require(least >= -1e-9, "covariance_m2 has no negative eigenvalue")
-    radii_m = np.asarray(located.radii_m)
-    finite = bool(np.all(np.isfinite(radii_m)))
-    _require(not finite or bool(np.all(np.diff(radii_m) >= 0)), "radii_m grow with their share")
+    _check_spread(located.covariance_m2, located.radii_m)
 
 
 def _require(holds: bool, clause: str) -> None:

@@ -13,18 +13,20 @@ import pandas as pd
 from mapfilter._arguments import Argument, Setting, check_arguments, generator
 from mapfilter.api.given import database_argument, log_argument, opened, read
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
 from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.integrity import DEFAULT_RISK
 from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
+from mapfilter.positioning.log_lacks import NO_MOTION, advice_of, lack_of_log
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.placeless import in_frame
+from mapfilter.tracks.tables import tidy_table
 from mapfilter.viewing.notebook import View
 from mapfilter.viewing.runs import ViewedRun
 from mapfilter.viewing.trace import TraceRecorder
@@ -141,7 +143,8 @@ def locate(
         filter (see the page "Extending"). The Bayes map filter when left out. What the log states
         takes the place of defaults: the step of timing advance by technology, and of levels; turns
         without headings, at a vehicle's speed, are a vehicle's. A log of motion alone is located by
-        the streets alone.
+        the streets alone. The notes of the track's ``log`` say so, and what is lacking where
+        nothing was located.
     seed : int or numpy.random.Generator
         Equal logs, databases, options and seeds give equal bytes.
     ways : bool
@@ -187,7 +190,25 @@ def locate(
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     trace = TraceRecorder(bound) if record else None
     found = loop.locate(log, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)
+    notes = _not_located(log, options, found.estimate, database)
+    if alone or not database.cell_ids:
+        notes += advice_of(log, options, found.estimate)
+    log = replace(log, notes=(*log.notes, *notes)) if notes else log
     return Track(found, log, database, trace)
+
+
+def _not_located(
+    log: TrackLog, options: Any, estimate: TrackEstimate, database: RadioRouteDatabase
+) -> tuple[str, ...]:
+    """Return a note on what a log lacks that was not located, with a remedy."""
+    lack = lack_of_log(log, options, estimate, database)
+    remedies = []
+    if NO_MOTION in lack and max(len(log.gnss), len(log.truth)) > 1:
+        remedies.append("mf.read_log makes it of a recording's positions with course_motion=True")
+    if NO_MOTION in lack and len(log.radio):
+        remedies.append("mf.locate_reports needs none")
+    remedy = f" ({'; '.join(remedies)})" if remedies else ""
+    return (f"nothing is located: {lack}{remedy}",) if lack else ()
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -230,12 +251,14 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
     ----------
     truth : DataFrame or Truth
         Columns ``time_s``, ``east_m`` and ``north_m``, as the table ``truth`` of a log, in the CRS
-        of the track.
+        of the track. As in :func:`mapfilter.make_log`, rows are sorted by time, and exact
+        duplicates dropped.
 
     Raises
     ------
     InputError
-        The ground truth has fewer than two positions, or lacks a column.
+        The ground truth has fewer than two positions, lacks a column, or has values that no log may
+        have, such as NaN.
     ConfigError
         There is no track, or no table of ground truth.
     """
@@ -250,7 +273,10 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
         if lacking:
             expected = "columns time_s, east_m and north_m"
             raise fail(InputError, "truth", expected, ", ".join(map(str, truth.columns)))
-        known = Truth.of_table(truth)
+        faults = Faults()
+        tidy, _ = tidy_table("truth", truth, "truth", faults)
+        faults.raise_if_any(InputError)
+        known = Truth.of_table(tidy)
         if known is None:
             raise fail(InputError, "truth", "two positions or more", len(truth))
         truth = known

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from html import escape
 from math import nan
 from pathlib import Path
@@ -27,9 +27,11 @@ from mapfilter._arguments import (
 from mapfilter.api.given import database_argument, opened
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.evaluation.success import success_cells
+from mapfilter.evaluation.success import HEADING, READING, success_cells
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
+    GYRO_ERRORS,
+    NO_TURNS,
     NOISE_AXES,
     Radio,
     Reading,
@@ -38,6 +40,7 @@ from mapfilter.experiments.sweep.plan import (
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.options import Positive
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.cells import CellPlan
@@ -161,23 +164,33 @@ class Sweep:
         return f"<p>{escape(repr(self))}</p>{self.to_dataframe().head(20).to_html()}"
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return success rates with 95 % intervals and mean errors, one row for each grid cell."""
-        return pd.DataFrame([asdict(cell) for cell in success_cells(self.runs)])
+        """Return success rates with 95 % intervals and mean errors, one row for each grid cell.
+
+        Columns are those of :class:`mapfilter.evaluation.success.SuccessCell`, with one for each
+        varied option in place of ``varied``, named by its key as in ``runs``.
+        """
+        return pd.DataFrame([cell.row for cell in success_cells(self.runs)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw success over the deviation of headings.
+        """Draw success over the deviation of headings, or over another value that differs.
 
-        There is a curve for each filter, and for each other noise or option that differs.
+        There is a curve for each filter, and for each other noise or option that differs. With one
+        deviation of headings the first of these is drawn along the axis; where nothing but the
+        filters differs, they stand side by side.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; a new figure when left out.
         """
-        from mapfilter.report.success import plot_success_curves, success_curves
+        from mapfilter.report.success import curve_axis, plot_success_curves, success_curves
 
-        curves = success_curves(success_cells(self.runs))
-        return plot_success_curves(curves, ax, title="Success over the noise of headings")
+        cells = success_cells(self.runs)
+        axis = curve_axis(cells)
+        title = "Success of filters" if axis == READING else f"Success over {axis}"
+        if axis == HEADING:
+            title = "Success over the noise of headings"
+        return plot_success_curves(success_curves(cells, axis), ax, title=title, axis=axis)
 
 
 def sweep(
@@ -206,7 +219,8 @@ def sweep(
     filters : mapping of str to options
         Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``.
     noises : sequence of ImuNoise, or one, optional
-        See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations.
+        See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations. Errors of a
+        gyro may differ only where a custom filter uses turns (``turns="gyro"``).
     routes, draws : int
         Routes, and runs on each of them with every noise.
     length_m : float
@@ -261,6 +275,7 @@ def sweep(
         )
         for noise, varied in _distinguished(items_of(several) or [ImuNoise()])
     ]
+    _check_turns(plans)
     network = _network(roads, rasters, "walking")
     named = named_by_plan(rasters, database.plan)
     world = SweepWorld.of(network, database.plan, {radio.name: named})
@@ -278,7 +293,8 @@ def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
                 f"filters, {name}", expected, type(options).__name__, "custom filters by name"
             )
         else:
-            found.append(Reading(name, options))
+            own_m = options.update_length_m if isinstance(options, CandidateFilter) else nan
+            found.append(Reading(name, options, float(own_m)))
     faults.raise_if_any(ConfigError)
     return tuple(found)
 
@@ -304,6 +320,19 @@ def _distinguished(
         (noise, tuple((f"imu.{name}", float(getattr(noise, name))) for name in other))
         for noise in noises
     ]
+
+
+def _check_turns(plans: Sequence[SweepPlan]) -> None:
+    """Refuse errors of turns in which noises differ, and which no filter uses."""
+    faults = Faults()
+    for name in GYRO_ERRORS:
+        given, used = (
+            {getattr(noise, name) for plan in group for noise in plan.noises}
+            for group in (plans, [plan.effective for plan in plans])
+        )
+        if len(given) > 1 and given != used:
+            faults.add(f"noises, {name}", "one value for all", "one without effect", NO_TURNS)
+    faults.raise_if_any(ConfigError)
 
 
 def _reports(value: object) -> Argument:

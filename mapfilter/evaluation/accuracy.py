@@ -29,6 +29,7 @@ RADII = (50, 67, 95, 99)
 GAP_S, GAP_M = 30.0, 50.0
 """Between true positions that are farther apart than both, nobody knows the way."""
 
+_COLUMNS = ("time_s", "east_m", "north_m")
 _CLAIMS = (Status.CONVERGED, Status.TRACKING)
 _WINDOW_M = 100.0
 
@@ -49,10 +50,16 @@ class Truth:
 
     @classmethod
     def of_table(cls, table: pd.DataFrame) -> Truth | None:
-        """Return the ground truth in a log's table ``truth``; None below two positions."""
+        """Return the ground truth in a log's table ``truth``; None below two positions.
+
+        Rows are sorted by time and repeated ones dropped, as in a log.
+        """
+        table = table[list(_COLUMNS)]
+        if not (np.diff(table["time_s"].to_numpy(np.float64)) > 0).all():
+            table = table.drop_duplicates().sort_values("time_s", kind="stable")
         if len(table) < 2:
             return None
-        return cls(*(table[name].to_numpy(np.float64) for name in ("time_s", "east_m", "north_m")))
+        return cls(*(table[name].to_numpy(np.float64) for name in _COLUMNS))
 
     def at(self, time_s: ArrayLike) -> tuple[Floats, Floats]:
         """Return true positions at other times by linear interpolation; NaN outside the record."""

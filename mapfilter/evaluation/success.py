@@ -20,6 +20,9 @@ _Z_95 = 1.959963984540054
 HEADING = "sigma_orient_deg"
 """The coordinate over which tables and figures show success."""
 
+READING = "reading"
+"""The coordinate that names filters."""
+
 
 def wilson_interval(successes: int, runs: int, z: float = _Z_95) -> tuple[float, float]:
     """Return the Wilson score interval of a share (Wilson 1927); (0, 1) without any run.
@@ -254,6 +257,13 @@ class SuccessCell:
     def place(self) -> dict[str, Any]:
         """Coordinates in the grid, varied options included."""
         return {name: getattr(self, name) for name in COORDINATES} | self.varied
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """Coordinates, varied options included, then counts and figures: a row of a table."""
+        figures = {one.name: getattr(self, one.name) for one in fields(self)}
+        del figures["varied"]
+        return self.place | figures
 
 
 COORDINATES = tuple(

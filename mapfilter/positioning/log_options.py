@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from math import hypot
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
+from annotated_types import Ge, Le
 
 from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.street_motion import MotionErrors
+from mapfilter.options import Options
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
@@ -28,6 +30,48 @@ _LONG_ROW_M = 15.0
 """Rows that are usually longer are no steps, whatever their speed."""
 
 
+@dataclass(frozen=True, slots=True)
+class LogStatement(Options):
+    """What a log states, for a live application, which has no log yet.
+
+    Parameters
+    ----------
+    technology : {"GSM", "LTE"} or None
+        Of all timing advances, which gives their step; None where unknown, or of several kinds.
+    level_step_db : float
+        Step of levels inside their scale, such as the width of a bar; 0 for none.
+    vehicle : bool or None
+        Whether motion is a vehicle's, such as of its wheels; None where unknown.
+    """
+
+    technology: Literal["GSM", "LTE"] | None = None
+    level_step_db: Annotated[float, Ge(0), Le(60)] = 0.0
+    vehicle: bool | None = None
+
+    @classmethod
+    def of_log(cls, log: TrackLog) -> LogStatement:
+        """Return what a log states."""
+        return cls(_timing_technology(log), level_step_db(log), log.vehicle)
+
+
+def fitted_to_statement(
+    options: OptionsT, stated: LogStatement
+) -> tuple[OptionsT, tuple[str, ...]]:
+    """Return options with what is stated in place of defaults, and notes on the changes.
+
+    With the statement of a log these are the options by which that log is located, unless
+    :func:`fitted_to_log` takes more from it: measured errors of motion, and the signs of a vehicle.
+
+    Examples
+    --------
+    >>> options, notes = fitted_to_statement(BayesFilter(), LogStatement(technology="LTE"))
+    >>> round(options.timing_step_m, 2), notes
+    (78.07, ('timing advance: steps of 78.07 m, by technology',))
+    """
+    changes, notes = _stated_changes(options, stated)
+    return _changed(options, changes), tuple(notes)
+
+
 def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str, ...]]:
     """Return options with what a log states in place of defaults, and notes on the changes.
 
@@ -43,21 +87,9 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
     not changed.
     """
     default = _defaults(options)
-    changes: dict[str, Any] = {}
-    notes = []
-    step_m = timing_step_m(log)
-    # The default is that of GSM, rounded to 0.1 m.
-    other = step_m is not None and abs(step_m - default.get("timing_step_m", step_m)) > 1.0
-    if other and _is_default(options, default, "timing_step_m"):
-        changes["timing_step_m"] = step_m
-        notes.append(f"timing advance: steps of {step_m:.2f} m, by technology")
-    step_db = level_step_db(log)
-    if step_db > 0 and _is_default(options, default, "level_error_db"):
-        error_db = hypot(default["level_error_db"], step_db / 12**0.5)
-        changes["level_error_db"] = error_db
-        notes.append(f"levels in steps of {step_db:g} dB: level_error_db = {error_db:.2f}")
-    if _is_default(options, default, "vehicle"):
-        vehicle, note = _whose_motion(log)
+    changes, notes = _stated_changes(options, LogStatement.of_log(log))
+    if log.vehicle is None and has_default(options, "vehicle"):
+        vehicle, note = _motion_by_signs(log)
         if vehicle is not None:
             changes["vehicle"] = vehicle
         notes += [note] if note else []
@@ -68,7 +100,7 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
     measured = {
         name: value
         for name, value in stated.items()
-        if _is_default(options, default, name) and value != default[name]
+        if has_default(options, name) and value != default[name]
     }
     if measured:
         shown = ", ".join(
@@ -76,9 +108,40 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         )
         notes.append(f"errors of motion as the log states them: {shown}")
         changes |= measured
-    if not changes:
-        return options, tuple(notes)
-    return replace(options, **changes), tuple(notes)  # type: ignore[type-var]
+    return _changed(options, changes), tuple(notes)
+
+
+def _stated_changes(options: Any, stated: LogStatement) -> tuple[dict[str, Any], list[str]]:
+    """Return which fields take other values by a statement, and notes on them."""
+    default = _defaults(options)
+    changes: dict[str, Any] = {}
+    notes = []
+    step_m = TIMING_STEP_M.get(stated.technology or "")
+    # The default is that of GSM, rounded to 0.1 m.
+    other = step_m is not None and abs(step_m - default.get("timing_step_m", step_m)) > 1.0
+    if other and has_default(options, "timing_step_m"):
+        changes["timing_step_m"] = step_m
+        notes.append(f"timing advance: steps of {step_m:.2f} m, by technology")
+    step_db = stated.level_step_db
+    if step_db > 0 and has_default(options, "level_error_db"):
+        error_db = hypot(default["level_error_db"], step_db / 12**0.5)
+        changes["level_error_db"] = error_db
+        notes.append(f"levels in steps of {step_db:g} dB: level_error_db = {error_db:.2f}")
+    if stated.vehicle is not None and has_default(options, "vehicle"):
+        whose = "a vehicle's" if stated.vehicle else "no vehicle's"
+        changes["vehicle"] = stated.vehicle
+        notes.append(f"motion: {whose}, as the log states it (filter.bayes.vehicle)")
+    return changes, notes
+
+
+def has_default(options: Any, name: str) -> bool:
+    """Return whether options have a field, and it has its default."""
+    default = _defaults(options)
+    return name in default and bool(getattr(options, name) == default[name])
+
+
+def _changed(options: OptionsT, changes: dict[str, Any]) -> OptionsT:
+    return replace(options, **changes) if changes else options  # type: ignore[type-var]
 
 
 def by_streets_alone(options: object, log: TrackLog, database: RadioRouteDatabase) -> bool:
@@ -94,11 +157,8 @@ def by_streets_alone(options: object, log: TrackLog, database: RadioRouteDatabas
     return bool(database.cell_ids and moved) and all(table.empty for table in measured)
 
 
-def _whose_motion(log: TrackLog) -> tuple[bool | None, str]:
+def _motion_by_signs(log: TrackLog) -> tuple[bool | None, str]:
     """Return whether motion is a vehicle's, None where nothing speaks for one, and a note."""
-    if log.vehicle is not None:
-        whose = "a vehicle's" if log.vehicle else "no vehicle's"
-        return log.vehicle, f"motion: {whose}, as the log states it (filter.bayes.vehicle)"
     signs = vehicle_signs(log)
     if signs is None:
         fault = speed_fault(log.motion) if log.imu is None else ""
@@ -174,15 +234,15 @@ def _median(values: Floats) -> float:
     return float(np.median(values)) if values.size else 0.0
 
 
-def timing_step_m(log: TrackLog) -> float | None:
-    """Return the step of all timing advances of a log; None where unknown, or of several kinds."""
+def _timing_technology(log: TrackLog) -> Literal["GSM", "LTE"] | None:
+    """Return the technology of all timing advances; None where unknown, or of several kinds."""
     if "technology" not in log.radio:
         return None
     of = log.radio["technology"][log.radio["timing_advance"].notna().to_numpy()]
-    families = set(of.dropna())
-    if of.isna().any() or len(families) != 1:
+    if of.isna().any():
         return None
-    return TIMING_STEP_M.get(families.pop())
+    families = set(of)
+    return "GSM" if families == {"GSM"} else "LTE" if families == {"LTE"} else None
 
 
 def level_step_db(log: TrackLog) -> float:
@@ -198,7 +258,3 @@ def _defaults(options: Any) -> dict[str, Any]:
     if not hasattr(type(options), "__dataclass_fields__"):
         return {}
     return {one.name: one.default for one in fields(options)}
-
-
-def _is_default(options: Any, default: dict[str, Any], name: str) -> bool:
-    return name in default and bool(getattr(options, name) == default[name])

@@ -10,8 +10,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
-from mapfilter.evaluation.success import HEADING, SuccessCell, axes_of
+from mapfilter.evaluation.success import HEADING, READING, SuccessCell, axes_of
 from mapfilter.report.canvas import (
     BLACK,
     GREY,
@@ -31,6 +32,19 @@ from mapfilter.report.canvas import (
 _SIZE_IN = (8.4, 5.2)
 _RUNS_SIZE_IN = (11.0, 4.6)
 _FARTHEST_M = 200.0
+_MOST_TICKS = 8
+_LABELS = {
+    HEADING: "standard deviation of the heading / °",
+    "sigma_trans_m": "standard deviation of a step / m",
+    "bias_sd_deg": "standard deviation of the heading's constant error / °",
+    "drift_deg_per_sqrt_s": "random walk of the heading error / (°/√s)",
+    "scale": "standard deviation of the step scale",
+    "prediction_error_db": "error of the predicted levels / dB",
+    "report_period_s": "time between reports / s",
+    "imu_period_s": "time between rows of dead reckoning / s",
+    "update_length_m": "length of updates / m",
+    READING: "filter",
+}
 _UNITS = {
     "prediction_error_db": "prediction error {:g} dB",
     "report_period_s": "reports every {:g} s",
@@ -54,13 +68,29 @@ def place_words(at: Mapping[str, Any], axes: Iterable[str]) -> Iterator[str]:
             yield f"{axis} {at[axis]:g}"
 
 
-def success_curves(cells: Sequence[SuccessCell]) -> list[tuple[str, list[SuccessCell]]]:
-    """Return the curves of a grid over the noise of headings, each with its name.
+def curve_axis(cells: Sequence[SuccessCell]) -> str:
+    """Return the coordinate over which the curves of a grid are drawn.
 
-    Cells of one curve differ in that noise alone; filters name the curves, and the other
+    The noise of headings where it differs, else the first number that does for cells of one filter;
+    ``reading`` where there is none.
+    """
+    axes = axes_of(cells, by_reading=True)
+    if not axes or HEADING in axes:
+        return HEADING
+    numbers = [axis for axis in axes if axis in _UNITS or "." in axis]
+    known = [axis for axis in numbers if all(pd.notna(cell.place[axis]) for cell in cells)]
+    return known[0] if known else READING
+
+
+def success_curves(
+    cells: Sequence[SuccessCell], over: str = HEADING
+) -> list[tuple[str, list[SuccessCell]]]:
+    """Return the curves of a grid over one of its coordinates, each with its name.
+
+    Cells of one curve differ in that coordinate alone; filters name the curves, and the other
     coordinates in which cells of one filter differ.
     """
-    axes = [axis for axis in axes_of(cells, by_reading=True) if axis.split(".")[-1] != HEADING]
+    axes = [one for one in axes_of(cells, by_reading=True) if over not in (one, one.split(".")[-1])]
     curves: dict[str, list[SuccessCell]] = {}
     for cell in cells:
         name = ", ".join([cell.reading, *place_words(cell.place, axes)])
@@ -76,8 +106,9 @@ def plot_success_curves(
     title: str,
     claims: Sequence[tuple[float, float]] = (),
     claimant: str = "",
+    axis: str = HEADING,
 ) -> Axes:
-    """Draw a curve of success over the deviation of headings for each of several groups.
+    """Draw a curve of success over a coordinate of the grid for each of several groups.
 
     Parameters
     ----------
@@ -88,6 +119,9 @@ def plot_success_curves(
         headings in degrees, the first. Drawn as steps; what lies above them agrees.
     claimant : str
         Who claims, for the legend.
+    axis : str
+        The coordinate, as :func:`curve_axis` returns it. Over ``reading`` the curves, of one cell
+        each, stand side by side.
     """
     axes = single_axes(ax, *_SIZE_IN)
     words = ", ".join(f"over {100 * share:.0f} % up to {deg:g}°" for deg, share in claims)
@@ -98,24 +132,51 @@ def plot_success_curves(
         end = Look(marker="|", markersize=11, markeredgewidth=2.6)
         axes.plot([deg], [100 * share], color=BLACK, zorder=4, **end)
         name = None
-    # Bars of curves that lie on each other stand side by side.
-    widest = max((c.sigma_orient_deg for _, cells in curves for c in cells), default=1.0)
-    apart = min(0.012, 0.06 / max(len(curves), 1)) * max(widest, 1.0)
-    shifts = apart * (np.arange(len(curves)) - (len(curves) - 1) / 2)
+    places, shifts = _across(curves, axis)
     bars = {"marker": "o", "markersize": 4, "linewidth": 1.4, "elinewidth": 0.9, "capsize": 2}
     colours = distinct_colours(len(curves))
-    for (label, cells), shift, colour in zip(curves, shifts, colours, strict=True):
-        ordered = sorted(cells, key=lambda cell: cell.sigma_orient_deg)
+    for (label, cells), at, shift, colour in zip(curves, places, shifts, colours, strict=True):
+        order = np.argsort(at, kind="stable")
+        ordered = [cells[index] for index in order]
         success = np.array([cell.success for cell in ordered])
         error = success - [c.low for c in ordered], [c.high for c in ordered] - success
-        at = np.array([cell.sigma_orient_deg for cell in ordered]) + shift
         look = Look(yerr=100 * np.abs(np.array(error)), color=colour, label=label) | bars
-        axes.errorbar(at, 100 * success, **look)
-    axes.set(xlabel="standard deviation of the heading / °", ylim=(0, 102), title=title)
+        axes.errorbar(at[order] + shift, 100 * success, **look)
+    axes.set(xlabel=_LABELS.get(axis, axis), ylim=(0, 102), title=title)
+    if axis != HEADING:
+        _mark(axes, [name for name, _ in curves], places, axis)
     axes.set_ylabel("successful global positioning / %")
     tidy(axes)
     legend(axes, ax, 3)
     return axes
+
+
+def _across(curves: Sequence[tuple[str, Sequence[SuccessCell]]], axis: str) -> tuple[Any, Any]:
+    """Return the places of each curve's cells, and its shift.
+
+    Bars of curves that lie on each other stand side by side.
+    """
+    if axis == READING:
+        return [np.full(len(cells), float(n)) for n, (_, cells) in enumerate(curves)], np.zeros(
+            len(curves)
+        )
+    places = [np.array([float(cell.place[axis]) for cell in cells]) for _, cells in curves]
+    every = np.concatenate([*places, [0.0]])
+    # Headings are drawn from 0 degrees on.
+    widest = max(float(every.max()), 1.0) if axis == HEADING else float(np.ptp(every[:-1]))
+    apart = min(0.012, 0.06 / max(len(curves), 1)) * widest
+    return places, apart * (np.arange(len(curves)) - (len(curves) - 1) / 2)
+
+
+def _mark(axes: Axes, names: Sequence[str], places: Sequence[Floats], axis: str) -> None:
+    """Put a tick at each value that was simulated, or at each name, while they can be read."""
+    if axis == READING:
+        axes.set_xticks(range(len(names)), names)
+        axes.set_xlim(-0.5, max(len(names), 1) - 0.5)
+        return
+    values = np.unique(np.concatenate(places)).tolist()
+    if len(values) <= _MOST_TICKS:
+        axes.set_xticks(values, [f"{value:g}" for value in values])
 
 
 @styled

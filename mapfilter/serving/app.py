@@ -18,6 +18,7 @@ from mapfilter.serving.documents import RequestError, one_fault, read_object
 from mapfilter.serving.door import PAGES, SAFE, Door, json_answer, no_route, read_body
 from mapfilter.serving.epoch_rows import MOST_EPOCHS
 from mapfilter.serving.events import EventStream, json_bytes
+from mapfilter.serving.filters import LOG, statement_document
 from mapfilter.serving.geolocate import Geolocator
 from mapfilter.serving.limits import ServiceLimits
 from mapfilter.serving.live_page import LivePage
@@ -78,7 +79,7 @@ class Service:
         found = {
             "service": "mapfilter",
             "version": VERSION,
-            "crs": self.sessions.positioner.crs,
+            "crs": self.sessions.filters.usual.positioner.crs,
             "sessions": len(self.sessions.all),
             "geolocate": self.geolocator is not None,
         }
@@ -91,7 +92,9 @@ class Service:
     async def _create(self, request: Request) -> Response:
         session = await self.sessions.create(await self._document(request))
         place = {"location": f"/sessions/{session.id}"}
-        return json_answer({**_shown(session), "seed": session.seed}, 201, place)
+        notes = (await self.sessions.filter_of(session)).notes
+        found = {**_shown(session), "seed": session.seed, "notes": list(notes)}
+        return json_answer(found, 201, place)
 
     async def _show(self, request: Request) -> Response:
         session = self._session(request)
@@ -111,8 +114,9 @@ class Service:
                 most = f"at most {MOST_EPOCHS} entries"
                 raise one_fault("epochs", most, len(epochs), "several requests")
             request.state.door.charge(request, len(epochs) - 1, again=1.0)
-        fixes = await self.sessions.post(session, document)
-        return _with_fixes(_shown(session), fixes, "fixes")
+        found = await self.sessions.post(session, document)
+        value = {**_shown(session), "notes": list(found.notes)}
+        return _with_fixes(value, found.fixes, "fixes")
 
     async def _events(self, request: Request) -> EventStream:
         detail = request.query_params.get(_DETAIL) == "1"
@@ -156,6 +160,7 @@ def _shown(session: Session) -> dict[str, Any]:
         "id": session.id,
         "name": session.name,
         "began_utc_s": session.began_utc_s,
+        LOG: statement_document(session.stated),
         "epochs": session.epochs,
         "time_s": session.time_s if math.isfinite(session.time_s) else None,
         "saved_time_s": session.saved_time_s if math.isfinite(session.saved_time_s) else None,

@@ -10,7 +10,7 @@ from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch, epoch_columns, make_epoch
-from mapfilter.radio.identities import LIMITS
+from mapfilter.radio.identities import LIMITS, TIMING_STEP_M
 from mapfilter.serving.documents import (
     RequestError,
     check_keys,
@@ -42,7 +42,9 @@ _LEAST_PLACE_M, _MOST_PLACE_M = 2.0e7, 5.5e7
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
 
 
-def read_epochs(document: Mapping[str, Any], names: PlanNames, after_s: float) -> list[Epoch]:
+def read_epochs(
+    document: Mapping[str, Any], names: PlanNames, after_s: float, technology: str = ""
+) -> list[Epoch]:
     """Return the epochs of a request, in the order of their times.
 
     Parameters
@@ -54,6 +56,8 @@ def read_epochs(document: Mapping[str, Any], names: PlanNames, after_s: float) -
         Gives cells the ids of the database.
     after_s : float
         Time of the last epoch before; NaN for none.
+    technology : str
+        Whose timing advances are read; those that state another are a fault. Empty for any.
 
     Raises
     ------
@@ -72,7 +76,8 @@ def read_epochs(document: Mapping[str, Any], names: PlanNames, after_s: float) -
         low, high = _TIME.low, _TIME.high
         time_s = number(one.get("time_s"), f"{where}.time_s", _TIME.expected, faults, low, high)
         rows = {
-            name: _rows(name, one.get(name), f"{where}.{name}", names, faults) for name in _TABLES
+            name: _rows(name, one.get(name), f"{where}.{name}", names, faults, technology)
+            for name in _TABLES
         }
         if time_s is not None:
             if found and time_s <= found[-1].time_s:
@@ -89,7 +94,7 @@ def read_epochs(document: Mapping[str, Any], names: PlanNames, after_s: float) -
 
 
 def _rows(
-    table: str, given: object, where: str, names: PlanNames, faults: Faults
+    table: str, given: object, where: str, names: PlanNames, faults: Faults, technology: str
 ) -> list[tuple[Any, ...]]:
     found: dict[tuple[Any, ...], None] = {}
     for index, row in enumerate(rows_of(given, where, faults, _MOST_ROWS)):
@@ -101,6 +106,8 @@ def _rows(
             for name, column in _COLUMNS[table].items()
         }
         _CHECKS.get(table, _nothing)(values, place, faults)
+        if table == "radio" and technology:
+            _check_steps(values, technology, place, faults)
         if len(faults.found) > before:
             continue
         if table == "radio":
@@ -149,6 +156,18 @@ def _check_radio(values: Mapping[str, Any], where: str, faults: Faults) -> None:
     for name, most in LIMITS.get(family or "", {}).items():
         if values[name] is not None and values[name] > most:
             faults.add(f"{where}.{name}", f"0..{most} in {family}", values[name])
+
+
+def _check_steps(values: Mapping[str, Any], read: str, where: str, faults: Faults) -> None:
+    """Note a timing advance in steps that the session does not read: its distance is another."""
+    family = values["technology"]
+    if values["timing_advance"] is None or family in (None, read):
+        return
+    hint = "leave it out"
+    if family in TIMING_STEP_M:
+        hint = f'begin a session with "log": {{"technology": "{family}"}}, or leave it out'
+    expected = f"steps of {read}, as the session reads them"
+    faults.add(f"{where}.timing_advance", expected, f"those of {shown(family)}", hint)
 
 
 def _check_gnss(values: Mapping[str, Any], where: str, faults: Faults) -> None:

@@ -10,6 +10,7 @@ from math import nan
 from typing import Any
 
 from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.log_options import LogStatement
 from mapfilter.serving.events import Channel
 
 _EMPTY_STATE_BYTES = 20_000
@@ -64,6 +65,8 @@ class Session:
         None while it is on disk only.
     saved_epochs : int
         Epochs that are on disk; -1 for nothing.
+    stated : LogStatement
+        What the device's log states, which its filter is fitted to.
     """
 
     id: str
@@ -83,6 +86,7 @@ class Session:
     fault_told: bool = False
     lock: asyncio.Lock = field(default_factory=asyncio.Lock)
     channel: Channel = field(default_factory=Channel)
+    stated: LogStatement = field(default_factory=LogStatement)
 
     def take(self, progress: Progress) -> None:
         """Replace what is known by what is new."""

@@ -1,6 +1,7 @@
 """Sessions: one filter state for each device, in memory and, where there is a folder, saved.
 
-The filter, and with it the map of the area, is shared by all sessions. A session's state is the
+The map of the area is shared by all sessions, and a filter by those whose logs state the same
+(:mod:`mapfilter.serving.filters`). A session's state is the
 frozen state of the filter and its random generator. A request of several epochs counts as a whole
 or not at all.
 """
@@ -16,13 +17,18 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, TypeVar
 
-from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.errors import Faults
 from mapfilter.serving.documents import RequestError
+from mapfilter.serving.filters import (
+    SessionFilter,
+    SessionFilters,
+    statement_document,
+    statement_of,
+)
 from mapfilter.serving.limits import ServiceLimits
 from mapfilter.serving.session import Progress, Session
-from mapfilter.serving.steps import SEED_BITS, first, shown_or, stepped, wanted
+from mapfilter.serving.steps import SEED_BITS, Stepped, first, shown_or, stepped, wanted
 from mapfilter.serving.store import SessionStore
-from mapfilter.serving.watching import Watcher
 from mapfilter.tracks.identify import PlanNames
 
 ResultT = TypeVar("ResultT")
@@ -36,8 +42,8 @@ class Sessions:
 
     Parameters
     ----------
-    positioner : BayesPositioner
-        The filter over the area.
+    filters : SessionFilters
+        Over the area.
     names : PlanNames
         Gives cells the ids of the database.
     store : SessionStore or None
@@ -48,14 +54,13 @@ class Sessions:
 
     def __init__(
         self,
-        positioner: BayesPositioner,
+        filters: SessionFilters,
         names: PlanNames,
         limits: ServiceLimits,
         store: SessionStore | None = None,
         workers: int = 1,
     ) -> None:
-        self.positioner, self.names, self.limits, self.store = positioner, names, limits, store
-        self.watcher = Watcher.over(positioner, names.plan)
+        self.filters, self.names, self.limits, self.store = filters, names, limits, store
         self.all: dict[str, Session] = {}
         self.room = asyncio.Lock()
         self.pool = ThreadPoolExecutor(workers, thread_name_prefix="step")
@@ -81,19 +86,23 @@ class Sessions:
         RequestError
             Faults (400), or there are as many sessions as there may be (503).
         """
-        name, seed, start = wanted(document, self.positioner.area.lattice)
+        asked = wanted(document, self.filters.usual.positioner.area.lattice)
         if len(self.all) >= self.limits.sessions:
             most = f"{self.limits.sessions} sessions are open, the most there may be"
             raise RequestError(503, "tooManySessions", most)
         if self.store is None and self.held_bytes >= self.limits.state_bytes:
             raise RequestError(503, "outOfMemory", "no memory is left for another session")
-        seed = secrets.randbits(SEED_BITS) if seed is None else seed
-        session = Session(secrets.token_urlsafe(16), name, seed, time.time(), None)
+        seed = secrets.randbits(SEED_BITS) if asked.seed is None else asked.seed
+        session = Session(
+            secrets.token_urlsafe(16), asked.name, seed, time.time(), None, stated=asked.stated
+        )
         # Counted before the first await, so that no two requests take the last place.
         self.all[session.id] = session
         async with session.lock:
             try:
-                session.take(await self._run(partial(first, self.positioner, seed, start)))
+                filter_ = await self.filter_of(session)
+                begin = partial(first, filter_.positioner, seed, asked.start)
+                session.take(await self._run(begin))
                 await self._save(session)
             except BaseException:
                 session.ended = True
@@ -104,8 +113,14 @@ class Sessions:
                 raise
         return session
 
-    async def post(self, session: Session, document: Mapping[str, Any]) -> list[bytes]:
-        """Process epochs; return the fixes as JSON.
+    async def filter_of(self, session: Session) -> SessionFilter:
+        """Return the filter of a session, which may have to be made first."""
+        if session.stated == self.filters.usual.stated:
+            return self.filters.usual
+        return await self._run(partial(self.filters.of, session.stated))
+
+    async def post(self, session: Session, document: Mapping[str, Any]) -> Stepped:
+        """Process epochs; return what they make, with the fixes as JSON.
 
         Raises
         ------
@@ -125,8 +140,9 @@ class Sessions:
                 if self.held_bytes > self.limits.state_bytes:
                     await self.make_room()
                 channel = session.channel
-                watcher = self.watcher if channel.is_watched(time.monotonic()) else None
-                step = partial(stepped, self.positioner, self.names, before, document, watcher)
+                watched = channel.is_watched(time.monotonic())
+                filter_ = await self.filter_of(session)
+                step = partial(stepped, filter_, self.names, before, document, watched=watched)
                 # Shielded: a client that hangs up does not leave a half-done session.
                 after = await asyncio.shield(self._run(step))
                 _refuse_ended(session)
@@ -134,7 +150,7 @@ class Sessions:
                 _tell(session, after.fault)
                 session.used_s = time.monotonic()
                 channel.publish(before.epochs + 1, after.fixes, after.details, after.belief)
-                return after.fixes
+                return after
         finally:
             session.waiting -= 1
 
@@ -158,7 +174,8 @@ class Sessions:
             _refuse_ended(session)
             progress = await self._loaded(session)
             faults = [""]
-            belief = partial(self.watcher.belief, progress.state, progress.epochs)
+            watcher = (await self.filter_of(session)).watcher
+            belief = partial(watcher.belief, progress.state, progress.epochs)
             session.channel.show(await self._run(partial(shown_or, b"", belief, faults)))
             _tell(session, faults[-1])
 
@@ -224,6 +241,7 @@ class Sessions:
                 saved["last"].encode(),
                 saved["epochs"],
                 saved["time_s"],
+                stated=statement_of(saved["stated"], Faults()),
             )
             if saved["last"]:
                 self.all[session_id].channel.keep(saved["epochs"], saved["last"].encode())
@@ -246,6 +264,7 @@ class Sessions:
             "name": session.name,
             "seed": session.seed,
             "began_utc_s": session.began_utc_s,
+            "stated": statement_document(session.stated),
             "state": progress.state,
             "rng": dict(progress.rng),
             "epochs": progress.epochs,

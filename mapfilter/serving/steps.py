@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,11 @@ from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput
+from mapfilter.positioning.log_options import LogStatement
 from mapfilter.serving.documents import RequestError, check_keys, text, whole
 from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.events import fix_document, json_bytes
+from mapfilter.serving.filters import LOG, SessionFilter, statement_of
 from mapfilter.serving.places import check_fixes, start_of
 from mapfilter.serving.session import Progress
 from mapfilter.serving.watching import Watcher
@@ -45,6 +47,8 @@ class Stepped:
         The same for a page that shows the session; empty where nobody watches.
     belief : bytes
         Of the last epoch; empty where nobody watches.
+    notes : tuple of str
+        What the epochs state in vain.
     fault : str
         Traceback of the last fault in what a page shows; empty without one.
     """
@@ -53,6 +57,7 @@ class Stepped:
     fixes: list[bytes]
     details: list[bytes]
     belief: bytes
+    notes: tuple[str, ...] = ()
     fault: str = ""
 
 
@@ -66,25 +71,27 @@ def first(
 
 
 def stepped(
-    positioner: BayesPositioner,
+    filter_: SessionFilter,
     names: PlanNames,
     before: Progress,
     document: Mapping[str, Any],
-    watcher: Watcher | None = None,
+    *,
+    watched: bool = False,
 ) -> Stepped:
     """Return what a request's epochs make of a session.
 
     Parameters
     ----------
-    watcher : Watcher or None
-        None where nobody watches.
+    watched : bool
+        Whether somebody watches.
 
     Raises
     ------
     RequestError
         Faults of the request.
     """
-    epochs = read_epochs(document, names, before.time_s)
+    positioner, watcher = filter_.positioner, filter_.watcher if watched else None
+    epochs = read_epochs(document, names, before.time_s, filter_.technology)
     check_fixes(epochs, before.state, positioner.area.lattice)
     rng = np.random.default_rng()
     rng.bit_generator.state = before.rng
@@ -103,7 +110,7 @@ def stepped(
     belief = b""
     if watcher is not None:
         belief = shown_or(b"", partial(watcher.belief, state, count), faults)
-    return Stepped(progress, fixes, details, belief, faults[-1])
+    return Stepped(progress, fixes, details, belief, filter_.unused(document), faults[-1])
 
 
 def _detail(
@@ -131,10 +138,25 @@ def shown_or(nothing: bytes, make: Callable[[], bytes], faults: list[str]) -> by
         return nothing
 
 
-def wanted(
-    document: Mapping[str, Any], lattice: Lattice
-) -> tuple[str, int | None, tuple[float, float, float] | None]:
-    """Return name, seed and start (east, north, deviation) of a new session over an area.
+class Wanted(NamedTuple):
+    """What a client asks of a new session.
+
+    Parameters
+    ----------
+    start : tuple of float or None
+        A known start: east, north and deviation.
+    stated : LogStatement
+        What the device's log states.
+    """
+
+    name: str
+    seed: int | None
+    start: tuple[float, float, float] | None
+    stated: LogStatement
+
+
+def wanted(document: Mapping[str, Any], lattice: Lattice) -> Wanted:
+    """Return what a client asks of a new session over an area.
 
     Raises
     ------
@@ -142,7 +164,7 @@ def wanted(
         With all faults together.
     """
     faults = Faults()
-    check_keys(document, ("name", "seed", "start"), "body", faults)
+    check_keys(document, ("name", "seed", "start", LOG), "body", faults)
     name, seed, start = "", None, None
     if document.get("name") is not None:
         name = text(document["name"], "name", "1..128 printable characters", faults) or ""
@@ -154,6 +176,7 @@ def wanted(
         start = start_of(given, lattice, faults)
     elif given is not None:
         faults.add("start", "an object with lat_deg, lon_deg and sd_m", "something else")
+    stated = statement_of(document.get(LOG), faults)
     if faults.found:
         raise RequestError.of(InputError(tuple(faults.found)))
-    return name, seed, start
+    return Wanted(name, seed, start, stated)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter._io import ensure_writable_folder
-from mapfilter.errors import ConfigError, StoreError, fail
+from mapfilter.errors import ConfigError, Faults, StoreError, fail
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import STATES
@@ -21,6 +21,7 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import LINEAR
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.serving.filters import statement_of
 from mapfilter.serving.state_file import read_session, write_session
 
 SUFFIX = ".session"
@@ -33,6 +34,7 @@ _TYPES: Mapping[str, type | tuple[type, ...]] = {
     "name": str,
     "seed": int,
     "began_utc_s": float,
+    "stated": dict,
     "state": BayesState,
     "rng": dict,
     "epochs": int,
@@ -161,6 +163,10 @@ def _check(value: Mapping[str, Any], where: str) -> None:
     for name, kind in _TYPES.items():
         if not isinstance(value.get(name), kind):
             raise fail(StoreError, where, f"{name}, as it was saved", "something else", "edited")
+    faults = Faults()
+    statement_of(value["stated"], faults)
+    if faults.found:
+        raise fail(StoreError, where, "what a log states", "something else", "edited")
     state = value["state"]
     beliefs, sources = [state.belief, *(one.belief for one in state.held + state.unaided)], [state.sources]
     if state.alternative is not None:

@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.log_lacks import advice_of
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
 from mapfilter.propagation.shadowing import named_rng
@@ -42,7 +43,7 @@ from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.planned_cells import plan_antennas, planned_cells
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
-from mapfilter.workflows.replay_lacks import advice_of, fixes_note, lack_of
+from mapfilter.workflows.replay_lacks import fixes_note, lack_of
 from mapfilter.workflows.replay_logs import ReplayLogs
 from mapfilter.workflows.replayed import (
     ReplayedLog,

@@ -9,24 +9,19 @@ from typing import Any
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, listed
 from mapfilter.geodesy import Lattice, same_crs, short_crs
-from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.log_options import by_streets_alone
+from mapfilter.positioning.log_lacks import NO_MOTION, lack_of_log
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers import plain_csv
 from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
-from mapfilter.tracks.schema import PLACE, SERVING
 
 _MOTION_COLUMNS = (
     "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps "
     "or wheel_speed_kmh"
 )
-_BY_CELLS = ("candidate", "grid")
-_BY_STREETS = "--filter bayes starts by the streets alone"
 
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
@@ -68,26 +63,13 @@ def lack_of(
     database : RadioRouteDatabase or None
         None where the filter only takes sites.
     """
-    if estimate.converged_at is not None:
-        return ""
-    if isinstance(options, KalmanFilter):
-        return f"too little was measured{_unused_ranges(log)}"
-    has_cells = database is None or bool(database.cell_ids)
-    if database is not None and by_streets_alone(options, log, database):
-        has_cells = False
-    lack = lacking(log, estimate, cells=has_cells, turns=isinstance(options, BayesFilter))
-    name = str(getattr(options, "name", ""))
-    if lack and not has_cells and name in _BY_CELLS:
-        return f"the filter {name} needs cells to start, the database has none ({_BY_STREETS})"
-    alone = database is not None and by_streets_alone(BayesFilter(), log, database)
-    if lack and name in _BY_CELLS and alone:
-        return f"{lack} ({_BY_STREETS})"
-    if "no motion" not in lack:
+    lack = lack_of_log(log, options, estimate, database)
+    if NO_MOTION not in lack:
         return lack
     columns = columns_of_motion(opened)
     if source := receiver_motion(opened):
         return f"{lack} (--course-motion, track.course_motion, makes it from {source}){columns}"
-    if has_cells and len(log.radio):
+    if len(log.radio) and (database is None or database.cell_ids):
         return f"{lack} (mapfilter locate needs none){columns}"
     return f"{lack}{columns}"
 
@@ -136,41 +118,6 @@ def fixes_note(
     return (text if len(log.truth) else f"{text}, --truth {placed[0].path.name} scores by them",)
 
 
-def _unused_ranges(log: TrackLog) -> str:
-    """Return why pseudoranges were of no use to a filter without a map; "" without any."""
-    given = len(log.pseudoranges)
-    if not given:
-        return ""
-    if log.pseudoranges[list(PLACE)].isna().any(axis=1).all():
-        why = "their satellites have no places, for which the day's navigation file is needed"
-        return f" ({given} pseudoranges: {why}; then the filter bayes uses them, over a map)"
-    return f" ({given} pseudoranges: only the filter bayes uses them, over a map)"
-
-
-def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str, ...]:
-    """Return notes on a log that streets alone did not locate.
-
-    Parameters
-    ----------
-    options
-        Of the filter, as fitted to the log.
-    """
-    by_streets = isinstance(options, BayesFilter) and not isinstance(options, GridFilter)
-    if estimate.converged_at is not None or not by_streets:
-        return ()
-    along_m = float(log.motion["step_m"].abs().sum())
-    notes = [
-        f"never converged in {along_m:.0f} m: by streets alone it takes about a kilometre, with "
-        "turns, all of it on the map"
-    ]
-    if not options.vehicle:
-        notes.append(
-            "motion taken for a walker's; where wheels, a camera or a lidar measured it, set "
-            "filter.bayes.vehicle = true"
-        )
-    return tuple(notes)
-
-
 def receiver_motion(opened: OpenedLog) -> str:
     """Return what positions of the log, or of its truth, make motion of; "" without them."""
     every = [r.tables.get("positions", r.tables.get("places")) for r in opened.recordings]
@@ -179,36 +126,3 @@ def receiver_motion(opened: OpenedLog) -> str:
     if any(course.notna().any() for course in courses):
         return "speed and course"
     return "positions" if placed else ""
-
-
-def lacking(
-    log: TrackLog, estimate: TrackEstimate, *, cells: bool = True, turns: bool = False
-) -> str:
-    """Return the missing data of a log that was not located, or an empty text.
-
-    Without ``cells`` in the database, motion is all that it needs. ``turns`` says whether the
-    filter does without headings.
-    """
-    if estimate.converged_at is not None:
-        return ""
-    serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
-    moved = log.motion["step_m"].notna()
-    lacks = []
-    turned = log.motion[["heading_rad", "turn_rad"]].notna().any(axis=1) & moved
-    if not cells:
-        # The first row turns by nothing.
-        if moved.any() and turned.sum() < 2:
-            lacks.append("no headings and no turns")
-        elif moved.any() and not (estimate.hypotheses > 0).any():
-            lacks.append("too short a way with steps and headings, or turns")
-    elif not serving.any() and not (estimate.hypotheses > 0).any():
-        lacks.append("no serving cell")
-    elif not (estimate.hypotheses > 0).any():
-        lacks.append("no serving cell of which the database has points")
-    if not moved.any():
-        lacks.append("no motion")
-    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turned.any():
-        lacks.append("no heading")
-    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turns:
-        lacks.append("no heading (turns alone do not give one; the filter bayes needs none)")
-    return " and ".join(lacks)

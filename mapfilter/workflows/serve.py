@@ -18,10 +18,12 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.fingerprints.locating import fit_locator
 from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.serving.app import Service
+from mapfilter.serving.filters import SessionFilters
 from mapfilter.serving.geolocate import Geolocator, geolocator
 from mapfilter.serving.limits import ServiceLimits
 from mapfilter.serving.live_page import LivePage
@@ -107,7 +109,8 @@ def run_serve(
     options.check()
     token = read_token(options.token_file)
     opened = open_database(database)
-    positioner = _positioner(config, opened)
+    filters = _filters(config, opened)
+    positioner = filters.usual.positioner
     store, found = None, dict[str, dict[str, object]]()
     made = listen(options.host, options.port, token)
     with made, ExitStack() as held:
@@ -120,7 +123,7 @@ def run_serve(
         locate = _geolocator(opened, options, progress)
         positioner.warm_up([])
         names, limits = PlanNames(opened.plan), options.limits
-        sessions = Sessions(positioner, names, limits, store, options.workers)
+        sessions = Sessions(filters, names, limits, store, options.workers)
         sessions.restore(found)
         host_names = frozenset(name.lower() for name in options.host_names)
         name = f"Live over {opened.path.name}"
@@ -171,15 +174,22 @@ def read_token(path: Path | None) -> str:
     return token
 
 
-def _positioner(config: Config, database: RadioRouteDatabase) -> BayesPositioner:
+def _filters(config: Config, database: RadioRouteDatabase) -> SessionFilters:
     chosen = filter_choice(config.filter)
     if config.filter.name != "bayes" or config.filter.smooth:
         got = "smooth" if config.filter.smooth else config.filter.name
         hint = "states of other filters cannot be saved, and nothing live can be smoothed"
         raise fail(ConfigError, "filter", "bayes, without smooth", got, hint)
-    found = chosen.over(database)
-    assert isinstance(found, BayesPositioner)
-    return found
+    assert isinstance(chosen, BayesFilter)
+    usual, measured = chosen.over(database), database.measured() is not None
+
+    def make(fitted: BayesFilter) -> BayesPositioner:
+        if fitted == chosen:
+            return usual
+        # The map is shared; a surveyed one depends on the options.
+        return fitted.over(database) if measured else fitted.over_area(usual.area)
+
+    return SessionFilters(chosen, make, database.plan)
 
 
 def _binding(config: Config, database: RadioRouteDatabase, positioner: BayesPositioner) -> str:

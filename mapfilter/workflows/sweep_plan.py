@@ -19,6 +19,8 @@ from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
+    GYRO_ERRORS,
+    NO_TURNS,
     NOISE_AXES,
     Radio,
     Reading,
@@ -108,12 +110,14 @@ def _check_effect(plans: Sequence[SweepPlan], axes: Iterable[str], faults: Fault
     """Refuse an option that none of the sweep's simulations and filters uses."""
     for key in axes:
         others = {
-            replace(plan, varied=tuple(pair for pair in plan.varied if pair[0] != key))
+            replace(plan.effective, varied=tuple(pair for pair in plan.varied if pair[0] != key))
             for plan in plans
         }
         if len(others) < len(plans):
             expected = "an option that the journeys, the unit or the filters of the sweep use"
             hint = "an option of another filter, or one that [sweep] sets"
+            if key.partition(".")[2] in GYRO_ERRORS:
+                hint = NO_TURNS
             faults.add(f"--vary {key}", expected, "one without effect", hint)
 
 

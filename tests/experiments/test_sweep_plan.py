@@ -1,7 +1,7 @@
 """The plan of a sweep: its grid, its batches, its seeds, and what is refused."""
 
 import pickle
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
 
@@ -19,6 +19,7 @@ from mapfilter.experiments.sweep.plan import (
     noise_grid,
 )
 from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning.custom_filter import CustomFilter
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -171,6 +172,29 @@ def test_digest_changes_with_everything_that_changes_runs():
     )
     assert len({plan(**change).digest for change in changes}) == len(changes)
     assert plan().digest == plan().digest
+
+
+@dataclass(frozen=True)
+class ByTurns(CandidateFilter):
+    """A filter that a user made of a built-in one."""
+
+
+@pytest.mark.parametrize(
+    ("turns", "choice", "used"),
+    [
+        ("headings", CandidateFilter(), False),
+        ("gyro", CandidateFilter(), False),
+        ("headings", ByTurns(), False),
+        ("gyro", ByTurns(), True),
+        ("gyro", CustomFilter("my_filter:MyFilter"), True),
+    ],
+)
+def test_errors_of_turns_count_where_a_custom_filter_may_use_them(turns, choice, used):
+    noise = ImuNoise(turns=turns, gyro_noise_deg_per_sqrt_s=1.0, gyro_bias_deg_per_s=0.1)
+    readings = (SET, Reading("other", choice))
+    (found,) = plan(noises=(noise,), readings=readings).effective.noises
+    assert (found == noise) is used
+    assert (found == ImuNoise(turns=turns)) is not used
 
 
 def test_a_plan_is_sent_to_workers_as_it_is():

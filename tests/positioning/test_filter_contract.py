@@ -139,10 +139,47 @@ class Drifting(Steady):
         return {"steps": steps}, replace(output, fix=fix)
 
 
+def with_fields(**changes):
+    """Make a filter whose fixes have other values."""
+
+    class Changed(Steady):
+        def step(self, state, epoch, rng):
+            output = fix_at(epoch, Status.SEARCHING)
+            return state, replace(output, fix=replace(output.fix, **changes))
+
+    return Changed
+
+
+@pytest.mark.parametrize(
+    ("changes", "clause"),
+    [
+        ({"covariance_m2": -np.eye(2)}, "no negative eigenvalue"),
+        ({"covariance_m2": np.array([[1.0, 2.0], [2.0, 1.0]])}, "no negative eigenvalue"),
+        ({"covariance_m2": np.array([[4.0, 1.0], [0.0, 4.0]])}, "covariance_m2 is symmetric"),
+        ({"covariance_m2": np.eye(3)}, r"the shape \(2, 2\)"),
+        ({"radii_m": np.array([-1.0, 2.0, 3.0])}, "radii are not negative"),
+        ({"radii_m": np.ones(2)}, r"the shape \(3,\)"),
+        ({"mass_50m": 1.5}, "mass_50m lies between 0 and 1"),
+        ({"way_probability": -0.5}, "way_probability lies between 0 and 1"),
+        ({"hypotheses": -1}, "counted from 0"),
+        ({"north_m": np.nan}, "both known, or neither"),
+    ],
+)
+def test_values_that_no_fix_can_have_are_named(changes, clause, database):
+    with pytest.raises(ContractError, match=clause):
+        check_filter(with_fields(**changes), database, walk_log())
+
+
+class Inverted(Beliefs):
+    def locate(self, belief):
+        return Estimate(*CROSSING, -np.eye(2), np.arange(3.0))
+
+
 @pytest.mark.parametrize(
     ("made", "clause"),
     [
         (InPlace, "states are never changed in place"),
+        (Inverted, "covariance_m2 has no negative eigenvalue"),
         (Jumping, "SEARCHING is not followed by TRACKING"),
         (Narrow, "99 % is not below that for 95 %"),
         (Negative, "a protection level is not negative"),

@@ -5,11 +5,13 @@ import subprocess
 import sys
 
 import geopandas as gpd
+import numpy as np
 import pandas as pd
 import pytest
 from cross_world import make_database, walk_log
 
 import mapfilter as mf
+from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.locators import as_filter
 
@@ -66,12 +68,38 @@ def test_a_filter_is_given_by_options_or_name(filter_, database, track):
     pd.testing.assert_frame_equal(found.to_dataframe(), track.to_dataframe())
 
 
+def test_a_track_says_what_a_log_lacks_that_was_not_located(database):
+    walk = walk_log()
+    fixes = walk.truth[["time_s", "east_m", "north_m"]]
+    still = mf.make_log(walk.crs, radio=walk.radio, truth=walk.truth)
+    (note,) = mf.locate(still, database).log.notes
+    assert note.startswith("nothing is located: no motion (mf.read_log makes it of")
+    assert note.endswith("mf.locate_reports needs none)")
+    placed = mf.make_log(walk.crs, radio=walk.radio, gnss=fixes)
+    lost = mf.locate(placed, database, "candidate")
+    assert any("nothing is located: no motion" in one for one in lost.log.notes)
+    alone = mf.make_log(walk.crs, motion=walk.motion[:40])
+    notes = mf.locate(alone, database).log.notes
+    assert any("never converged in" in one for one in notes)
+    assert mf.locate(walk, database, "candidate").log.notes == walk.notes
+
+
 def test_a_score_has_the_error_of_each_epoch(track):
     score = mf.score(track, walk_log().truth)
     assert score.switched
     assert score.error_m.shape == (len(track),)
     assert list(score.to_dataframe()["success"]) == [score.success]
     assert repr(mf.score(track.estimate, walk_log().truth)) == repr(score)
+
+
+def test_a_score_takes_ground_truth_in_any_order_and_each_row_once(track):
+    truth = walk_log().truth
+    expected = repr(mf.score(track, truth))
+    for other in (truth.sample(frac=1, random_state=0), pd.concat([truth, truth]), truth[::-1]):
+        assert repr(mf.score(track, other)) == expected
+        assert repr(mf.score(track, Truth.of_table(other))) == expected
+    with pytest.raises(mf.MapfilterError, match="truth row 6, east_m"):
+        mf.score(track, truth.assign(east_m=truth["east_m"].where(truth.index != 5)))
 
 
 def test_a_score_says_what_the_ground_truth_does_not_tell(track):
@@ -175,10 +203,46 @@ def test_noises_of_any_field_have_cells_of_their_own(database, rasters, streets)
     assert found.plot().get_title()
 
 
+def test_cells_of_a_sweep_are_a_table_of_plain_columns(database, rasters, streets):
+    noises = (mf.ImuNoise(), mf.ImuNoise(heading_correlation_s=20.0))
+    filters = {"c": mf.CandidateFilter(update_length_m=5.0), "b": mf.BayesFilter()}
+    given = {"routes": 1, "length_m": 200.0, "noises": noises}
+    found = mf.sweep(database, rasters, streets, filters, **given)
+    table = found.to_dataframe()
+    assert "varied" not in table
+    assert table["imu.heading_correlation_s"].tolist() == [0.0, 0.0, 20.0, 20.0]
+    assert len(table.drop_duplicates()) == 4
+    assert table.groupby("imu.heading_correlation_s").size().tolist() == [2, 2]
+    by_name = table.groupby("reading")["update_length_m"].first()
+    assert by_name["c"] == 5.0
+    assert np.isnan(by_name["b"])
+    coordinates = list(found.runs)[: list(found.runs).index("route")]
+    assert list(table)[: len(coordinates)] == coordinates
+
+
+def ticks_of(axes):
+    return [label.get_text() for label in axes.get_xticklabels()]
+
+
+def test_a_sweep_is_drawn_over_what_it_varies(database, rasters, streets):
+    noises = (mf.ImuNoise(scale=0.0), mf.ImuNoise(scale=0.05))
+    axes = swept(database, rasters, streets, noises=noises).plot()
+    assert axes.get_xlabel() == "standard deviation of the step scale"
+    assert ticks_of(axes) == ["0", "0.05"]
+    filters_alone = swept(database, rasters, streets)
+    axes = filters_alone.plot()
+    assert (axes.get_xlabel(), ticks_of(axes)) == ("filter", ["c", "again"])
+    at = {float(x) for line in axes.lines for x in line.get_xdata()}
+    assert at == {0.0, 1.0}
+
+
 def test_what_cannot_be_swept_is_refused(database, rasters, streets):
     with pytest.raises(mf.MapfilterError, match="noises: expected one noise or several, each once"):
         swept(database, rasters, streets, noises=(mf.ImuNoise(), mf.ImuNoise()))
     with pytest.raises(mf.MapfilterError, match="noises, turns: expected one value for all"):
         swept(database, rasters, streets, noises=(mf.ImuNoise(), mf.ImuNoise(turns="gyro")))
+    gyro = mf.ImuNoise(turns="gyro"), mf.ImuNoise(turns="gyro", gyro_bias_deg_per_s=1.0)
+    with pytest.raises(mf.MapfilterError, match=r"gyro_bias_deg_per_s: .*one without effect"):
+        swept(database, rasters, streets, noises=gyro)
     with pytest.raises(mf.MapfilterError, match="filters, mine: expected options, or the name"):
         mf.sweep(database, rasters, streets, {"mine": Recording})

@@ -163,7 +163,7 @@ def swept(world, filters, **given):
     return mf.sweep(world["database"], world["rasters"], "helsinki", filters, **given)
 
 
-@pytest.mark.parametrize("seed", [-1, "1", 1.5])
+@pytest.mark.parametrize("seed", [-1, "1", 1.5, None, True])
 @pytest.mark.parametrize(
     ("function", "call"),
     [

@@ -10,6 +10,7 @@ import pytest
 from mapfilter.evaluation.success import SuccessCell
 from mapfilter.report.canvas import save
 from mapfilter.report.success import (
+    curve_axis,
     plot_run_distributions,
     plot_success_curves,
     plot_success_map,
@@ -91,6 +92,34 @@ def test_what_belongs_to_a_filter_is_not_in_the_name_of_its_curve():
         f"{name}, filter.bayes.scale {at}" for at in (0.1, 0.2) for name in ("a", "b")
     ]
     assert success_curves([]) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "axis", "names"),
+    [
+        ({"sigma_orient_deg": 3.0}, "sigma_orient_deg", ["set"]),
+        ({"sigma_trans_m": 0.4}, "sigma_trans_m", ["set"]),
+        ({"varied": {"filter.bayes.scale": 0.2}}, "filter.bayes.scale", ["set"]),
+        ({"scale": 0.1, "sigma_trans_m": 0.4}, "sigma_trans_m", ["set, scale 0", "set, scale 0.1"]),
+        ({"reading": "list", "update_length_m": 5.0}, "reading", ["set", "list"]),
+        ({"prediction_error_db": np.nan, "scale": 0.1}, "scale",
+         ["set, prediction error 0 dB", "set"]),
+        ({}, "sigma_orient_deg", ["set"]),
+    ],
+)  # fmt: skip
+def test_curves_are_drawn_over_what_differs(changes, axis, names):
+    known = {"filter.bayes.scale": 0.1} if "varied" in changes else {}
+    first = replace(cell(0.0, 0.2, 0.5), reading="set", varied=known)
+    cells = [first, replace(first, **changes)] if changes else [first]
+    assert curve_axis(cells) == axis
+    curves = success_curves(cells, axis)
+    assert [name for name, _ in curves] == names
+    axes = plot_success_curves(curves, title="a town", axis=axis)
+    found = {float(x) for line in axes.lines for x in line.get_xdata()}
+    wanted = {0.0, 1.0} if axis == "reading" else {one.place[axis] for one in cells}
+    assert len(found) >= len(wanted)
+    for at in found:
+        assert min(abs(at - place) for place in wanted) < 0.02
 
 
 def test_equal_curves_give_equal_bytes(tmp_path):

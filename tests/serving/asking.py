@@ -7,14 +7,17 @@ from dataclasses import dataclass
 
 from positioning.cross_world import walk_log
 
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import epochs
 from mapfilter.serving.app import Service
+from mapfilter.serving.filters import SessionFilters
 from mapfilter.serving.limits import ServiceLimits
 from mapfilter.serving.sessions import Sessions
 from mapfilter.serving.store import SessionStore
 from mapfilter.tracks.identify import PlanNames
 
 JSON = {"content-type": "application/json", "host": "localhost"}
+SMALL = BayesFilter(max_particles=1500, min_search_particles=800, min_particles=300)
 SERVING = {"role": "serving", "cell": "W", "level_dbm": -70.0}
 
 
@@ -108,7 +111,12 @@ def service(positioner, plan, folder=None, locate=None, token="", names=(), **li
     """A service, with its sessions saved in a folder or nowhere."""
     held = ServiceLimits(**({"rate_per_s": 1e5} | limits))
     store = SessionStore.in_folder(folder, "made") if folder is not None else None
-    sessions = Sessions(positioner, PlanNames(plan), held, store)
+
+    def make(fitted):
+        return positioner if fitted == SMALL else fitted.over_area(positioner.area)
+
+    filters = SessionFilters(SMALL, make, plan)
+    sessions = Sessions(filters, PlanNames(plan), held, store)
     with contextlib.ExitStack() as stack:
         if store is not None:
             stack.enter_context(contextlib.closing(store))

@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
+from asking import SMALL
 from positioning.cross_world import make_database
 
-from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.fingerprints.locating import fit_locator
 from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.serving.geolocate import geolocator
-
-SMALL = BayesFilter(max_particles=1500, min_search_particles=800, min_particles=300)
 
 
 @pytest.fixture(scope="session")

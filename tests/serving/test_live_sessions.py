@@ -231,7 +231,7 @@ def test_a_session_with_satellites_is_restored(positioner, tmp_path):
     assert state.belief.state.shape[0] > STATES
     value = {
         "name": "a phone", "seed": 0, "began_utc_s": 0.0, "state": state, "epochs": 60,
-        "rng": rng.bit_generator.state, "time_s": 1.0, "last": "",
+        "stated": {}, "rng": rng.bit_generator.state, "time_s": 1.0, "last": "",
     }  # fmt: skip
     session = "0" * 22
     with closing(SessionStore.in_folder(tmp_path, "made")) as store:

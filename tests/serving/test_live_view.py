@@ -191,7 +191,7 @@ def test_a_page_that_comes_back_misses_nothing_that_is_kept(made):
 def test_nothing_is_described_where_nobody_watches(made, monkeypatch):
     sent = documents(4)[0]
     held = made()
-    monkeypatch.setattr(type(held.sessions.watcher), "detail", None)
+    monkeypatch.setattr(type(held.sessions.filters.usual.watcher), "detail", None)
 
     async def run():
         app = held.app()
@@ -307,9 +307,9 @@ def test_contributions_of_the_last_epochs_of_a_long_request_only(positioner, mad
     held = made()
     sent = documents(steps._MOST_WATCHED + 6)[0]
     before = steps.first(positioner, 0, None)
-    names, watcher = held.sessions.names, held.sessions.watcher
-    plain = steps.stepped(positioner, names, before, {"epochs": sent})
-    rich = steps.stepped(positioner, names, before, {"epochs": sent}, watcher)
+    names, usual = held.sessions.names, held.sessions.filters.usual
+    plain = steps.stepped(usual, names, before, {"epochs": sent})
+    rich = steps.stepped(usual, names, before, {"epochs": sent}, watched=True)
     assert rich.fixes == plain.fixes
     assert rich.progress.rng == plain.progress.rng
     assert (plain.details, plain.belief) == ([], b"")

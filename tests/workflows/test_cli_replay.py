@@ -95,7 +95,7 @@ def test_all_cells_unknown_with_pictures(log, replay, tmp_path):
     ("kept", "lack"),
     [
         ((), "no serving cell and no motion"),
-        (("motion",), "no serving cell (--filter bayes starts by the streets alone)"),
+        (("motion",), "no serving cell (the filter bayes starts by the streets alone)"),
         (("radio", "truth"), "no motion (mapfilter locate needs none)"),
         (("truth",), "no serving cell and no motion"),
     ],
@@ -282,7 +282,7 @@ def test_a_log_of_motion_alone_is_located_by_the_streets(log, replay, world):
     # Others cannot, and no filter with a step or two.
     for name in ("candidate", "grid"):
         refused = replay(log, "--filter", name)
-        assert "no serving cell (--filter bayes starts by the streets alone)" in refused.err
+        assert "no serving cell (the filter bayes starts by the streets alone)" in refused.err
     pd.read_csv(log / "motion.csv").iloc[:4].to_csv(log / "motion.csv", index=False)
     short = replay(log, "--filter", "bayes")
     assert (short.code, "too short a way" in short.err) == (3, True)

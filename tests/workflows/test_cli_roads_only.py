@@ -78,7 +78,7 @@ def test_what_a_database_of_roads_alone_cannot_do_is_refused(roads):
         out = roads.parent / name
         outcome = mapfilter("replay", "--db", built, "--log", drive, "--filter", name, "--out", out)
         assert (outcome.code, f"the filter {name} needs cells" in outcome.err) == (3, True)
-        assert "--filter bayes starts by the streets alone" in outcome.err
+        assert "the filter bayes starts by the streets alone" in outcome.err
 
 
 def test_a_drive_that_is_too_short_is_said_to_be(roads):

@@ -270,6 +270,7 @@ def test_the_margin_of_the_database_is_the_filters(own_world):
     [
         (["filter.bayes.heading_sd_deg=3,6"], ["heading_sd_deg", "one without effect"]),
         (["filter.kalman.step_sd_m=1,2"], ["filter.kalman.step_sd_m", "one without effect"]),
+        (["imu.gyro_noise_deg_per_sqrt_s=0,1"], ["one without effect", "motion has headings"]),
         (["journeys.seed=1,2"], ["journeys.seed", "an option that a sweep uses", "sweep.seed"]),
         (["imu.turns=1,2", "imu.scale=2"], ["imu.turns", "a numeric option", "imu.scale", "< 1"]),
         (["imu.scale=0", "imu.scale=0.1"], ["imu.scale", "every option once"]),

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter.errors import ConfigError, Faults
+from mapfilter.positioning import BUILT_IN
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
@@ -24,6 +25,14 @@ AS_PREDICTED = "as_predicted"
 
 NOISE_AXES = ("sigma_trans_m", "sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
 """Errors of dead reckoning that are axes of the grid, and columns of its table."""
+
+GYRO_ERRORS = ("gyro_noise_deg_per_sqrt_s", "gyro_bias_deg_per_s")
+"""Errors of turns, which a filter does not use where motion has headings, as that of a sweep."""
+
+NO_TURNS = (
+    "simulated motion has headings, and filters use turns only without; a custom filter may use "
+    'those of turns = "gyro"'
+)
 
 LONGEST_BATCH = 100
 SHORTEST_BATCH = 24
@@ -201,6 +210,26 @@ class SweepPlan:
                 self.databases[database],
                 self.readings[reading],
             )
+
+    @property
+    def effective(self) -> SweepPlan:
+        """The plan without errors of turns that no filter of it uses."""
+        if all(self._uses_turns(noise) for noise in self.noises):
+            return self
+        without = dict.fromkeys(GYRO_ERRORS, 0.0)
+        return replace(
+            self,
+            noises=tuple(
+                one if self._uses_turns(one) else replace(one, **without)  # type: ignore[arg-type]
+                for one in self.noises
+            ),
+        )
+
+    def _uses_turns(self, noise: ImuNoise) -> bool:
+        """Return whether a filter may use turns of their own: a custom one, beside headings."""
+        own = (type(reading.choice) for reading in self.readings)
+        paths = {f"{one.__module__}:{one.__qualname__}" for one in own}
+        return noise.turns == "gyro" and not paths <= set(BUILT_IN.values())
 
     @property
     def as_json(self) -> str:

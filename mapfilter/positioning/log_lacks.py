@@ -1,0 +1,117 @@
+"""What a log lacks that a filter did not locate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.log_options import by_streets_alone
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.schema import PLACE, SERVING
+
+NO_MOTION = "no motion"
+
+_BY_CELLS = ("candidate", "grid")
+_BY_STREETS = "the filter bayes starts by the streets alone"
+
+
+def lack_of_log(
+    log: TrackLog, options: Any, estimate: TrackEstimate, database: RadioRouteDatabase | None
+) -> str:
+    """Return what a log lacks that was not located, else an empty text.
+
+    Parameters
+    ----------
+    log : TrackLog
+        What the filter was given.
+    options
+        Of the filter.
+    database : RadioRouteDatabase or None
+        None where the filter only takes sites.
+    """
+    if estimate.converged_at is not None:
+        return ""
+    if isinstance(options, KalmanFilter):
+        return f"too little was measured{_unused_ranges(log)}"
+    has_cells = database is None or bool(database.cell_ids)
+    if database is not None and by_streets_alone(options, log, database):
+        has_cells = False
+    lack = lacking(log, estimate, cells=has_cells, turns=isinstance(options, BayesFilter))
+    name = str(getattr(options, "name", ""))
+    if lack and not has_cells and name in _BY_CELLS:
+        return f"the filter {name} needs cells to start, the database has none ({_BY_STREETS})"
+    alone = database is not None and by_streets_alone(BayesFilter(), log, database)
+    if lack and name in _BY_CELLS and alone:
+        return f"{lack} ({_BY_STREETS})"
+    return lack
+
+
+def _unused_ranges(log: TrackLog) -> str:
+    """Return why pseudoranges were of no use to a filter without a map; "" without any."""
+    given = len(log.pseudoranges)
+    if not given:
+        return ""
+    if log.pseudoranges[list(PLACE)].isna().any(axis=1).all():
+        why = "their satellites have no places, for which the day's navigation file is needed"
+        return f" ({given} pseudoranges: {why}; then the filter bayes uses them, over a map)"
+    return f" ({given} pseudoranges: only the filter bayes uses them, over a map)"
+
+
+def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str, ...]:
+    """Return notes on a log that streets alone did not locate.
+
+    Parameters
+    ----------
+    options
+        Of the filter, as fitted to the log.
+    """
+    by_streets = isinstance(options, BayesFilter) and not isinstance(options, GridFilter)
+    if estimate.converged_at is not None or not by_streets:
+        return ()
+    along_m = float(log.motion["step_m"].abs().sum())
+    notes = [
+        f"never converged in {along_m:.0f} m: by streets alone it takes about a kilometre, with "
+        "turns, all of it on the map"
+    ]
+    if not options.vehicle:
+        notes.append(
+            "motion taken for a walker's; where wheels, a camera or a lidar measured it, set "
+            "filter.bayes.vehicle = true"
+        )
+    return tuple(notes)
+
+
+def lacking(
+    log: TrackLog, estimate: TrackEstimate, *, cells: bool = True, turns: bool = False
+) -> str:
+    """Return the missing data of a log that was not located, or an empty text.
+
+    Without ``cells`` in the database, motion is all that it needs. ``turns`` says whether the
+    filter does without headings.
+    """
+    if estimate.converged_at is not None:
+        return ""
+    serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
+    moved = log.motion["step_m"].notna()
+    lacks = []
+    turned = log.motion[["heading_rad", "turn_rad"]].notna().any(axis=1) & moved
+    if not cells:
+        # The first row turns by nothing.
+        if moved.any() and turned.sum() < 2:
+            lacks.append("no headings and no turns")
+        elif moved.any() and not (estimate.hypotheses > 0).any():
+            lacks.append("too short a way with steps and headings, or turns")
+    elif not serving.any() and not (estimate.hypotheses > 0).any():
+        lacks.append("no serving cell")
+    elif not (estimate.hypotheses > 0).any():
+        lacks.append("no serving cell of which the database has points")
+    if not moved.any():
+        lacks.append(NO_MOTION)
+    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turned.any():
+        lacks.append("no heading")
+    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turns:
+        lacks.append("no heading (turns alone do not give one; the filter bayes needs none)")
+    return " and ".join(lacks)
