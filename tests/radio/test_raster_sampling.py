@@ -134,9 +134,7 @@ def test_what_is_not_plausible_in_one_window_is_an_error(tmp_path):
 
     rasters = rasters_of(tmp_path / "rasters", values={"D": spoilt})
     places = places_in(rasters)
-    with pytest.raises(
-        InputError, match=r"D\.tif.*0 means no data, and the file does not"
-    ):
+    with pytest.raises(InputError, match=r"D\.tif.*0 means no data, and the file does not"):
         levels_at(places)
     levels_at(places[1:])
 
