@@ -59,6 +59,8 @@ REMEDIES = {
     "compass azimuth in radians; mapfilter convert reads a column of degrees as compass_deg.",
     "log-invalid": "Correct the log or recording, or its settings in [track].",
     "log-outside-area": "Take a log of this area, or the area of this log.",
+    "log-ranges": "Give differences in metres, how much farther the cell is than the other one, "
+    "and timing advances in steps, with the technology.",
     "log-rows-unused": "Look at the lines named; mapfilter convert lists all reasons.",
     "log-speeds": "Give lengths in metres; if a vehicle moved, set filter.bayes.vehicle = true.",
     "log-without-motion": "Add a recording of steps, odometry or a fused track (track.recordings), "

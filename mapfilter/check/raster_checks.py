@@ -18,19 +18,14 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.files import check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters, in_other_case
+from mapfilter.rasters.undeclared import nodata_taken_as_level
 
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
 
 _HIGHEST_RXLEV = 63
 _LEAST_LOSS_DB = 20.0
 _NO_LEVEL_BELOW = -300.0
-_NO_LEVEL_ABOVE = 60.0
-_TELLING_SHARE = 0.01
 _MOST_SHARE = 0.5
-_NEAR_ZERO = 1.0
-_LARGEST_OF_TYPES = (255.0, 32767.0, 65535.0)
-_FAR_DB = 20.0
-_MANY_TIMES = 10
 _PHONE_M = 1.5
 _NEAREST_RING_M = 64.0
 _LEAST_IN_RING = 50
@@ -59,68 +54,6 @@ def kind_of(values: Floats32) -> Kind:
     if whole and known.min() >= 0 and known.max() <= _HIGHEST_RXLEV:
         return "rxlev"
     return "loss" if np.median(known) > _LEAST_LOSS_DB else "unclear"
-
-
-def nodata_taken_as_level(values: Floats32, factor: float = 1.0) -> tuple[float, float] | None:
-    """Return the number that means no data though the file does not state it, and its share.
-
-    That is one and the same number, beyond all levels (such as -9999), exactly 0 among levels
-    that are below it, or the largest number of an integer type, far above all others.
-
-    Parameters
-    ----------
-    values : ndarray of float32
-        NaN without data.
-    factor : float
-        By which the stored numbers were multiplied.
-
-    Examples
-    --------
-    >>> nodata_taken_as_level(np.float32([-80.5, -91.25, -9999, -9999]))
-    (-9999.0, 0.5)
-    >>> nodata_taken_as_level(np.float32([-80.5, 0, 0, -70]))
-    (0.0, 0.5)
-    >>> nodata_taken_as_level(np.float32([80, 140, 255, 255]))
-    (255.0, 0.5)
-    >>> nodata_taken_as_level(np.float32([-80.5, -70]))
-    """
-    known = values[~np.isnan(values)]
-    if (top := _top_of_type(known, factor)) is not None:
-        return top
-    low, others = known[known < _NO_LEVEL_BELOW], known[known >= _NO_LEVEL_BELOW]
-    if low.size and others.size and (low == low[0]).all() and (others >= 0).all():
-        return float(low[0]), low.size / known.size
-    beyond = known[(known < _NO_LEVEL_BELOW) | (known > _NO_LEVEL_ABOVE)]
-    inside = known.size - beyond.size
-    if beyond.size and (beyond == beyond[0]).all() and (inside == 0 or (known < 0).any()):
-        return float(beyond[0]), beyond.size / known.size
-    zero, others = int((known == 0).sum()), known[known != 0]
-    if not known.size or zero < _TELLING_SHARE * known.size:
-        return None
-    # Zero means no data where nothing comes near it.
-    near = int((np.abs(others) < _NEAR_ZERO).sum())
-    apart = bool((others < 0).all() or (others >= _LEAST_LOSS_DB).all())
-    return (0.0, zero / known.size) if apart and zero > _MANY_TIMES * near else None
-
-
-def _top_of_type(known: Floats32, factor: float) -> tuple[float, float] | None:
-    """Return the largest number of an integer type and its share, where it means no data.
-
-    Numbers that reach up to it are those of a raster that was cut off there.
-    """
-    exact = known / np.float64(factor)
-    stored = np.rint(exact)
-    if not known.size or stored.max() not in _LARGEST_OF_TYPES:
-        return None
-    if not np.allclose(exact, stored, rtol=1e-6, atol=1e-3):
-        return None
-    at_top = stored == stored.max()
-    share, others = float(at_top.mean()), known[~at_top]
-    if share < _TELLING_SHARE or not others.size:
-        return None
-    top = known[at_top][0]
-    far = np.abs(top - others).min() >= _FAR_DB
-    return (float(top), share) if far else None
 
 
 def falls_with_distance(sample: RasterSample, east_m: float, north_m: float) -> float:
@@ -191,14 +124,21 @@ def check_ids(rasters: RxLevRasters, plan: CellPlan, where: str, findings: Findi
         findings.add("raster-without-cell", f"{rasters.path} and {where}", evidence)
 
 
-def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) -> list[RasterSample]:
+def sampled(
+    rasters: RxLevRasters, plan: CellPlan | None, tile_px: int, findings: Findings
+) -> list[RasterSample]:
     """Read a sample of each raster, and check that its numbers are of the declared kind.
+
+    Parameters
+    ----------
+    tile_px : int
+        Side of the tiles that a build looks at one by one.
 
     Returns
     -------
     list of RasterSample
-        Levels, or losses with a minus sign, without what stands for no data; those of rasters
-        without anything to look at, or beyond what the quantity can be, are left out.
+        Levels, or losses with a minus sign; those of rasters without anything to look at, beyond
+        what the quantity can be, or with a number that means no data, are left out.
     """
     kinds: dict[Kind, list[RasterSample]] = {}
     beyond: dict[tuple[str, str], list[RasterSample]] = {}
@@ -222,7 +162,7 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
             empty.append(cell_id)
         elif np.ptp(sample.known) == 0:
             constant.append(f"{cell_id} {sample.known[0]:g}")
-        elif (fault := _beyond(sample, rasters, kind)) is not None:
+        elif (fault := _beyond(sample, rasters, kind, tile_px)) is not None:
             beyond.setdefault((fault.expected, fault.hint), []).append(sample)
         else:
             kinds.setdefault(kind, []).append(sample)
@@ -249,6 +189,7 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
         ids = listed([sample.cell_id for sample in samples])
         findings.add("values-implausible", f"{where}, cells {ids}", evidence)
     useful: list[RasterSample] = []
+    marked = {one[0] for one in nodata}
     for kind, samples in kinds.items():
         _check_copies(samples, where, findings)
         falls = kind == "loss" and _falls_away(samples, plan)
@@ -270,19 +211,25 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
             # Whether more is stronger is not known.
             continue
         negative = kind == "loss" and not falls
-        useful += [replace(s, values=-s.values) for s in samples] if negative else samples
+        # Of what is left without the number for no data, places are not judged.
+        whole = [s for s in samples if s.cell_id not in marked]
+        useful += [replace(s, values=-s.values) for s in whole] if negative else whole
     return useful
 
 
-def _beyond(sample: RasterSample, rasters: RxLevRasters, kind: Kind) -> Fault | None:
+def _beyond(sample: RasterSample, rasters: RxLevRasters, kind: Kind, tile_px: int) -> Fault | None:
     """Return the fault of numbers that the declared quantity cannot have, and a build refuses.
 
     None where they are of another quantity, which is told as such.
     """
     if kind not in (rasters.quantity, "empty"):
         return None
+    side = max(round(tile_px * rasters.lattice.resolution_m / sample.lattice.resolution_m), 1)
+    rows, cols = (range(0, length, side) for length in sample.values.shape)
+    tiles = (sample.values[top : top + side, left : left + side] for top in rows for left in cols)
     try:
-        check_plausible(sample.values, rasters.quantity, rasters.path)
+        for values in (sample.values, *tiles):
+            check_plausible(values, rasters.quantity, rasters.path)
     except InputError as error:
         return error.faults[0]
     return None

@@ -8,11 +8,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from mapfilter._words import number_of
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.cell_layouts import (
     ALIASES,
+    HELPERS,
     IMPLIED,
     LAYOUTS,
+    LIKELY,
     OFFSETS,
     OPENCELLID_HEADER,
     Columns,
@@ -23,14 +25,16 @@ from mapfilter.radio.headings import Heading, doubtful_units, places_named, rese
 from mapfilter.radio.identities import parse_cgi, technology
 from mapfilter.radio.reported_power import ASSUMABLE, REPORTED_SHARE_DB, reported_eirp_dbm
 from mapfilter.radio.tables import Table
+from mapfilter.radio.transmitter_lists import is_inactive, stated_otherwise
 
 UNUSED_COLUMNS = "columns not used that resemble fields"
 """What the note on such columns begins with."""
-
 _LONGEST_SHOWN = 200
 _NOT_RESEMBLED = ("technology", "assumed", "crs", "cgi", *OFFSETS)
 _RADIOS = {"GSM", "UMTS", "LTE", "CDMA", "NR"}
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
+_MADE_OF = (("frequency_mhz", "band"), ("ci", "cell_number", "enodeb"))
+"""Fields, and columns of planning tools that they are made of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +79,10 @@ def arrange(
         header = OPENCELLID_HEADER
     picked = _pick(table, header, layout, columns)
     headings = [Heading.of(name) for name in header]
-    unused = _unused(header, picked, layout, columns)
     fields = [*picked, *(name for name in defaults if name not in picked)]
     fields += [name for name in _IDENTITY if "cgi" in picked and name not in fields]
-    fields = [name for name in fields if name != "cgi"]
+    fields += [name for name, by, *_ in _MADE_OF if by in picked and name not in fields]
+    fields = [name for name in fields if name != "cgi" and name not in HELPERS]
     composed = "cell" not in fields and all(name in fields for name in _IDENTITY)
     implied = [IMPLIED.get(heading.words.replace(" ", "_")) for heading in headings]
     if any(implied[i] for at in picked.values() for i in at) and "technology" not in fields:
@@ -88,11 +92,18 @@ def arrange(
     names = (*fields, "cell") if composed else tuple(fields)
     filled: Counter[str] = Counter()
     lowered, beyond, found = Counter[str](), list[str](), []
+    made, inactive = Counter[str](), 0
     for line, texts in table.whole_rows(len(header), faults):
         values = {name: _first(texts, at) for name, at in picked.items()}
+        if is_inactive(values):
+            inactive += 1
+            continue
         _by_technology(
             values, [implied[i] for at in picked.values() for i in at if texts[i].strip()]
         )
+        stated = stated_otherwise(values)
+        values |= stated
+        made.update(stated.keys())
         if layout == "opencellid":
             known = technology(values.get("technology", ""))
             known = known if known in TECHNOLOGIES else None
@@ -115,10 +126,26 @@ def arrange(
             parts = (values[name] for name in _IDENTITY)
             values["cell"] = "-".join(part for part in parts if part)
         found.append((line, [values.get(name, "") for name in names]))
+    if inactive and not found:
+        got = f"{number_of(inactive, 'row')}, all of them inactive"
+        raise fail(InputError, str(table.path), "at least one active transmitter", got)
     notes = table.notes + tuple(
         f"{name} = {defaults[name]:g} for {count} of {len(found)} cells without one"
         for name, count in sorted(filled.items())
     )
+    if filled["frequency_mhz"] and "arfcn" in picked:
+        carrier = header[picked["arfcn"][0]]
+        notes += (f"frequency_mhz is not taken from {carrier!r}; set cells.frequency_mhz",)
+    if made["frequency_mhz"]:
+        some, band = number_of(made["frequency_mhz"], "cell"), header[picked["band"][0]]
+        notes += (f"frequency_mhz of {some} is the number in the name of the band ({band!r})",)
+    if inactive:
+        which = header[picked["active"][0]]
+        notes += (f"{number_of(inactive, 'row')} left out: inactive, by {which!r}",)
+    for field, *helpers in _MADE_OF:
+        if not made[field]:
+            picked = {name: at for name, at in picked.items() if name not in helpers}
+    unused = _unused(header, picked, layout, columns)
     if lowered:
         shares = ", ".join(f"{name} {REPORTED_SHARE_DB[name]:g} dB" for name in sorted(lowered))
         some = number_of(lowered.total(), "cell")
@@ -248,10 +275,15 @@ def _unused(
     has = set(picked) | set(_NOT_RESEMBLED)
     has |= {"east", "north"} if {"lat", "lon"} <= has else set()
     has |= {"lat", "lon"} if {"east", "north"} <= has else set()
+    likely = LIKELY if layout == "atoll" else {}
     wanted = {
-        field: (*names, field.rpartition("_")[0] if unit_of(field) else field)
+        field: (
+            *names,
+            *likely.get(field, ()),
+            field.rpartition("_")[0] if unit_of(field) else field,
+        )
         for field, names in LAYOUTS[layout].items()
-        if field not in has
+        if field not in has and field not in HELPERS
     }
     wanted = {field: tuple(filter(None, names)) for field, names in wanted.items()}
     used = {at for places in picked.values() for at in places}

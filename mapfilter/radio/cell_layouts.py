@@ -47,11 +47,29 @@ ATOLL: Columns = {
     "lac": ("LAC",),
     "ci": ("CELL_IDENTITY", "CI"),
     "arfcn": ("CONTROL_CHANNEL", "BCCH"),
-    "bsic": ("BSIC", "PHY_CELL_ID", "PHYSICAL_CELL_ID", "PSC"),
+    "bsic": (
+        *("BSIC", "PHY_CELL_ID", "PHYSICAL_CELL_ID", "PSC"),
+        *("PRIMARY_SCRAMBLING_CODE", "SCRAMBLING_CODE"),
+    ),
     "technology": ("TECHNOLOGY",),
 }
 """Names of fields, and headings that Atoll shows for them, in which blanks stand for underscores
 and a unit in brackets may follow."""
+HELPERS: Columns = {
+    "band": ("FREQUENCY_BAND", "FBAND", "BAND"),
+    "enodeb": ("ENODEB_ID", "ENB_ID"),
+    "cell_number": ("CELL_ID", "LOCAL_CELL_ID"),
+    "active": ("ACTIVE",),
+}
+"""Columns of planning tools that are no fields, and state some by other means."""
+LIKELY: Columns = {
+    "arfcn": ("channel", "carrier"),
+    "ci": ("enodeb id", "gnodeb id", "cell id", "cid"),
+    "bsic": ("scrambling code",),
+    "lac": ("location area", "tracking area"),
+    "frequency_mhz": ("band",),
+}
+"""Names that a planning tool's heading may hold if it means a field, and that may mean others."""
 OPENCELLID: Columns = {
     "technology": ("radio",),
     "lat": ("lat",),
@@ -82,6 +100,6 @@ _OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs", *O
 }
 LAYOUTS: Mapping[Layout, Columns] = {
     "plan": _OWN,
-    "atoll": {name: (*ATOLL.get(name, ()), name) for name in _OWN},
+    "atoll": {**{name: (*ATOLL.get(name, ()), *own) for name, own in _OWN.items()}, **HELPERS},
     "opencellid": OPENCELLID,
 }

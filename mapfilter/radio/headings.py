@@ -68,8 +68,6 @@ _ALIKE = 0.85
 _SHORTEST_WORD = 3
 _LONGEST = 80
 """Longer headings resemble nothing."""
-_OF_OTHER_MEANING = frozenset({"frequency band"})
-"""Headings that resemble a field and are none: a band is no frequency of a carrier."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +175,7 @@ def resembling(
     """Return (heading, field) for unused headings that resemble a name of a wanted field."""
     found = []
     for at, heading in enumerate(headings):
-        if at in used or heading.words in _OF_OTHER_MEANING:
+        if at in used:
             continue
         alike = []
         for field, names in wanted.items():

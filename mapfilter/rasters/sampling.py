@@ -13,6 +13,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.files import RasterFile, Window, check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.resampling import read_on
+from mapfilter.rasters.undeclared import check_nodata_stated
 
 _BANDS_AT_A_TIME, _MOST_BYTES = 128, 1 << 32
 _MOST_UNUSED = 2.0
@@ -114,7 +115,9 @@ def _read(
         one = places[number]
         top, left, height, width = one.window
         inside = values[:, top - box[0] :, left - box[1] :][:, :height, :width]
-        check_plausible(inside, rasters.quantity, file.path)
+        check_nodata_stated(inside, ids, rasters.quantity, rasters.factor, file.path)
+        for band in inside:
+            check_plausible(band, rasters.quantity, file.path)
         wanted = [n for n, cell in enumerate(ids) if cell in rows[number]]
         taken = [ids[n] for n in wanted]
         at_points = inside[np.array(wanted, np.intp)[:, None], one.row, one.col]

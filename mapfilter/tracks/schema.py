@@ -107,7 +107,9 @@ TABLES: dict[str, Table] = {
             _integer("bsic", 0, 1007, "a BSIC or PCI"),
             Column("level_dbm", -200, 0, "dBm in -200..0", "raw RXLEV given for dBm"),
             _integer("censored", -1, 1, "-1, 0 or 1"),
-            _integer("timing_advance", 0, 3846, "steps >= 0"),
+            replace(
+                _integer("timing_advance", 0, 3846, "steps in 0..3846"), hint="metres for steps"
+            ),
             replace(_text("technology", "GSM, UMTS, LTE or NR"), optional=True),
             Column("level_step_db", 0, 60, "dB in 0..60", optional=True),
             *(

@@ -198,7 +198,7 @@ class _Checks:
         rasters = rasters if plan is None else named_by_plan(rasters, plan)
         check_pixels(rasters, findings)
         before = len(findings.found)
-        samples = sampled(rasters, plan, findings)
+        samples = sampled(rasters, plan, config.database.tile_px, findings)
         as_declared = len(findings.found) == before
         if plan is None:
             return

@@ -16,6 +16,7 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import outside_m
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
+from mapfilter.tracks.range_units import range_notes
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
@@ -53,6 +54,9 @@ def check_logs(
         # Motion without any reports is located by the streets alone.
         if near and plan and (len(log.radio) or log.motion.empty):
             _check_cells(path, name_by_plan(log, plan), plan, findings)
+        if near and plan:
+            for note in range_notes(name_by_plan(log, plan), plan):
+                findings.add("log-ranges", str(path), f"{note}.", "warning")
 
 
 def _check_recordings(opened: OpenedLog, findings: Findings) -> None:

@@ -20,6 +20,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenOptions, list_journeys, open_log
+from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.readers import plain_csv
 from mapfilter.tracks.readers.columns import header_names, likely_separator
 from mapfilter.tracks.readers.csv_fields import FIELDS
@@ -84,7 +85,8 @@ def read_reports(
         except MapfilterError as error:
             faults.found.extend(error.faults)
         else:
-            logs.append(_with_positions(opened.log))
+            log = _with_positions(opened.log)
+            logs.append(log if plan is None else with_range_notes(log, plan))
             names.append(opened.name)
     faults.raise_if_any(InputError)
     return reports_of_logs(logs, plan), names

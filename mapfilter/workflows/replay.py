@@ -33,6 +33,7 @@ from mapfilter.report.ground import BaseMap
 from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
+from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.store import is_log
 from mapfilter.viewing.bundle import replay_bundle
 from mapfilter.viewing.page import write_page
@@ -145,6 +146,7 @@ def run_replay(
         opened = journeys.open(path)
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
+        log = with_range_notes(log, sites(crs))
         fitted, notes = fitted_to_log(options, log)
         notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))
         if database is not None and by_streets_alone(fitted, log, database):

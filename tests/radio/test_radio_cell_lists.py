@@ -55,6 +55,7 @@ def test_transmitters_of_a_planning_tool(tmp_path: Path) -> None:
     assert plan.notes == (
         "eirp_dbm = 52 for 1 of 2 cells without one",
         "frequency_mhz = 1800 for 2 of 2 cells without one",
+        "frequency_mhz is not taken from 'BCCH'; set cells.frequency_mhz",
     )
 
 

@@ -16,6 +16,7 @@ SHOWN = (
     "Additional Electrical Downtilt (°);EIRP (dBm);Frequency Band\n"
     "Kamppi;K1;385584,61;6671974,34;65deg;32;120;4;2;55,5;GSM 1800\n"
 )
+OF_BAND = "frequency_mhz of 1 cell is the number in the name of the band ('Frequency Band')"
 
 
 def read(folder: Path, text: str, **options: object) -> CellPlan:
@@ -43,7 +44,7 @@ def test_displayed_headings_are_the_fields(tmp_path):
         *(32.0, 120.0),
     )
     assert (cell.mechanical_downtilt_deg, cell.downtilt_deg, cell.eirp_dbm) == (4.0, 2.0, 55.5)
-    assert plan.notes == ("frequency_mhz = 1800 for 1 of 1 cells without one",)
+    assert plan.notes == (OF_BAND,)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +58,7 @@ def test_displayed_headings_are_the_fields(tmp_path):
 def test_spellings_of_a_unit(shown, tmp_path):
     plan = read(tmp_path, SHOWN.replace("Height (m)", shown))
     assert plan["K1"].height_m == 32.0
-    assert plan.notes == ("frequency_mhz = 1800 for 1 of 1 cells without one",)
+    assert plan.notes == (OF_BAND,)
 
 
 @pytest.mark.parametrize(
@@ -67,7 +68,7 @@ def test_spellings_of_a_unit(shown, tmp_path):
 def test_spellings_of_degrees(shown, tmp_path):
     plan = read(tmp_path, SHOWN.replace("Azimuth (°)", shown))
     assert plan["K1"].azimuth_deg == 120.0
-    assert plan.notes == ("frequency_mhz = 1800 for 1 of 1 cells without one",)
+    assert plan.notes == (OF_BAND,)
 
 
 def test_spellings_of_megahertz(tmp_path):
@@ -165,6 +166,53 @@ def test_they_are_noted_with_a_map_of_columns_too(tmp_path):
 def test_other_columns_are_ignored_without_a_word(more, tmp_path):
     text = SHOWN.replace("Frequency Band", more)
     assert not unused(read(tmp_path, text))
+
+
+CARRIER = "Frequency Band;EARFCN;PCI;TAC;eNodeB ID;Cell ID;MCC;MNC"
+
+
+@pytest.mark.parametrize(
+    ("names", "texts", "identity", "carrier"),
+    [
+        (CARRIER, "LTE 800;6200;17;91;4001;7;244;91", (244, 91, 91, 1024263), (6200, 17)),
+        ("UARFCN;Scrambling Code;CGI", "10700;100;244-91-7-30", (244, 91, 7, 30), (10700, 100)),
+        ("nr_arfcn;Physical Cell ID;NCI", "633984;900;5", (None, None, None, 5), (633984, 900)),
+        ("BCCH;BSIC;LAC;Cell ID", "612;17;801;30417", (None, None, 801, 30417), (612, 17)),
+    ],
+)
+def test_identities_have_the_names_of_their_technologies(names, texts, identity, carrier, tmp_path):
+    text = SHOWN.replace("Frequency Band", names).replace("GSM 1800", texts)
+    plan = read(tmp_path, text)
+    cell = plan["K1"]
+    assert (cell.mcc, cell.mnc, cell.lac, cell.ci) == identity
+    assert (cell.arfcn, cell.bsic) == carrier
+    assert cell.frequency_mhz == (800.0 if "LTE 800" in texts else 1800.0)
+    assert not unused(plan)
+    of_default = f"frequency_mhz is not taken from {names.split(';')[0]!r}; set cells.frequency_mhz"
+    assert (of_default in plan.notes) == ("LTE 800" not in texts)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "field"),
+    [
+        *(("Channel", "6200", "arfcn"), ("Carriers", "1", "arfcn"), ("gNodeB ID", "4001", "ci")),
+        *(("Cell ID", "K1-a", "ci"), ("eNodeB ID", "4001", "ci")),
+        ("Frequency Band", "E-UTRA 3", "frequency_mhz"),
+    ],
+)
+def test_columns_that_may_state_a_carrier_are_noted_where_they_do_not(name, text, field, tmp_path):
+    plan = read(tmp_path, SHOWN.replace("Frequency Band", name).replace("GSM 1800", text))
+    assert unused(plan) == [f"columns not used that resemble fields: {name!r} ({field})"]
+
+
+def test_inactive_transmitters_are_left_out_and_noted(tmp_path):
+    text = SHOWN.replace("Frequency Band", "Active").replace("GSM 1800", "Yes")
+    row = text.splitlines()[1]
+    plan = read(tmp_path, f"{text}{row.replace('K1', 'K2').replace('Yes', 'No')}\n")
+    assert plan.ids == ("K1",)
+    assert "1 row left out: inactive, by 'Active'" in plan.notes
+    told = complaint(tmp_path, text.replace("Yes", "No"))
+    assert "expected at least one active transmitter, found 1 row, all of them inactive" in told
 
 
 def test_a_list_of_atoll_without_positions_is_told_where_they_are(tmp_path):

@@ -13,13 +13,13 @@ from mapfilter.check.raster_checks import (
     RasterSample,
     above_free_space_db,
     falls_with_distance,
-    nodata_taken_as_level,
 )
 from mapfilter.geodesy import Lattice, heading_from_azimuth_rad
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import simulate_ground_truth
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.undeclared import nodata_taken_as_level
 
 # On the central meridian, so that grid north is true north.
 LATTICE = Lattice("EPSG:32635", 499_000.0, 6_670_000.0, 20.0, 80, 100)
@@ -160,10 +160,26 @@ def test_the_largest_number_of_a_type_far_above_all_others_means_no_data():
         assert found == (top, 0.2)
     tenths = np.float32(0.1) * np.append(10 * losses, np.float32([65535] * 20))
     assert nodata_taken_as_level(tenths, 0.1) == (pytest.approx(6553.5), 0.2)
-    # Cut off at 255, too few, a number with decimals, or no limit of a type.
+    # Among numbers with decimals it is one that hardly a loss reaches, as any other.
+    decimals = np.append(losses + 0.25, np.float32([255] * 20))
+    assert nodata_taken_as_level(decimals) == (255, 0.2)
+    # Cut off at 255, too few, or no limit of a type.
     cut_off = np.minimum(np.arange(70, 300, dtype=np.float32), 255)
     few = np.append(losses.repeat(10), np.float32([255]))
-    decimals = np.append(losses + 0.25, np.float32([255] * 20))
     other = np.append(losses, np.float32([200] * 20))
-    for values in (cut_off, few, decimals, other):
+    for values in (cut_off, few, other):
+        assert nodata_taken_as_level(values) is None
+
+
+def test_a_number_that_hardly_a_level_reaches_means_no_data_far_from_all_others():
+    levels = np.linspace(-130, -45, 400, dtype=np.float32)
+    for number in (-1, 5, -200):
+        found = nodata_taken_as_level(np.append(levels, np.float32([number] * 100)))
+        assert found == (number, 0.2)
+    # Too few, one that levels reach, near others, and cut off.
+    few = np.append(levels, np.float32([-1] * 4))
+    usual = np.append(levels, np.float32([-25] * 100))
+    near = np.append(np.linspace(-130, -10, 400, dtype=np.float32), np.float32([-1] * 100))
+    cut_off = np.minimum(np.linspace(-130, 20, 400, dtype=np.float32), -1)
+    for values in (few, usual, near, cut_off):
         assert nodata_taken_as_level(values) is None

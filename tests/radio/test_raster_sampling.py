@@ -134,9 +134,26 @@ def test_what_is_not_plausible_in_one_window_is_an_error(tmp_path):
 
     rasters = rasters_of(tmp_path / "rasters", values={"D": spoilt})
     places = places_in(rasters)
-    with pytest.raises(InputError, match=r"D\.tif.*mostly 0 and above"):
+    with pytest.raises(InputError, match=r"D\.tif.*0 means no data, and the file does not"):
         levels_at(places)
     levels_at(places[1:])
+
+
+@pytest.mark.parametrize(
+    ("quantity", "number", "refused"),
+    [("level", -1, True), ("level", -200, False), ("loss", 0, True), ("loss", 255, False)],
+)
+def test_a_number_for_no_data_is_an_error_where_it_is_strong(quantity, number, refused, tmp_path):
+    def spoilt(values):
+        values[:16, 8:16] = number
+        return values
+
+    places = places_in(rasters_of(tmp_path / "rasters", quantity, {"D": spoilt}))
+    if not refused:
+        levels_at(places)
+        return
+    with pytest.raises(InputError, match=rf"D\.tif pixels, cell D: .*{number} means no data"):
+        levels_at(places)
 
 
 def test_deviations_are_no_levels(tmp_path):

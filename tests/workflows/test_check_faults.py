@@ -64,6 +64,11 @@ def holed(values, number):
     return values
 
 
+def weakest(levels, number):
+    """Levels, a number in place of the weaker half."""
+    return np.where(levels < np.median(levels), number, levels)
+
+
 def whole(losses, top):
     """Whole losses, the weakest third taken for not predicted."""
     return np.where(losses > np.quantile(losses, 0.67), top, np.round(losses))
@@ -150,6 +155,9 @@ ERRORS = [
     ("identical-rasters", lambda w: w.levels.update(S2C=w.levels["S2B"])),
     ("nodata-as-level", lambda w: w.each(lambda v: holed(v, -9999))),
     ("nodata-as-level", lambda w: w.each(lambda v: holed(v, 0))),
+    ("nodata-as-level", lambda w: w.levels.update(S1C=holed(w.levels["S1C"], 0))),
+    ("nodata-as-level", lambda w: w.levels.update(S1C=weakest(w.levels["S1C"], -1))),
+    ("nodata-as-level", lambda w: w.each(lambda v: weakest(v, -200))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: whole(v, 255)))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: whole(v, 65535)))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: holed(v, -9999)))),
@@ -235,6 +243,13 @@ def test_text_is_a_paragraph_for_each_finding(world):
     assert "1 of 10 cells have no raster: S3B." in first
     assert "S1A is of S1C, S1C is of S1A" in second
     assert second.endswith("Exchange the labels of the rasters, or the azimuths in the plan.")
+
+
+def test_levels_that_a_build_refuses_in_one_tile_are_an_error(world):
+    world.levels.update(S1A=world.levels["S1A"] + 75)
+    given = "--set=database.tile_px=32"
+    world.set(given)
+    assert {(f["code"], f["severity"]) for f in check(world)} == {("values-implausible", "error")}
 
 
 def test_text_of_a_clean_world(world):

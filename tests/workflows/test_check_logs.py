@@ -49,6 +49,16 @@ def test_headings_by_a_compass_are_a_finding(check, log):
     assert "pi/2 minus a" in found["log-headings"]["remedy"]
 
 
+def test_timing_advances_in_metres_are_a_finding(check, log):
+    serving = pd.read_csv(log / "radio.csv")["role"] == "serving"
+    metres = serving.map({True: 700, False: None}).astype("Int64")
+    change(log / "radio.csv", timing_advance=lambda _: metres)
+    found = check(log)
+    assert set(found) == {"log-ranges"}
+    assert found["log-ranges"]["severity"] == "warning"
+    assert "(metres for steps" in found["log-ranges"]["evidence"]
+
+
 def test_motion_alone_is_no_fault(check, log):
     for table in ("radio", "gnss", "truth"):
         (log / f"{table}.csv").unlink(missing_ok=True)

@@ -171,6 +171,14 @@ def test_a_search_that_ends_without_a_position_is_told(log, replay):
     assert found["last_lon_deg"] is None
 
 
+def test_timing_advances_in_metres_are_noted(log, replay):
+    serving = pd.read_csv(log / "radio.csv")["role"] == "serving"
+    metres = serving.map({True: 700, False: None}).astype("Int64")
+    change(log / "radio.csv", timing_advance=lambda _: metres)
+    notes = assert_done(replay(log, "--json")).json["notes"]
+    assert any("radio, timing_advance: " in note and "(metres for steps" in note for note in notes)
+
+
 def test_notes_of_a_log_are_told(log, replay):
     change(log / "motion.csv", time_s=put(0.0))
     (log / "motion.txt").write_text("")
