@@ -168,7 +168,10 @@ def _check(value: Mapping[str, Any], where: str) -> None:
     if faults.found:
         raise fail(StoreError, where, "what a log states", "something else", "edited")
     state = value["state"]
-    beliefs, sources = [state.belief, *(one.belief for one in state.held + state.unaided)], [state.sources]
+    beliefs, sources = (
+        [state.belief, *(one.belief for one in state.held + state.unaided)],
+        [state.sources],
+    )
     if state.alternative is not None:
         beliefs.append(state.alternative.belief)
         sources.append(state.alternative.sources)
