@@ -180,11 +180,14 @@ def test_where_the_map_may_start_a_belief_the_path_is_kept():
 )  # fmt: skip
 def test_turns_alone_at_the_start_make_headings_relative(raw, gone_m, compass):
     state = walking()
-    state = replace(state, reckoning=replace(state.reckoning, travelled_m=gone_m))
+    reckoning = replace(state.reckoning, travelled_m=gone_m)
+    state = replace(state, reckoning=reckoning, unaided=(turned_phone(Hold(), 6),))
     found, _, asked = move(state, raw)
     assert found.compass is compass
+    # A belief without positions that began with a compass is none any more.
+    assert len(found.unaided) == compass
     assert (("without compass",) in asked) is not compass
-    assert [one[3] for one in asked if one[0] == "predict"] == [compass]
+    assert [one[3] for one in asked if one[:2] == ("predict", 0)] == [compass]
 
 
 @pytest.mark.parametrize(

@@ -139,6 +139,8 @@ def moved(
             if compass and not turned and reckoning.travelled_m == 0:
                 # Nothing has moved yet, so headings can still be relative to the first one.
                 compass, belief = False, beliefs.without_compass(belief, rng)
+                # What began beside it has headings of a compass.
+                unaided = ()
             predict = beliefs.moving_filter(state, compass=compass).predict
             tracked = state.status is Status.TRACKING and belief.status is Status.TRACKING
             jumped = compass and not positioned and jumps(walking_rad, raw, rules)
