@@ -115,7 +115,7 @@ def _far_from_others(known: Floats32) -> tuple[float, float] | None:
         near = np.count_nonzero(np.abs(known - number) < _FAR_DB) - count
         often = count >= max(_TELLING_SHARE * known.size, _FEWEST) and count < known.size
         if often and count > _MANY_TIMES * near:
-            return number, count / known.size
+            return number, float(count) / known.size
     return None
 
 

@@ -167,7 +167,7 @@ def test_when_another_way_of_holding_the_phone_is_ahead():
     reckoning = SimpleNamespace(travelled_m=100.0)
     for held, expected in (((), False), ((ahead(93.0),), True), ((ahead(93.1),), False),
                            ((ahead(50.0, -1.0),), False)):  # fmt: skip
-        state = SimpleNamespace(held=held, belief=belief(), reckoning=reckoning, unaided=())
+        state = SimpleNamespace(held=held, belief=belief(), reckoning=reckoning, found_alone=())
         assert FILTERS.is_contested(state) is expected
     state.held, state.belief = (ahead(50.0),), on_grid(3)
     assert not FILTERS.is_contested(state)

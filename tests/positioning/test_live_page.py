@@ -5,6 +5,7 @@ import textwrap
 from pathlib import Path
 
 import numpy as np
+import pytest
 from cross_world import SPEED_MPS, make_database, walk_log
 
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -18,7 +19,7 @@ def test_a_live_application_gets_what_a_replay_gets(tmp_path, monkeypatch):
     (tmp_path / "out").mkdir()
     database = make_database(tmp_path / "out")
     monkeypatch.chdir(tmp_path)
-    (code,) = re.findall(r"code-block:: python\n\n((?:   .*\n|\n)+)", PAGE.read_text("utf-8"))
+    code, stated = re.findall(r"code-block:: python\n\n((?:   .*\n|\n)+)", PAGE.read_text("utf-8"))
     names = {}
     exec(textwrap.dedent(code), names)
     walked = walk_log()
@@ -36,3 +37,7 @@ def test_a_live_application_gets_what_a_replay_gets(tmp_path, monkeypatch):
     np.testing.assert_array_equal(places[:, 0], replayed.east_m)
     np.testing.assert_array_equal(places[:, 1], replayed.north_m)
     np.testing.assert_array_equal(places[:, 2], replayed.radii_m[:, 2])
+    # The second block is of a log that states more, with the names of the first.
+    exec(textwrap.dedent(stated), names)
+    assert names["notes"]
+    assert names["bayes"].timing.step_m == pytest.approx(78.07, abs=0.01)

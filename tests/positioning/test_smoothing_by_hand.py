@@ -32,7 +32,13 @@ def after_epoch(reckoned, belief, unit_m=1.0, **more):
     way = SimpleNamespace(
         east_m=east_m, north_m=north_m, travelled_m=travelled_m, sampling_m2=sampling_m2
     )
-    usual = {"alternative": None, "takeovers": 0, "held": (), "hold": held_in(unit_m)}
+    usual = {
+        "alternative": None,
+        "takeovers": 0,
+        "held": (),
+        "unaided": (),
+        "hold": held_in(unit_m),
+    }
     return SimpleNamespace(reckoning=way, belief=belief, **(usual | more))
 
 
