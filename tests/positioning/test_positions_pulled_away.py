@@ -208,6 +208,8 @@ def test_a_fix_agrees_where_95_percent_of_them_would_lie(apart_m, agrees):
     summary = SimpleNamespace(mean=np.array([200.0, 100.0]), covariance_m2=np.diag([99.0, 48.0]))
     fix = GnssFix(1000.0 + 200.0 + apart_m, 5000.0 + 100.0, 1.0, 1.0, 0.0)
     assert agrees_with(SimpleNamespace(summary=summary), fix, (1000.0, 5000.0)) is agrees
+    unknown = replace(fix, cov_east_north_m2=nan)
+    assert agrees_with(SimpleNamespace(summary=summary), unknown, (1000.0, 5000.0)) is agrees
 
 
 def test_distrusted_readings_are_used_again_once_they_have_agreed_for_some_way():

@@ -72,8 +72,7 @@ class FixTerm:
         dx = state[EAST] - _F(fix.east_m - west)
         dy = state[NORTH] - _F(fix.north_m - south)
         var_x, var_y = max(fix.var_east_m2, 1.0), max(fix.var_north_m2, 1.0)
-        cross = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
-        cross = float(np.clip(cross, -0.99 * sqrt(var_x * var_y), 0.99 * sqrt(var_x * var_y)))
+        cross = cross_of(var_x, var_y, fix)
         det = var_x * var_y - cross**2
         square = (var_y * dx**2 - 2 * cross * dx * dy + var_x * dy**2) / det
         return np.asarray(-0.5 * np.minimum(square, _FIX_CLIP**2), dtype=np.float64)
@@ -100,6 +99,13 @@ def refutation(fix: GnssFix, total: float, area_m2: float) -> float:
     return min(max(anywhere - total, -_MOST_REFUTED_NATS), 0.0)
 
 
+def cross_of(var_east_m2: float, var_north_m2: float, fix: GnssFix) -> float:
+    """Return the covariance of a fix, 0 where it has none, as far as its variances allow."""
+    cross_m2 = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
+    most_m2 = 0.99 * sqrt(var_east_m2 * var_north_m2)
+    return float(np.clip(cross_m2, -most_m2, most_m2))
+
+
 def agrees_with(belief: MapBelief, fix: GnssFix, origin_m: tuple[float, float]) -> bool:
     """Return whether a fix lies where 95 % of them would, by the errors of the belief and its own.
 
@@ -111,7 +117,7 @@ def agrees_with(belief: MapBelief, fix: GnssFix, origin_m: tuple[float, float]) 
     origin_m : tuple of float
         Of the frame of the hypotheses.
     """
-    summary, cross_m2 = belief.summary, fix.cov_east_north_m2
+    summary, cross_m2 = belief.summary, cross_of(fix.var_east_m2, fix.var_north_m2, fix)
     covariance_m2 = summary.covariance_m2 + np.array(
         [[fix.var_east_m2, cross_m2], [cross_m2, fix.var_north_m2]]
     )
