@@ -82,7 +82,9 @@ class Roads(Section):
     Parameters
     ----------
     profile : {"walking", "driving"}
-        Ways that count.
+        Ways that count. Of a ``layer``, driving leaves out the classes that OpenStreetMap has for
+        ways on foot (``footway``, ``cycleway``, ``path``, ``track``, ``steps``, …), unless
+        ``half_width_by_class_m`` names them; other words and numbers are kept, with a note.
     half_width_m : float
         Points as near as this to the centre line of a way belong to it.
     half_width_by_class_m : dict

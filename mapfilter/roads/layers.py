@@ -1,24 +1,27 @@
 """Roads, buildings and water from any vector file, such as a shapefile, GeoPackage or GeoJSON.
 
 Lines are ways; polygons in a layer of roads are accessible areas, as squares are. A layer
-has no access rules: classes that must not be used are left out by a half width of 0.
+has no access rules: classes that must not be used are left out by a half width of 0. Of those that
+the classes of OpenStreetMap name, vehicles have no footways, cycleways, paths, tracks and steps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container
-from dataclasses import dataclass
+from collections.abc import Collection, Container
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._types import Ints
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter._words import number_of
+from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.roads.buildings import (
     check_heights,
     made_buildings,
 )
 from mapfilter.roads.defaults import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
+from mapfilter.roads.osm import DRIVING_CLASSES, NOT_DRIVEN_CLASSES
 from mapfilter.roads.vector import Layer, read_layer
 from mapfilter.roads.ways import (
     Bounds,
@@ -47,6 +50,44 @@ class LayerRoads:
         """Return the areas that are not of some classes."""
         kept = np.array([name not in classes for name in self.area_class], dtype=np.bool_)
         return Squares(self.areas.crs, self.areas.area_id[kept], self.areas.geometry[kept])
+
+    def driven(self, kept: Collection[str]) -> LayerRoads:
+        """Return the roads without those on foot, by the words of OpenStreetMap, and a note.
+
+        Parameters
+        ----------
+        kept : collection of str
+            Classes that stay, whatever they name.
+
+        Raises
+        ------
+        InputError
+            Nothing is left.
+        """
+        words = {*self.ways.class_names, *self.area_class}
+        on_foot = {name for name in words if name.casefold() in NOT_DRIVEN_CLASSES} - {*kept}
+        if not on_foot:
+            if any(name.casefold() in DRIVING_CLASSES for name in words):
+                return self
+            note = "profile driving: no class of the layer is known as a road or a footway "
+            note += f"({listed(sorted(words))}), so all are kept; half_width_by_class_m leaves "
+            note += "classes out"
+            return replace(self, notes=(*self.notes, note))
+        names = np.array(self.ways.class_names, dtype=object)[self.ways.way_class]
+        away = np.isin(names, list(on_foot))
+        areas = self.areas_without(on_foot)
+        if away.all() and not len(areas):
+            expected, got = "ways for vehicles in the area", listed(sorted(on_foot))
+            raise fail(InputError, "layer of roads", expected, f"only {got}", "another profile")
+        stay = tuple(name for name in self.area_class if name not in on_foot)
+        note = f"profile driving: {number_of(int(away.sum()), 'way')} left out, of classes "
+        note += f"{listed(sorted(on_foot))}; half_width_by_class_m keeps those that it names"
+        # Without the names of classes that no way has any more.
+        left = Ways.open(
+            *(self.ways.crs, self.ways.way_id[~away]),
+            *(names[~away], self.ways.geometry[~away]),
+        )
+        return LayerRoads(left, areas, stay, (*self.notes, note))
 
 
 def read_layer_roads(

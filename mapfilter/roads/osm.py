@@ -43,6 +43,7 @@ _SHARED = frozenset((*_MAIN, *_MINOR))
 _ON_FOOT = ("bridleway", "cycleway", "footway", "path", "pedestrian", "platform", "steps", "track")
 WALKING_CLASSES = _SHARED.union(_ON_FOOT)
 DRIVING_CLASSES = _SHARED.union(("motorway", "motorway_link", "trunk", "trunk_link"))
+NOT_DRIVEN_CLASSES = WALKING_CLASSES - DRIVING_CLASSES
 SQUARE_CLASSES = frozenset(("footway", "living_street", "path", "pedestrian"))
 
 _ALLOWING = frozenset(("yes", "designated", "permissive", "official", "destination", "customers"))

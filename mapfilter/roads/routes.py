@@ -209,6 +209,8 @@ def read_roads(
             class_column=class_column,
             id_column=id_column,
         )
+        if profile == "driving":
+            layer = layer.driven([name for name, width_m in by_class_m.items() if width_m > 0])
         left_out = [name for name, width_m in by_class_m.items() if width_m == 0]
         return Roads(layer.ways, layer.areas_without(left_out) if squares else None, layer.notes)
     areas = None

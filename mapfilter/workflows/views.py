@@ -131,7 +131,11 @@ def pages_of(paths: Sequence[Path]) -> list[Path]:
     for path in paths:
         pages = [path] if path.is_file() else sorted(path.glob(REPLAY_HTML))
         pages = pages or sorted(path.glob(f"*/{REPLAY_HTML}"))
-        if not pages:
+        if (path / _MANIFEST).is_file():
+            expected = f"results with {REPLAY_HTML} alone, or one database alone"
+            hint = "each database is a page of its own; mapfilter merge makes one of several"
+            faults.add(shown(str(path)), expected, "a database beside others", hint)
+        elif not pages:
             expected = f"a result with {REPLAY_HTML}, or a database"
             what = "a folder without any" if path.is_dir() else "nothing there"
             hint = "run mapfilter replay with --html"

@@ -13,6 +13,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.osm import read_water
 from mapfilter.roads.route_points import route_lattice
+from mapfilter.roads.routes import read_roads
 
 FORMATS = ("roads.shp", "roads.gpkg", "roads.geojson", "roads.fgb", "roads.parquet", "roads.gml",
            "roads.sqlite", "roads.shp.zip")  # fmt: skip
@@ -111,6 +112,30 @@ def test_half_widths_go_by_class(tmp_path):
     rows = np.unique(routes.row[routes.way_id == 3])
     assert rows.size == 4  # 2.5 and 7.5 m to either side of the street at 200 m
     assert not np.any(routes.way_id == 1)
+
+
+def test_vehicles_have_no_footways_of_a_layer(tmp_path):
+    path = write(ROADS, tmp_path / "a.gpkg")
+    lattice = Lattice.covering(CRS, AREA[1], 5.0)
+
+    def read(**options):
+        return read_roads(path, lattice, **{"class_column": "fclass", **options})
+
+    assert set(read().ways.class_names) == {"footway", "primary"}
+    driven = read(profile="driving")
+    assert driven.ways.class_names == ("primary",)
+    assert driven.notes[-1].startswith("profile driving: 1 way left out, of classes footway; ")
+    kept = read(profile="driving", half_width_by_class_m={"footway": 3.0})
+    assert set(kept.ways.class_names) == {"footway", "primary"}
+    numbered = read(profile="driving", class_column="lanes")
+    assert "no class of the layer is known as a road or a footway (1, 2, 4)" in numbered.notes[-1]
+    with pytest.raises(InputError, match="ways for vehicles in the area, found only footway"):
+        read_roads(
+            write(ROADS[ROADS["fclass"] == "footway"], tmp_path / "b.gpkg"),
+            lattice,
+            profile="driving",
+            class_column="fclass",
+        )
 
 
 def test_polygons_of_roads_are_areas(tmp_path):

@@ -35,6 +35,12 @@ def bundle(replays):
     return read_page(replays / "bayes" / "replay.html")
 
 
+def test_several_databases_are_refused_as_such(world, tmp_path):
+    done = mapfilter("view", world.database, world.database, "--out", tmp_path / "view.html")
+    assert_refused(done, "one database alone, found a database beside others", "mapfilter merge")
+    assert not (tmp_path / "view.html").exists()
+
+
 def test_epochs_are_those_of_the_estimate(bundle, replays):
     estimate = read_estimate(replays / "bayes" / "estimate.parquet")
     (run,) = bundle["runs"]
