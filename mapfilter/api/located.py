@@ -26,6 +26,7 @@ from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.placeless import in_frame
+from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.tables import tidy_table
 from mapfilter.viewing.notebook import View
 from mapfilter.viewing.runs import ViewedRun
@@ -181,6 +182,7 @@ def locate(
     database = opened(database)
     log = read(log, database.lattice.crs)
     log = name_by_plan(in_frame(log, database.lattice.crs), database.plan)
+    log = with_range_notes(log, database.plan)
     options, notes = fitted_to_log(
         filter_options(filter) if isinstance(filter, str) else filter, log
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields
 from functools import lru_cache
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ LOG = "log"
 _USUAL = LogStatement()
 _KEPT = 8
 """Filters that are kept besides the usual one; others are made again when they are needed."""
-_MOST_STEP_DB = 60.0
+_MOST_STEP_DB, _STEP_DIGITS = 60.0, 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +92,14 @@ class SessionFilters:
     ) -> None:
         self.options, self.make, self.plan = options, make, plan
         self.usual = self._made(_USUAL)
-        self._of = lru_cache(maxsize=_KEPT)(self._made)
+        self._of, self._making = lru_cache(maxsize=_KEPT)(self._made), Lock()
 
     def of(self, stated: LogStatement) -> SessionFilter:
         """Return the filter of a session; it may have to be made first."""
-        return self.usual if stated == _USUAL else self._of(stated)
+        if stated == _USUAL:
+            return self.usual
+        with self._making:
+            return self._of(stated)
 
     def _made(self, stated: LogStatement) -> SessionFilter:
         fitted, notes = fitted_to_statement(self.options, stated)
@@ -125,7 +129,7 @@ def statement_of(given: object, faults: Faults) -> LogStatement:
         faults.add(f"{LOG}.vehicle", "true or false", shown(vehicle))
     if len(faults.found) > before:
         return _USUAL
-    return LogStatement(technology, step_db or 0.0, vehicle)
+    return LogStatement(technology, round(step_db or 0.0, _STEP_DIGITS), vehicle)
 
 
 def statement_document(stated: LogStatement) -> dict[str, Any]:

@@ -44,9 +44,9 @@ class Progress:
     @property
     def state_bytes(self) -> int:
         """Memory of the state, but for some kilobytes."""
-        beliefs = [self.state.belief]
-        if self.state.alternative is not None:
-            beliefs.append(self.state.alternative.belief)
+        state = self.state
+        rivals = (*state.held, *state.unaided, state.alternative, state.twin)
+        beliefs = [state.belief, *(one.belief for one in rivals if one is not None)]
         arrays = [getattr(b, name) for b in beliefs for name in _ARRAYS if hasattr(b, name)]
         return _EMPTY_STATE_BYTES + sum(int(one.nbytes) for one in arrays)
 

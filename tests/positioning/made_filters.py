@@ -92,6 +92,10 @@ class Beliefs:
     def model(self):
         return SimpleNamespace(area=self.area)
 
+    @property
+    def alone(self):
+        return self.held_otherwise
+
     def filter_of(self, state):
         assert state.belief is not None
         return self.filter

@@ -196,7 +196,7 @@ def test_positions_ways_and_masses_are_those_of_the_paths():
     assert places(estimate)[4].tolist() == pytest.approx([45.0, 25.0 - 20.0 / 3], abs=0.1)
 
 
-def at(epoch, state, alternative=None, takeovers=0, hold=None, held=(), unaided=()):
+def at(epoch, state, alternative=None, takeovers=0, hold=None, held=(), alone_from_m=nan):
     """The part of the filter's state after an epoch that the history uses."""
     east_m, north_m, travelled_m = MOVED[epoch]
     state = np.vstack([state, np.zeros((STATES - 5, state.shape[1]), np.float32)])
@@ -209,7 +209,7 @@ def at(epoch, state, alternative=None, takeovers=0, hold=None, held=(), unaided=
         takeovers=takeovers,
         hold=hold or Hold(),
         held=held,
-        unaided=unaided,
+        alone_from_m=alone_from_m,
     )
 
 
@@ -308,30 +308,29 @@ def test_an_alternative_that_outlasts_a_takeover_by_a_turned_phone(between):
     assert history.alternative_is_whole
 
 
-def test_beliefs_that_positions_led_away_are_dropped_once_one_without_them_takes_over():
+@pytest.mark.parametrize("ends", [False, True])
+def test_beliefs_that_positions_led_away_are_dropped_once_one_without_them_takes_over(ends):
+    """Whether or not an alternative ends in the same epoch."""
     history = BayesSmoother(AREA, ERRORS, every_m=1.0)
     main, other = cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
-    alone = tuple(
-        SimpleNamespace(start_m=start_m, belief=SimpleNamespace(log_evidence=log_evidence))
-        for start_m, log_evidence in ((0.0, -9.0), (6.0, -8.0))
-    )
     rival = SimpleNamespace(belief=at(0, main).belief, start_m=7.0)
-    tracks = [at(0, main), at(1, main, unaided=alone), at(2, main, rival, unaided=alone)]
-    tracks += [at(3, other, rival, takeovers=1), at(4, other, rival, takeovers=1)]
+    left, since = None if ends else rival, {"takeovers": 1, "alone_from_m": 6.0}
+    tracks = [at(0, main), at(1, main), at(2, main, rival)]
+    tracks += [at(3, other, left, **since), at(4, other, left, **since)]
     for before, after in zip([tracks[0], *tracks], tracks, strict=False):
         history.add(before, after)
     assert [k.epoch for k in history.kept] == [0, 3, 4]
     # What was kept of the alternative before is not joined to it, as it may have gaps.
-    assert not history.alternative_is_whole
+    assert history.alternative_is_whole is ends
 
 
-def test_beliefs_stay_where_an_alternative_takes_over_beside_one_without_positions():
+def test_an_alternative_replaces_what_was_kept_after_such_a_takeover_too():
     history = BayesSmoother(AREA, ERRORS, every_m=1.0)
     main, other = cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
-    alone = (SimpleNamespace(start_m=6.0),)
     rival = SimpleNamespace(belief=at(0, other).belief, start_m=12.0)
-    tracks = [at(0, main), at(1, main, unaided=alone), at(2, main, rival, unaided=alone)]
-    tracks += [at(3, other, takeovers=1)]
+    since = {"alone_from_m": 0.0}
+    tracks = [at(0, main, **since), at(1, main, **since), at(2, main, rival, **since)]
+    tracks += [at(3, other, takeovers=1, **since)]
     for before, after in zip([tracks[0], *tracks], tracks, strict=False):
         history.add(before, after)
     assert [float(k.state[0, 0]) for k in history.kept] == [1.0, 1.0, 9.0, 9.0]

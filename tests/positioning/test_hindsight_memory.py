@@ -1,6 +1,7 @@
 """What a smoother keeps: bounded bytes, and a jitter no less than the forward pass has."""
 
 import inspect
+from math import nan
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,7 +27,7 @@ def state_at(travelled_m):
     )
     return SimpleNamespace(
         reckoning=reckoning, belief=belief, alternative=None, takeovers=0, hold=Hold(),
-        unaided=(), held=(),
+        alone_from_m=nan, held=(),
     )  # fmt: skip
 
 

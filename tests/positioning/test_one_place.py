@@ -45,6 +45,7 @@ class State:
     held: tuple = ()
     null: object = field(default_factory=lambda: SimpleNamespace(log_odds=-12.0))
     recovery: object = None
+    proven: bool = True
     sources: dict = field(default_factory=dict)
     reckoning: object = field(default_factory=lambda: SimpleNamespace(travelled_m=40.0))
 
@@ -84,6 +85,7 @@ def test_below_the_mass_of_a_split_it_has_to_converge_anew():
     assert found.belief.status is Status.SEARCHING
     assert isnan(found.belief.agreement_start_m)
     assert not found.contested
+    assert not found.proven
 
 
 @pytest.mark.parametrize("mass", [1.0, 0.5])

@@ -25,15 +25,23 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, RadioReading
+from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm, RadioReading
+from mapfilter.positioning.bayes.filter import _in_doubt
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.hold_rules import PullRules
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.unaided import beside_alternative
-from mapfilter.positioning.epochs import GnssFix
+from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
+from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.filter import locate
-from mapfilter.positioning.gnss.gate import GnssState, agrees_with
+from mapfilter.positioning.gnss.gate import (
+    GnssComparison,
+    GnssGate,
+    GnssState,
+    _neutral,
+    agrees_with,
+)
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.tracks.log import make_log
@@ -67,9 +75,12 @@ def test_it_is_weighed_by_all_but_positions():
     assert (found.status, found.takeovers) == (TRACKING, 0)
     _, (reading,) = beside(given, measured=False)
     assert not reading.tracked
-    # Positions alone say nothing of it.
-    same, readings = beside(given, (FIX,), source=Source(is_position=True))
-    assert (same.unaided, readings) == (given.unaided, [])
+    # Positions alone say nothing of it, but what the way has cost is settled with the main belief.
+    found, (reading,) = beside(given, (FIX,), source=Source(is_position=True))
+    assert (reading.serving, reading.levels, reading.bounds) == (-1, None, ())
+    (nothing,) = reading.terms
+    assert nothing.log_likelihood(None).tolist() == [0.0]
+    assert found.unaided[0].belief.log_evidence == -10.0
     assert beside(STATE)[0].unaided == ()
 
 
@@ -88,6 +99,9 @@ def test_one_that_fails_is_given_up_and_so_is_one_beside_a_search():
     assert beside(replace(STATE, unaided=(alone(-9.0),)), beliefs=failing)[0].unaided == ()
     searching = replace(STATE, belief=belief(SEARCHING), unaided=(alone(-9.0),))
     assert beside(searching)[0].unaided == ()
+    # One that is ahead, as positions and reports tear the main belief apart, is not.
+    ahead = replace(searching, unaided=(replace(alone(-7.0), ahead_m=-7.0),))
+    assert len(beside(ahead)[0].unaided) == 1
 
 
 @pytest.mark.parametrize(
@@ -105,6 +119,7 @@ def test_one_that_is_far_ahead_takes_over_and_positions_are_distrusted(log_evide
         assert found.belief.log_evidence == log_evidence - 1.0
         assert (found.status, found.recovery, found.held) == (TRACKING, Recovery(), ())
         assert found.hold == given.hold
+        assert found.alone_from_m == 0.0
         assert found.sources == {"one": "before distrusted at 9 s", "two": 2}
 
 
@@ -189,10 +204,18 @@ def test_a_belief_that_converges_without_positions_is_proven(positions, proven):
     assert weighed(Beliefs(positions=positions), searching)[0].proven is False
 
 
+def test_a_belief_that_searches_again_has_to_be_proven_anew():
+    proven = replace(STATE, proven=True)
+    assert weighed(Beliefs(), proven)[0].proven
+    assert not weighed(Beliefs(gaining(-2.0, status=SEARCHING)), proven)[0].proven
+    # A search that has been proven stays so.
+    searching = replace(proven, belief=belief(SEARCHING), status=SEARCHING)
+    assert weighed(Beliefs(), searching)[0].proven
+
+
 def test_beside_an_alternative_that_takes_over_one_from_scratch_goes_on():
-    state = replace(
-        STATE, unaided=(alone(-7.0), scratch(-8.0)), alternative=rival(-3.0), proven=True
-    )  # fmt: skip
+    both = alone(-7.0), replace(scratch(-8.0), ahead_m=3.0)
+    state = replace(STATE, unaided=both, alternative=rival(-3.0), proven=True)
     (left,) = beside_alternative(state, STATE.belief)
     # 2 nats ahead of the main belief at -10; the alternative began with it there, and is 7 ahead.
     assert left.from_scratch
@@ -221,6 +244,64 @@ def test_distrusted_readings_are_used_again_once_they_have_agreed_for_some_way()
     trusted = begins.on_trial(options, 130.0)
     assert not trusted.distrusted
     assert np.isnan(trusted.agrees_from_m)
+
+
+def test_readings_on_trial_are_used_no_more_but_contradict_nothing():
+    rejected = GnssState(distrusted=True, rejected_since_s=3.0)
+    assert rejected.rejecting
+    assert rejected.contradicting
+    agrees = rejected.on_trial(GnssOptions(), 30.0)
+    assert agrees.rejecting
+    assert not agrees.contradicting
+
+
+def place_of(east_m, sd_m, *, count=400):
+    """A belief about a place 500 m north, and a log of nothing else."""
+    rng = np.random.default_rng(2)
+    own = belief(TRACKING)
+    place = rng.normal([[east_m], [500.0]], sd_m, (2, count)).astype(np.float32)
+    rest = np.zeros((5, count), dtype=np.float32)
+    weights = np.full(count, -np.log(count))
+    kept = np.empty((0, count), dtype=np.float32)
+    return replace(own, state=np.vstack([place, rest]), log_weight=weights, kept=kept)
+
+
+def test_a_fix_that_the_gate_rejects_does_not_end_the_distrust():
+    """It agrees by the width of the belief, none of whose hypotheses lie near it."""
+    gate = GnssGate(GnssOptions(), CRS, (0.0, 0.0), 1e6)
+    half = place_of(300.0, 5.0)
+    apart = replace(half, state=half.state + np.where(np.arange(400) % 2, 0, 60)[None].astype("f4")
+                    * np.array([1, 0, 0, 0, 0, 0, 0], dtype=np.float32)[:, None])  # fmt: skip
+    trusted_soon = GnssState(distrusted=True, agrees_from_m=0.0)
+    epoch = Epoch(9.0, (), fix=GnssFix(330.0, 500.0, 1.0, 1.0, 0.0))
+    found = gate.compare(apart, trusted_soon, epoch, 200.0, 5.0)
+    assert [one[2] for one in found.unused] == [Reason.REJECTED_BY_EVIDENCE]
+    assert found.state.distrusted
+    assert np.isnan(found.state.agrees_from_m)
+
+
+def test_a_fix_and_pseudoranges_together_leave_the_total_likelihood_as_it_is():
+    one, rng = place_of(300.0, 5.0), np.random.default_rng(3)
+    shared = rng.normal(0, 1, 400)
+    terms = FixedTerm(shared), FixedTerm(np.array([-0.4])), FixedTerm(shared - 0.5)
+    found = _neutral(GnssComparison(one, GnssState(), terms))
+    assert found.terms[:2] == terms[:2]
+    # What is common to all hypotheses goes with the pseudoranges, which are of this belief alone.
+    total = sum(term.log_likelihood(one.state) for term in found.terms)
+    assert np.log(np.mean(np.exp(total))) == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(found.terms[2].value - terms[2].value) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_positions_in_doubt_are_told_once_each():
+    epoch = Epoch(9.0, (), fix=GnssFix(1.0, 2.0, 9.0, 9.0, 0.0),
+                  ranges=(Pseudorange("G01", 2e7, 1.0, (0, 0, 0)),))  # fmt: skip
+    why = Reason.REJECTED_BY_EVIDENCE
+    assert _in_doubt(epoch, []) == [
+        UnusedReading(9.0, "gnss", "", why), UnusedReading(9.0, "pseudorange", "G01", why),
+    ]  # fmt: skip
+    told = [UnusedReading(9.0, "gnss", "", Reason.ON_PROBATION)]
+    assert [one.kind for one in _in_doubt(epoch, told)] == ["pseudorange"]
+    assert _in_doubt(Epoch(9.0), []) == []
 
 
 def test_distrusted_positions_are_rejected_from_then_on():
@@ -302,3 +383,12 @@ def test_a_lost_position_is_told_with_the_fix_in_doubt():
             if one.kind == "gnss" and one.reason is Reason.REJECTED_BY_EVIDENCE}  # fmt: skip
     assert lost <= told
     assert not [one for one in found.unused if one.reason is Reason.PHONE_TURNED]
+
+
+def test_good_positions_are_claimed_though_reports_have_ended():
+    """The way costs the main belief as much as the one without positions."""
+    for seed in (0, 1):
+        log = walk(seed, 0.0)
+        log = replace(log, radio=log.radio[log.radio["time_s"] < 120])
+        found = locate(log, FILTER, np.random.default_rng(5)).estimate
+        assert set(found.status[120:]) == {Status.TRACKING}

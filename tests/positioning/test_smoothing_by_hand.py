@@ -1,7 +1,7 @@
 """What a smoother keeps where lengths are read anew, and how paths go back, by hand."""
 
 from dataclasses import dataclass
-from math import exp, log
+from math import exp, log, nan
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,7 +36,7 @@ def after_epoch(reckoned, belief, unit_m=1.0, **more):
         "alternative": None,
         "takeovers": 0,
         "held": (),
-        "unaided": (),
+        "alone_from_m": nan,
         "hold": held_in(unit_m),
     }
     return SimpleNamespace(reckoning=way, belief=belief, **(usual | more))

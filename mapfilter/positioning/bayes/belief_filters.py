@@ -34,7 +34,7 @@ MapFilter = BeliefFilter[Start, Any, RadioReading]
 
 _MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
-_FOLLOWED, _SOUGHT = (Status.TRACKING,), (Status.SEARCHING, Status.OUTSIDE)
+_FOLLOWED, _SOUGHT = (Status.TRACKING,), (Status.SEARCHING, Status.LOST, Status.OUTSIDE)
 _POSITIONED_M = 200.0
 """Distance from the last position that was measured after which the map is the evidence again."""
 
@@ -151,7 +151,15 @@ class BeliefFilters:
     @cached_property
     def held_otherwise(self) -> MapFilter:
         """The filter of beliefs in which the phone was turned: smaller ones."""
-        few = min(self.holds.particles, self.options.max_particles)
+        return self._smaller(self.holds)
+
+    @cached_property
+    def alone(self) -> MapFilter:
+        """The filter of beliefs without positions that began as the belief: smaller ones, too."""
+        return self._smaller(self.pulls)
+
+    def _smaller(self, rules: RivalRules) -> MapFilter:
+        few = min(rules.particles, self.options.max_particles)
         options = replace(
             self.options, max_particles=2 * few, min_particles=few, min_search_particles=few
         )
@@ -172,7 +180,7 @@ class BeliefFilters:
         }
 
     def is_contested(self, state: BayesState) -> bool:
-        """Return whether a rival that began as the belief is ahead of it."""
+        """Return whether a rival is ahead: a turned phone, or a belief without positions."""
         return self._is_ahead(self.holds, state, state.held) or self.is_pulled(state)
 
     def is_pulled(self, state: BayesState) -> bool:

@@ -65,7 +65,7 @@ def _in_one_place(beliefs: BeliefFilters, state: BayesState) -> BayesState:
         return state
     if belief.summary.mass_50m < beliefs.options.split_mass:
         belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
-        return replace(state, belief=belief, status=Status.LOST)
+        return replace(state, belief=belief, status=Status.LOST, proven=False)
     if beliefs.is_contested(state) or beliefs.may_have_left(state):
         return replace(state, status=Status.LOST, contested=True)
     return state

@@ -194,9 +194,8 @@ class BayesPositioner(Filter[BayesState]):
         taken_over = read_anew and not state.hold.is_as_measured
         if motion is Reason.USED and state.contested and self.beliefs.may_have_left(state):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.MOTION_STUCK))
-        elif self.beliefs.is_pulled(state) and state.contested:
-            if epoch.fix is not None:
-                unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REJECTED_BY_EVIDENCE))
+        elif state.contested and self.beliefs.is_pulled(state):
+            unused += _in_doubt(epoch, unused)
         elif motion is Reason.USED and (taken_over or (epoch.motion and state.contested)):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         elif other_unit:
@@ -270,6 +269,15 @@ def _tracked(state: BayesState) -> BayesState:
     if not (state.contested or state.status is Status.UNCERTAIN):
         return state
     return replace(state, status=Status.TRACKING, contested=False)
+
+
+def _in_doubt(epoch: Epoch, unused: Sequence[UnusedReading]) -> list[UnusedReading]:
+    """Return the positions of an epoch as rejected, but for those that are unused already."""
+    given = [("gnss", "")] if epoch.fix is not None else []
+    given += [("pseudorange", one.satellite) for one in epoch.ranges]
+    told = {(one.kind, one.what) for one in unused}
+    why = Reason.REJECTED_BY_EVIDENCE
+    return [UnusedReading(epoch.time_s, *one, why) for one in given if one not in told]
 
 
 def _gnss_of(state: BayesState) -> GnssState:

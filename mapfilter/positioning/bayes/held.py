@@ -109,7 +109,7 @@ class Hold:
 
 @dataclass(frozen=True, eq=False)
 class HeldOtherwise:
-    """A belief with a phone that is held otherwise since its heading jumped.
+    """A rival: a belief with a phone that is held otherwise, or one that takes no positions.
 
     Parameters
     ----------
@@ -118,9 +118,9 @@ class HeldOtherwise:
     hold : Hold
         How it reads headings.
     log_prior : float
-        Log odds of the phone having been turned.
+        Log odds of what it assumes, beforehand.
     start_m : float
-        Distance travelled at the jump.
+        Distance travelled at the jump of the heading, or at its start.
     null : NullHypothesis
         Beside this belief.
     ahead_m : float
@@ -264,7 +264,7 @@ def still_open(
     ----------
     rules : RivalRules
     held : sequence of HeldOtherwise
-        Rivals that began as ``main``, weighed by the same readings.
+        Rivals of ``main``, weighed by the same readings.
     main : ParticleBelief
     travelled_m : float
         Distance travelled by now, by dead reckoning.
@@ -320,7 +320,7 @@ def winner(
     ----------
     rules : RivalRules
     held : sequence of HeldOtherwise
-        Rivals that began as ``main``, weighed by the same readings.
+        Rivals of ``main``, weighed by the same readings.
     main : ParticleBelief
     max_null_log_odds : float
         Largest log odds of the null hypothesis beside it.

@@ -210,6 +210,7 @@ def moved(
         alternatives=state.alternatives,
         unaided=unaided,
         proven=state.proven,
+        alone_from_m=state.alone_from_m,
     ), unused
 
 

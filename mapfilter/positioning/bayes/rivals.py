@@ -15,17 +15,19 @@ import numpy as np
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief, NullHypothesis
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.belief_filters import BeliefFilters, MapFilter
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import (
     EvidenceSource,
     EvidenceUpdate,
+    FixedTerm,
     RadioReading,
     joined,
 )
 from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
     after_takeover,
+    is_ahead,
     own_rng,
     still_open,
     winner,
@@ -35,6 +37,8 @@ from mapfilter.positioning.bayes.state import BayesState
 
 _TURNED, _UNAIDED = 3, 6
 """Salts of the draws of beliefs in which the phone was turned, and of the one without positions."""
+
+_SAYS_NOTHING = FixedTerm(np.zeros(1))
 
 
 @dataclass(frozen=True)
@@ -58,11 +62,12 @@ class Rivals:
         if not state.held or not isinstance(main, ParticleBelief):
             return state
         rules, holds = self.beliefs.rules_of(state), self.beliefs.holds
-        rng = own_rng(time_s, _TURNED)
+        rng, filter_ = own_rng(time_s, _TURNED), self.beliefs.held_otherwise
         # Pseudoranges are compared with the main belief alone, whose total likelihood they leave.
         evidence = evidence.for_other_hypotheses()
         weighed = (
-            self._weighed(state, one, evidence, rng, measured=measured) for one in state.held
+            self._weighed(state, one, filter_, evidence, rng, measured=measured)
+            for one in state.held
         )
         found = [one for one in weighed if one is not None]
         held = still_open(holds, found, main, state.reckoning.travelled_m)
@@ -88,21 +93,27 @@ class Rivals:
         main = state.belief
         if not state.unaided or not isinstance(main, ParticleBelief):
             return state
+        pulls, gone_m, proven = self.beliefs.pulls, state.reckoning.travelled_m, state.proven
+        # A belief that is torn between positions and reports may search anew.
         found = main.status is Status.TRACKING
-        rivals = [one for one in state.unaided if found or one.from_scratch]
+        rivals = [
+            one
+            for one in state.unaided
+            if found or one.from_scratch or is_ahead(pulls, (one,), main, gone_m)
+        ]
         others = [
             update
             for source, update in zip(self.sources, updates, strict=True)
             if not source.is_position
         ]
-        evidence = joined(others)
-        if evidence is None:
-            return replace(state, unaided=tuple(rivals))
+        # With positions alone the main belief settles what the way has cost it, and so must these.
+        evidence = joined(others) or RadioReading(terms=(_SAYS_NOTHING,))
         rng, rules = own_rng(time_s, _UNAIDED), self.beliefs.rules_of(state)
-        pulls, gone_m, proven = self.beliefs.pulls, state.reckoning.travelled_m, state.proven
+        smaller = self.beliefs.alone
         left: list[HeldOtherwise] = []
         for one in rivals:
-            weighed = self._weighed(state, one, evidence, rng, measured=measured)
+            filter_ = self.beliefs.filter_of(state) if one.from_scratch else smaller
+            weighed = self._weighed(state, one, filter_, evidence, rng, measured=measured)
             if one.from_scratch and _proves(pulls, weighed, main):
                 proven = True
             elif weighed is not None:
@@ -115,22 +126,23 @@ class Rivals:
         if best is None:
             return replace(state, unaided=tuple(left), proven=proven)
         own = {one.name: one.distrusted(state.sources[one.name], time_s) for one in self.sources}
-        return replace(_taken_over(state, best, own), held=(), proven=True)
+        taken_over = _taken_over(state, best, own)
+        return replace(taken_over, held=(), proven=True, alone_from_m=best.start_m)
 
     def _weighed(
         self,
         state: BayesState,
         one: HeldOtherwise,
+        filter_: MapFilter,
         evidence: RadioReading,
         rng: np.random.Generator,
         *,
         measured: bool,
     ) -> HeldOtherwise | None:
         """Weigh one of them; None where none of its hypotheses explains a reading."""
-        rules, filter_ = self.beliefs.rules_of(state), self.beliefs.held_otherwise
+        rules = self.beliefs.rules_of(state)
         reading = for_belief(evidence, one.belief, measured=measured)
         if one.from_scratch:
-            filter_ = self.beliefs.filter_of(state)
             reading = replace(reading, doubted=one.null.log_odds > rules.converge_log_odds)
         belief, info = filter_.update(one.belief, reading, rng)
         if info.reason is Reason.NO_READING:

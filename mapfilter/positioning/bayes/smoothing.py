@@ -9,7 +9,7 @@ beliefs a path follows the dead reckoning, bent to end at the later one.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import exp, log
+from math import exp, isfinite, log
 from typing import NamedTuple
 
 import numpy as np
@@ -88,21 +88,19 @@ class BayesSmoother:
         self.last, now = after, after.reckoning
         self.moved.append((now.east_m, now.north_m, now.travelled_m, now.sampling_m2))
         taken_over, held_anew = after.takeovers > before.takeovers, after.hold != before.hold
-        by_alternative = before.alternative is not None and after.alternative is None
-        pulled = bool(before.unaided) and not by_alternative
+        since_m = after.alone_from_m
+        led = isfinite(since_m) and since_m != before.alone_from_m
         unit = after.hold.step_unit_m / before.hold.step_unit_m
         if taken_over and unit != 1.0:
             self._read_in_another_unit(unit)
-        elif taken_over and (held_anew or pulled):
-            # Since the start of what has taken over dead reckoning was read otherwise, or beliefs
-            # were led astray.
-            starts_m = [one.start_m for one in before.held if one.hold == after.hold]
-            if pulled and not held_anew:
-                likeliest = max(before.unaided, key=lambda one: one.belief.log_evidence)
-                starts_m = [likeliest.start_m]
-            if not starts_m and before.alternative is not None:
-                starts_m = [before.alternative.start_m]
-            since_m = min(starts_m, default=now.travelled_m)
+        elif taken_over and (held_anew or led):
+            # Since the start of what has taken over positions led the beliefs away, or dead
+            # reckoning was read otherwise.
+            if not led:
+                starts_m = [one.start_m for one in before.held if one.hold == after.hold]
+                if not starts_m and before.alternative is not None:
+                    starts_m = [before.alternative.start_m]
+                since_m = min(starts_m, default=now.travelled_m)
             self._keep_only([k for k in self.kept if k.travelled_m < since_m])
             self.alternative, self.alternative_is_whole = [], after.alternative is None
         elif before.alternative is not None and after.alternative is None:

@@ -41,8 +41,8 @@ class BayesState:
     status : Status
         As reported; that of the belief may differ while it is LOST or UNCERTAIN.
     contested : bool
-        LOST only because a belief in which the phone was turned is ahead, or because the phone may
-        have been carried on though no step is counted.
+        LOST only because a belief in which the phone was turned, or one without positions, is
+        ahead, or because the phone may have been carried on though no step is counted.
     sources : mapping of str to object
         State of each source of evidence by its name.
     reckoning : DeadReckoning
@@ -82,6 +82,9 @@ class BayesState:
         that, and one that began from scratch.
     proven : bool
         Whether the belief's place was found without positions, too, or that was tried.
+    alone_from_m : float
+        Distance travelled at the start of the last belief without positions that took over; NaN if
+        none did.
     """
 
     belief: MapBelief | None = None
@@ -106,6 +109,7 @@ class BayesState:
     alternatives: int = 0
     unaided: tuple[HeldOtherwise, ...] = ()
     proven: bool = False
+    alone_from_m: float = nan
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -132,6 +136,7 @@ class BayesState:
             alternatives=self.alternatives,
             unaided=self.unaided,
             proven=self.proven,
+            alone_from_m=self.alone_from_m,
         )
 
     @property

@@ -15,6 +15,7 @@ one that begins with a report alone, and converges to the same place.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 
@@ -90,7 +91,7 @@ def beside_alternative(state: BayesState, main: MapBelief) -> tuple[HeldOtherwis
         return ()
     least = main.log_evidence + alternative.log_bayes_factor(main)
     return tuple(
-        replace(one, belief=_with_evidence(one.belief, alternative.belief, least))
+        replace(one, belief=_with_evidence(one.belief, alternative.belief, least), ahead_m=nan)
         for one in state.unaided
         if one.from_scratch
     )

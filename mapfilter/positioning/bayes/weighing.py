@@ -16,6 +16,7 @@ from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     MapBelief,
     NullHypothesis,
+    Resolution,
     doubted,
     resolve_alternative,
 )
@@ -210,7 +211,8 @@ class Weighing:
             held=() if now.taken_over else state.held,
             alternatives=state.alternatives + (disputed and alternative is not now.alternative),
             unaided=beside_alternative(state, before) if now.taken_over else state.unaided,
-            proven=self._proven(state, now.status, taken_over=now.taken_over),
+            proven=self._proven(state, now, before),
+            alone_from_m=state.alone_from_m,
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
@@ -220,13 +222,13 @@ class Weighing:
             after = self._asked_for_proof(after, epoch)
         return after, Reason.USED
 
-    def _proven(self, state: BayesState, status: Status, *, taken_over: bool) -> bool:
-        """Return whether the belief was found without positions, once it has converged."""
-        if taken_over:
+    def _proven(self, state: BayesState, now: Resolution, before: MapBelief) -> bool:
+        """Return whether the belief was found without positions, and has not been lost since."""
+        lost = before.status is Status.TRACKING and now.belief.status is Status.SEARCHING
+        if now.taken_over or lost:
             return False
-        return state.proven or (
-            status is Status.CONVERGED and not self.beliefs.used_positions(state)
-        )
+        found = now.status is Status.CONVERGED and not self.beliefs.used_positions(state)
+        return state.proven or found
 
     def _asked_for_proof(self, state: BayesState, epoch: Epoch) -> BayesState:
         """Start a belief from this epoch's report alone, without positions."""

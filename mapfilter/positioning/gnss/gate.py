@@ -193,8 +193,13 @@ class GnssState:
 
     @property
     def rejecting(self) -> bool:
-        """Whether the last readings contradicted the belief."""
+        """Whether the last readings contradicted the belief, or are on trial since."""
         return isfinite(self.rejected_since_s)
+
+    @property
+    def contradicting(self) -> bool:
+        """Whether the last readings contradicted the belief."""
+        return self.rejecting and not isfinite(self.agrees_from_m)
 
 
 class GnssComparison(NamedTuple):
@@ -218,6 +223,19 @@ class GnssComparison(NamedTuple):
         """Add readings left out, and change further fields."""
         left_out = tuple((kind, name, why) for name in names)
         return self._replace(unused=(*self.unused, *left_out), **changes)
+
+
+def _neutral(found: GnssComparison) -> GnssComparison:
+    """Return a comparison whose terms leave the total likelihood of the belief as it is.
+
+    A fix does so by itself, and so do pseudoranges, the last term; where they agree, not together.
+    """
+    belief, (*terms, last) = found.belief, found.terms
+    gain = sum((one.log_likelihood(belief.state) for one in terms), np.zeros(1))
+    gain = gain + (own := last.log_likelihood(belief.state))
+    log_weight = belief.log_weight
+    total = np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight)
+    return found._replace(terms=(*terms, FixedTerm(own - total)))
 
 
 @dataclass(frozen=True)
@@ -248,8 +266,11 @@ class GnssGate:
         found = GnssComparison(belief, state)
         if epoch.fix is not None and belief.count:
             found = self._compare_fix(found, epoch.fix, epoch.time_s, travelled_m)
+        by_fix = found.terms
         if epoch.ranges:
             found = self._compare_ranges(found, epoch, travelled_m, particle_spacing_m)
+        if by_fix and found.terms is not by_fix:
+            found = _neutral(found)
         if found.state.probation_until_s > epoch.time_s:
             # Where fixes are rejected, pseudoranges are not used alone, and the other way around.
             found = found._replace(terms=(FixedTerm(np.zeros(1)),), under_null=0.0)
@@ -288,7 +309,8 @@ class GnssGate:
         gain = term.log_likelihood(belief.state)
         total = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
         if total + 1.0 < -self._gate(belief):
-            state = self.rejected(state, time_s)
+            # Whether it is trusted again stays as it was.
+            state = self.rejected(found.state, time_s)
             why = Reason.REJECTED_BY_EVIDENCE
             return found.without("gnss", [""], why, state=state, compared=True)
         state = replace(state, fix_used_at_m=travelled_m, rejected_since_s=nan)

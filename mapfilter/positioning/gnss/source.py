@@ -155,7 +155,7 @@ class GnssSource(EvidenceSource):
             alternative = replace(alternative, belief=other.belief, sources=sources)
             terms, under_null = other.terms, other.under_null
             if main.compared or other.compared:
-                step = float(main.state.rejecting) - float(other.state.rejecting)
+                step = float(main.state.contradicting) - float(other.state.contradicting)
                 alternative = self._supported(alternative, step, epoch.time_s)
         rejected_s = epoch.time_s - main.state.rejected_since_s
         return EvidenceUpdate(
@@ -167,7 +167,7 @@ class GnssSource(EvidenceSource):
             unused=[UnusedReading(epoch.time_s, *one) for one in main.unused],
             belief=main.belief,
             alternative=alternative,
-            disputed=rejected_s >= self.options.dispute_s,
+            disputed=main.state.contradicting and rejected_s >= self.options.dispute_s,
         )
 
     def _supported(
