@@ -32,7 +32,7 @@ from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.epochs import GnssFix
-from mapfilter.positioning.gnss.gate import FixTerm
+from mapfilter.positioning.gnss.fixes import FixTerm
 from mapfilter.workflows import bench_device
 
 assert config.ENABLE_CUDASIM

@@ -15,7 +15,7 @@ from mapfilter.positioning.bayes.area_tiles import LevelRange
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.tile_search import SearchedTiles, places_of, searched_tiles
 from mapfilter.positioning.epochs import GnssFix
-from mapfilter.positioning.gnss.gate import FixTerm
+from mapfilter.positioning.gnss.fixes import FixTerm
 
 ROWS, COLS, SIDE, PIXEL_M = 6, 7, 10, 5.0
 LATTICE = Lattice("EPSG:32635", 0.0, PIXEL_M * 57, PIXEL_M, 57, 64)

@@ -14,7 +14,8 @@ from mapfilter.geodesy import project
 from mapfilter.gnss.sky import GridFrame
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
-from mapfilter.positioning.gnss.gate import FixTerm, GnssGate, GnssState, refutation, widened
+from mapfilter.positioning.gnss.fixes import FixTerm, refutation, widened
+from mapfilter.positioning.gnss.gate import GnssGate, GnssState
 from mapfilter.positioning.gnss.options import GnssOptions
 
 CRS = "EPSG:32632"

@@ -5,7 +5,7 @@ from math import log, nan, pi, sqrt
 import pytest
 
 from mapfilter.positioning.epochs import GnssFix
-from mapfilter.positioning.gnss.gate import refutation
+from mapfilter.positioning.gnss.fixes import refutation
 
 AREA_M2 = 800.0
 

@@ -37,7 +37,7 @@ from mapfilter.positioning.bayes.tiled_area import TiledArea
 from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import GnssFix, epochs
 from mapfilter.positioning.filter import locate
-from mapfilter.positioning.gnss.gate import FixTerm
+from mapfilter.positioning.gnss.fixes import FixTerm
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.roads.lattice import RouteLattice

@@ -20,7 +20,8 @@ from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, Eviden
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.gnss.gate import FixTerm, GnssGate, GnssState
+from mapfilter.positioning.gnss.fixes import FixTerm
+from mapfilter.positioning.gnss.gate import GnssGate, GnssState
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
