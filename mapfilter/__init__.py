@@ -23,6 +23,7 @@ from mapfilter._kernel_cache import keep_kernels
 if TYPE_CHECKING:
     from mapfilter.api.bounds import Bound as Bound
     from mapfilter.api.bounds import bound as bound
+    from mapfilter.api.journeys import simulate as simulate
     from mapfilter.api.located import Score as Score
     from mapfilter.api.located import Track as Track
     from mapfilter.api.located import locate as locate
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from mapfilter.api.logs import read_log as read_log
     from mapfilter.api.reports import locate_reports as locate_reports
     from mapfilter.api.studies import Sweep as Sweep
-    from mapfilter.api.studies import simulate as simulate
     from mapfilter.api.studies import sweep as sweep
     from mapfilter.database.build import build as build
     from mapfilter.database.radioroutes import RadioRouteDatabase as RadioRouteDatabase
@@ -69,10 +69,11 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "api.bounds": "Bound bound",
+    "api.journeys": "simulate",
     "api.located": "Score Track locate score",
     "api.logs": "read_log",
     "api.reports": "locate_reports",
-    "api.studies": "Sweep simulate sweep",
+    "api.studies": "Sweep sweep",
     "database.build": "build",
     "database.radioroutes": "RadioRouteDatabase",
     "database.store": "open_database",

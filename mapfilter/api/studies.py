@@ -1,4 +1,4 @@
-"""Simulate journeys, and sweep filters over noise."""
+"""Sweep filters over noise."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ import pandas as pd
 
 from mapfilter._annotations import items_of
 from mapfilter._arguments import (
-    PATH,
-    Argument,
     Count,
     Entries,
     Setting,
@@ -25,6 +23,12 @@ from mapfilter._arguments import (
     items,
 )
 from mapfilter.api.given import database_argument, opened
+from mapfilter.api.journeys import (
+    network_of,
+    rasters_argument,
+    reports_argument,
+    roads_argument,
+)
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.evaluation.success import HEADING, READING, success_cells
@@ -43,105 +47,18 @@ from mapfilter.options import Positive
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
-from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.roads.network import StreetNetwork, street_network
-from mapfilter.roads.osm import Profile
-from mapfilter.roads.routes import read_roads
 from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Ways
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
-from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
-from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.log import TrackLog
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _FILTERS = 'names and options, such as {"mine": BayesFilter()}'
-
-
-def simulate(
-    rasters: RxLevRasters,
-    cells: CellPlan,
-    roads: Layer | Ways,
-    *,
-    journeys: int = 1,
-    draws: int = 1,
-    length_m: float = 1940.0,
-    imu: ImuNoise | None = None,
-    reports: ReportModel | None = None,
-    walker: WalkerModel | None = None,
-    profile: Profile = "walking",
-    seed: int = 0,
-) -> dict[str, TrackLog]:
-    """Simulate journeys along streets: dead reckoning, radio reports and ground truth.
-
-    Parameters
-    ----------
-    rasters : RxLevRasters
-        The levels that the phone receives. Other rasters than those of the database, or
-        the database has no errors.
-    roads : path, GeoDataFrame or Ways
-        OpenStreetMap file or vector layer, as for :func:`mapfilter.read_routes`.
-    journeys : int
-        Number of different routes.
-    draws : int
-        Logs of each route, which differ in noise only.
-    length_m : float
-        Length of each route.
-    imu : ImuNoise, optional
-        Errors of the inertial unit.
-    reports : ReportModel, optional
-        What the phone reports: period, hysteresis, fading, neighbours.
-    walker : WalkerModel, optional
-        Place on the street, and stops.
-    profile : {"walking", "driving"}
-        Ways that routes may use, and speed. Logs of drives state that a vehicle moved.
-    seed : int
-        Of routes and noise.
-
-    Returns
-    -------
-    dict of str to TrackLog
-        By name, in the order of the journeys.
-
-    Raises
-    ------
-    InputError
-        Plan and roads differ in their CRS, or no route is as long as wanted.
-    ConfigError
-        An argument is none of these, or the seed is none.
-    """
-    check_arguments(
-        "simulate",
-        _rasters(rasters),
-        Argument("cells", cells, CellPlan, "a cell plan of read_cell_plan"),
-        _roads(roads),
-        keywords=[
-            Setting("journeys", journeys, Count),
-            Setting("draws", draws, Count),
-            Setting("length_m", length_m, Positive),
-            Argument("imu", imu, ImuNoise | None, "ImuNoise"),
-            _reports(reports),
-            Argument("walker", walker, WalkerModel | None, "WalkerModel"),
-            Setting("profile", profile, Profile),
-            Setting("seed", seed, WholeNumber),
-        ],
-    )
-    journey = JourneyPlan(length_m=length_m, profile=profile, walker=walker or WalkerModel())
-    settings = SimulationSettings(
-        journeys=journeys,
-        draws=draws,
-        journey=journey,
-        imu=imu or ImuNoise(),
-        reports=reports or ReportModel(),
-    )
-    network, rasters = _network(roads, rasters, profile), named_by_plan(rasters, cells)
-    return dict(simulate_journeys(network, rasters, cells, settings, seed))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -243,15 +160,15 @@ def sweep(
     check_arguments(
         "sweep",
         database_argument(database),
-        _rasters(rasters),
-        _roads(roads),
+        rasters_argument(rasters),
+        roads_argument(roads),
         Entries("filters", filters, object, "options", _FILTERS, optional=False),
         keywords=[
             *items("noises", several, ImuNoise, "ImuNoise"),
             Setting("routes", routes, Count),
             Setting("draws", draws, Count),
             Setting("length_m", length_m, Positive),
-            _reports(reports),
+            reports_argument(reports),
             Setting("seed", seed, WholeNumber),
             executor_argument(executor),
         ],
@@ -276,7 +193,7 @@ def sweep(
         for noise, varied in _distinguished(items_of(several) or [ImuNoise()])
     ]
     _check_turns(plans)
-    network = _network(roads, rasters, "walking")
+    network = network_of(roads, rasters, "walking")
     named = named_by_plan(rasters, database.plan)
     world = SweepWorld.of(network, database.plan, {radio.name: named})
     return Sweep(sweep_runs(plans, world, {"database": database}, executor=executor))
@@ -333,21 +250,3 @@ def _check_turns(plans: Sequence[SweepPlan]) -> None:
         if len(given) > 1 and given != used:
             faults.add(f"noises, {name}", "one value for all", "one without effect", NO_TURNS)
     faults.raise_if_any(ConfigError)
-
-
-def _reports(value: object) -> Argument:
-    return Argument("reports", value, ReportModel | None, "ReportModel")
-
-
-def _rasters(value: object) -> Argument:
-    return Argument("rasters", value, RxLevRasters, "rasters of open_rasters")
-
-
-def _roads(value: object) -> Argument:
-    return Argument("roads", value, Layer | PATH | Ways, "a map's path or name, or ways")
-
-
-def _network(roads: Layer | Ways, rasters: RxLevRasters, profile: Profile) -> StreetNetwork:
-    if not isinstance(roads, Ways):
-        roads = read_roads(roads, rasters.lattice, profile=profile).ways
-    return street_network(roads)
