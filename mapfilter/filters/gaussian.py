@@ -107,6 +107,31 @@ METHODS = {method.name: method for method in (EKF, IEKF, RBUKF, UKF, CKF)}
 """The methods by name."""
 
 
+def factors_of(covariances: Floats, size: int) -> Floats:
+    """Return a factor of each of (k, n, n) covariances, as by :func:`factor_of`.
+
+    Those that are positive definite are factored together.
+
+    Raises
+    ------
+    InputError
+        One of them is no covariance.
+    """
+    if covariances.shape[1:] != (size, size):
+        return np.array([factor_of(one, size) for one in covariances])
+    variances = np.diagonal(covariances, axis1=1, axis2=2)
+    unit = np.sqrt(np.where(variances > 0, variances, 1.0))
+    off = np.abs(covariances - covariances.transpose(0, 2, 1))
+    sound = np.isfinite(covariances).all() and (variances > 0).all()
+    if sound and (off <= 1e-9 * np.abs(covariances)).all():
+        try:
+            correlations = covariances / (unit[:, :, None] * unit[:, None, :])
+            return np.asarray(unit[:, :, None] * np.linalg.cholesky(correlations))
+        except np.linalg.LinAlgError:
+            pass
+    return np.array([factor_of(one, size) for one in covariances])
+
+
 def factor_of(covariance: ArrayLike, size: int, where: str = "covariance") -> Floats:
     """Return T with ``T Tᵀ`` equal to a covariance, which may be singular.
 

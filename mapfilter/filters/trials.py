@@ -17,7 +17,7 @@ from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters._square_root import Problem
 from mapfilter.filters._updates import kernel_of, run_lanes_kernel
-from mapfilter.filters.gaussian import Method, factor_of
+from mapfilter.filters.gaussian import Method, factor_of, factors_of
 
 LANES = 64
 """Trials that a kernel takes at once."""
@@ -109,7 +109,7 @@ def run_trials(
     starts = np.broadcast_to(np.asarray(first_mean, dtype=np.float64), (trials, n))
     given = np.asarray(first_covariance, dtype=np.float64)
     each = given.ndim == 3 and len(given) == trials
-    factors = np.array([factor_of(one, n) for one in (given if each else [given])])
+    factors = factors_of(given, n) if each else factor_of(given, n)[None]
     factors = np.broadcast_to(factors.reshape(-1, n, n), (trials, n, n))
     problem = problem_of(measurement, transition, process, method)
     means, found = np.empty((trials, steps, n)), np.empty((trials, steps * covariances, n, n))

@@ -25,7 +25,7 @@ class GaussianTerms:
     ----------
     layout : StateLayout
         Meaning of the components of a state.
-    rows : (m, 13) array
+    rows : (m, 15) array
         One term for each component of the reading.
     noise : (m, m) array
         Covariance of the noise.
@@ -36,6 +36,8 @@ class GaussianTerms:
         Samples of measured antennas.
     names : tuple of str
         Name of each component, for messages.
+    errors : tuple of int
+        Components of the state that levels contain besides, in dB.
     """
 
     layout: StateLayout
@@ -44,6 +46,7 @@ class GaussianTerms:
     step: Floats
     patterns: Floats = field(default_factory=lambda: np.zeros(1))
     names: tuple[str, ...] = ()
+    errors: tuple[int, ...] = ()
 
     @property
     def size(self) -> int:
@@ -53,7 +56,7 @@ class GaussianTerms:
     @cached_property
     def uses(self) -> Ints:
         """Indices of the components of the state that matter."""
-        return np.array(self.layout.uses, dtype=np.int64)
+        return np.array((*self.layout.uses, *self.errors), dtype=np.int64)
 
     @cached_property
     def slots(self) -> Ints:

@@ -6,6 +6,8 @@ slow fading in dB. Zhang et al. (2006, eq. 4) measure the loss itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -103,6 +105,33 @@ def levels(
     rows = terms(layout, LEVEL, sites, columns)
     patterns = samples if samples.size else None
     return independent(faults, layout, rows, sigma, quantity, patterns=patterns)
+
+
+def with_errors(model: GaussianTerms, components: Sequence[tuple[int, int]]) -> GaussianTerms:
+    """Return a model whose levels contain errors that are components of the state.
+
+    Parameters
+    ----------
+    model : GaussianTerms
+        Levels first.
+    components : sequence of pairs of int
+        Two components for each level, in dB; -1 for none.
+
+    Examples
+    --------
+    >>> from mapfilter.models.state import StateLayout
+    >>> plane = StateLayout(3, 0, 1)
+    >>> model = levels(plane, [[0.0, 0.0]], 8.0, loss_at_km_db=132.8, exponent=3.8, eirp_dbm=50)
+    >>> with_errors(model, [(2, -1)]).mean([1000.0, 0.0, 5.0]).round(9).tolist()
+    [-77.8]
+    """
+    used = tuple(sorted({one for pair in components for one in pair if one >= 0}))
+    first = len(model.layout.uses) + 1
+    slot = {one: first + at for at, one in enumerate(used)}
+    rows = model.rows.copy()
+    for row, pair in zip(rows, components, strict=False):
+        row[13:15] = [slot.get(one, 0) for one in pair]
+    return replace(model, rows=rows, errors=used)
 
 
 def sampled_pattern(

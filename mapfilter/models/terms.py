@@ -11,7 +11,8 @@ range           0     transmitter   4: 1 where the clock's bias is added
 level           1     transmitter   4: constant dB, 5: dB per decade of km, 6: gain's sign,
                                     7: boresight, 8: beamwidth, 9: largest attenuation,
                                     10: first sample of a pattern, 11: number of samples,
-                                    12: shortest distance
+                                    12: shortest distance, 13, 14: slots of errors in dB that
+                                    are part of the state, plus one; 0 for none
 difference      2     station       4, 5, 6: reference station
 component       3     –             4: slot
 =============== ===== ============= =========================================================
@@ -28,7 +29,7 @@ from numba import njit
 from mapfilter._kernels import MEASURE_SIGNATURE, on_demand
 from mapfilter._types import Floats, Ints
 
-COLUMNS = 13
+COLUMNS = 15
 RANGE, LEVEL, DIFFERENCE, COMPONENT = 0.0, 1.0, 2.0, 3.0
 
 _LOG10_E = 0.4342944819032518
@@ -226,6 +227,14 @@ def _add_level(
                     slope[slot, w] += beyond * delta[axis, w] / squared[w]
     if row[6] != 0.0:
         _add_gain(row, slots, patterns, work, mean, slope, derive)
+    for column in range(13, 15):
+        error = int(row[column]) - 1
+        if error >= 0:
+            for w in range(mean.size):
+                mean[w] += points[error, w]
+            if derive:
+                for w in range(mean.size):
+                    slope[error, w] = 1.0
 
 
 def measure(
@@ -245,7 +254,7 @@ def measure(
         The components of the state that measurements depend on, for W lanes.
     slots : (4,) integer array
         Rows of ``points`` that hold east, north, up and the clock's bias; -1 for none.
-    rows : (m, 13) array
+    rows : (m, 15) array
         The terms.
     patterns : (p,) array
         Samples of measured antennas in dB, anticlockwise from boresight.

@@ -123,10 +123,12 @@ def _stated_changes(options: Any, stated: LogStatement) -> tuple[dict[str, Any],
         changes["timing_step_m"] = step_m
         notes.append(f"timing advance: steps of {step_m:.2f} m, by technology")
     step_db = stated.level_step_db
-    if step_db > 0 and has_default(options, "level_error_db"):
-        error_db = hypot(default["level_error_db"], step_db / 12**0.5)
-        changes["level_error_db"] = error_db
-        notes.append(f"levels in steps of {step_db:g} dB: level_error_db = {error_db:.2f}")
+    # Rounding is noise where that is apart from errors that last.
+    rounded = "level_noise_db" if "level_noise_db" in default else "level_error_db"
+    if step_db > 0 and has_default(options, rounded):
+        error_db = hypot(default[rounded], step_db / 12**0.5)
+        changes[rounded] = error_db
+        notes.append(f"levels in steps of {step_db:g} dB: {rounded} = {error_db:.2f}")
     if stated.vehicle is not None and has_default(options, "vehicle"):
         whose = "a vehicle's" if stated.vehicle else "no vehicle's"
         changes["vehicle"] = stated.vehicle

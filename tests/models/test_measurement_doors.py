@@ -33,16 +33,16 @@ NAN, INF = math.nan, math.inf
 
 def test_the_columns_of_terms_are_those_of_the_table():
     advance = timing_advances(POSITION, [[3.0, 4.0, 5.0]], 2.0).rows
-    assert advance.tolist() == [[0.0, 3.0, 4.0, 5.0, *[0.0] * 9]]
+    assert advance.tolist() == [[0.0, 3.0, 4.0, 5.0, *[0.0] * 11]]
     ranges = pseudoranges(MOVING_CLOCK, [[1.0, 2.0, 3.0]], 2.0).rows
-    assert ranges.tolist() == [[0.0, 1.0, 2.0, 3.0, 1.0, *[0.0] * 8]]
+    assert ranges.tolist() == [[0.0, 1.0, 2.0, 3.0, 1.0, *[0.0] * 10]]
     pair = range_differences(POSITION, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], 2.0).rows
-    assert pair.tolist() == [[2.0, 4.0, 5.0, 6.0, 1.0, 2.0, 3.0, *[0.0] * 6]]
+    assert pair.tolist() == [[2.0, 4.0, 5.0, 6.0, 1.0, 2.0, 3.0, *[0.0] * 8]]
     fix = position_fix(MOVING_3D, np.eye(3)).rows
-    assert fix.tolist() == [[3.0, 0.0, 0.0, 0.0, slot, *[0.0] * 8] for slot in (0.0, 1.0, 2.0)]
+    assert fix.tolist() == [[3.0, 0.0, 0.0, 0.0, slot, *[0.0] * 10] for slot in (0.0, 1.0, 2.0)]
     plain = levels(POSITION, [[1.0, 2.0]], 8.0, **LOSS).rows[0]
     expected = [1.0, 1.0, 2.0, 0.0, -130.0, -35.0, 0.0, 0.0, math.pi / 3, 20.0, 0.0, 0.0, 1.0]
-    assert plain.tolist() == expected
+    assert plain.tolist() == [*expected, 0.0, 0.0]
     pattern = levels(
         POSITION,
         [[1.0, 2.0]],
@@ -57,7 +57,7 @@ def test_the_columns_of_terms_are_those_of_the_table():
         quantity="loss",
     )
     expected = [1.0, 1.0, 2.0, 0.0, 80.0, 35.0, -1.0, 0.5, 0.7, 0.0, 0.0, 2.0, 3.0]
-    assert pattern.rows[0].tolist() == expected
+    assert pattern.rows[0].tolist() == [*expected, 0.0, 0.0]
     assert pattern.patterns.tolist() == [0.0, 0.0]
 
 

@@ -44,8 +44,11 @@ PLAN = CellPlan(
 )
 
 
-def drive(seed, *, steps=120, speed=1.5, named=True, plan=PLAN):
-    """A walk among seven sites of three sectors: timing advance, levels with lasting errors."""
+def drive(seed, *, steps=120, speed=1.5, named=True, plan=PLAN, offset_db=0.0, own_db=0.0):
+    """A walk among seven sites of three sectors: timing advance, levels with lasting errors.
+
+    ``offset_db`` is the deviation of an error of all levels, ``own_db`` that of each cell's.
+    """
     rng = np.random.default_rng(seed)
     heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.02, steps))
     ways = speed * np.column_stack([np.cos(heading), np.sin(heading)])
@@ -53,9 +56,10 @@ def drive(seed, *, steps=120, speed=1.5, named=True, plan=PLAN):
     model = SiteModels(plan, KalmanOptions()).of(POSITION, plan.ids, ())
     lasting, error = np.exp(-speed / 50), rng.normal(0, 7, model.size)
     rows, serving = [], None
+    stay = rng.normal(0, offset_db) + rng.normal(0, own_db, model.size) if own_db else 0.0
     for k, expected in enumerate(model.mean(truth)):
         error = lasting * error + np.sqrt(1 - lasting**2) * rng.normal(0, 7, model.size)
-        level = expected + error
+        level = expected + error + stay
         best = int(np.argmax(level))
         if serving is None or level[best] > level[serving] + 4:
             serving = best
@@ -166,6 +170,18 @@ def test_starts_by_levels_find_the_place_and_say_how_sure_they_are():
         inside.append((error <= found.radii_m[:, 2])[60:].mean())
     assert np.mean(errors) < 200
     assert np.mean(inside) > 0.85
+
+
+@pytest.mark.parametrize("method", [EKF, UKF], ids=lambda one: one.name)
+def test_radii_hold_where_the_formula_of_a_cell_stays_wrong(method):
+    """Its antenna and surroundings are the same at each report: many of them tell it no better."""
+    inside = []
+    for seed in range(3):
+        log, truth = drive(seed, steps=300, offset_db=10.0, own_db=9.0)
+        radio = log.radio.assign(timing_advance=pd.array([None] * len(log.radio), "Int64"))
+        found = located(make_log(CRS, radio=radio, motion=log.motion), method)
+        inside.append((errors_m(found, truth) <= found.radii_m[:, 2])[100:].mean())
+    assert np.mean(inside) > 0.8
 
 
 def test_a_sum_of_one_is_its_filter_and_news_are_its_news():

@@ -51,12 +51,14 @@ def started(reckoned=True, **more):
 
 def test_the_usual_options():
     assert asdict(KalmanOptions()) == {
-        "level_error_db": 9.0, "timing_step_m": pytest.approx(553.46, abs=0.01),
-        "timing_sd_m": 200.0, "level_memory_m": 100.0, "timing_memory_m": 500.0,
+        "level_error_db": 12.0, "level_memory_m": 300.0, "level_offset_db": 10.0,
+        "level_offset_memory_m": 3000.0, "level_noise_db": 8.0, "level_noise_memory_m": 40.0,
+        "timing_step_m": pytest.approx(553.46, abs=0.01),
+        "timing_sd_m": 200.0, "timing_memory_m": 500.0,
         "fix_sd_m": 10.0, "fix_lasting_m": 0.0, "fix_lasting_s": 30.0,
         "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0, "step_sd_m": 0.3,
         "heading_sd_deg": 11.459155902616464, "drift_m_per_sqrt_s": 0.3, "start_sd_m": 1500.0,
-        "start_parts": 11, "start_spacing_m": 600.0, "reach_m": 35_000.0,
+        "start_parts": 21, "start_spacing_m": 600.0, "reach_m": 35_000.0,
         "converged_radius_m": 1000.0,
     }  # fmt: skip
     for name in asdict(KalmanOptions()):
@@ -76,7 +78,7 @@ def test_steps_shift_and_spread():
     made = started()
     steps = (MotionStep(2.0, 0.5), MotionStep(3.0, nan), MotionStep(nan, 0.1), MotionStep(1.0, 2.0))
     made.moved_m = 7.0
-    transition, noise, shift = made._move(Epoch(14.0, steps))
+    transition, noise, shift = made._move(Epoch(14.0, steps), ())
     np.testing.assert_array_equal(transition, np.eye(2))
     expected = 0.09 * 4.0 * np.eye(2)
     way = np.zeros(2)
@@ -100,7 +102,7 @@ def test_steps_shift_and_spread():
 def test_without_dead_reckoning_one_keeps_going():
     made = started(reckoned=False)
     made.moved_m = 1.0
-    transition, noise, shift = made._move(Epoch(12.0))
+    transition, noise, shift = made._move(Epoch(12.0), ())
     pair = np.array([[1.0, 2.0], [0.0, 1.0]])
     np.testing.assert_array_equal(transition, np.kron(np.eye(2), pair))
     own = 0.49 * np.array([[8 / 3, 2.0], [2.0, 2.0]])
@@ -112,12 +114,12 @@ def test_without_dead_reckoning_one_keeps_going():
     slow = started(reckoned=False)
     slow.belief = replace(slow.belief, means=np.array([[0.0, 0.6, 0.0, 0.8]]))
     slow.moved_m = 0.0
-    slow._move(Epoch(14.0))
+    slow._move(Epoch(14.0), ())
     assert slow.moved_m == 6.0
     # No time, or time that goes back, changes nothing.
     for time_s in (10.0, 9.0):
         made = started(reckoned=False)
-        transition, noise, _ = made._move(Epoch(time_s))
+        transition, noise, _ = made._move(Epoch(time_s), ())
         np.testing.assert_array_equal(transition, np.eye(4))
         assert not noise.any()
 
@@ -142,7 +144,7 @@ def test_where_a_belief_starts():
     np.testing.assert_array_equal(at_fix.means, [[1.0, 0.0, 2.0, 0.0]])
     np.testing.assert_array_equal(at_fix.covariances[0], np.diag([1500.0, 8, 1500, 8]) ** 2)
     about = walk()._start(None, SiteReadings(("B",), (-70.0,), (), (), ()))
-    assert about.means.shape == (121, 2)
+    assert about.means.shape == (441, 2)
     np.testing.assert_allclose(about.weights @ about.means, [EAST + 2000.0, NORTH])
     np.testing.assert_allclose(
         about.moments.covariance, 1500.0**2 * np.eye(2), rtol=1e-6, atol=1e-3
@@ -168,14 +170,14 @@ def test_errors_that_last_are_told_once():
     made = walk()
     model = SITES.of(POSITION, ("A",), ("B",))
     sigma = hypot(200.0, KalmanOptions().timing_step_m / 12**0.5)
-    np.testing.assert_allclose(model.noise, np.diag([81.0, sigma**2]))
+    np.testing.assert_allclose(model.noise, np.diag([64.0, sigma**2]))
     # Before the first report nothing has been told.
     np.testing.assert_allclose(made._aged(model, [100.0, 500.0]).noise, model.noise)
     made.moved_m = 25.0
     aged = made._aged(model, [100.0, 500.0]).noise
-    np.testing.assert_allclose(aged, np.diag([81.0 * 4, sigma**2 * 20]))
+    np.testing.assert_allclose(aged, np.diag([64.0 * 4, sigma**2 * 20]))
     made.moved_m = 0.0
-    assert made._aged(model, [100.0, 500.0]).noise[0, 0] == pytest.approx(81.0 * 1000)
+    assert made._aged(model, [100.0, 500.0]).noise[0, 0] == pytest.approx(64.0 * 1000)
 
 
 def test_noise_of_fixes():

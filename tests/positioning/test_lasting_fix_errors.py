@@ -105,7 +105,7 @@ def test_without_time_the_place_of_fixes_moves_with_the_position(layout):
     )
     assert (moved.means - wide.means)[0, [*where, -2, -1]].tolist() == [3.0, 4.0, 3.0, 4.0]
     assert moved.covariances == pytest.approx(wide.covariances)
-    seen = fix_layout(extended_layout(layout))
+    seen = fix_layout(extended_layout(layout), n)
     assert (seen.size, seen.east, seen.north) == (n + 2, n, n + 1)
 
 

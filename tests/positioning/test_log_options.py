@@ -65,6 +65,9 @@ def test_steps_of_levels_add_their_rounding_error():
     assert fitted.level_error_db == pytest.approx((usual_db**2 + 12.0**2 / 12) ** 0.5)
     assert "levels in steps of 12 dB" in notes[0]
     assert fitted_to_log(BayesFilter(), log(level_step_db=0.0))[1] == ()
+    fitted, notes = fitted_to_log(KalmanFilter(), log(level_step_db=12.0))
+    assert fitted == KalmanFilter(level_noise_db=(8.0**2 + 12.0) ** 0.5)
+    assert "level_noise_db = 8.72" in notes[0]
     assert fitted_to_log(BayesFilter(), log(level_step_db=10.0, censored=1))[1] == ()
 
 

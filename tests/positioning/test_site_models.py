@@ -42,7 +42,7 @@ def level_dbm(cell, azimuth_deg=0.0, km=1.0):
     heading_rad = pi / 2 - radians(azimuth_deg) + convergence_rad()
     place = EAST_M + 1000 * km * cos(heading_rad), NORTH_M + 1000 * km * sin(heading_rad)
     model = sites.of(POSITION, ("A",), ())
-    assert model.noise.tolist() == [[81.0]]
+    assert model.noise.tolist() == [[64.0]]
     return float(model.mean(place)[0])
 
 
@@ -133,11 +133,12 @@ def test_a_neighbour_is_within_the_reach_of_the_serving_cell():
 
 def test_the_usual_options_of_kalman_type_filters():
     assert asdict(KalmanOptions()) == {
-        "level_error_db": 9.0, "level_memory_m": 100.0,
+        "level_error_db": 12.0, "level_memory_m": 300.0, "level_offset_db": 10.0,
+        "level_offset_memory_m": 3000.0, "level_noise_db": 8.0, "level_noise_memory_m": 40.0,
         "timing_step_m": pytest.approx(553.46, abs=0.01), "timing_sd_m": 200.0,
         "timing_memory_m": 500.0, "fix_sd_m": 10.0, "fix_lasting_m": 0.0, "fix_lasting_s": 30.0,
         "step_sd_m": 0.3, "heading_sd_deg": pytest.approx(np.degrees(0.2)),
         "drift_m_per_sqrt_s": 0.3, "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0,
-        "start_sd_m": 1500.0, "start_parts": 11, "start_spacing_m": 600.0, "reach_m": 35_000.0,
+        "start_sd_m": 1500.0, "start_parts": 21, "start_spacing_m": 600.0, "reach_m": 35_000.0,
         "converged_radius_m": 1000.0,
     }  # fmt: skip

@@ -23,10 +23,13 @@ from mapfilter.filters.gaussian_sum import split
 from mapfilter.filters.kalman import Taken, smooth
 from mapfilter.filters.trials import CompiledMeasurement, run_trials
 
-_LEAST_WEIGHT = 1e-6
-_NEAR = 0.1
-"""Squared distance, in a heavier part's deviations, at which another is the same."""
-_ALIKE = 0.2
+_LEAST_SHARE = 1e-4
+"""Share of a belief that the parts without weight have together."""
+_MANY = 64
+_NEAR, _NEAR_OF_MANY = 0.5, 2.0
+"""Squared distance, in a heavier part's deviations, at which another is the same; where there are
+more parts than so many, it is larger."""
+_ALIKE = 0.5
 """Largest difference of the logarithms of their volumes then."""
 _COS_SQUARED = np.cos(np.pi * (np.arange(128) + 0.5) / 256) ** 2
 """At angles over a quarter of a turn; the other quarters are like it."""
@@ -98,12 +101,17 @@ class SumBelief:
         )
 
     def update(
-        self, measurement: CompiledMeasurement, reading: ArrayLike, method: Method
+        self,
+        measurement: CompiledMeasurement,
+        reading: ArrayLike,
+        method: Method,
+        compared: int | None = None,
     ) -> tuple[SumBelief, Taken]:
         """Return the belief after a reading (NaN where absent), and the outcome of the update.
 
         Each part is updated by the method and weighed by its evidence; a part whose update fails
-        loses its weight. Where all updates fail, nothing changes.
+        loses its weight. Where all updates fail, nothing changes. Parts that are the same in the
+        first ``compared`` components (all by default) become one: the others follow from these.
 
         Raises
         ------
@@ -126,27 +134,41 @@ class SumBelief:
         weights = gained / total
         nis = float(weights[taken] @ run.nis[taken, 0])
         updated = SumBelief(weights, run.means[:, 0], run.covariances[:, 0], self.parts)
-        return updated._lessened(), Taken(float(most + np.log(total)), nis)
+        return updated._lessened(compared), Taken(float(most + np.log(total)), nis)
 
-    def _lessened(self) -> SumBelief:
-        """Drop parts without weight, and merge parts that lie on heavier ones into these."""
+    def _lessened(self, compared: int | None) -> SumBelief:
+        """Drop parts without weight, and merge parts that lie on heavier ones into these.
+
+        What lies on a heavier part widens it: second moments about its mean stay as they are.
+        """
         if self.weights.size == 1:
             return self
         order = np.argsort(-self.weights, kind="stable")
-        order = order[self.weights[order] >= min(_LEAST_WEIGHT, self.weights.max())]
+        order = order[np.cumsum(self.weights[order[::-1]])[::-1] > _LEAST_SHARE]
         weights, means = self.weights[order], self.means[order]
-        covariances = self.covariances[order]
-        volume = np.linalg.slogdet(covariances)[1]
-        kept = np.ones(order.size, dtype=np.bool_)
+        covariances, own = self.covariances[order], slice(compared)
+        size, at = covariances[:, own, own], means[:, own]
+        volume = np.linalg.slogdet(size)[1]
+        off = at - at[:, None]
+        apart = np.einsum("hci,hij,hcj->hc", off, np.linalg.inv(size), off, optimize=True)
+        near = _NEAR if order.size <= _MANY else _NEAR_OF_MANY
+        alike = (apart < near) & (np.abs(volume - volume[:, None]) < _ALIKE)
+        left = np.ones(order.size, dtype=np.bool_)
+        kept = []
         for heavy in range(order.size):
-            if not kept[heavy]:
+            if not left[heavy]:
                 continue
-            off = means - means[heavy]
-            apart = np.einsum("ci,ci->c", off, np.linalg.solve(covariances[heavy], off.T).T)
-            same = kept & (apart < _NEAR) & (np.abs(volume - volume[heavy]) < _ALIKE)
-            same[: heavy + 1] = False
-            weights[heavy] += weights[same].sum()
-            kept &= ~same
+            kept.append(heavy)
+            same = left & alike[heavy]
+            left[heavy] = same[heavy] = False
+            if not same.any():
+                continue
+            left &= ~same
+            whole = weights[heavy] + weights[same].sum()
+            beside = means[same] - means[heavy]
+            moments = covariances[same] + beside[:, :, None] * beside[:, None, :]
+            both = weights[heavy] * covariances[heavy] + np.tensordot(weights[same], moments, 1)
+            weights[heavy], covariances[heavy] = whole, both / whole
         weights = weights[kept] / weights[kept].sum()
         return SumBelief(weights, means[kept], covariances[kept], self.parts[order][kept])
 

@@ -21,6 +21,7 @@ from mapfilter.positioning.estimate import StepOutput, TrackEstimate
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
 from mapfilter.positioning.kalman.belief import FusionHistory
 from mapfilter.positioning.kalman.lasting import extended_layout
+from mapfilter.positioning.kalman.level_errors import MOST_CELLS, CellSlots, with_levels
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.step import KalmanState, KalmanStep, place_of
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -89,8 +90,11 @@ class KalmanTracker(Filter[KalmanState]):
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> KalmanState:
         """Return the state before the first epoch."""
         layout = POSITION if "motion" in kinds else MOVING
-        lasts = self.sites.options.fix_lasting_m > 0
-        return KalmanState(extended_layout(layout) if lasts else layout)
+        if self.sites.options.fix_lasting_m > 0:
+            layout = extended_layout(layout)
+        heard = {"serving", "neighbour"}.intersection(kinds)
+        slots = CellSlots.empty(min(MOST_CELLS, len(self.sites.cells)) if heard else 0)
+        return KalmanState(with_levels(layout, slots), slots=slots)
 
     def step(
         self,

@@ -32,9 +32,9 @@ def extended_layout(layout: StateLayout) -> StateLayout:
     return replace(layout, size=layout.size + 2)
 
 
-def fix_layout(layout: StateLayout) -> StateLayout:
-    """Return an extended layout as fixes measure it."""
-    return StateLayout(layout.size, layout.size - 2, layout.size - 1)
+def fix_layout(layout: StateLayout, first: int) -> StateLayout:
+    """Return an extended layout as fixes measure it: ``first`` is the place's east."""
+    return StateLayout(layout.size, first, first + 1)
 
 
 def extended_belief(belief: SumBelief, layout: StateLayout, lasting_m: float) -> SumBelief:

@@ -20,6 +20,7 @@ from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import measure_kernel
 from mapfilter.options import NotNegative, Options, Positive
+from mapfilter.positioning.kalman.level_errors import LastingLevels
 from mapfilter.propagation.empirical import cost231_hata_db
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cell_rules import ANTENNAS
@@ -37,10 +38,17 @@ class KalmanOptions(Options):
     Parameters
     ----------
     level_error_db : float
-        Assumed deviation of levels from the path loss: slow fading and errors of the formula.
+        Assumed deviation of a cell's levels from the path loss: antenna, streets and buildings.
     level_memory_m : float
-        Distance for which errors of levels last: reports in a row count as one over it. With a
-        correlation of ``exp(-d/50 m)`` that is 100 m.
+        Distance after which the correlation of that error is 1/e.
+    level_offset_db : float
+        Assumed deviation of the error that all cells share: of the formula and the receiver.
+    level_offset_memory_m : float
+        Distance after which the correlation of that error is 1/e.
+    level_noise_db : float
+        Assumed deviation of levels besides: fading and obstacles that are passed.
+    level_noise_memory_m : float
+        Distance for which that noise lasts: reports in a row count as one over it.
     timing_step_m : float
         Distance of a step of timing advance: 553.5 m in GSM, 78.1 m in LTE.
     timing_sd_m : float
@@ -78,8 +86,12 @@ class KalmanOptions(Options):
         95 % radius below which the filter has converged.
     """
 
-    level_error_db: Positive = 9.0
-    level_memory_m: Positive = 100.0
+    level_error_db: Positive = 12.0
+    level_memory_m: Positive = 300.0
+    level_offset_db: Positive = 10.0
+    level_offset_memory_m: Positive = 3000.0
+    level_noise_db: Positive = 8.0
+    level_noise_memory_m: Positive = 40.0
     timing_step_m: Positive = GSM_STEP_M
     timing_sd_m: Positive = 200.0
     timing_memory_m: Positive = 500.0
@@ -92,10 +104,16 @@ class KalmanOptions(Options):
     acceleration_mps_per_sqrt_s: Positive = 0.7
     speed_sd_mps: Positive = 8.0
     start_sd_m: Positive = 1500.0
-    start_parts: Annotated[int, Ge(1), Le(100)] = 11
+    start_parts: Annotated[int, Ge(1), Le(100)] = 21
     start_spacing_m: Positive = 600.0
     reach_m: Positive = 35_000.0
     converged_radius_m: Positive = 1000.0
+
+    @property
+    def lasting_levels(self) -> LastingLevels:
+        """Errors of levels that last."""
+        common = self.level_offset_db, self.level_offset_memory_m
+        return LastingLevels(*common, self.level_error_db, self.level_memory_m)
 
 
 class SiteModels:
@@ -181,7 +199,7 @@ class SiteModels:
         return levels(
             layout,
             [[cell.east_m, cell.north_m]],
-            self.options.level_error_db,
+            self.options.level_noise_db,
             loss_at_km_db=float(near) + cell.penetration_loss_db * cell.indoor,
             exponent=float(far - near) / 10.0,
             eirp_dbm=cell.eirp_dbm,

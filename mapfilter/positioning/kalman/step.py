@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import cos, inf, isfinite, nan, pi, radians, sin
 from typing import Any
 
@@ -15,6 +15,7 @@ from mapfilter.filters.gaussian import Gaussian, Method
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix
+from mapfilter.models.signal_strength import with_errors
 from mapfilter.models.state import MOVING, POSITION, StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import Fix, UnusedReading
@@ -31,6 +32,7 @@ from mapfilter.positioning.kalman.lasting import (
     fix_layout,
     white_part,
 )
+from mapfilter.positioning.kalman.level_errors import CellSlots, with_own_spread
 from mapfilter.positioning.kalman.models import SiteModels, compiled
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 
@@ -49,7 +51,7 @@ class KalmanState:
     ----------
     layout : StateLayout
         Position only where there is dead reckoning, else position and velocity; with the place that
-        fixes are of, where their errors last.
+        fixes are of, where their errors last, and behind them the errors of levels.
     belief : SumBelief or None
         None before the first measurement that it can start from.
     time_s : float
@@ -62,6 +64,8 @@ class KalmanState:
         Transition, noise and shift that led to the last epoch.
     last_fix : GnssFix or None
         The last one with a position.
+    slots : CellSlots
+        Cells whose errors of levels are in the state.
     """
 
     layout: StateLayout
@@ -72,13 +76,15 @@ class KalmanState:
     recent_nis: tuple[float, ...] = ()
     motion: tuple[Floats, Floats, Floats] | None = None
     last_fix: GnssFix | None = None
+    slots: CellSlots = field(default_factory=lambda: CellSlots.empty(0))
 
 
 class KalmanStep:
     """One epoch in work: the state is replaced by parts."""
 
     def __init__(self, sites: SiteModels, method: Method, state: KalmanState) -> None:
-        self.sites, self.method, self.options = sites, method, sites.options
+        self.sites, self.options = sites, sites.options
+        self.method = with_own_spread(method, state.slots)
         self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
         self.lasts = self.options.fix_lasting_m > 0
         # With a rate behind each coordinate north is the third component.
@@ -86,7 +92,7 @@ class KalmanStep:
         self.where = [self.layout.east, self.layout.north]
         self.moved_m, self.status = state.moved_m, state.status
         self.recent_nis = list(state.recent_nis)
-        self.motion, self.last_fix = state.motion, state.last_fix
+        self.motion, self.last_fix, self.slots = state.motion, state.last_fix, state.slots
         self.unused: list[UnusedReading] = []
 
     @property
@@ -101,6 +107,7 @@ class KalmanStep:
             tuple(self.recent_nis),
             self.motion,
             self.last_fix,
+            self.slots,
         )
 
     @property
@@ -110,42 +117,50 @@ class KalmanStep:
 
     def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
-        self.motion = self._move(epoch)
-        reason = self._measure(epoch, site_readings(self.sites, epoch))
+        given = site_readings(self.sites, epoch)
+        self.slots, renewed = self.slots.hearing(given.cells, epoch.time_s)
+        self.motion = self._move(epoch, renewed)
+        reason = self._measure(epoch, given)
         self.time_s = epoch.time_s
         return self._fix(epoch.time_s, reason)
 
-    def _move(self, epoch: Epoch) -> tuple[Floats, Floats, Floats]:
+    def _move(self, epoch: Epoch, renewed: Sequence[int]) -> tuple[Floats, Floats, Floats]:
         """Predict; return the transition, the noise and the shift."""
         size = self.own.size
         elapsed_s = max(epoch.time_s - self.time_s, 0.0) if isfinite(self.time_s) else 0.0
         transition, noise, shift = np.eye(size), np.zeros((size, size)), np.zeros(size)
         if self.belief is None:
             self._label(epoch, epoch.motion, Reason.NOT_STARTED)
-            return self._extended((transition, noise, shift), elapsed_s)
+            return self._extended((transition, noise, shift), renewed, elapsed_s, 0.0)
+        moved_m = 0.0
         if self.own is MOVING:
             if elapsed_s > 0:
                 root = self.options.acceleration_mps_per_sqrt_s
                 motion = constant_velocity(elapsed_s, root, noise="continuous")
                 transition, noise = motion.transition, motion.noise
-                self.moved_m += self._speed_mps() * elapsed_s
+                moved_m = self._speed_mps() * elapsed_s
         else:
             noise = self.options.drift_m_per_sqrt_s**2 * elapsed_s * np.eye(2)
             for step in epoch.motion:
                 moved, spread = self._step(epoch, step)
                 shift, noise = shift + moved, noise + spread
-                self.moved_m += step.step_m if isfinite(step.step_m) else 0.0
-        whole = self._extended((transition, noise, shift), elapsed_s)
+                moved_m += abs(step.step_m) if isfinite(step.step_m) else 0.0
+        self.moved_m += moved_m
+        whole = self._extended((transition, noise, shift), renewed, elapsed_s, moved_m)
         self.belief = self.belief.predict(*whole)
         return whole
 
-    def _extended(self, motion: Motion, elapsed_s: float) -> Motion:
-        """Return motion with that of the place that fixes are of, where their errors last."""
-        if not self.lasts:
-            return motion
+    def _extended(
+        self, motion: Motion, renewed: Sequence[int], elapsed_s: float, moved_m: float
+    ) -> Motion:
+        """Return motion with that of errors that last: of fixes over time, of levels by the way."""
         options = self.options
-        lasting = options.fix_lasting_m, options.fix_lasting_s
-        return extended_motion(motion, self.own, *lasting, elapsed_s)
+        if self.lasts:
+            lasting = options.fix_lasting_m, options.fix_lasting_s
+            motion = extended_motion(motion, self.own, *lasting, elapsed_s)
+        if self.slots.size:
+            motion = options.lasting_levels.extended_motion(motion, self.slots, renewed, moved_m)
+        return motion
 
     def _speed_mps(self) -> float:
         """Return the estimated speed, at least that of a walk."""
@@ -186,13 +201,19 @@ class KalmanStep:
             self.belief = self._start(fix, given)
             if self.lasts:
                 self.belief = extended_belief(self.belief, self.own, self.options.fix_lasting_m)
+            if self.slots.size:
+                lasting = self.options.lasting_levels
+                self.belief = lasting.extended_belief(self.belief, self.slots)
         taken = fix is not None and self._update_fix(fix)
         if given.cells or given.timed:
             model = self.sites.of(self.layout, given.cells, given.timed)
             step_m = self.options.timing_step_m
             reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
-            kept_m = [self.options.level_memory_m] * len(given.cells)
+            kept_m = [self.options.level_noise_memory_m] * len(given.cells)
             kept_m += [self.options.timing_memory_m] * len(given.timed)
+            if self.slots.size:
+                errors = self.slots.components(given.cells, self.layout)
+                model = with_errors(model, errors)
             if self._update(self._aged(model, kept_m), reading):
                 self.moved_m, taken = 0.0, True
         return Reason.USED if taken else Reason.UPDATE_FAILED
@@ -234,14 +255,17 @@ class KalmanStep:
             noise = np.eye(2) * self.options.fix_sd_m**2
         layout = self.layout
         if self.lasts:
-            layout, noise = fix_layout(layout), white_part(noise, self.options.fix_lasting_m)
+            layout = fix_layout(layout, self.own.size)
+            noise = white_part(noise, self.options.fix_lasting_m)
         return self._update(position_fix(layout, noise), [fix.east_m, fix.north_m])
 
     def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
         """Update with a measurement; return whether that could be done."""
         if self.belief is None:
             raise AssertionError("started before it measures")
-        self.belief, info = self.belief.update(compiled(model), reading, self.method)
+        self.belief, info = self.belief.update(
+            compiled(model), reading, self.method, self.layout.size - self.slots.size
+        )
         if info.used:
             self.recent_nis = [*self.recent_nis, info.nis / len(reading)][-_WINDOW:]
         return info.used

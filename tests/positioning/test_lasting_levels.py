@@ -1,0 +1,195 @@
+"""Errors of levels that last, in the state of Kalman-type filters; by hand and by plain NumPy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mapfilter.errors import InputError
+from mapfilter.filters.gaussian import CKF, EKF, IEKF, RBUKF, UKF, factor_of, factors_of
+from mapfilter.models.signal_strength import levels, with_errors
+from mapfilter.models.state import MOVING, POSITION, StateLayout
+from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.level_errors import (
+    CellSlots,
+    LastingLevels,
+    with_levels,
+    with_own_spread,
+)
+from mapfilter.positioning.kalman.models import KalmanOptions, compiled
+
+SITES = [[0.0, 0.0], [400.0, 100.0], [-300.0, 500.0]]
+LOSS = {"loss_at_km_db": 130.0, "exponent": 3.5, "eirp_dbm": 50.0}
+LASTING = LastingLevels(6.0, 3000.0, 9.0, 300.0)
+
+
+def test_the_usual_errors():
+    assert KalmanOptions().lasting_levels == LastingLevels(10.0, 3000.0, 12.0, 300.0)
+
+
+def test_slots_are_of_the_cells_last_heard():
+    slots, renewed = CellSlots.empty(3).hearing(["A", "B", "A"], 1.0)
+    assert (slots.cells, renewed) == (("A", "B", ""), (0, 1))
+    slots, renewed = slots.hearing(["C", "A"], 2.0)
+    assert (slots.cells, renewed) == (("A", "B", "C"), (2,))
+    # B was not heard for longest; of a report, no cell takes the slot of another one.
+    slots, renewed = slots.hearing(["D", "E", "A"], 3.0)
+    assert (slots.cells, slots.heard_s, renewed) == (("A", "D", "E"), (3.0, 3.0, 3.0), (1, 2))
+    slots, renewed = slots.hearing(["F", "G", "H", "D"], 4.0)
+    assert set(slots.cells) == {"F", "G", "H"}
+    assert sorted(renewed) == [0, 1, 2]
+    assert CellSlots.empty(0).hearing(["A"], 1.0) == (CellSlots.empty(0), ())
+
+
+@given(st.lists(st.lists(st.sampled_from("ABCDEFG"), max_size=5), max_size=12))
+def test_slots_never_hold_a_cell_twice(reports):
+    slots = CellSlots.empty(3)
+    for time_s, names in enumerate(reports):
+        slots, renewed = slots.hearing(names, float(time_s))
+        held = [one for one in slots.cells if one]
+        assert len(set(held)) == len(held)
+        assert set(dict.fromkeys(names[:3])) <= set(held)
+        assert all(slots.cells[one] in names for one in renewed)
+
+
+def test_components_are_behind_the_others():
+    slots, _ = CellSlots.empty(2).hearing(["B", "A"], 0.0)
+    layout = with_levels(MOVING, slots)
+    assert (layout.size, layout.east, layout.north) == (7, 0, 2)
+    assert slots.components(["A", "Z", "B"], layout) == [(4, 6), (4, -1), (4, 5)]
+    assert with_levels(MOVING, CellSlots.empty(0)) == MOVING
+
+
+def test_a_belief_begins_with_what_is_assumed():
+    slots = CellSlots.empty(2)
+    belief = SumBelief.start([1.0, 2.0], np.diag([4.0, 9.0]), {0: 3})
+    wide = LASTING.extended_belief(belief, slots)
+    assert wide.means[:, :2].tolist() == belief.means.tolist()
+    assert not wide.means[:, 2:].any()
+    for own, all_ in zip(belief.covariances, wide.covariances, strict=True):
+        expected = np.zeros((5, 5))
+        expected[:2, :2] = own
+        expected[[2, 3, 4], [2, 3, 4]] = 36.0, 81.0, 81.0
+        np.testing.assert_array_equal(all_, expected)
+
+
+def test_errors_fade_along_the_way_and_renewed_ones_begin_anew():
+    slots, _ = CellSlots.empty(2).hearing(["A", "B"], 0.0)
+    rng = np.random.default_rng(1)
+    mean, root = rng.normal(size=5), rng.normal(size=(5, 5))
+    belief = SumBelief.start(mean, root @ root.T)
+    motion = np.eye(2), 0.5 * np.eye(2), np.array([3.0, -1.0])
+    moved = belief.predict(*LASTING.extended_motion(motion, slots, [1], 30.0))
+    kept = np.array([1.0, 1.0, np.exp(-0.01), np.exp(-0.1), 0.0])
+    np.testing.assert_allclose(moved.means[0], kept * mean + [3.0, -1.0, 0.0, 0.0, 0.0])
+    expected = np.outer(kept, kept) * (root @ root.T)
+    expected += np.diag([0.5, 0.5, *(1 - kept[2:] ** 2) * [36.0, 81.0, 81.0]])
+    np.testing.assert_allclose(moved.covariances[0], expected, atol=1e-12)
+    still = belief.predict(*LASTING.extended_motion(motion, slots, [], 0.0))
+    np.testing.assert_allclose(still.covariances[0][2:, 2:], (root @ root.T)[2:, 2:])
+
+
+def test_levels_contain_the_errors_of_the_state():
+    layout = StateLayout(6, 0, 1)
+    plain = levels(layout, SITES, 8.0, **LOSS, boresight_rad=[0.1, 1.0, 2.0])
+    model = with_errors(plain, [(2, 4), (2, -1), (-1, 5)])
+    assert model.errors == (2, 4, 5)
+    rng = np.random.default_rng(2)
+    states = np.column_stack([rng.uniform(-900, 900, (20, 2)), rng.normal(0, 9, (20, 4))])
+    expected = plain.mean(states)
+    expected += states[:, [2, 2, 5]] + np.column_stack([states[:, 4], np.zeros((20, 2))])
+    np.testing.assert_allclose(model.mean(states), expected, rtol=1e-12)
+    numeric = np.empty((20, 3, 6))
+    for j in range(6):
+        step = 1e-4 * np.eye(6)[j]
+        numeric[:, :, j] = (model.mean(states + step) - model.mean(states - step)) / 2e-4
+    np.testing.assert_allclose(model.jacobian(states), numeric, atol=1e-6)
+
+
+def plain_ekf(model, mean, covariance, reading):
+    """Textbook, with an inverse."""
+    slope = model.jacobian(mean)
+    gain = covariance @ slope.T @ np.linalg.inv(slope @ covariance @ slope.T + model.noise)
+    left = np.eye(mean.size) - gain @ slope
+    return mean + gain @ (reading - model.mean(mean)), left @ covariance
+
+
+def test_an_update_is_that_of_the_textbook():
+    layout = with_levels(POSITION, CellSlots.empty(3))
+    model = levels(layout, SITES, 8.0, **LOSS)
+    model = with_errors(model, [(2, 3), (2, 4), (2, 5)])
+    mean = np.array([250.0, -120.0, 1.0, -2.0, 0.0, 3.0])
+    covariance = np.diag([400.0, 900.0, 36.0, 81.0, 81.0, 81.0])
+    reading = np.array([-60.0, -75.0, -90.0])
+    belief, news = SumBelief.start(mean, covariance).update(compiled(model), reading, EKF, 2)
+    expected = plain_ekf(model, mean, covariance, reading)
+    np.testing.assert_allclose(belief.means[0], expected[0], rtol=1e-9)
+    np.testing.assert_allclose(belief.covariances[0], expected[1], rtol=1e-8, atol=1e-8)
+    assert news.used
+
+
+@pytest.mark.parametrize("method", [UKF, CKF, RBUKF], ids=lambda one: one.name)
+def test_errors_that_are_known_change_nothing(method):
+    """Sigma points lie where they lay without errors in the state: so do results."""
+    slots = CellSlots.empty(3)
+    wide, narrow = with_levels(POSITION, slots), POSITION
+    model, small = levels(wide, SITES, 8.0, **LOSS), levels(narrow, SITES, 8.0, **LOSS)
+    model = with_errors(model, [(2, 3), (2, 4), (2, 5)])
+    covariance = np.diag([2500.0, 3600.0, *[1e-12] * 4])
+    mean, reading = np.array([250.0, -120.0, *[0.0] * 4]), np.array([-60.0, -75.0, -90.0])
+    own = with_own_spread(method, slots)
+    found, _ = SumBelief.start(mean, covariance).update(compiled(model), reading, own)
+    alone = SumBelief.start(mean[:2], covariance[:2, :2])
+    alone, _ = alone.update(compiled(small), reading, method)
+    np.testing.assert_allclose(found.means[0, :2], alone.means[0], rtol=1e-6)
+    np.testing.assert_allclose(found.covariances[0, :2, :2], alone.covariances[0], rtol=1e-5)
+
+
+def test_linear_methods_have_no_sigma_points():
+    for method in (EKF, IEKF):
+        assert with_own_spread(method, CellSlots.empty(3)) is method
+    assert with_own_spread(UKF, CellSlots.empty(0)) is UKF
+
+
+def test_parts_at_one_place_fall_together_and_keep_their_spread():
+    """Places and weights count, not the errors that follow from them; second moments stay."""
+    covariance = np.diag([100.0, 100.0, 81.0])
+    means = np.array([[0.0, 0.0, 20.0], [3.0, 0.0, -20.0], [500.0, 0.0, 0.0]])
+    weights = np.array([0.5, 0.3, 0.2])
+    belief = SumBelief(weights, means, np.tile(covariance, (3, 1, 1)), np.arange(3))
+    found = belief._lessened(2)
+    assert found.weights.tolist() == pytest.approx([0.8, 0.2])
+    assert found.parts.tolist() == [0, 2]
+    off = means[1] - means[0]
+    np.testing.assert_allclose(found.covariances[0], covariance + 0.375 * np.outer(off, off))
+    assert belief._lessened(None).weights.size == 3
+
+
+def test_what_has_hardly_any_weight_is_dropped():
+    weights = np.array([1.0, 4e-5, 5e-5, 2e-5])
+    means = 1e4 * np.arange(8.0).reshape(4, 2)
+    belief = SumBelief(weights / weights.sum(), means, np.tile(np.eye(2), (4, 1, 1)), np.arange(4))
+    # Of these two, the lighter ones have less than 1e-4 together.
+    assert belief._lessened(None).parts.tolist() == [0, 2]
+
+
+def test_factors_of_many_are_those_of_each():
+    rng = np.random.default_rng(3)
+    root = rng.normal(size=(7, 4, 4))
+    many = root @ root.transpose(0, 2, 1) * np.outer([1.0, 1e3, 1e-3, 1.0], [1.0, 1e3, 1e-3, 1.0])
+    found = factors_of(many, 4)
+    for one, expected in zip(found, many, strict=True):
+        np.testing.assert_allclose(one, factor_of(expected, 4), rtol=1e-9)
+    many[2] = np.diag([1.0, 0.0, 2.0, 0.0])
+    np.testing.assert_allclose(factors_of(many, 4)[2] @ factors_of(many, 4)[2].T, many[2])
+    for fault in (np.nan, -1.0):
+        wrong = many.copy()
+        wrong[5, 1, 1] = fault
+        with pytest.raises(InputError):
+            factors_of(wrong, 4)
+    wrong = many.copy()
+    wrong[5, 0, 1] += 1.0
+    with pytest.raises(InputError, match="symmetric"):
+        factors_of(wrong, 4)
+    with pytest.raises(InputError, match="shape"):
+        factors_of(many[:, :3, :3], 4)
