@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Bools, Complexes, Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.stretches import Stretches, stretches
@@ -112,17 +112,7 @@ def step_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
     if ways is None:
         return ""
     ways = ways.where(ways.grown(*_rests(time_s, step_m)).real <= _REST_SHARE * ways.lasted_s)
-    heading_rad, unknown = _directions(motion)
-    moved_m = step_m * np.exp(1j * heading_rad)
-    turned_rad = ways.turned_by(time_s, np.cumsum(moved_m))
-    # A mirror image has the same distances.
-    off_rad = [np.abs(wrap_rad(turned_rad - sign * ways.turned_rad)) for sign in (1, -1)]
-    alike = (np.minimum(*off_rad) <= _AGREED_RAD) & (
-        np.abs(ways.grown(time_s, np.cumsum(unknown, dtype=np.float64))) == 0
-    )
-    if alike.sum() < _FEWEST:
-        moved_m, alike = step_m + 0j, np.abs(ways.turned_rad) <= _STRAIGHT_RAD
-    ways = ways.where(alike)
+    ways, moved_m = _comparable(ways, motion)
     distance_m = np.abs(ways.before_m + ways.after_m)
     factor = np.abs(ways.grown(time_s, np.cumsum(moved_m))) / distance_m
     typical = float(np.median(factor)) if factor.size >= _FEWEST else 1.0
@@ -216,6 +206,24 @@ def _known(motion: pd.DataFrame, name: str) -> Floats:
     values = np.nan_to_num(_column(motion, name), nan=0.0)
     values[:1] = 0.0
     return values
+
+
+def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Complexes]:
+    """Return pairs whose distance motion tells, and its moves.
+
+    Moves have directions where most pairs bend by them as the positions do, or as a mirror image,
+    which has the same distances. Else they are lengths, and pairs are straight.
+    """
+    time_s, step_m = _column(motion, "time_s"), _known(motion, "step_m")
+    heading_rad, unknown = _directions(motion)
+    moved_m = step_m * np.exp(1j * heading_rad)
+    turned_rad = ways.turned_by(time_s, np.cumsum(moved_m))
+    off_rad = [np.abs(wrap_rad(turned_rad - sign * ways.turned_rad)) for sign in (1, -1)]
+    known = np.abs(ways.grown(time_s, np.cumsum(unknown, dtype=np.float64))) == 0
+    alike = known & (np.minimum(*off_rad) <= _AGREED_RAD)
+    if alike.sum() >= max(_FEWEST, len(ways) / 2):
+        return ways.where(alike), moved_m
+    return ways.where(np.abs(ways.turned_rad) <= _STRAIGHT_RAD), step_m.astype(np.complex128)
 
 
 def _directions(motion: pd.DataFrame) -> tuple[Floats, Bools]:
