@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
+Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 Ints8 = NDArray[np.int8]
 Ints32 = NDArray[np.int32]

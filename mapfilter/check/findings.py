@@ -63,6 +63,10 @@ REMEDIES = {
     "and timing advances in steps, with the technology.",
     "log-rows-unused": "Look at the lines named; mapfilter convert lists all reasons.",
     "log-speeds": "Give lengths in metres; if a vehicle moved, set filter.bayes.vehicle = true.",
+    "log-steps": "Give the metres moved in each interval: lengths in metres, not speeds and not in "
+    "feet; a recording with a column speed_kmh or speed_mps is read as such by mapfilter convert.",
+    "log-turns": "Give the change of heading in each interval, in radians, counter-clockwise "
+    "positive; mapfilter convert reads columns turn_deg, yaw_rate_radps and yaw_rate_degps.",
     "log-without-motion": "Add a recording of steps, odometry or a fused track (track.recordings), "
     "or set track.course_motion; without motion only GNSS locates.",
     "lon-lat-swapped": "Exchange longitude and latitude.",

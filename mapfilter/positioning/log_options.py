@@ -17,6 +17,7 @@ from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.motion_faults import fault_notes
 from mapfilter.tracks.speeds import FASTEST_MPS, speed_fault
 
 STREETS_ALONE = "no cells and no positions in the log: located by the streets alone"
@@ -163,7 +164,9 @@ def _motion_by_signs(log: TrackLog) -> tuple[bool | None, str]:
     """Return whether motion is a vehicle's, None where nothing speaks for one, and a note."""
     signs = vehicle_signs(log)
     if signs is None:
-        fault = speed_fault(log.motion) if log.imu is None else ""
+        # Where positions contradict the steps, their note says more than the speed does.
+        in_doubt = log.imu is None and not fault_notes(log.notes, "step_m")
+        fault = speed_fault(log.motion) if in_doubt else ""
         advice = "if a vehicle moved, set filter.bayes.vehicle = true"
         return None, f"motion: {fault}; {advice}" if fault else ""
     if not signs.fast:

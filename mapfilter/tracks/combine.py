@@ -154,10 +154,12 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         names = ", ".join(str(r.path) for r in journey)
         faults = (replace(one, where=f"{names}, {one.where}") for one in error.faults)
         raise InputError(tuple(faults)) from error
-    if moved.compass and mirrored:
+    if mirrored:
         # The other half of the same fault: either positions or azimuths are mirrored.
-        sense = "motion, heading_rad: headings run"
-        log = replace(log, notes=tuple(n for n in log.notes if not n.startswith(sense)))
+        halves = ["motion, turn_rad: turns run"]
+        halves += ["motion, heading_rad: headings run"] if moved.compass else []
+        kept = (note for note in log.notes if not note.startswith(tuple(halves)))
+        log = replace(log, notes=tuple(kept))
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)
         raise fail(InputError, names, "rows of a journey", "none")

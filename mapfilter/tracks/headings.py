@@ -7,6 +7,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.stretches import known_places
 
 _LEAST_M = 2.0
 _FEWEST = 20
@@ -110,21 +111,19 @@ def headings_and_courses(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Fl
         As of :func:`heading_fault`.
     """
     nothing = np.empty(0)
-    places = places[np.isfinite(places[["east_m", "north_m"]].to_numpy(np.float64)).all(axis=1)]
-    if len(motion) < _FEWEST or len(places) < 2:
+    time_s, *along = known_places(places)
+    if len(motion) < _FEWEST or len(time_s) < 2:
         return nothing, nothing
     end_s = motion["time_s"].to_numpy(dtype=np.float64)
     heading = motion["heading_rad"].to_numpy(dtype=np.float64)
     step_m = motion["step_m"].to_numpy(dtype=np.float64)
-    time_s, first = np.unique(places["time_s"].to_numpy(dtype=np.float64), return_index=True)
     begin_s = np.concatenate([[np.nan], end_s[:-1]])
     with np.errstate(invalid="ignore"):
         known = (step_m > 0) & np.isfinite(heading) & (begin_s >= time_s[0]) & (end_s <= time_s[-1])
     begin_s, end_s, heading = begin_s[known], end_s[known], heading[known]
     moved = []
-    for name in ("east_m", "north_m"):
-        along = places[name].to_numpy(dtype=np.float64)[first]
-        moved.append(np.interp(end_s, time_s, along) - np.interp(begin_s, time_s, along))
+    for axis_m in along:
+        moved.append(np.interp(end_s, time_s, axis_m) - np.interp(begin_s, time_s, axis_m))
     # Of short steps only a few together have a course.
     group = np.floor(np.cumsum(np.hypot(*moved)) / _LEAST_M).astype(np.int64)
     if not group.size:

@@ -25,9 +25,9 @@ from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.tracks.clock_steps import with_clocks_gone_on
-from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import check_clocks, check_start, check_steps, early_ends
+from mapfilter.tracks.motion_faults import motion_faults
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
 from mapfilter.tracks.tables import tidy_table
@@ -264,9 +264,12 @@ def make_log(
         every_note += early_ends(tables)
         places = next((tables[name] for name in ("truth", "gnss") if len(tables[name]) > 1), None)
         # Of values that are refused nothing is told besides.
-        of_headings = places is not None and not faults.found
-        if of_headings and (wrong := heading_fault(tables["motion"], places)):
-            every_note += (f"{called.get('motion', 'motion')}, heading_rad: {wrong}",)
+        if places is not None and not faults.found:
+            for column, wrong in motion_faults(tables["motion"], places).items():
+                fault = f", {column}: {wrong}"
+                # A log that was written and read has its notes of then.
+                if not any(note.endswith(fault) for note in every_note):
+                    every_note += (f"{called.get('motion', 'motion')}{fault}",)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless and not any(UNPLACED in note for note in every_note):

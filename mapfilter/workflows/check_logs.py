@@ -14,6 +14,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import outside_m
+from mapfilter.tracks.motion_faults import fault_notes
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.range_units import range_notes
@@ -23,6 +24,7 @@ from mapfilter.workflows.logs import journeys_of, open_journey
 
 _AWAY_M = 5000.0
 _MANY = 0.2
+_OF_COLUMNS = {"heading_rad": "log-headings", "turn_rad": "log-turns", "step_m": "log-steps"}
 
 
 def check_logs(
@@ -43,11 +45,13 @@ def check_logs(
             findings.add_faults(error, "log-invalid")
             continue
         _check_recordings(opened, findings)
-        for note in opened.log.notes:
-            if ", heading_rad: " in note:
-                findings.add("log-headings", str(path), f"{note}.", "warning")
+        for column, code in _OF_COLUMNS.items():
+            for note in fault_notes(opened.log.notes, column):
+                findings.add(code, str(path), f"{note}.", "warning")
         whose = config.filter.bayes.of(BayesFilter).vehicle, opened.log.vehicle, opened.log.imu
-        if all(one is None for one in whose) and (fault := speed_fault(opened.log.motion)):
+        # Positions say more of the lengths of steps than their speed does.
+        in_doubt = all(one is None for one in whose) and not fault_notes(opened.log.notes, "step_m")
+        if in_doubt and (fault := speed_fault(opened.log.motion)):
             findings.add("log-speeds", str(path), f"Motion: {fault}.", "warning")
         log = opened.log if lattice is None else in_frame(opened.log, lattice.crs)
         near = lattice is not None and _is_near(path, log, lattice, findings)

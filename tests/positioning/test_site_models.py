@@ -115,7 +115,7 @@ def test_a_plan_without_cells_has_no_grid_to_be_turned():
 def test_timing_advances_are_distances_with_the_error_of_their_step():
     sites = SiteModels(CellPlan(CRS, (CELL, OTHER)), replace(OPTIONS, timing_step_m=120.0))
     model = sites.of(MOVING, ("Z",), ("A",))
-    np.testing.assert_allclose(np.diag(model.noise), [81.0, 200.0**2 + 120.0**2 / 12])
+    np.testing.assert_allclose(np.diag(model.noise), [64.0, 200.0**2 + 120.0**2 / 12])
     assert model.mean([EAST_M + 300.0, 0.0, NORTH_M + 400.0, 0.0])[1] == pytest.approx(500.0)
 
 

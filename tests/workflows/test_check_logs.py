@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
 from command_line import ONE, change, mapfilter, settings
@@ -47,6 +48,53 @@ def test_headings_by_a_compass_are_a_finding(check, log):
     assert found["log-headings"]["where"] == str(log)
     assert "headings run clockwise from north" in found["log-headings"]["evidence"]
     assert "pi/2 minus a" in found["log-headings"]["remedy"]
+
+
+@pytest.fixture
+def laps(tmp_path):
+    """A log of a car that goes round a block of the world four times."""
+    corner = np.arange(800) % 50 == 49
+    turn = np.where(corner, np.pi / 2, 0.0)
+    middle = np.cumsum(turn) - turn / 2
+    motion = pd.DataFrame({"time_s": 0.4 * np.arange(800), "step_m": 2.0, "turn_rad": turn})
+    motion["heading_rad"] = np.nan
+    east, north = (np.cumsum(2.0 * way(middle)) for way in (np.cos, np.sin))
+    place = {"east_m": 386_000.0 + east, "north_m": 6_671_900.0 + north}
+    folder = tmp_path / "laps"
+    folder.mkdir()
+    motion.to_csv(folder / "motion.csv", index=False)
+    pd.DataFrame({"time_s": motion["time_s"], **place}).to_csv(folder / "truth.csv", index=False)
+    (folder / "log.json").write_text('{"crs": "EPSG:32635"}')
+    return folder
+
+
+def test_turns_and_steps_that_contradict_positions_are_findings(check, laps):
+    assert not {"log-turns", "log-steps", "log-speeds"} & set(check(laps))
+    change(laps / "motion.csv", turn_rad=lambda turn: -turn)
+    found = check(laps)
+    assert "log-steps" not in found
+    assert found["log-turns"]["severity"] == "warning"
+    assert found["log-turns"]["where"] == str(laps)
+    assert "motion.csv, turn_rad: turns run clockwise" in found["log-turns"]["evidence"]
+    assert "counter-clockwise positive" in found["log-turns"]["remedy"]
+    change(laps / "motion.csv", step_m=lambda step_m: step_m / 0.4)
+    found = check(laps)
+    assert found["log-steps"]["severity"] == "warning"
+    assert "speeds in m/s, rows 0.4 s apart" in found["log-steps"]["evidence"]
+    assert "not speeds" in found["log-steps"]["remedy"]
+
+
+def test_steps_with_another_unit_are_one_finding(check, laps):
+    """By the positions; not by the speed too, which would blame feet for km/h."""
+    heading = np.angle(np.exp(1j * np.cumsum(pd.read_csv(laps / "motion.csv")["turn_rad"])))
+    times = {"time_s": lambda time_s: 4 * time_s}
+    change(laps / "truth.csv", **times)
+    change(laps / "motion.csv", heading_rad=lambda _: heading, turn_rad=lambda _: None, **times)
+    assert not {"log-steps", "log-speeds"} & set(check(laps))
+    change(laps / "motion.csv", step_m=lambda step_m: 3.6 * step_m)
+    found = check(laps)
+    assert "(km/h for m/s or " in found["log-steps"]["evidence"]
+    assert "log-speeds" not in found
 
 
 def test_timing_advances_in_metres_are_a_finding(check, log):

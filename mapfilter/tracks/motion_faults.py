@@ -1,0 +1,281 @@
+"""Checks of steps and turns by positions: their units, and the sense of rotation.
+
+Errors of sensors are not meant: only what differs from the positions by a factor that is far from
+1, and the same nearly everywhere, or by the sense or the unit of its turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Bools, Complexes, Floats
+from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.headings import heading_fault
+from mapfilter.tracks.stretches import Stretches, stretches
+
+_FEWEST = 6
+_SHORTER, _LONGER = 0.6, 1.6
+_ALIKE, _MOSTLY = 1.2, 0.75
+_MOSTLY_UNKNOWN = 0.5
+_NAMED, _MOST_NAMED = 1.1, 2
+_REST_S, _REST_SHARE = 5.0, 0.1
+_STRAIGHT_RAD, _CORNER_RAD, _BACK_RAD = np.deg2rad(30.0), np.deg2rad(30.0), np.deg2rad(150.0)
+_AGREED_RAD = np.deg2rad(30.0)
+_FEWEST_CORNERS, _BOTH, _AGREED, _SELDOM = 5, 2 / 3, 0.85, 0.5
+_A_SECOND = 1.2
+
+_FOOT_M, _KMH_MPS, _MPH_MPS, _KNOT_MPS = 0.3048, 1 / 3.6, 0.44704, 1852 / 3600
+_UNITS: Mapping[str, float] = {
+    "feet for metres": 1 / _FOOT_M,
+    "metres taken for feet": _FOOT_M,
+    "km/h for m/s": 1 / _KMH_MPS,
+    "m/s taken for km/h": _KMH_MPS,
+    "mph for m/s": 1 / _MPH_MPS,
+    "knots for m/s": 1 / _KNOT_MPS,
+    "inches for metres": 1 / 0.0254,
+    "centimetres for metres": 100.0,
+    "millimetres for metres": 1000.0,
+    "kilometres for metres": 0.001,
+    "each counted twice": 2.0,
+}
+"""How many times too long steps are, by the mistake."""
+_SPEEDS: Mapping[str, float] = {
+    "m/s": 1.0,
+    "km/h": 3.6,
+    "mph": 1 / _MPH_MPS,
+    "knots": 1 / _KNOT_MPS,
+}
+
+
+_FIRST_WORDS = {"heading_rad": "headings", "turn_rad": "turns", "step_m": "steps"}
+
+
+def motion_faults(motion: pd.DataFrame, places: pd.DataFrame) -> dict[str, str]:
+    """Return what is wrong with a log's motion, by its positions: a text for each such column.
+
+    Parameters
+    ----------
+    motion : pandas.DataFrame
+        time_s, step_m, heading_rad and turn_rad.
+    places : pandas.DataFrame
+        time_s, east_m and north_m: ground truth, or fixes by GNSS.
+    """
+    checks = {"heading_rad": heading_fault, "turn_rad": turn_fault, "step_m": step_fault}
+    found = {column: check(motion, places) for column, check in checks.items()}
+    return {column: fault for column, fault in found.items() if fault}
+
+
+def fault_notes(notes: Iterable[str], column: str) -> list[str]:
+    """Return those notes of a log that are a fault of a column of its motion by its positions.
+
+    Examples
+    --------
+    >>> notes = ["motion, turn_rad: turns run clockwise", "motion: 1 exact duplicate row dropped"]
+    >>> fault_notes(notes, "turn_rad"), fault_notes(notes, "step_m")
+    (['motion, turn_rad: turns run clockwise'], [])
+    """
+    return [note for note in notes if f", {column}: {_FIRST_WORDS[column]} " in note]
+
+
+def step_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
+    """Return what is wrong with the lengths of steps; an empty text for nothing.
+
+    Dead reckoning by the steps, and by headings or turns, is compared with the distances of
+    positions some 100 m apart; where directions are not known or wrong, it is the length of steps
+    along straight ways. Steps are wrong where they are less than 0.6 or more than 1.6 times as
+    long, and by the same factor, within 20 %, on three quarters of these ways. Ways on which steps
+    are 0 or unknown for a while are left out: a sensor that was dead, or a rest.
+
+    Parameters
+    ----------
+    motion : pandas.DataFrame
+        time_s, step_m, heading_rad and turn_rad.
+    places : pandas.DataFrame
+        time_s, east_m and north_m.
+
+    Examples
+    --------
+    >>> time_s = np.arange(101.0)
+    >>> truth = pd.DataFrame({"time_s": time_s, "east_m": 10 * time_s, "north_m": 0.0})
+    >>> motion = pd.DataFrame({"time_s": time_s, "step_m": 11.0})
+    >>> motion = motion.assign(heading_rad=0.0, turn_rad=np.nan)
+    >>> step_fault(motion.assign(step_m=400.0), truth)
+    'steps are 40 times as long as the way between positions (inches for metres?); expected metres'
+    >>> step_fault(motion, truth)
+    ''
+    """
+    time_s, step_m = _column(motion, "time_s"), _known(motion, "step_m")
+    ways = stretches(places, time_s, np.cumsum(np.abs(step_m)))
+    if ways is None:
+        return ""
+    ways = ways.where(ways.grown(*_rests(time_s, step_m)).real <= _REST_SHARE * ways.lasted_s)
+    ways, moved_m = _comparable(ways, motion)
+    distance_m = np.abs(ways.before_m + ways.after_m)
+    factor = np.abs(ways.grown(time_s, np.cumsum(moved_m))) / distance_m
+    typical = float(np.median(factor)) if factor.size >= _FEWEST else 1.0
+    if _SHORTER <= typical <= _LONGER or typical <= 0:
+        return ""
+    lasted_s = np.diff(time_s, prepend=time_s[:1])
+    # As long as they were if the steps were speeds.
+    of_speeds = np.abs(ways.grown(time_s, np.cumsum(moved_m * lasted_s))) / distance_m
+    causes = _matching(_UNITS, factor)
+    speeds = _matching(_SPEEDS, of_speeds)
+    apart_s = float(np.median(lasted_s[1:]))
+    if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
+        causes |= {
+            f"speeds in {unit}, rows {apart_s:.2g} s apart": off for unit, off in speeds.items()
+        }
+    if not (_is_constant(factor) or (speeds and _is_constant(of_speeds))):
+        return ""
+    likely = " or ".join(sorted(causes, key=causes.__getitem__)[:_MOST_NAMED])
+    times = f"steps are {typical:.3g} times as long as the way between positions"
+    return f"{times}{f' ({likely}?)' if likely else ''}; expected metres"
+
+
+def turn_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
+    """Return what is wrong with turns, their sense or unit; an empty text for nothing.
+
+    Dead reckoning by the steps and turns has corners of its own, which are compared with those of
+    the positions, between lines of some 50 m. Turns are wrong where corners of 30 to 150 degrees,
+    five or more, contradict them and fit the same turns the other way round, or in another unit.
+
+    Parameters
+    ----------
+    motion : pandas.DataFrame
+        time_s, step_m and turn_rad.
+    places : pandas.DataFrame
+        time_s, east_m and north_m.
+
+    Examples
+    --------
+    >>> turn = np.where(np.arange(400) % 20 == 10, np.pi / 2, 0.0) * np.repeat([1, -1, 1, -1], 100)
+    >>> heading = np.cumsum(turn)
+    >>> east, north = (np.cumsum(10 * f(heading - turn / 2)) for f in (np.cos, np.sin))
+    >>> motion = pd.DataFrame({"time_s": np.arange(400.0), "step_m": 10.0, "turn_rad": -turn})
+    >>> truth = pd.DataFrame({"time_s": np.arange(400.0), "east_m": east, "north_m": north})
+    >>> turn_fault(motion, truth)
+    'turns run clockwise by the course of the positions; expected radians counter-clockwise'
+    >>> turn_fault(motion.assign(turn_rad=turn), truth)
+    ''
+    """
+    turn_rad = _column(motion, "turn_rad")
+    if np.isfinite(turn_rad[1:]).sum() < _FEWEST:
+        return ""
+    time_s, step_m = _column(motion, "time_s"), _known(motion, "step_m")
+    corners = stretches(places, time_s, np.cumsum(np.abs(step_m)))
+    if corners is None:
+        return ""
+    unknown = np.cumsum(~np.isfinite(turn_rad), dtype=np.float64)
+    corners = corners.where(_is_corner(corners.turned_rad))
+    corners = corners.where(np.abs(corners.grown(time_s, unknown)) == 0)
+    if len(corners) < _FEWEST_CORNERS:
+        return ""
+    turn_rad = _known(motion, "turn_rad")
+    if _agreement(corners, time_s, step_m, turn_rad) > _SELDOM:
+        return ""
+    lasted_s = np.diff(time_s, prepend=time_s[:1])
+    apart_s = float(np.median(lasted_s[1:]))
+    units: dict[str, Floats | float] = {"": 1.0, "degrees": np.pi / 180, "counted twice": 0.5}
+    if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
+        units[f"rates (rad/s) in rows {apart_s:.2g} s apart"] = lasted_s
+        units[f"rates (degrees/s) in rows {apart_s:.2g} s apart"] = lasted_s * np.pi / 180
+    agreed = {
+        (unit, sign): _agreement(corners, time_s, step_m, sign * factor * turn_rad)
+        for unit, factor in units.items()
+        for sign in (1, -1)
+    }
+    (unit, sign), most = max(agreed.items(), key=lambda one: one[1])
+    if most < _AGREED:
+        return ""
+    alike = [other for other in units if other and agreed[other, sign] == most]
+    words = [f"are {' or '.join(alike)}"] if unit else []
+    words += ["run clockwise"] if sign < 0 else []
+    by = "by the course of the positions; expected radians counter-clockwise"
+    return f"turns {' and '.join(words)} {by}"
+
+
+def _column(motion: pd.DataFrame, name: str) -> Floats:
+    return np.asarray(motion[name], dtype=np.float64)
+
+
+def _known(motion: pd.DataFrame, name: str) -> Floats:
+    """Return a column's values from the second row on; 0 where one is not known."""
+    values = np.nan_to_num(_column(motion, name), nan=0.0)
+    values[:1] = 0.0
+    return values
+
+
+def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Complexes]:
+    """Return pairs whose distance motion tells, and its moves.
+
+    Moves have directions where most pairs bend by them as the positions do, or as a mirror image,
+    which has the same distances. Else they are lengths, and pairs are straight.
+    """
+    time_s, step_m = _column(motion, "time_s"), _known(motion, "step_m")
+    heading_rad, unknown = _directions(motion)
+    moved_m = step_m * np.exp(1j * heading_rad)
+    turned_rad = ways.turned_by(time_s, np.cumsum(moved_m))
+    off_rad = [np.abs(wrap_rad(turned_rad - sign * ways.turned_rad)) for sign in (1, -1)]
+    known = np.abs(ways.grown(time_s, np.cumsum(unknown, dtype=np.float64))) == 0
+    alike = known & (np.minimum(*off_rad) <= _AGREED_RAD)
+    if alike.sum() >= max(_FEWEST, len(ways) / 2):
+        return ways.where(alike), moved_m
+    return ways.where(np.abs(ways.turned_rad) <= _STRAIGHT_RAD), step_m.astype(np.complex128)
+
+
+def _directions(motion: pd.DataFrame) -> tuple[Floats, Bools]:
+    """Return headings, those since the start by turns where most are unknown, and unknown rows."""
+    heading_rad, turn_rad = _column(motion, "heading_rad"), _column(motion, "turn_rad")
+    unknown = np.isnan(heading_rad)
+    if unknown.mean() > _MOSTLY_UNKNOWN:
+        unknown, turned_rad = np.isnan(turn_rad), np.nan_to_num(turn_rad)
+        heading_rad = np.cumsum(turned_rad) - turned_rad / 2
+    unknown[:1] = False
+    return np.nan_to_num(heading_rad), unknown
+
+
+def _is_corner(turned_rad: Floats) -> Bools:
+    """Return which turns are of 30 to 150 degrees: those back look alike both ways round."""
+    return np.asarray((np.abs(turned_rad) >= _CORNER_RAD) & (np.abs(turned_rad) <= _BACK_RAD))
+
+
+def _rests(time_s: Floats, step_m: Floats) -> tuple[Floats, Floats]:
+    """Return times, and the sum of pauses of more than 5 s without steps until each."""
+    moving = step_m != 0
+    begin_s = np.append(time_s[np.flatnonzero(moving) - 1], time_s[-1])
+    end_s = np.append(time_s[0], time_s[moving])
+    paused_s = begin_s - end_s
+    rest_s = np.cumsum(np.where(paused_s > _REST_S, paused_s, 0.0))
+    # Nothing is added while there are steps.
+    at_s = np.column_stack([end_s, begin_s]).ravel()
+    return at_s, np.column_stack([np.append(0.0, rest_s[:-1]), rest_s]).ravel()
+
+
+def _matching(units: Mapping[str, float], factor: Floats) -> dict[str, float]:
+    """Return the mistakes that explain a factor within 10 %, and how far off each is."""
+    typical = max(float(np.median(factor)), 1e-9)
+    off = {word: abs(float(np.log(typical / unit))) for word, unit in units.items()}
+    return {word: by for word, by in off.items() if by <= np.log(_NAMED)}
+
+
+def _is_constant(factor: Floats) -> bool:
+    """Return whether most are within 20 % of the median."""
+    near = np.abs(np.log(np.maximum(factor, 1e-9) / np.median(factor))) <= np.log(_ALIKE)
+    return bool(np.mean(near) >= _MOSTLY)
+
+
+def _agreement(corners: Stretches, time_s: Floats, step_m: Floats, turn_rad: Floats) -> float:
+    """Return the share of corners that dead reckoning by steps and turns has, too."""
+    heading_rad = np.cumsum(turn_rad)
+    reckoned_m = np.cumsum(step_m * np.exp(1j * (heading_rad - turn_rad / 2)))
+    turned_rad = corners.turned_by(time_s, reckoned_m)
+    both = _is_corner(turned_rad)
+    if both.sum() < max(_FEWEST_CORNERS, _BOTH * both.size):
+        return 0.0
+    # Five times a right angle has the same course, and is a whole turn more.
+    more_rad = corners.grown(time_s, heading_rad).real - corners.turned_rad
+    near = np.abs(wrap_rad(turned_rad - corners.turned_rad)) <= _AGREED_RAD
+    return float(np.mean((near & (np.abs(more_rad) <= np.pi))[both]))

@@ -1,0 +1,144 @@
+"""Stretches of a journey between its positions, over which motion is compared with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Bools, Complexes, Floats, Ints
+
+_USUAL_M, _SHORTEST_M, _LONGEST_M = 40.0, 25.0, 300.0
+_COVERED = 0.6
+_LONGEST_TIMES = 5.0
+_MOST, _FEWEST, _FEWER = 4096, 6, 1.4
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """Pairs of straight lines between positions, one after the other; N pairs of M positions.
+
+    Positions of a few seconds are one, their mean, so that noise counts less. What motion says is
+    averaged over the same times.
+
+    Parameters
+    ----------
+    time_s : ndarray of float64, shape (M,)
+        Of each position.
+    group : ndarray of int64, shape (M,)
+        Number of its mean, from 0.
+    first : ndarray of int64, shape (N,)
+        Number of the mean with which a pair begins; the next two follow.
+    before_m, after_m : ndarray of complex128, shape (N,)
+        The two lines of a pair: east, and north as the imaginary part.
+    """
+
+    time_s: Floats
+    group: Ints
+    first: Ints
+    before_m: Complexes
+    after_m: Complexes
+
+    def __len__(self) -> int:
+        return self.first.size
+
+    @property
+    def turned_rad(self) -> Floats:
+        """Change of course at the middle, in (-π, π]."""
+        return np.asarray(np.angle(self.after_m * np.conj(self.before_m)))
+
+    @property
+    def lasted_s(self) -> Floats:
+        """Duration of each pair."""
+        return self.grown(self.time_s, self.time_s).real
+
+    def where(self, kept: Bools) -> Stretches:
+        """Return some of the pairs."""
+        parts = self.first[kept], self.before_m[kept], self.after_m[kept]
+        return Stretches(self.time_s, self.group, *parts)
+
+    def grown(self, time_s: Floats, total: Floats | Complexes) -> Complexes:
+        """Return how much a sum of motion grows along each pair.
+
+        Parameters
+        ----------
+        time_s, total : (K,) array
+            The sum, of real or complex numbers, and its times.
+        """
+        mean = _means(np.interp(self.time_s, time_s, total), self.group)
+        return np.asarray(mean[self.first + 2] - mean[self.first])
+
+    def turned_by(self, time_s: Floats, reckoned_m: Complexes) -> Floats:
+        """Return the change of course at the middle by positions of motion's own.
+
+        Parameters
+        ----------
+        time_s : (K,) array
+        reckoned_m : (K,) array of complex128
+            Positions by dead reckoning in any frame.
+        """
+        mean = _means(np.interp(self.time_s, time_s, reckoned_m), self.group)
+        before_m, after_m = (np.diff(mean)[self.first + i] for i in (0, 1))
+        return np.asarray(np.angle(after_m * np.conj(before_m)))
+
+
+def known_places(places: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
+    """Return time, east and north of finite positions, in order, of each time the first."""
+    table = places[["time_s", "east_m", "north_m"]].to_numpy(dtype=np.float64)
+    table = table[np.isfinite(table).all(axis=1)]
+    time_s, first = np.unique(table[:, 0], return_index=True)
+    return time_s, table[first, 1], table[first, 2]
+
+
+def stretches(places: pd.DataFrame, time_s: Floats, way_m: Floats) -> Stretches | None:
+    """Return pairs of lines of some 40 m and more between positions; None where there are too few.
+
+    The way is parted equally, as finely as it may be with lines of 40 m or more on most of it. It
+    is that of motion, in whatever unit: the way between positions grows by their noise, and a rest
+    is none. Lines of less than 25 m (positions that stand still), of more than 300 m, and over a
+    gap are left out.
+
+    Parameters
+    ----------
+    places : pandas.DataFrame
+        time_s, east_m and north_m.
+    time_s, way_m : (K,) array
+        Of motion: times, and the way until each. Positions before and after are left out.
+
+    Examples
+    --------
+    >>> time_s = np.arange(201.0)
+    >>> truth = pd.DataFrame({"time_s": time_s, "east_m": 10 * time_s, "north_m": 0.0})
+    >>> found = stretches(truth, time_s, 10 * time_s)
+    >>> line_m = float(np.median(np.abs(found.before_m)))
+    >>> len(found), line_m, found.turned_rad.max(), np.median(found.grown(time_s, 10 * time_s).real)
+    (50, 40.0, np.float64(0.0), np.float64(80.0))
+    """
+    at_s, east_m, north_m = known_places(places)
+    within = np.zeros(at_s.size, dtype=np.bool_)
+    if time_s.size:
+        within = (at_s >= time_s[0]) & (at_s <= time_s[-1])
+    at_s, place_m = at_s[within], (east_m + 1j * north_m)[within]
+    walked_m = np.interp(at_s, time_s, way_m) if at_s.size else at_s
+    if at_s.size <= _FEWEST or walked_m[-1] <= walked_m[0]:
+        return None
+    part = (walked_m - walked_m[0]) / (walked_m[-1] - walked_m[0])
+    parts = float(_MOST)
+    while parts >= _FEWEST:
+        group = np.cumsum(np.diff(np.floor(parts * part), prepend=0.0) != 0)
+        line_m, passed = np.diff(_means(place_m, group)), np.diff(_means(part, group).real)
+        length_m = np.abs(line_m)
+        fits = (length_m <= _LONGEST_M) & (passed <= _LONGEST_TIMES * np.median(passed))
+        if passed[fits & (length_m >= _USUAL_M)].sum() >= _COVERED * passed.sum():
+            fits &= length_m >= _SHORTEST_M
+            first = np.flatnonzero(fits[:-1] & fits[1:])
+            return Stretches(at_s, group, first, line_m[first], line_m[first + 1])
+        parts /= _FEWER
+    return None
+
+
+def _means(values: Floats | Complexes, group: Ints) -> Complexes:
+    """Return the mean of each group."""
+    east, north = (np.bincount(group, part) for part in (values.real, values.imag))
+    return np.asarray((east + 1j * north) / np.bincount(group))
