@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from codecs import BOM_UTF8
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -71,9 +72,10 @@ def open_ascii_grid(path: Path, cell_id: str, declared: Declared) -> AsciiGrid:
     """
     with open_input(path) as stream:
         head = stream.read(_LARGEST_ASCII_HEADER_BYTES)
-    lines = head.splitlines(keepends=True)[:_MOST_HEADER_LINES]
+    mark = BOM_UTF8 if head.startswith(BOM_UTF8) else b""
+    lines = head[len(mark) :].splitlines(keepends=True)[:_MOST_HEADER_LINES]
     lines = list(takewhile(lambda line: line.strip()[:1].isalpha(), lines))
-    header, header_bytes = GridHeader.of(str(path), lines), sum(map(len, lines))
+    header, header_bytes = GridHeader.of(str(path), lines), len(mark) + sum(map(len, lines))
     if "NCOLS" not in header.values or "NROWS" not in header.values:
         raise fail(InputError, str(path), "lines NCOLS and NROWS first", "none", "no ASCII grid")
     crs, faults = grid_crs(path, declared.crs), header.faults

@@ -11,6 +11,9 @@ from mapfilter.tracks.imu_noise import ImuNoise
 
 _LONGEST_S = 5.0
 _USUAL_INTERVALS = 3
+_LEAST_GAP_S, _ROWS_OF_A_GAP = 3.0, 5.0
+_STANDING_MPS = 0.3
+"""Least time and usual intervals without rows that are a gap, if the vehicle moved at an end of it."""
 MAD_TO_SD = 1.4826
 LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG = 0.05, 1.0, 90.0
 _COURSE_BIAS_DEG = 1.0
@@ -45,6 +48,8 @@ def by_compass(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
 def motion_from_odometry(rows: pd.DataFrame) -> pd.DataFrame:
     """Integrate speed and yaw rate over each interval, by the mean of its ends.
 
+    What a vehicle did while rows are missing is not known: neither step nor turn.
+
     Parameters
     ----------
     rows : pandas.DataFrame
@@ -53,7 +58,7 @@ def motion_from_odometry(rows: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        time_s, step_m, heading_rad (NaN), turn_rad.
+        time_s, step_m, heading_rad (NaN), turn_rad; NaN over gaps.
 
     Examples
     --------
@@ -63,14 +68,42 @@ def motion_from_odometry(rows: pd.DataFrame) -> pd.DataFrame:
     """
     rows = rows.drop_duplicates("time_s")
     time = rows["time_s"].to_numpy(dtype=np.float64)
+    speed = rows["speed_mps"].to_numpy(dtype=np.float64)
+    gap = odometry_gaps(time, speed)
     return pd.DataFrame(
         {
             "time_s": time,
-            "step_m": _integrated(time, rows["speed_mps"].to_numpy(dtype=np.float64)),
+            "step_m": np.where(gap, np.nan, _integrated(time, speed)),
             "heading_rad": np.nan,
-            "turn_rad": _integrated(time, rows["yaw_rate_radps"].to_numpy(dtype=np.float64)),
+            "turn_rad": np.where(
+                gap, np.nan, _integrated(time, rows["yaw_rate_radps"].to_numpy(dtype=np.float64))
+            ),
         }
     )
+
+
+def odometry_gaps(time_s: Floats, speed_mps: Floats) -> Bools:
+    """Return which rows end a gap: rows of a vehicle that moves are missing before them.
+
+    Parameters
+    ----------
+    time_s, speed_mps : (N,) arrays
+
+    Examples
+    --------
+    >>> time_s = np.array([0.0, 0.1, 0.2, 30.0, 30.1])
+    >>> odometry_gaps(time_s, np.full(5, 10.0)).tolist()
+    [False, False, False, True, False]
+    >>> odometry_gaps(time_s, np.zeros(5)).any()
+    np.False_
+    """
+    gap = np.zeros(time_s.size, dtype=np.bool_)
+    if time_s.size > 2:
+        lasted_s = np.diff(time_s)
+        longest_s = max(_LEAST_GAP_S, _ROWS_OF_A_GAP * float(np.median(lasted_s)))
+        moved = (np.abs(speed_mps[1:]) > _STANDING_MPS) | (np.abs(speed_mps[:-1]) > _STANDING_MPS)
+        gap[1:] = (lasted_s > longest_s) & moved
+    return gap
 
 
 def _integrated(time_s: Floats, rate: Floats) -> Floats:

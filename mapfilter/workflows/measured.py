@@ -113,7 +113,8 @@ def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: 
         mcc, mnc, lac, ci = identity
         rows.identities.setdefault(cell, (mcc, mnc, lac, ci))
     if "technology" in radio:
-        kinds = radio["technology"].fillna("").astype(object).to_numpy()[kept]
+        technology = radio["technology"].astype(object)
+        kinds = technology.where(technology.notna(), "").to_numpy()[kept]
         pairs = zip(cells, kinds, strict=True)
         rows.technologies.update({cell: kind for cell, kind in pairs if kind})
 

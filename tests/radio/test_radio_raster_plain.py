@@ -51,6 +51,11 @@ def test_a_header_of_text_has_4096_bytes_at_most(tmp_path):
         values(tmp_path, head.replace("cellsize 5", "cellsize 5 ") + ROWS)
 
 
+def test_a_byte_order_mark_is_before_the_header(tmp_path):
+    assert values(tmp_path, "\ufeff" + HEAD + ROWS) == [[-80, -81], [-82, -83]]
+    assert grid(tmp_path, "\ufeff" + HEAD + ROWS).header_bytes == len(HEAD) + 3
+
+
 def test_64_characters_for_each_number_are_the_most(tmp_path):
     row = "-82 -83".rjust(127) + "\n"
     assert values(tmp_path, HEAD + "-80 -81\n" + row) == [[-80, -81], [-82, -83]]

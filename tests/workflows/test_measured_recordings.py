@@ -54,6 +54,15 @@ def test_both_readers_give_the_same_measurements(made):
     assert [ids[i] for i in rows.cell] == [own.cell_ids[i] for i in own.cell]
 
 
+def test_columns_of_other_names_without_a_technology(tmp_path):
+    path = tmp_path / "mini.csv"
+    rows = [f"{1_777_629_600 + k},60.17,24.94,S1A,{-80 - k}" for k in range(4)]
+    path.write_text("\n".join(["time,Latitude,Longitude,Cell,RSRP", *rows]))
+    found = read(path)
+    assert (found.cell_ids, found.technologies) == (("S1A",), {})
+    assert found.level_dbm.tolist() == [-80.0, -81.0, -82.0, -83.0]
+
+
 def test_levels_lie_between_the_positions_before_and_after(made):
     text = (
         "time,lat,lon,mcc,mnc,lac,ci,rsrp,technology\n"

@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
+from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import motion_from_odometry
+from mapfilter.tracks.moved import motion_from_odometry, odometry_gaps
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S, Compass, YawOffset, yaw_offset
 from mapfilter.tracks.pdr.signals import inertial_signals
@@ -60,6 +61,11 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     )
     speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
     imu = _noise(time_s, found, float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS)
+    gaps = np.flatnonzero(odometry_gaps(time_s, speed))
+    if gaps.size:
+        longest_s = float((time_s[gaps] - time_s[gaps - 1]).max())
+        words = number_of(gaps.size, "gap")
+        notes += (f"odometry: {words} (longest {longest_s:.1f} s), over which motion is not known",)
     return motion.assign(turn_rad=turn), imu, notes
 
 

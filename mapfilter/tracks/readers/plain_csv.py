@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import (
@@ -31,6 +32,7 @@ from mapfilter.tracks.readers.text import Text
 _UNIX_S = 1e8
 
 _KMH = 1 / 3.6
+_NEAR_S = 1.0
 _SPEEDS = ("speed_mps", "speed_kmh")
 _CONTENT = (
     *(("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("bars",)),
@@ -202,9 +204,33 @@ def _add_odometry(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
     speed = mapped.number(f"{name}_mps")
     if mapped.has(f"{name}_kmh"):
         speed = _KMH * mapped.number(f"{name}_kmh")
-    yaw = mapped.radians("yaw_rate", "ps")
+    yaw = _at_speeds(reading, time_s, speed, mapped.radians("yaw_rate", "ps"))
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
     _add(reading, "odometry", columns, mapped.rows, np.isfinite(speed))
+
+
+def _at_speeds(reading: Reading, time_s: Floats, speed: Floats, yaw: Floats) -> Floats:
+    """Return yaw rates of the rows with speeds: a bus sends each in rows of its own.
+
+    They are taken from the rows with a yaw rate before and after, at most a second away.
+    """
+    wanted = np.isfinite(speed) & ~np.isfinite(yaw) & np.isfinite(time_s)
+    known = np.isfinite(yaw) & np.isfinite(time_s)
+    if not wanted.any() or not known.any():
+        return yaw
+    order = np.argsort(time_s[known], kind="stable")
+    at_s, rates = time_s[known][order], yaw[known][order]
+    after = np.searchsorted(at_s, time_s[wanted])
+    near_s = np.minimum(
+        np.abs(at_s[np.minimum(after, at_s.size - 1)] - time_s[wanted]),
+        np.abs(at_s[np.maximum(after - 1, 0)] - time_s[wanted]),
+    )
+    found = np.where(near_s <= _NEAR_S, np.interp(time_s[wanted], at_s, rates), np.nan)
+    joined = yaw.copy()
+    joined[wanted] = found
+    if count := int(np.isfinite(found).sum()):
+        reading.note(f"{number_of(count, 'yaw rate')} taken from rows beside those with speeds")
+    return joined
 
 
 def _add_sensors(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:

@@ -1,0 +1,88 @@
+"""Odometry as vehicles log it: speeds and yaw rates in rows of their own, and rows that miss."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.moved import motion_from_odometry, odometry_gaps
+from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.pdr.vehicle import reckon_odometry
+
+UTM = OpenOptions(combine=CombineOptions(crs="EPSG:32629"))
+TIME_S = np.arange(0.0, 60.0, 0.1)
+SPEED_MPS = 8.0 + 2.0 * np.sin(TIME_S / 9)
+RATE_RADPS = 0.2 * np.sin(TIME_S / 7)
+
+
+def written(path, rows):
+    """A CSV whose empty fields are values that a row lacks."""
+    pd.DataFrame(rows).to_csv(path, index=False)
+    return path
+
+
+def test_speeds_and_yaw_rates_in_rows_of_their_own_are_joined(tmp_path):
+    """As a bus sends them: of the true turns nothing is lost."""
+    odd = np.arange(TIME_S.size) % 2 == 1
+    rows = {
+        "time": TIME_S,
+        "wheel_speed_mps": np.where(odd, SPEED_MPS, np.nan),
+        "yaw_rate_radps": np.where(odd, np.nan, RATE_RADPS),
+    }
+    log = open_log([written(tmp_path / "bus.csv", rows)], options=UTM).log
+    whole = motion_from_odometry(
+        pd.DataFrame({"time_s": TIME_S, "speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS})
+    )
+    assert len(log.motion) == odd.sum()
+    assert log.motion["step_m"].sum() == pytest.approx(whole["step_m"].sum(), rel=0.01)
+    turned = np.cumsum(whole["turn_rad"].to_numpy())[odd]
+    np.testing.assert_allclose(np.cumsum(log.motion["turn_rad"]), turned, atol=0.02)
+    assert any("300 yaw rates taken from rows beside" in note for note in log.notes)
+
+
+def test_yaw_rates_far_from_speeds_are_not_taken(tmp_path):
+    early = TIME_S < 20.0
+    rows = {
+        "time": np.concatenate([TIME_S, TIME_S[early] + 0.05]),
+        "wheel_speed_mps": np.concatenate([SPEED_MPS, np.full(early.sum(), np.nan)]),
+        "yaw_rate_radps": np.concatenate([np.full(TIME_S.size, np.nan), RATE_RADPS[early]]),
+    }
+    motion = open_log([written(tmp_path / "bus.csv", rows)], options=UTM).log.motion
+    known = motion["turn_rad"].notna().to_numpy()
+    # The yaw rates end at 20 s, and each is taken for a second more.
+    assert known[1:200].all()
+    assert not known[215:].any()
+
+
+@pytest.mark.parametrize("gone_s", [4.0, 30.0])
+def test_what_happened_while_rows_are_missing_is_not_known(gone_s):
+    """The rows at both ends tell nothing of what was between: no step, no turn."""
+    kept = (TIME_S < 25.0) | (TIME_S >= 25.0 + gone_s)
+    rows = pd.DataFrame({"time_s": TIME_S, "speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS})
+    whole, motion = motion_from_odometry(rows), motion_from_odometry(rows[kept])
+    unknown = motion["step_m"].isna().to_numpy()
+    assert motion["time_s"].to_numpy()[unknown].tolist() == pytest.approx([25.0 + gone_s])
+    assert np.isnan(motion["turn_rad"].to_numpy()[unknown]).all()
+    others = whole[kept][~unknown]
+    np.testing.assert_allclose(motion["step_m"][~unknown], others["step_m"])
+    _, _, notes = reckon_odometry(rows[kept])
+    assert any(f"1 gap (longest {gone_s + 0.1:.1f} s)" in note for note in notes)
+
+
+def test_rests_and_slow_rows_are_no_gaps():
+    assert not odometry_gaps(np.array([0.0, 1.0, 60.0, 61.0]), np.zeros(4)).any()
+    assert not odometry_gaps(np.arange(0.0, 100.0, 5.0), np.full(20, 9.0)).any()
+    assert not odometry_gaps(np.array([0.0, 0.1, 2.9, 3.0]), np.full(4, 9.0)).any()
+    # Rows stop at a rest and go on once the vehicle moves: it moved in between.
+    moved = odometry_gaps(np.array([0.0, 0.1, 30.0, 30.1]), np.array([0.0, 0.0, 9.0, 9.0]))
+    assert moved.tolist() == [False, False, True, False]
+    assert not odometry_gaps(np.array([0.0]), np.array([9.0])).any()
+
+
+def test_a_turn_in_a_gap_is_no_fault_of_the_log(tmp_path):
+    """Seven radians in 25 s at the rate of the next row were refused as degrees."""
+    kept = (TIME_S < 10.0) | (TIME_S >= 35.0)
+    rate = np.where(TIME_S < 10.0, 0.0, 0.6)
+    rows = {"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "yaw_rate_radps": rate}
+    path = written(tmp_path / "gap.csv", pd.DataFrame(rows)[kept])
+    assert len(open_log([path], options=UTM).log.motion) == kept.sum()
