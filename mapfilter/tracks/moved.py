@@ -13,7 +13,7 @@ _LONGEST_S = 5.0
 _USUAL_INTERVALS = 3
 _LEAST_GAP_S, _ROWS_OF_A_GAP = 3.0, 5.0
 _STANDING_MPS = 0.3
-"""Least time and usual intervals without rows that are a gap, if the vehicle moved at an end of it."""
+"""Least time and usual intervals without rows that are a gap, if it moved at an end of it."""
 MAD_TO_SD = 1.4826
 LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG = 0.05, 1.0, 90.0
 _COURSE_BIAS_DEG = 1.0
