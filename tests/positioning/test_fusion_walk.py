@@ -13,6 +13,7 @@ from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.filter import KalmanSmoother
+from mapfilter.positioning.kalman.level_errors import CellSlots, with_levels
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
@@ -178,6 +179,20 @@ def test_errors_that_last_are_told_once():
     np.testing.assert_allclose(aged, np.diag([64.0 * 4, sigma**2 * 20]))
     made.moved_m = 0.0
     assert made._aged(model, [100.0, 500.0]).noise[0, 0] == pytest.approx(64.0 * 1000)
+
+
+def test_errors_of_more_cells_than_are_kept_are_noise():
+    """For the first report both are the same."""
+
+    def radius_m(count):
+        slots = CellSlots.empty(count)
+        made = KalmanStep(SITES, EKF, KalmanState(with_levels(POSITION, slots), slots=slots))
+        heard = tuple(ReportRow("serving", name, None, None, -70.0, 0) for name in ("B", "A"))
+        made.take(Epoch(0.0, radio=heard))
+        return float(made._fix(0.0, Reason.USED).radii_m[2])
+
+    kept, noise = radius_m(2), radius_m(1)
+    assert noise == pytest.approx(kept, rel=1e-3)
 
 
 def test_noise_of_fixes():

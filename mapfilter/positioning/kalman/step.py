@@ -214,6 +214,10 @@ class KalmanStep:
             if self.slots.size:
                 errors = self.slots.components(given.cells, self.layout)
                 model = with_errors(model, errors)
+                # More cells than are kept at a time: their own errors are noise.
+                alone = [own < 0 for _, own in errors] + [False] * len(given.timed)
+                more_db2 = np.diag(np.array(alone) * self.options.level_error_db**2)
+                model = replace(model, noise=model.noise + more_db2)
             if self._update(self._aged(model, kept_m), reading):
                 self.moved_m, taken = 0.0, True
         return Reason.USED if taken else Reason.UPDATE_FAILED
