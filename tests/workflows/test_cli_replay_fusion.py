@@ -104,7 +104,7 @@ def test_every_filter_follows(method, motion):
 @pytest.mark.parametrize("motion", [False, True], ids=["no motion", "dead reckoning"])
 def test_levels_and_timing_advances_alone_say_how_sure_they_are(motion):
     inside, errors = [], []
-    for seed in range(4):
+    for seed in range(8):
         error, found = errors_m(*walk(seed, motion=motion))
         inside.append((error <= found.radii_m[:, 2]).mean())
         errors.append(error[100:].mean())
