@@ -353,6 +353,6 @@ def _mixture_radius(share: float, weight: Floats, mean: Floats, deviation: Float
             high = middle
         else:
             low = middle
-        if high - low < 1e-4 * high:
+        if high - low < 1e-5 * high:
             break
     return high

@@ -23,13 +23,12 @@ from mapfilter.filters.gaussian_sum import split
 from mapfilter.filters.kalman import Taken, smooth
 from mapfilter.filters.trials import CompiledMeasurement, run_trials
 
-_LEAST_SHARE = 1e-4
-"""Share of a belief that the parts without weight have together."""
+_LEAST_WEIGHT, _LEAST_SHARE = 1e-6, 1e-4
+"""Weight of the lightest part that is kept; where there are many, of all that are dropped."""
 _MANY = 64
-_NEAR, _NEAR_OF_MANY = 0.5, 2.0
-"""Squared distance, in a heavier part's deviations, at which another is the same; where there are
-more parts than so many, it is larger."""
-_ALIKE = 0.5
+_NEAR, _NEAR_OF_MANY = 0.1, 2.0
+"""Squared distance, in a heavier part's deviations, at which another is the same."""
+_ALIKE, _ALIKE_OF_MANY = 0.2, 0.5
 """Largest difference of the logarithms of their volumes then."""
 _COS_SQUARED = np.cos(np.pi * (np.arange(128) + 0.5) / 256) ** 2
 """At angles over a quarter of a turn; the other quarters are like it."""
@@ -144,15 +143,19 @@ class SumBelief:
         if self.weights.size == 1:
             return self
         order = np.argsort(-self.weights, kind="stable")
-        order = order[np.cumsum(self.weights[order[::-1]])[::-1] > _LEAST_SHARE]
+        many = order.size > _MANY
+        if many:
+            order = order[np.cumsum(self.weights[order[::-1]])[::-1] > _LEAST_SHARE]
+        else:
+            order = order[self.weights[order] >= min(_LEAST_WEIGHT, self.weights.max())]
         weights, means = self.weights[order], self.means[order]
         covariances, own = self.covariances[order], slice(compared)
         size, at = covariances[:, own, own], means[:, own]
         volume = np.linalg.slogdet(size)[1]
         off = at - at[:, None]
         apart = np.einsum("hci,hij,hcj->hc", off, np.linalg.inv(size), off, optimize=True)
-        near = _NEAR if order.size <= _MANY else _NEAR_OF_MANY
-        alike = (apart < near) & (np.abs(volume - volume[:, None]) < _ALIKE)
+        near, differing = (_NEAR_OF_MANY, _ALIKE_OF_MANY) if many else (_NEAR, _ALIKE)
+        alike = (apart < near) & (np.abs(volume - volume[:, None]) < differing)
         left = np.ones(order.size, dtype=np.bool_)
         kept = []
         for heavy in range(order.size):
