@@ -95,6 +95,9 @@ class MotionStep:
     sampling_sd_m : float
         Deviation of the displacement, east as north, of a step that was made of velocities seconds
         apart; besides the errors that a filter assumes of every step.
+    turned_sd_rad : float
+        Deviation of a change of heading that was not measured, of a step to all sides; headings
+        that turns add up to are unknown by it from there on.
     """
 
     step_m: float
@@ -102,6 +105,7 @@ class MotionStep:
     turn_rad: float = float("nan")
     spread_m: float = float("nan")
     sampling_sd_m: float = 0.0
+    turned_sd_rad: float = 0.0
 
     @property
     def all_sides_m(self) -> float:

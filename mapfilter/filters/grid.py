@@ -33,7 +33,7 @@ from mapfilter.filters.particle import (
 )
 
 _LEAST_MASS = 1e-9
-_NOTHING = (0.0, 0.0, 0.0, 0.0)
+_NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +83,17 @@ class GridModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
         """Return pixels as states of the particle model, shape (R, N)."""
 
     def transport(
-        self, east_m: float, north_m: float, length_m: float, spread_m2: float
+        self,
+        east_m: float,
+        north_m: float,
+        length_m: float,
+        spread_m2: float,
+        turned_rad2: float,
     ) -> Transport:
         """Return the effect of a displacement by dead reckoning, of some length.
 
-        ``spread_m2`` is a further variance along each axis.
+        ``spread_m2`` is a further variance along each axis, ``turned_rad2`` that of a change of
+        heading that was not measured.
         """
 
     def placed(self, device: Device) -> Self:
@@ -104,9 +110,10 @@ class GridBelief:
         Mass of those on and off the map; together they sum to one after an update.
     shared : object
         What the model shares between all pixels after the last reading.
-    waiting : (float, float, float, float)
-        Displacement east and north (m), its length (m) and the variance of steps without a heading
-        (m², along each axis) that mass has not been moved by yet.
+    waiting : (float, float, float, float, float)
+        Displacement east and north (m), its length (m), the variance of steps without a heading
+        (m², along each axis) and that of turns that were not measured (rad²), which mass has not
+        been moved by yet.
     travelled_m, log_evidence, status, agreement_start_m
         As of :class:`mapfilter.filters.particle.ParticleBelief`.
     """
@@ -115,7 +122,7 @@ class GridBelief:
     off: Floats32
     model: GridModel[Any, Any]
     shared: Any = None
-    waiting: tuple[float, float, float, float] = _NOTHING
+    waiting: tuple[float, float, float, float, float] = _NOTHING
     travelled_m: float = 0.0
     log_evidence: float = 0.0
     status: Status = Status.SEARCHING
@@ -246,14 +253,15 @@ class GridFilter(Generic[PriorT, ReadingT]):
         reason = Reason.USED if isfinite(motion.heading_rad) else Reason.NO_HEADING
         if motion.step_m == 0:
             return belief, reason
-        east_m, north_m, length_m, spread_m2 = belief.waiting
+        east_m, north_m, length_m, spread_m2, turned_rad2 = belief.waiting
         if reason is Reason.USED:
             east_m += motion.step_m * cos(motion.heading_rad)
             north_m += motion.step_m * sin(motion.heading_rad)
             spread_m2 += motion.sampling_sd_m**2
         else:
             spread_m2 += motion.all_sides_m**2 / 2
-        waiting = (east_m, north_m, length_m + abs(motion.step_m), spread_m2)
+            turned_rad2 += motion.turned_sd_rad**2
+        waiting = (east_m, north_m, length_m + abs(motion.step_m), spread_m2, turned_rad2)
         travelled_m = belief.travelled_m + abs(motion.step_m)
         return replace(belief, waiting=waiting, travelled_m=travelled_m), reason
 

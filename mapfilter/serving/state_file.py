@@ -32,6 +32,7 @@ from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.pace import Pace
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.pauses import RowTimes
 from mapfilter.positioning.bayes.repeats import MotionRepeats
 from mapfilter.positioning.bayes.rest import Rest
 from mapfilter.positioning.bayes.sensors import SensorWatch
@@ -44,7 +45,7 @@ from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.integrity import SampleTail
 
-FORMAT, VERSION = "mapfilter session", 10
+FORMAT, VERSION = "mapfilter session", 11
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -76,6 +77,7 @@ _CLASSES: dict[str, type] = {
         Reported,
         Pace,
         Rest,
+        RowTimes,
         SampleTail,
         SensorWatch,
         StepOutput,

@@ -145,7 +145,7 @@ def test_mass_that_lies_elsewhere_than_the_model_is_moved_with_it():
     assert isinstance(found.on, strict_arrays.Array)
     np.testing.assert_array_equal(on_host(found.on), on_host(ahead.moved.on))
     np.testing.assert_array_equal(on_host(found.off), on_host(ahead.moved.off))
-    assert found.waiting == (0.0, 0.0, 0.0, 0.0)
+    assert found.waiting == (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("device", [PROCESSOR, DEVICE])

@@ -52,8 +52,8 @@ class Tiny:
         state[2], state[3] = bias_rad, off
         return state
 
-    def transport(self, east_m, north_m, length_m, spread_m2):
-        self.asked.append((east_m, north_m, length_m, spread_m2))
+    def transport(self, east_m, north_m, length_m, spread_m2, turned_rad2):
+        self.asked.append((east_m, north_m, length_m, spread_m2, turned_rad2))
         way = [displaced(b, east_m, north_m) for b in range(3)]
         right, down = np.array(way).T
         return Transport(
@@ -180,8 +180,8 @@ def test_steps_wait_for_a_reading_and_are_summed():
     assert same is belief
     assert info.reason is Reason.NO_READING
     weighed, _ = filter_.update(belief, 1, rng)
-    assert model.asked[-1] == pytest.approx((2.0, 4.0, 8.0, 0.0))
-    assert weighed.waiting == (0.0, 0.0, 0.0, 0.0)
+    assert model.asked[-1] == pytest.approx((2.0, 4.0, 8.0, 0.0, 0.0))
+    assert weighed.waiting == (0.0, 0.0, 0.0, 0.0, 0.0)
     assert weighed.travelled_m == belief.travelled_m == 8.0
     one = oracle.forward(PRIOR.ravel(), [(transition(2.0, 4.0, circular=False), likelihood(1))])
     np.testing.assert_allclose(np.stack([weighed.on, weighed.off]).ravel(), one[0][0], rtol=2e-4)
@@ -191,14 +191,15 @@ def test_steps_without_a_heading_wait_as_a_variance_to_all_sides():
     model, rng = Tiny(), np.random.default_rng(0)
     filter_ = GridFilter(model)
     belief, reasons = filter_.init(None, rng), []
-    for motion in (MotionStep(3.0, 0.0), MotionStep(4.0, nan), MotionStep(-2.0, nan)):
+    turned = MotionStep(4.0, nan, turned_sd_rad=0.3)
+    for motion in (MotionStep(3.0, 0.0), turned, MotionStep(-2.0, nan)):
         belief, reason = filter_.predict(belief, motion, rng)
         reasons.append(reason)
     assert reasons == [Reason.USED, Reason.NO_HEADING, Reason.NO_HEADING]
     assert belief.travelled_m == 9.0
     filter_.update(belief, 1, rng)
     # The mean square of each step's distance is that of the step: a half of it on each axis.
-    assert model.asked[-1] == pytest.approx((3.0, 0.0, 9.0, 8.0 + 2.0))
+    assert model.asked[-1] == pytest.approx((3.0, 0.0, 9.0, 8.0 + 2.0, 0.09))
     same, reason = filter_.predict(belief, MotionStep(0.0, nan), rng)
     assert same is belief
     assert reason is Reason.NO_HEADING

@@ -236,6 +236,24 @@ def test_a_step_without_a_heading_spreads_to_all_sides():
                                   state[[BIAS, LOG_SCALE, TURN, STRETCH]])  # fmt: skip
 
 
+def test_a_turn_that_was_not_measured_leaves_headings_open():
+    """On the grid by as much as of hypotheses; around the circle, where it is wide."""
+    state = np.zeros((STATES, COUNT), dtype=np.float32)
+    state[EAST], state[NORTH], state[BIAS] = 45.0, 35.0, 0.4
+    for sd_rad in (0.5, 2.0):
+        motion = MotionStep(8.0, np.nan, turned_sd_rad=sd_rad)
+        moved, _ = MODEL.move(state, np.zeros(COUNT), motion, np.uint64(5))
+        assert np.abs(moved[BIAS]).max() <= np.pi + 1e-6
+        # Of a normal angle with that deviation about the heading.
+        mean = np.exp(1j * moved[BIAS].astype(np.float64)).mean()
+        assert abs(mean - np.exp(0.4j - sd_rad**2 / 2)) < 5 / sqrt(COUNT)
+    grid = StreetGrid(MODEL, compass=False)
+    width_rad = 2 * np.pi / grid.bias_rad.size
+    still = grid.transport(0.0, 0.0, 4.0, 32.0)
+    way = grid.transport(0.0, 0.0, 4.0, 32.0, 0.5**2)
+    assert way.turned_bins == pytest.approx(np.hypot(still.turned_bins, 0.5 / width_rad))
+
+
 @pytest.mark.parametrize(("step_m", "heading_rad"), [(4.0, 0.0), (4.0, 2.2), (12.0, -1.0)])
 def test_the_grid_moves_mass_as_the_oracle_moves_hypotheses(step_m, heading_rad):
     """Over three typical steps the noise adds up; the scale's error is one of the whole way."""

@@ -289,7 +289,8 @@ def test_nothing_is_known_before_the_first_row():
     assert (watch.unmeasured_s, watch.moved_m, watch.repeated_nats) == (0.0, 0.0, 0.0)
     assert (watch.rest, watch.report) == (None, ())
     before, seen, why = watched(watch, epoch(3.0))
-    assert before == watch
+    assert before._replace(times=watch.times) == watch
+    assert before.times.epoch_s == 3.0
     assert (seen, why) == (epoch(3.0), (Reason.USED, Reason.USED))
     # The first row may be one of a rest.
     rests = after(epoch(3.0, 0.0), watch=watch)

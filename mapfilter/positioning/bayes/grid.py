@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, exp, isfinite, pi
+from math import ceil, exp, isfinite, pi, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -115,7 +115,12 @@ class StreetGrid:
         return state
 
     def transport(
-        self, east_m: float, north_m: float, length_m: float, spread_m2: float
+        self,
+        east_m: float,
+        north_m: float,
+        length_m: float,
+        spread_m2: float,
+        turned_rad2: float = 0.0,
     ) -> Transport:
         """Return the transport of the mass of each bin by a displacement of dead reckoning."""
         motion, over = self.model.motion, self.model.weights.over(length_m)
@@ -139,7 +144,7 @@ class StreetGrid:
             -up,
             np.sqrt(east_var) / pixel_m,
             np.sqrt(north_var) / pixel_m,
-            motion.bias_drift_rad_per_sqrt_m * length_m**0.5 / width_rad,
+            sqrt(motion.bias_drift_rad_per_sqrt_m**2 * length_m + turned_rad2) / width_rad,
             self.device.arrays.exp(over.exponent * self._log_map),
             over.off,
             over.leave,

@@ -51,6 +51,7 @@ class Hold:
                 step.turn_rad,
                 unit_m * step.spread_m,
                 unit_m * step.sampling_sd_m,
+                step.turned_sd_rad,
             )
         if self.is_as_measured or not isfinite(step.heading_rad):
             return step

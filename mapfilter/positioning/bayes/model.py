@@ -20,6 +20,7 @@ from mapfilter.filters.copies import columns_of
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import log_sum
+from mapfilter.geodesy import wrap_rad
 from mapfilter.models import fingerprint
 from mapfilter.models.ageing import Ageing, age, as_it_is
 from mapfilter.models.level_errors import LevelReport
@@ -31,6 +32,7 @@ from mapfilter.models.level_kernels import (
 )
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import (
+    BIAS,
     NORTH,
     OFF,
     MapWeights,
@@ -153,8 +155,12 @@ class BayesModel:
         else:
             # To all sides.
             moved = move(state, 0.0, 0.0, self.motion, key)
-            noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
+            draws = np.random.default_rng(int(key))
+            noise = draws.standard_normal((2, count))
             moved[: NORTH + 1] += (motion.all_sides_m / sqrt(2.0) * noise).astype(np.float32)
+            if motion.turned_sd_rad > 0:
+                turned = draws.standard_normal(count, dtype=np.float32)
+                moved[BIAS] = wrap_rad(moved[BIAS] + np.float32(motion.turned_sd_rad) * turned)
         # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
         cost = BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
         per_m = self.weights.weight_per_m

@@ -124,6 +124,9 @@ def moved(
         belief = beliefs.carried_on(state, belief, gone_s, own_rng(epoch.time_s, _AWAY))
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
+        if compass and step.turned_sd_rad > 0:
+            # A compass tells where the phone points afterwards.
+            step = replace(step, turned_sd_rad=0.0)
         measured = step
         step = hold.read(measured)
         why = Reason.NOT_STARTED

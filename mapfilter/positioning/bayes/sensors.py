@@ -19,14 +19,13 @@ from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.impossible_steps import without_impossible
-from mapfilter.positioning.bayes.pace import GAP_INTERVALS, Pace
+from mapfilter.positioning.bayes.pace import Going, Pace
+from mapfilter.positioning.bayes.pauses import RowTimes, longest_s, unrecorded_s
 from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
 from mapfilter.positioning.bayes.rest import Rest
 from mapfilter.positioning.bayes.stale_radio import STALE_NATS, repeated_nats
 from mapfilter.positioning.epochs import Epoch, ReportRow
 
-_GAP_S = 5.0
-"""After so long motion rows are missing."""
 _STRAIGHT_S = 60.0
 """Time after which the direction of an unmeasured way is forgotten by 1/e."""
 _STRETCH_M = 60.0
@@ -58,6 +57,8 @@ class SensorWatch(NamedTuple):
         How much repeated reports speak for a radio that stands still.
     repeats : MotionRepeats
         How motion rows repeat each other.
+    times : RowTimes
+        When rows came.
     """
 
     pace: Pace = Pace()
@@ -69,6 +70,7 @@ class SensorWatch(NamedTuple):
     report: tuple[ReportRow, ...] = ()
     repeated_nats: float = 0.0
     repeats: MotionRepeats = MotionRepeats()
+    times: RowTimes = RowTimes()
 
     def positioned(self, time_s: float) -> SensorWatch:
         """Return the watch after a position was measured and used.
@@ -136,9 +138,19 @@ def _followed(
 ) -> tuple[SensorWatch, Epoch, Reason]:
     """Follow the motion rows; add the way that they lack."""
     time_s, steps = epoch.time_s, epoch.motion
-    pace, going = watch.pace.read(time_s, steps, step_unit_m)
-    before_m = watch.moved_m
-    watch = watch._replace(pace=pace, moved_m=before_m + going.gone_m)
+    known, times, before_m = watch.pace, watch.times, watch.moved_m
+    pace, going = known.read(time_s, steps, step_unit_m)
+    watch = watch._replace(
+        pace=pace,
+        moved_m=before_m + going.gone_m,
+        times=times.read(time_s, has_report=bool(epoch.radio)),
+    )
+    if isfinite(watch.moving_s):
+        rested = watch.rest is not None
+        paused_s = unrecorded_s(known, times, time_s, going, rested=rested)
+        paused_s = min(paused_s, time_s - watch.known_s)  # rows without steps may tell of a part
+        if paused_s > 0:
+            return _after_a_pause(watch, epoch, paused_s, known.speed_mps, going)
     if going.moves:
         return watch._moving(time_s), epoch, Reason.USED
     if not isfinite(watch.moving_s):
@@ -152,8 +164,8 @@ def _followed(
     if steps and not going.measured:
         why = Reason.NO_STEP
     elif not steps and pace.reports_always:
-        longest_s = max(_GAP_S, GAP_INTERVALS * pace.interval_s)
-        why = Reason.MOTION_MISSING if time_s - pace.motion_s > longest_s else Reason.USED
+        missing = time_s - pace.motion_s > longest_s(pace)
+        why = Reason.MOTION_MISSING if missing else Reason.USED
     if why is Reason.USED and rest.is_carried:
         why = Reason.MOTION_STUCK if steps else Reason.MOTION_MISSING
     if why is Reason.USED:
@@ -172,10 +184,24 @@ def _followed(
             # What the counter did not miss is in the belief already.
             missed = max(1 - rest.measured_m / (rest.pace_mps * to_s), 0.0)
     step = _unmeasured(missed * pace.speed_mps, watch.unmeasured_s, to_s)
+    if any(isfinite(one.turn_rad) for one in steps):
+        step = replace(step, turned_sd_rad=0.0)
     watch = watch._replace(
         known_s=time_s, rest=rest, unmeasured_s=to_s, moved_m=before_m + step.step_m
     )
     return watch, replace(epoch, motion=(*_turns_of(steps), step)), why
+
+
+def _after_a_pause(
+    watch: SensorWatch, epoch: Epoch, paused_s: float, speed_mps: float, going: Going
+) -> tuple[SensorWatch, Epoch, Reason]:
+    """Add the way of a pause of the recording before an epoch's own motion."""
+    to_s = watch.unmeasured_s + paused_s
+    step = _unmeasured(speed_mps, watch.unmeasured_s, to_s)
+    watch = watch._moving(epoch.time_s)._replace(
+        unmeasured_s=0.0 if going.measured else to_s, moved_m=watch.moved_m + step.step_m
+    )
+    return watch, replace(epoch, motion=(step, *epoch.motion)), Reason.MOTION_MISSING
 
 
 def _turns_of(steps: tuple[MotionStep, ...]) -> tuple[MotionStep, ...]:
@@ -190,7 +216,11 @@ def _turns_of(steps: tuple[MotionStep, ...]) -> tuple[MotionStep, ...]:
 def _unmeasured(speed_mps: float, from_s: float, to_s: float) -> MotionStep:
     """Return the step to all sides between two times since the last measured one."""
     more_m2 = spread_m2(speed_mps, to_s) - spread_m2(speed_mps, from_s)
-    return MotionStep(speed_mps * (to_s - from_s), nan, nan, sqrt(max(more_m2, 0.0)))
+    # The direction changes by a random walk, whose cosine is 1/e after that time in the mean.
+    turned_sd_rad = sqrt(2 * max(to_s - from_s, 0.0) / _STRAIGHT_S)
+    return MotionStep(
+        speed_mps * (to_s - from_s), nan, nan, sqrt(max(more_m2, 0.0)), turned_sd_rad=turned_sd_rad
+    )
 
 
 def spread_m2(speed_mps: float, time_s: float) -> float:

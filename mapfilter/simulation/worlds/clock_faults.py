@@ -6,6 +6,7 @@ Rows stay in the order in which they were written, as in a file that a phone wro
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,8 @@ FAR_S = 1e9
 BACK_S = 30.0
 APART_S = 20.0
 AGAIN_S = 0.3
+PAUSED_S = 30.0
+"""How long a recording pauses where nothing says that it goes on."""
 _SOURCES = ("motion", "radio")
 
 
@@ -65,6 +68,21 @@ def epochs_twice(log: TrackLog, window: Window, _rng: np.random.Generator) -> Tr
         again = again.assign(time_s=again["time_s"] + AGAIN_S)
         whole = pd.concat([table, again]) if len(again) else table
         changed[source] = whole.sort_values("time_s", kind="stable").reset_index(drop=True)
+    return replace(log, **changed)
+
+
+def recording_paused(log: TrackLog, window: Window, _rng: np.random.Generator) -> TrackLog:
+    """Leave all rows out, those of motion as those of radio; a pause without an end lasts 30 s.
+
+    Operating systems suspend a program in the background; a logger is restarted, or its computer
+    changes batteries. The first step after the pause is that of one interval.
+    """
+    lasts = isfinite(window.end_s)
+    paused = window if lasts else replace(window, end_s=window.begin_s + PAUSED_S)
+    changed = {}
+    for source in _SOURCES:
+        table = getattr(log, source)
+        changed[source] = table[~paused.holds(table["time_s"])].reset_index(drop=True)
     return replace(log, **changed)
 
 

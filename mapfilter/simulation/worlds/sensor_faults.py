@@ -17,6 +17,7 @@ from mapfilter.simulation.worlds.clock_faults import (
     clock_steps_back,
     clocks_apart,
     epochs_twice,
+    recording_paused,
     report_far_ahead,
 )
 from mapfilter.simulation.worlds.motion_faults import (
@@ -67,6 +68,7 @@ SENSOR_FAULTS: Mapping[str, SensorFault] = MappingProxyType(
         "clock-steps-back": clock_steps_back,
         "clocks-apart": clocks_apart,
         "epochs-twice": epochs_twice,
+        "recording-paused": recording_paused,
     }
 )
 """All faults by name, in the order of the table."""

@@ -320,6 +320,17 @@ def test_rows_are_delivered_twice():
     assert walked_m == pytest.approx(2 * inside(LOG.motion)["step_m"].sum())
 
 
+@pytest.mark.parametrize("end_s", [WINDOW.end_s, np.inf])
+def test_a_recording_pauses_in_all_its_tables_and_goes_on(end_s):
+    window = Window(WINDOW.begin_s, end_s)
+    goes_on_s = end_s if np.isfinite(end_s) else window.begin_s + 30.0
+    found = faulty("recording-paused", window)
+    for table in ("motion", "radio"):
+        same(getattr(found, table), outside(getattr(LOG, table), Window(window.begin_s, goes_on_s)))
+        assert getattr(found, table)["time_s"].max() >= goes_on_s
+    same(found.truth, LOG.truth)
+
+
 @given(first_s=st.floats(-1e3, 1e3), lasts_s=st.floats(1.0, 1e4), seed=st.integers(0, 2**32))
 def test_faults_begin_within_the_walk(first_s, lasts_s, seed):
     window = drawn_window(first_s, first_s + lasts_s, np.random.default_rng(seed))
