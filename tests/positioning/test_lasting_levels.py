@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
 from mapfilter.filters.gaussian import CKF, EKF, IEKF, RBUKF, UKF, factor_of, factors_of
+from mapfilter.models.gaussian import stack
+from mapfilter.models.ranging import timing_advances
 from mapfilter.models.signal_strength import levels, with_errors
 from mapfilter.models.state import MOVING, POSITION, StateLayout
 from mapfilter.positioning.kalman.belief import SumBelief
@@ -141,6 +143,32 @@ def test_levels_contain_the_errors_of_the_state():
         step = 1e-4 * np.eye(6)[j]
         numeric[:, :, j] = (model.mean(states + step) - model.mean(states - step)) / 2e-4
     np.testing.assert_allclose(model.jacobian(states), numeric, atol=1e-6)
+
+
+def test_levels_with_errors_are_put_together_with_others():
+    layout = StateLayout(6, 0, 1)
+    one, other = (levels(layout, [site], 8.0, **LOSS) for site in SITES[:2])
+    advance = timing_advances(layout, [SITES[2]], 200.0)
+    apart = [with_errors(one, [(5, 3)]), advance, with_errors(other, [(2, -1)])]
+    whole = stack(apart)
+    assert whole.errors == (2, 3, 5)
+    states = np.random.default_rng(3).normal(0, 300, (10, 6))
+    expected = np.column_stack([model.mean(states)[:, 0] for model in apart])
+    np.testing.assert_array_equal(whole.mean(states), expected)
+    slope = np.concatenate([model.jacobian(states) for model in apart], axis=1)
+    np.testing.assert_array_equal(whole.jacobian(states), slope)
+
+
+def test_errors_that_the_state_lacks_are_refused():
+    layout = StateLayout(4, 0, 1)
+    model = levels(layout, SITES[:2], 8.0, **LOSS)
+    for components in ([(4, -1)], [(2, 1)], [(2, 3)] * 3):
+        with pytest.raises(InputError, match="components: expected"):
+            with_errors(model, components)
+    timed = stack([model, timing_advances(layout, [SITES[2]], 200.0)])
+    with pytest.raises(InputError, match="at most a pair for each of 2 levels, found 3"):
+        with_errors(timed, [(2, 3)] * 3)
+    assert with_errors(timed, [(2, 3)] * 2).errors == (2, 3)
 
 
 def plain_ekf(model, mean, covariance, reading):
