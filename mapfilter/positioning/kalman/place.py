@@ -9,7 +9,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.filters.gaussian import Gaussian
-from mapfilter.positioning.integrity import GaussianTail
+from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.kalman.belief import SumBelief
 
 WITHIN_M = 50.0

@@ -18,7 +18,7 @@ from mapfilter.models.signal_strength import with_errors
 from mapfilter.models.state import MOVING, POSITION, StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import Fix, UnusedReading
-from mapfilter.positioning.integrity import GaussianTail
+from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import (
     Motion,
