@@ -9,7 +9,8 @@ import numpy as np
 
 from mapfilter.evaluation.intervals import share_interval
 from mapfilter.evaluation.stanford import stanford_bins, stanford_counts
-from mapfilter.positioning.integrity import GaussianTail, sample_tail
+from mapfilter.positioning.gaussian_tail import GaussianTail
+from mapfilter.positioning.integrity import sample_tail
 from mapfilter.report.canvas import (
     BLUE,
     GREY,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.models.state import StateLayout
-from mapfilter.models.terms import COLUMNS, measure_kernel
+from mapfilter.models.terms import COLUMNS, ERROR_SLOTS, measure_kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,17 +124,26 @@ def stack(measurements: Sequence[GaussianTerms]) -> GaussianTerms:
         raise fail(InputError, "measurements", "states of one layout", "several layouts")
     size = sum(one.size for one in measurements)
     noise, rows = np.zeros((size, size)), np.zeros((size, COLUMNS))
+    errors = tuple(sorted({error for one in measurements for error in one.errors}))
     at, samples = 0, 0
     for one in measurements:
         span = slice(at, at + one.size)
         noise[span, span] = one.noise
         rows[span] = one.rows
         rows[span, 10] += samples
+        rows[span, ERROR_SLOTS] = _error_slots(one, errors)
         at, samples = at + one.size, samples + one.patterns.size
     step = np.concatenate([one.step for one in measurements])
     patterns = np.concatenate([one.patterns for one in measurements])
     names = sum((one.names for one in measurements), ())
-    return GaussianTerms(layout, rows, noise, step, patterns, names)
+    return GaussianTerms(layout, rows, noise, step, patterns, names, errors)
+
+
+def _error_slots(one: GaussianTerms, errors: tuple[int, ...]) -> Ints:
+    """Return the slots of a measurement's errors, plus one, among those of several; 0 for none."""
+    first = len(one.layout.uses)
+    slot = np.array([0, *(first + 1 + errors.index(error) for error in one.errors)], dtype=np.int64)
+    return np.asarray(slot[np.maximum(one.rows[:, ERROR_SLOTS].astype(np.int64) - first, 0)])
 
 
 def places(where: str, given: ArrayLike, faults: Faults) -> Floats:

@@ -17,7 +17,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.models.gaussian import GaussianTerms, deviations, independent, places, terms
 from mapfilter.models.state import StateLayout
-from mapfilter.models.terms import LEVEL
+from mapfilter.models.terms import ERROR_SLOTS, LEVEL
 from mapfilter.radio.antenna import MeasuredAntenna, leaning
 
 SHORTEST_DISTANCE_M = 1.0
@@ -117,6 +117,12 @@ def with_errors(model: GaussianTerms, components: Sequence[tuple[int, int]]) -> 
     components : sequence of pairs of int
         Two components for each level, in dB; -1 for none.
 
+    Raises
+    ------
+    InputError
+        There are more pairs than levels, or components that the state lacks or that are its
+        position or clock.
+
     Examples
     --------
     >>> from mapfilter.models.state import StateLayout
@@ -126,11 +132,20 @@ def with_errors(model: GaussianTerms, components: Sequence[tuple[int, int]]) -> 
     [-77.8]
     """
     used = tuple(sorted({one for pair in components for one in pair if one >= 0}))
-    first = len(model.layout.uses) + 1
+    faults, layout, count = Faults(), model.layout, len(components)
+    if (model.rows[:count, 0] != LEVEL).any() or count > model.size:
+        levels_first = int((model.rows[:, 0] == LEVEL).cumprod().sum())
+        faults.add("components", f"at most a pair for each of {levels_first} levels", count)
+    wrong = [one for one in used if one >= layout.size or one in layout.uses]
+    if wrong:
+        expected = f"components below {layout.size} that are no position or clock"
+        faults.add("components", expected, wrong)
+    faults.raise_if_any(InputError)
+    first = len(layout.uses) + 1
     slot = {one: first + at for at, one in enumerate(used)}
     rows = model.rows.copy()
     for row, pair in zip(rows, components, strict=False):
-        row[13:15] = [slot.get(one, 0) for one in pair]
+        row[ERROR_SLOTS] = [slot.get(one, 0) for one in pair]
     return replace(model, rows=rows, errors=used)
 
 

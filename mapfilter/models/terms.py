@@ -30,6 +30,7 @@ from mapfilter._kernels import MEASURE_SIGNATURE, on_demand
 from mapfilter._types import Floats, Ints
 
 COLUMNS = 15
+ERROR_SLOTS = slice(13, 15)
 RANGE, LEVEL, DIFFERENCE, COMPONENT = 0.0, 1.0, 2.0, 3.0
 
 _LOG10_E = 0.4342944819032518

@@ -195,6 +195,22 @@ def test_errors_of_more_cells_than_are_kept_are_noise():
     assert noise == pytest.approx(kept, rel=1e-3)
 
 
+def test_errors_of_cells_that_are_not_kept_last_longer_than_noise():
+    """Of two reports 30 m apart: noise lasts for 40 m, an error of 300 m counts once in 600 m."""
+    made = KalmanStep(SITES, EKF, KalmanState(POSITION, slots=CellSlots.empty(1)))
+    made.layout = with_levels(POSITION, made.slots)
+    heard = (-70.0, -80.0)
+    made._move(Epoch(0.0), ("B", "A"))
+    given = SiteReadings(("B", "A"), heard, (), (), ())
+    np.testing.assert_allclose(made._radio_model(given).noise, np.diag([64.0, 64.0 + 144.0]))
+    made.moved_m = 30.0
+    made.slots = replace(made.slots, ago_m={"B": 30.0, "A": 30.0})
+    made._move(Epoch(0.0), ("B", "A"))
+    np.testing.assert_allclose(
+        made._radio_model(given).noise, np.diag([64.0 * 40 / 30, 64.0 * 40 / 30 + 144.0 * 20])
+    )
+
+
 def test_noise_of_fixes():
     def gain(**variances):
         made = started()

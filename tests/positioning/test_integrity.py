@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy import integrate, stats
 
 from mapfilter.errors import ConfigError
+from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.integrity import (
-    GaussianTail,
     SampleTail,
     sample_tail,
     usable_risk,

@@ -13,7 +13,8 @@ from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
-from mapfilter.positioning.kalman.step import KalmanState, KalmanStep, belief_tail, place_of
+from mapfilter.positioning.kalman.place import belief_tail, place_of
+from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS, EAST, NORTH = "EPSG:32629", 500_000.0, 4_600_000.0

@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
 from mapfilter.filters.gaussian import CKF, EKF, IEKF, RBUKF, UKF, factor_of, factors_of
+from mapfilter.models.gaussian import stack
+from mapfilter.models.ranging import timing_advances
 from mapfilter.models.signal_strength import levels, with_errors
 from mapfilter.models.state import MOVING, POSITION, StateLayout
 from mapfilter.positioning.kalman.belief import SumBelief
@@ -27,33 +29,70 @@ def test_the_usual_errors():
     assert KalmanOptions().lasting_levels == LastingLevels(10.0, 3000.0, 12.0, 300.0)
 
 
-def test_slots_are_of_the_cells_last_heard():
-    slots, renewed = CellSlots.empty(3).hearing(["A", "B", "A"], 1.0)
-    assert (slots.cells, renewed) == (("A", "B", ""), (0, 1))
-    slots, renewed = slots.hearing(["C", "A"], 2.0)
-    assert (slots.cells, renewed) == (("A", "B", "C"), (2,))
-    # B was not heard for longest; of a report, no cell takes the slot of another one.
-    slots, renewed = slots.hearing(["D", "E", "A"], 3.0)
-    assert (slots.cells, slots.heard_s, renewed) == (("A", "D", "E"), (3.0, 3.0, 3.0), (1, 2))
-    slots, renewed = slots.hearing(["F", "G", "H", "D"], 4.0)
-    assert set(slots.cells) == {"F", "G", "H"}
-    assert sorted(renewed) == [0, 1, 2]
-    assert CellSlots.empty(0).hearing(["A"], 1.0) == (CellSlots.empty(0), ())
+def test_cells_give_way_that_were_not_heard_within_the_memory():
+    heard = CellSlots.empty(3).hearing(["A", "B", "A"], 0.0, 300.0)
+    assert heard.slots.cells == ("A", "B", "")
+    assert (heard.growth, heard.renewed) == ({"A": 1.0, "B": 1.0}, {0: 1.0, 1: 1.0})
+    heard = heard.slots.hearing(["C", "A"], 100.0, 300.0)
+    assert (heard.slots.cells, heard.renewed) == (("A", "B", "C"), {2: 1.0})
+    # B was heard 299 m ago: D has no place.
+    heard = heard.slots.hearing(["D", "A"], 199.0, 300.0)
+    assert (heard.slots.cells, heard.renewed) == (("A", "B", "C"), {})
+    assert heard.growth == {"D": 1.0, "A": 600 / 199}
+    assert heard.slots.ago_m == {"A": 0.0, "B": 299.0, "C": 199.0, "D": 0.0}
+    # B gives way, not C, which was heard later; D counts as if it had been heard once.
+    heard = heard.slots.hearing(["D", "E"], 100.0, 300.0)
+    assert (heard.slots.cells, heard.renewed) == (("A", "D", "C"), {1: 6.0})
+    assert heard.slots.ago_m["B"] == 399.0
+    # Of a report, no cell takes the place of another one.
+    heard = heard.slots.hearing(["E", "C", "D", "A"], 1e6, 300.0)
+    assert (heard.slots.cells, heard.renewed) == (("A", "D", "C"), {})
+    assert heard.growth == dict.fromkeys("ECDA", 1.0)
+    heard = heard.slots.hearing(["E", "F", "G", "H"], 600.0, 300.0)
+    assert set(heard.slots.cells) == {"E", "F", "G"}
+    assert CellSlots.empty(0).hearing(["A"], 0.0, 300.0) == (CellSlots.empty(0), {}, {})
 
 
-@given(st.lists(st.lists(st.sampled_from("ABCDEFG"), max_size=5), max_size=12))
+def test_a_cell_that_is_heard_again_on_the_spot_tells_nothing():
+    heard = CellSlots.empty(1).hearing(["A", "B"], 0.0, 300.0)
+    heard = heard.slots.hearing(["A", "B"], 0.0, 300.0)
+    assert (heard.slots.cells, heard.growth["B"]) == (("A",), 6000.0)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.lists(st.sampled_from("ABCDEFG"), max_size=5),
+            st.sampled_from([0.0, 100.0, 299.0, 300.0, 1000.0]),
+        ),
+        max_size=12,
+    )
+)
 def test_slots_never_hold_a_cell_twice(reports):
-    slots = CellSlots.empty(3)
-    for time_s, names in enumerate(reports):
-        slots, renewed = slots.hearing(names, float(time_s))
+    slots, at_m, last_m = CellSlots.empty(3), 0.0, dict[str, float]()
+    for names, moved_m in reports:
+        at_m += moved_m
+        before = slots
+        slots, growth, renewed = before.hearing(names, moved_m, 300.0)
         held = [one for one in slots.cells if one]
         assert len(set(held)) == len(held)
-        assert set(dict.fromkeys(names[:3])) <= set(held)
-        assert all(slots.cells[one] in names for one in renewed)
+        assert growth.keys() == set(names)
+        for slot in range(3):
+            if slot in renewed:
+                assert slots.cells[slot] in names
+                old = before.cells[slot]
+                assert old not in names
+                assert not old or at_m - last_m[old] >= 300.0
+            else:
+                assert slots.cells[slot] == before.cells[slot]
+        for name in names:
+            ago_m = at_m - last_m[name] if name in last_m else 600.0
+            assert growth[name] == max(600.0 / max(ago_m, 0.1), 1.0)
+        last_m |= dict.fromkeys(names, at_m)
 
 
 def test_components_are_behind_the_others():
-    slots, _ = CellSlots.empty(2).hearing(["B", "A"], 0.0)
+    slots = CellSlots(("B", "A"))
     layout = with_levels(MOVING, slots)
     assert (layout.size, layout.east, layout.north) == (7, 0, 2)
     assert slots.components(["A", "Z", "B"], layout) == [(4, 6), (4, -1), (4, 5)]
@@ -74,18 +113,18 @@ def test_a_belief_begins_with_what_is_assumed():
 
 
 def test_errors_fade_along_the_way_and_renewed_ones_begin_anew():
-    slots, _ = CellSlots.empty(2).hearing(["A", "B"], 0.0)
+    slots = CellSlots(("A", "B"))
     rng = np.random.default_rng(1)
     mean, root = rng.normal(size=5), rng.normal(size=(5, 5))
     belief = SumBelief.start(mean, root @ root.T)
     motion = np.eye(2), 0.5 * np.eye(2), np.array([3.0, -1.0])
-    moved = belief.predict(*LASTING.extended_motion(motion, slots, [1], 30.0))
+    moved = belief.predict(*LASTING.extended_motion(motion, slots, {1: 2.5}, 30.0))
     kept = np.array([1.0, 1.0, np.exp(-0.01), np.exp(-0.1), 0.0])
     np.testing.assert_allclose(moved.means[0], kept * mean + [3.0, -1.0, 0.0, 0.0, 0.0])
     expected = np.outer(kept, kept) * (root @ root.T)
-    expected += np.diag([0.5, 0.5, *(1 - kept[2:] ** 2) * [36.0, 81.0, 81.0]])
+    expected += np.diag([0.5, 0.5, *(1 - kept[2:] ** 2) * [36.0, 81.0, 2.5 * 81.0]])
     np.testing.assert_allclose(moved.covariances[0], expected, atol=1e-12)
-    still = belief.predict(*LASTING.extended_motion(motion, slots, [], 0.0))
+    still = belief.predict(*LASTING.extended_motion(motion, slots, {}, 0.0))
     np.testing.assert_allclose(still.covariances[0][2:, 2:], (root @ root.T)[2:, 2:])
 
 
@@ -104,6 +143,32 @@ def test_levels_contain_the_errors_of_the_state():
         step = 1e-4 * np.eye(6)[j]
         numeric[:, :, j] = (model.mean(states + step) - model.mean(states - step)) / 2e-4
     np.testing.assert_allclose(model.jacobian(states), numeric, atol=1e-6)
+
+
+def test_levels_with_errors_are_put_together_with_others():
+    layout = StateLayout(6, 0, 1)
+    one, other = (levels(layout, [site], 8.0, **LOSS) for site in SITES[:2])
+    advance = timing_advances(layout, [SITES[2]], 200.0)
+    apart = [with_errors(one, [(5, 3)]), advance, with_errors(other, [(2, -1)])]
+    whole = stack(apart)
+    assert whole.errors == (2, 3, 5)
+    states = np.random.default_rng(3).normal(0, 300, (10, 6))
+    expected = np.column_stack([model.mean(states)[:, 0] for model in apart])
+    np.testing.assert_array_equal(whole.mean(states), expected)
+    slope = np.concatenate([model.jacobian(states) for model in apart], axis=1)
+    np.testing.assert_array_equal(whole.jacobian(states), slope)
+
+
+def test_errors_that_the_state_lacks_are_refused():
+    layout = StateLayout(4, 0, 1)
+    model = levels(layout, SITES[:2], 8.0, **LOSS)
+    for components in ([(4, -1)], [(2, 1)], [(2, 3)] * 3):
+        with pytest.raises(InputError, match="components: expected"):
+            with_errors(model, components)
+    timed = stack([model, timing_advances(layout, [SITES[2]], 200.0)])
+    with pytest.raises(InputError, match="at most a pair for each of 2 levels, found 3"):
+        with_errors(timed, [(2, 3)] * 3)
+    assert with_errors(timed, [(2, 3)] * 2).errors == (2, 3)
 
 
 def plain_ekf(model, mean, covariance, reading):

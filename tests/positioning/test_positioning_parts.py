@@ -23,7 +23,7 @@ from mapfilter.positioning.bayes.radio import name_of
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.fixes import FixTerm, refutation, widened
-from mapfilter.positioning.kalman.belief import gaussian_radii_m, share_within
+from mapfilter.positioning.kalman.place import gaussian_radii_m, share_within
 from mapfilter.positioning.kalman.static_fix import (
     BAD_GEOMETRY,
     TOO_FEW,

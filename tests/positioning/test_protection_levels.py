@@ -15,7 +15,7 @@ from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.integrity import sample_tail
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.step import belief_tail
+from mapfilter.positioning.kalman.place import belief_tail
 
 FEW = BayesFilter(max_particles=4000, min_search_particles=2000, min_particles=500)
 

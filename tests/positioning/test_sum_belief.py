@@ -8,13 +8,9 @@ from scipy.stats import norm
 from mapfilter.filters.gaussian import EKF
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import POSITION
-from mapfilter.positioning.kalman.belief import (
-    FusionHistory,
-    SumBelief,
-    gaussian_radii_m,
-    share_within,
-)
+from mapfilter.positioning.kalman.belief import FusionHistory, SumBelief
 from mapfilter.positioning.kalman.models import compiled
+from mapfilter.positioning.kalman.place import gaussian_radii_m, share_within
 
 COVARIANCE = np.array([[25.0, 6.0], [6.0, 16.0]])
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mapfilter.positioning.integrity import GaussianTail, SampleTail
+from mapfilter.positioning.gaussian_tail import GaussianTail
+from mapfilter.positioning.integrity import SampleTail
 
 
 @pytest.mark.parametrize("radius_m", [0.0, -3.0])

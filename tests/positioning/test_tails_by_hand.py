@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.integrity import (
     DEFAULT_RISK,
-    GaussianTail,
     SampleTail,
     sample_tail,
     usable_risk,

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from mapfilter.positioning.integrity import GaussianTail
+from mapfilter.positioning.gaussian_tail import GaussianTail
 
 
 def share_beyond(radius_m, along_m, across_m, long_m, short_m):

@@ -30,12 +30,6 @@ _NEAR, _NEAR_OF_MANY = 0.1, 2.0
 """Squared distance, in a heavier part's deviations, at which another is the same."""
 _ALIKE, _ALIKE_OF_MANY = 0.2, 0.5
 """Largest difference of the logarithms of their volumes then."""
-_COS_SQUARED = np.cos(np.pi * (np.arange(128) + 0.5) / 256) ** 2
-"""At angles over a quarter of a turn; the other quarters are like it."""
-_SHARES = np.array([0.50, 0.67, 0.95])
-_LINE_SQUARED = np.array([0.454936423119572, 0.9488978454795189, 3.841458820694124])
-"""Squares of the radii that hold these shares of a normal number, in its variances."""
-_NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,49 +217,3 @@ def _moved(transitions: list[Floats], shifts: list[Floats]) -> Floats:
         at = phi @ at + shift if k else at
         found.append(at)
     return np.array(found)
-
-
-def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, float]:
-    """Return the radii that hold 50, 67 and 95 %, and the share within a distance.
-
-    ``P(r > R) = 1/π ∫ exp(-R² / 2v) dφ`` over half a turn, ``v = a cos²φ + b sin²φ``, with the
-    eigenvalues a and b of the covariance: polar coordinates, with ``tan φ = sqrt(a/b) tan θ``.
-
-    Examples
-    --------
-    >>> radii, share = gaussian_radii_m(np.diag([100.0, 100.0]), 20.0)
-    >>> radii.round(2).tolist(), round(share, 4)
-    ([11.77, 14.89, 24.48], 0.8647)
-    """
-    high_m, variances = _spread(covariance_m2)
-    # The logarithm of what lies beyond is a convex function of the squared radius (the hazard of a
-    # sum of two squared normal numbers never grows). So Newton's steps, which begin where the
-    # belief is a line, come from below and never pass the root.
-    squared = _LINE_SQUARED
-    for _ in range(_NEWTON_STEPS):
-        decay = np.exp(-0.5 * squared[:, None] / variances)
-        beyond = decay.mean(axis=1)
-        slope = -0.5 * (decay / variances).mean(axis=1)
-        step = np.log((1 - _SHARES) / beyond) * beyond / slope
-        squared = squared + step
-        if np.all(np.abs(step) <= 1e-12 * squared):
-            break
-    return high_m * np.sqrt(squared), share_within(covariance_m2, within_m)
-
-
-def share_within(covariance_m2: Floats, within_m: float) -> float:
-    """Return the share of a normal belief within a distance of its mean.
-
-    Examples
-    --------
-    >>> round(share_within(np.diag([100.0, 100.0]), 20.0), 4)
-    0.8647
-    """
-    high_m, variances = _spread(covariance_m2)
-    return float(1 - np.exp(-0.5 * (within_m / high_m) ** 2 / variances).mean())
-
-
-def _spread(covariance_m2: Floats) -> tuple[float, Floats]:
-    """Return the largest standard deviation, and v in :func:`gaussian_radii_m`, with ``a = 1``."""
-    low, high = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
-    return float(np.sqrt(high)), _COS_SQUARED + (1 - _COS_SQUARED) * (low / high)

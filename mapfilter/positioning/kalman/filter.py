@@ -23,7 +23,8 @@ from mapfilter.positioning.kalman.belief import FusionHistory
 from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.level_errors import MOST_CELLS, CellSlots, with_levels
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
-from mapfilter.positioning.kalman.step import KalmanState, KalmanStep, place_of
+from mapfilter.positioning.kalman.place import place_of
+from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 

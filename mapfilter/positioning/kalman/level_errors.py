@@ -9,14 +9,18 @@ a tenth of the error. Here a level is
 
 with e common to all cells, e_c the cell's own, both first-order Gauss-Markov processes along the
 way (Gudmundson 1991; Bar-Shalom, Li & Kirubarajan 2001, sect. 8.2), and w noise. The state is
-extended by e and by the errors of a few cells: of the cells heard, those last heard keep theirs.
+extended by e and by the errors of a few cells. One that was heard within the memory of its error
+keeps its place there; the error of a cell without a place is noise. Nothing that was forgotten
+counts again as if it were new: the variance of an error that is not kept grows so that the cell
+counts once over twice that distance.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import exp, inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +31,30 @@ from mapfilter.positioning.kalman.lasting import Motion
 
 MOST_CELLS = 12
 """Cells whose errors are kept at a time."""
+_ONCE = 2.0
+"""Reports count as one over so many times the distance at which a correlation is 1/e: its integral
+over both sides."""
+LEAST_MOVED_M = 0.1
+"""Shortest distance between two reports of one cell, for the growth of variances."""
+
+
+class Hearing(NamedTuple):
+    """What a report changes.
+
+    Parameters
+    ----------
+    slots : CellSlots
+        After the report.
+    growth : mapping of str to float
+        Of each cell reported, how many times as large the variance of its own error is where the
+        error was not kept; 1 for a cell that was not heard for long.
+    renewed : mapping of int to float
+        Slots that are another cell's now, and its growth.
+    """
+
+    slots: CellSlots
+    growth: Mapping[str, float]
+    renewed: Mapping[int, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,46 +65,54 @@ class CellSlots:
     ----------
     cells : tuple of str
         Empty where there is none yet.
-    heard_s : tuple of float
-        When each was last heard.
+    ago_m : mapping of str to float
+        Distance travelled since each cell was heard, of those whose errors are still alike.
     """
 
     cells: tuple[str, ...]
-    heard_s: tuple[float, ...]
+    ago_m: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def empty(cls, count: int) -> CellSlots:
         """Return slots of no cells yet."""
-        return cls(("",) * count, (-inf,) * count)
+        return cls(("",) * count)
 
     @property
     def size(self) -> int:
         """Components of the state: the common error and one for each slot, or none."""
         return len(self.cells) + 1 if self.cells else 0
 
-    def hearing(self, names: Sequence[str], time_s: float) -> tuple[CellSlots, tuple[int, ...]]:
-        """Return the slots after a report, and those that are another cell's now.
+    def hearing(self, names: Sequence[str], moved_m: float, memory_m: float) -> Hearing:
+        """Return what a report changes, a distance after the one before.
 
-        The cells that were not heard for longest give way; what exceeds the slots has none.
+        Cells take the slots of those that were not heard within the memory, in their order.
 
         Examples
         --------
-        >>> slots, renewed = CellSlots.empty(2).hearing(["A", "B"], 1.0)
-        >>> slots, renewed = slots.hearing(["C", "B"], 2.0)
-        >>> slots.cells, renewed
-        (('C', 'B'), (0,))
+        >>> heard = CellSlots.empty(2).hearing(["A", "B"], 0.0, 300.0)
+        >>> heard = heard.slots.hearing(["C", "B"], 100.0, 300.0)
+        >>> heard.slots.cells, heard.growth
+        (('A', 'B'), {'C': 1.0, 'B': 6.0})
+        >>> heard.slots.hearing(["C", "B"], 200.0, 300.0).slots.cells
+        ('C', 'B')
         """
-        cells, heard_s, renewed = list(self.cells), list(self.heard_s), []
-        wanted = list(dict.fromkeys(names))[: len(cells)]
-        for name in wanted:
-            if name in cells:
-                heard_s[cells.index(name)] = time_s
-        for name in wanted:
-            if name not in cells:
-                slot = min(range(len(cells)), key=heard_s.__getitem__)
-                cells[slot], heard_s[slot] = name, time_s
-                renewed.append(slot)
-        return CellSlots(tuple(cells), tuple(heard_s)), tuple(renewed)
+        if not self.cells:
+            return Hearing(self, {}, {})
+        once_m = _ONCE * memory_m
+        before = ((name, far_m + moved_m) for name, far_m in self.ago_m.items())
+        ago_m = {name: far_m for name, far_m in before if far_m < once_m}
+        growth = {name: once_m / max(ago_m.get(name, once_m), LEAST_MOVED_M) for name in names}
+        cells, renewed = list(self.cells), dict[int, float]()
+        far = [slot for slot, name in enumerate(cells) if ago_m.get(name, inf) >= memory_m]
+        free = sorted(
+            (slot for slot in far if cells[slot] not in growth),
+            key=lambda slot: ago_m.get(cells[slot], inf),
+            reverse=True,
+        )
+        coming = [name for name in growth if name not in cells]
+        for name, slot in zip(coming, free, strict=False):
+            cells[slot], renewed[slot] = name, growth[name]
+        return Hearing(CellSlots(tuple(cells), ago_m | dict.fromkeys(growth, 0.0)), growth, renewed)
 
     def components(self, names: Sequence[str], layout: StateLayout) -> list[tuple[int, int]]:
         """Return the components of the common and the own error of each cell; -1 for none."""
@@ -109,17 +145,22 @@ class LastingLevels:
         return replace(belief, means=means, covariances=covariances)
 
     def extended_motion(
-        self, motion: Motion, slots: CellSlots, renewed: Sequence[int], moved_m: float
+        self, motion: Motion, slots: CellSlots, renewed: Mapping[int, float], moved_m: float
     ) -> Motion:
-        """Return motion with that of the errors over a distance; renewed ones begin anew."""
+        """Return motion with that of the errors over a distance.
+
+        Those of ``renewed`` slots begin anew, with so many times their variance.
+        """
         transition, noise, shift = motion
         n, more = shift.size, slots.size
         kept = np.array([exp(-moved_m / self.common_m), *[exp(-moved_m / self.own_m)] * (more - 1)])
-        kept[[1 + slot for slot in renewed]] = 0.0
+        begun = np.ones(more)
+        for slot, growth in renewed.items():
+            kept[1 + slot], begun[1 + slot] = 0.0, growth
         wide, spread = np.zeros((n + more, n + more)), np.zeros((n + more, n + more))
         wide[:n, :n], spread[:n, :n] = transition, noise
         wide[n:, n:] = np.diag(kept)
-        spread[n:, n:] = np.diag((1 - kept**2) * self.variances(slots))
+        spread[n:, n:] = np.diag(begun * (1 - kept**2) * self.variances(slots))
         return wide, spread, np.concatenate([shift, np.zeros(more)])
 
 

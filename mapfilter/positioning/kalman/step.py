@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import cos, inf, isfinite, nan, pi, radians, sin
-from typing import Any
 
 import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.filters.gaussian import Gaussian, Method
+from mapfilter.filters.gaussian import Method
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix
@@ -19,12 +18,8 @@ from mapfilter.models.signal_strength import with_errors
 from mapfilter.models.state import MOVING, POSITION, StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import Fix, UnusedReading
-from mapfilter.positioning.integrity import GaussianTail
-from mapfilter.positioning.kalman.belief import (
-    SumBelief,
-    gaussian_radii_m,
-    share_within,
-)
+from mapfilter.positioning.gaussian_tail import GaussianTail
+from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import (
     Motion,
     extended_belief,
@@ -32,14 +27,17 @@ from mapfilter.positioning.kalman.lasting import (
     fix_layout,
     white_part,
 )
-from mapfilter.positioning.kalman.level_errors import CellSlots, with_own_spread
+from mapfilter.positioning.kalman.level_errors import (
+    LEAST_MOVED_M,
+    CellSlots,
+    with_own_spread,
+)
 from mapfilter.positioning.kalman.models import SiteModels, compiled
+from mapfilter.positioning.kalman.place import WITHIN_M, belief_tail, place_of, share_within
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 
 _LOST_NIS, _WINDOW = 5.0, 10
-_WITHIN_M = 50.0
 _MOST_PARTS = 64
-_LEAST_MOVED_M = 0.1
 _WALK_MPS = 1.5
 
 
@@ -60,7 +58,7 @@ class KalmanState:
         Distance travelled since levels or timing advances were last used.
     recent_nis : tuple of float
         Normalised innovations squared of the last measurements, per component.
-    motion : tuple of arrays
+    motion : tuple of arrays or None
         Transition, noise and shift that led to the last epoch.
     last_fix : GnssFix or None
         The last one with a position.
@@ -74,7 +72,7 @@ class KalmanState:
     moved_m: float = inf
     status: Status = Status.SEARCHING
     recent_nis: tuple[float, ...] = ()
-    motion: tuple[Floats, Floats, Floats] | None = None
+    motion: Motion | None = None
     last_fix: GnssFix | None = None
     slots: CellSlots = field(default_factory=lambda: CellSlots.empty(0))
 
@@ -93,6 +91,7 @@ class KalmanStep:
         self.moved_m, self.status = state.moved_m, state.status
         self.recent_nis = list(state.recent_nis)
         self.motion, self.last_fix, self.slots = state.motion, state.last_fix, state.slots
+        self.growth: Mapping[str, float] = {}
         self.unused: list[UnusedReading] = []
 
     @property
@@ -118,49 +117,48 @@ class KalmanStep:
     def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
         given = site_readings(self.sites, epoch)
-        self.slots, renewed = self.slots.hearing(given.cells, epoch.time_s)
-        self.motion = self._move(epoch, renewed)
+        self.motion = self._move(epoch, given.cells)
         reason = self._measure(epoch, given)
         self.time_s = epoch.time_s
         return self._fix(epoch.time_s, reason)
 
-    def _move(self, epoch: Epoch, renewed: Sequence[int]) -> tuple[Floats, Floats, Floats]:
-        """Predict; return the transition, the noise and the shift."""
-        size = self.own.size
+    def _move(self, epoch: Epoch, names: Sequence[str]) -> Motion:
+        """Predict, up to a report of cells; return the transition, the noise and the shift."""
         elapsed_s = max(epoch.time_s - self.time_s, 0.0) if isfinite(self.time_s) else 0.0
-        transition, noise, shift = np.eye(size), np.zeros((size, size)), np.zeros(size)
-        if self.belief is None:
-            self._label(epoch, epoch.motion, Reason.NOT_STARTED)
-            return self._extended((transition, noise, shift), renewed, elapsed_s, 0.0)
-        moved_m = 0.0
-        if self.own is MOVING:
-            if elapsed_s > 0:
-                root = self.options.acceleration_mps_per_sqrt_s
-                motion = constant_velocity(elapsed_s, root, noise="continuous")
-                transition, noise = motion.transition, motion.noise
-                moved_m = self._speed_mps() * elapsed_s
-        else:
-            noise = self.options.drift_m_per_sqrt_s**2 * elapsed_s * np.eye(2)
-            for step in epoch.motion:
-                moved, spread = self._step(epoch, step)
-                shift, noise = shift + moved, noise + spread
-                moved_m += abs(step.step_m) if isfinite(step.step_m) else 0.0
+        motion, moved_m = self._own_motion(epoch, elapsed_s)
         self.moved_m += moved_m
-        whole = self._extended((transition, noise, shift), renewed, elapsed_s, moved_m)
-        self.belief = self.belief.predict(*whole)
-        return whole
-
-    def _extended(
-        self, motion: Motion, renewed: Sequence[int], elapsed_s: float, moved_m: float
-    ) -> Motion:
-        """Return motion with that of errors that last: of fixes over time, of levels by the way."""
         options = self.options
         if self.lasts:
             lasting = options.fix_lasting_m, options.fix_lasting_s
             motion = extended_motion(motion, self.own, *lasting, elapsed_s)
         if self.slots.size:
+            self.slots, self.growth, renewed = self.slots.hearing(
+                names, moved_m, options.level_memory_m
+            )
             motion = options.lasting_levels.extended_motion(motion, self.slots, renewed, moved_m)
+        if self.belief is not None:
+            self.belief = self.belief.predict(*motion)
         return motion
+
+    def _own_motion(self, epoch: Epoch, elapsed_s: float) -> tuple[Motion, float]:
+        """Return motion of the state without errors that last, and the distance travelled."""
+        size = self.own.size
+        transition, noise, shift = np.eye(size), np.zeros((size, size)), np.zeros(size)
+        if self.belief is None:
+            self._label(epoch, epoch.motion, Reason.NOT_STARTED)
+            return (transition, noise, shift), 0.0
+        if self.own is MOVING:
+            if not elapsed_s > 0:
+                return (transition, noise, shift), 0.0
+            root = self.options.acceleration_mps_per_sqrt_s
+            moving = constant_velocity(elapsed_s, root, noise="continuous")
+            return (moving.transition, moving.noise, shift), self._speed_mps() * elapsed_s
+        noise, moved_m = self.options.drift_m_per_sqrt_s**2 * elapsed_s * np.eye(2), 0.0
+        for step in epoch.motion:
+            moved, spread = self._step(epoch, step)
+            shift, noise = shift + moved, noise + spread
+            moved_m += abs(step.step_m) if isfinite(step.step_m) else 0.0
+        return (transition, noise, shift), moved_m
 
     def _speed_mps(self) -> float:
         """Return the estimated speed, at least that of a walk."""
@@ -206,25 +204,29 @@ class KalmanStep:
                 self.belief = lasting.extended_belief(self.belief, self.slots)
         taken = fix is not None and self._update_fix(fix)
         if given.cells or given.timed:
-            model = self.sites.of(self.layout, given.cells, given.timed)
             step_m = self.options.timing_step_m
             reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
-            kept_m = [self.options.level_noise_memory_m] * len(given.cells)
-            kept_m += [self.options.timing_memory_m] * len(given.timed)
-            if self.slots.size:
-                errors = self.slots.components(given.cells, self.layout)
-                model = with_errors(model, errors)
-                # More cells than are kept at a time: their own errors are noise.
-                alone = [own < 0 for _, own in errors] + [False] * len(given.timed)
-                more_db2 = np.diag(np.array(alone) * self.options.level_error_db**2)
-                model = replace(model, noise=model.noise + more_db2)
-            if self._update(self._aged(model, kept_m), reading):
+            if self._update(self._radio_model(given), reading):
                 self.moved_m, taken = 0.0, True
         return Reason.USED if taken else Reason.UPDATE_FAILED
 
+    def _radio_model(self, given: SiteReadings) -> GaussianTerms:
+        """Return the model of a report's levels and timing advances."""
+        kept_m = [self.options.level_noise_memory_m] * len(given.cells)
+        kept_m += [self.options.timing_memory_m] * len(given.timed)
+        model = self._aged(self.sites.of(self.layout, given.cells, given.timed), kept_m)
+        if not self.slots.size:
+            return model
+        errors = self.slots.components(given.cells, self.layout)
+        # More cells than are kept at a time: their own errors are noise.
+        more_db2 = np.zeros(model.size)
+        for row, (name, (_, own)) in enumerate(zip(given.cells, errors, strict=True)):
+            more_db2[row] = self.growth[name] * self.options.level_error_db**2 if own < 0 else 0.0
+        return with_errors(replace(model, noise=model.noise + np.diag(more_db2)), errors)
+
     def _aged(self, model: GaussianTerms, kept_m: Sequence[float]) -> GaussianTerms:
         """Return a model with noise for errors that last: reports in a row count once."""
-        growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, _LEAST_MOVED_M)))
+        growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, LEAST_MOVED_M)))
         return replace(model, noise=model.noise * np.outer(growth, growth))
 
     def _start(self, fix: GnssFix | None, given: SiteReadings) -> SumBelief:
@@ -285,7 +287,7 @@ class KalmanStep:
         count = self.belief.weights.size
         if count > 1:
             lead = self.belief.leading.covariance[np.ix_(self.where, self.where)]
-            place["mass_50m"] = share_within(lead, _WITHIN_M) * float(self.belief.weights.max())
+            place["mass_50m"] = share_within(lead, WITHIN_M) * float(self.belief.weights.max())
         return Fix(time_s, **place, status=self.status, hypotheses=count, reason=reason)
 
     def _set_status(self, radius_m: float) -> None:
@@ -296,25 +298,3 @@ class KalmanStep:
                 self.status = Status.CONVERGED
         else:
             self.status = Status.LOST if lost else Status.TRACKING
-
-
-def belief_tail(belief: SumBelief, where: list[int]) -> GaussianTail:
-    """Return the tail of a Gaussian sum about its mean; ``where`` are east and north."""
-    offsets_m = belief.means[:, where] - belief.moments.mean[where]
-    return GaussianTail(belief.weights, offsets_m, belief.covariances[:, where][:, :, where])
-
-
-def place_of(belief: Gaussian, where: list[int]) -> dict[str, Any]:
-    """Return the position of a belief as fields of a fix."""
-    covariance = belief.covariance[np.ix_(where, where)]
-    radii, mass = gaussian_radii_m(covariance, _WITHIN_M)
-    east_m, north_m = (float(value) for value in belief.mean[where])
-    return {
-        "east_m": east_m,
-        "north_m": north_m,
-        "covariance_m2": covariance,
-        "radii_m": radii,
-        "mass_50m": mass,
-        "way_id": 0,
-        "way_probability": nan,
-    }

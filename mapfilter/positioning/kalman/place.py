@@ -1,0 +1,90 @@
+"""Position of a belief: its covariance, the radii that hold shares of it, and its tail."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.filters.gaussian import Gaussian
+from mapfilter.positioning.gaussian_tail import GaussianTail
+from mapfilter.positioning.kalman.belief import SumBelief
+
+WITHIN_M = 50.0
+"""Distance from the position within which the share of a belief is reported."""
+_COS_SQUARED = np.cos(np.pi * (np.arange(128) + 0.5) / 256) ** 2
+"""At angles over a quarter of a turn; the other quarters are like it."""
+_SHARES = np.array([0.50, 0.67, 0.95])
+_LINE_SQUARED = np.array([0.454936423119572, 0.9488978454795189, 3.841458820694124])
+"""Squares of the radii that hold these shares of a normal number, in its variances."""
+_NEWTON_STEPS = 20
+
+
+def place_of(belief: Gaussian, where: list[int]) -> dict[str, Any]:
+    """Return the position of a belief as fields of a fix; ``where`` are east and north."""
+    covariance = belief.covariance[np.ix_(where, where)]
+    radii, mass = gaussian_radii_m(covariance, WITHIN_M)
+    east_m, north_m = (float(value) for value in belief.mean[where])
+    return {
+        "east_m": east_m,
+        "north_m": north_m,
+        "covariance_m2": covariance,
+        "radii_m": radii,
+        "mass_50m": mass,
+        "way_id": 0,
+        "way_probability": nan,
+    }
+
+
+def belief_tail(belief: SumBelief, where: list[int]) -> GaussianTail:
+    """Return the tail of a Gaussian sum about its mean; ``where`` are east and north."""
+    offsets_m = belief.means[:, where] - belief.moments.mean[where]
+    return GaussianTail(belief.weights, offsets_m, belief.covariances[:, where][:, :, where])
+
+
+def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, float]:
+    """Return the radii that hold 50, 67 and 95 %, and the share within a distance.
+
+    ``P(r > R) = 1/π ∫ exp(-R² / 2v) dφ`` over half a turn, ``v = a cos²φ + b sin²φ``, with the
+    eigenvalues a and b of the covariance: polar coordinates, with ``tan φ = sqrt(a/b) tan θ``.
+
+    Examples
+    --------
+    >>> radii, share = gaussian_radii_m(np.diag([100.0, 100.0]), 20.0)
+    >>> radii.round(2).tolist(), round(share, 4)
+    ([11.77, 14.89, 24.48], 0.8647)
+    """
+    high_m, variances = _spread(covariance_m2)
+    # The logarithm of what lies beyond is a convex function of the squared radius (the hazard of a
+    # sum of two squared normal numbers never grows). So Newton's steps, which begin where the
+    # belief is a line, come from below and never pass the root.
+    squared = _LINE_SQUARED
+    for _ in range(_NEWTON_STEPS):
+        decay = np.exp(-0.5 * squared[:, None] / variances)
+        beyond = decay.mean(axis=1)
+        slope = -0.5 * (decay / variances).mean(axis=1)
+        step = np.log((1 - _SHARES) / beyond) * beyond / slope
+        squared = squared + step
+        if np.all(np.abs(step) <= 1e-12 * squared):
+            break
+    return high_m * np.sqrt(squared), share_within(covariance_m2, within_m)
+
+
+def share_within(covariance_m2: Floats, within_m: float) -> float:
+    """Return the share of a normal belief within a distance of its mean.
+
+    Examples
+    --------
+    >>> round(share_within(np.diag([100.0, 100.0]), 20.0), 4)
+    0.8647
+    """
+    high_m, variances = _spread(covariance_m2)
+    return float(1 - np.exp(-0.5 * (within_m / high_m) ** 2 / variances).mean())
+
+
+def _spread(covariance_m2: Floats) -> tuple[float, Floats]:
+    """Return the largest standard deviation, and v in :func:`gaussian_radii_m`, with ``a = 1``."""
+    low, high = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
+    return float(np.sqrt(high)), _COS_SQUARED + (1 - _COS_SQUARED) * (low / high)
