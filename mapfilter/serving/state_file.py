@@ -30,12 +30,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullH
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
-from mapfilter.positioning.bayes.pace import Pace
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
-from mapfilter.positioning.bayes.pauses import RowTimes
-from mapfilter.positioning.bayes.repeats import MotionRepeats
-from mapfilter.positioning.bayes.rest import Rest
-from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.bayes.state import BayesState, Reported
 from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.epochs import GnssFix, ReportRow
@@ -44,6 +39,11 @@ from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.integrity import SampleTail
+from mapfilter.positioning.sensors.pace import Pace
+from mapfilter.positioning.sensors.pauses import RowTimes
+from mapfilter.positioning.sensors.repeats import MotionRepeats
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.watch import SensorWatch
 
 FORMAT, VERSION = "mapfilter session", 11
 

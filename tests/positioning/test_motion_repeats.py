@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
+from mapfilter.positioning.sensors.repeats import MotionRepeats, without_repeats
 
 
 def followed(steps, again_s=0.3):

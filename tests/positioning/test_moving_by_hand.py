@@ -17,10 +17,10 @@ from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.moving import moved
-from mapfilter.positioning.bayes.pace import Pace
-from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
+from mapfilter.positioning.sensors.pace import Pace
+from mapfilter.positioning.sensors.watch import SensorWatch
 
 SEARCHING, TRACKING = Status.SEARCHING, Status.TRACKING
 FIX = GnssFix(0.0, 0.0)

@@ -6,7 +6,7 @@ from math import exp, nan
 import pytest
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.positioning.bayes.pace import Pace
+from mapfilter.positioning.sensors.pace import Pace
 
 
 def after(pace, time_s, *lengths_m, unit_m=1.0):

@@ -17,9 +17,9 @@ from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.held import Hold
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.rest import Rest
-from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.watch import SensorWatch
 
 FEW = ParticleOptions(max_particles=300, min_search_particles=200, min_particles=100)
 POSITIONER = BayesPositioner(BayesModel(make_area()), FEW)

@@ -6,7 +6,7 @@ from math import exp, log, nan, radians, sqrt
 import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
+from mapfilter.positioning.sensors.repeats import MotionRepeats, without_repeats
 
 
 def after(*rows, repeats=None, unit_m=1.0):

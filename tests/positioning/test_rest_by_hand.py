@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from mapfilter.positioning.bayes.rest import Rest, _added, _carried, _left, levels_of
 from mapfilter.positioning.epochs import ReportRow
+from mapfilter.positioning.sensors.rest import Rest, _added, _carried, _left, levels_of
 
 
 def row(cell, level_dbm, role="neighbour", censored=0, **more):

@@ -11,9 +11,6 @@ from made_town import Town, slowed, walk_log
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.held import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.pace import Pace
-from mapfilter.positioning.bayes.rest import Rest
-from mapfilter.positioning.bayes.sensors import SensorWatch, watched
 from mapfilter.positioning.bayes.step_units import (
     asks_for_unit,
     hold_after_takeover,
@@ -22,6 +19,9 @@ from mapfilter.positioning.bayes.step_units import (
     unit_of_next_m,
 )
 from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
+from mapfilter.positioning.sensors.pace import Pace
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.watch import SensorWatch, watched
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.speeds import speed_fault

@@ -7,11 +7,11 @@ from math import exp, isnan, nan, sqrt
 import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.pace import Pace
-from mapfilter.positioning.bayes.repeats import MotionRepeats
-from mapfilter.positioning.bayes.rest import Rest
-from mapfilter.positioning.bayes.sensors import SensorWatch, spread_m2, watched
 from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.sensors.pace import Pace
+from mapfilter.positioning.sensors.repeats import MotionRepeats
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.watch import SensorWatch, spread_m2, watched
 
 
 def epoch(time_s, *lengths_m, radio=()):

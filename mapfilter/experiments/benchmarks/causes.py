@@ -13,8 +13,8 @@ from mapfilter.evaluation.accuracy import Truth, position_errors_m
 from mapfilter.experiments.benchmarks.worst_run import WorstEpoch
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import wrap_rad
-from mapfilter.positioning.bayes.sensors import UNMEASURED
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.sensors.watch import UNMEASURED
 
 OFF_MAP_M = 30.0
 """Farther from every point of the map the true way is not on it."""

@@ -25,10 +25,10 @@ from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.held import HeldOtherwise, is_ahead
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules, RivalRules
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.sensors import spread_m2
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.positioning.sensors.watch import spread_m2
 
 MapFilter = BeliefFilter[Start, Any, RadioReading]
 

@@ -39,7 +39,6 @@ from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
 from mapfilter.positioning.bayes.radio import RadioSource, name_of
-from mapfilter.positioning.bayes.sensors import UNMEASURED, watched
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesState, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
@@ -50,6 +49,7 @@ from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
+from mapfilter.positioning.sensors.watch import UNMEASURED, watched
 
 _LEAST_AT_START = 0.8
 """Share of a known start within 50 m from which on it is one place, and tracked."""

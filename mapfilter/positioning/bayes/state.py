@@ -17,10 +17,10 @@ from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
-from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading, protected_m
 from mapfilter.positioning.integrity import sample_tail
+from mapfilter.positioning.sensors.watch import SensorWatch
 
 FIRST_SPACING_M = 5.0
 """Assumed distance between hypotheses before there are any."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import isfinite, nan
 from typing import NamedTuple
 
-from mapfilter.positioning.bayes.pace import GAP_INTERVALS, Going, Pace
+from mapfilter.positioning.sensors.pace import GAP_INTERVALS, Going, Pace
 
 GAP_S = 5.0
 """After so long motion rows are missing, if they come at rest, too."""

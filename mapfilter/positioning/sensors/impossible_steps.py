@@ -10,7 +10,7 @@ from dataclasses import replace
 from math import isfinite, nan
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.positioning.bayes.pace import Pace
+from mapfilter.positioning.sensors.pace import Pace
 
 _FASTEST_MPS, _AT_ONCE_M = 150.0, 50.0
 """Speed of the fastest trains, and the way of rows that come late together, or at jittering times;

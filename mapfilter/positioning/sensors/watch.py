@@ -8,7 +8,7 @@ in that time, so the belief grows as it must; a report that stands still while t
 taken out.
 
 Rows that are missing, or lengths of zero, can also be those of a phone that rests, and short ones
-those of a stroll, so levels decide (:mod:`mapfilter.positioning.bayes.rest`).
+those of a stroll, so levels decide (:mod:`mapfilter.positioning.sensors.rest`).
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from math import exp, isfinite, nan, sqrt
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.impossible_steps import without_impossible
-from mapfilter.positioning.bayes.pace import Going, Pace
-from mapfilter.positioning.bayes.pauses import RowTimes, longest_s, unrecorded_s
-from mapfilter.positioning.bayes.repeats import MotionRepeats, without_repeats
-from mapfilter.positioning.bayes.rest import Rest
-from mapfilter.positioning.bayes.stale_radio import STALE_NATS, repeated_nats
 from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.sensors.impossible_steps import without_impossible
+from mapfilter.positioning.sensors.pace import Going, Pace
+from mapfilter.positioning.sensors.pauses import RowTimes, longest_s, unrecorded_s
+from mapfilter.positioning.sensors.repeats import MotionRepeats, without_repeats
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.stale_radio import STALE_NATS, repeated_nats
 
 _STRAIGHT_S = 60.0
 """Time after which the direction of an unmeasured way is forgotten by 1/e."""

@@ -1,0 +1,1 @@
+"""Sensors that no longer measure what they seem to, seen by their rows and reports alone."""
