@@ -11,7 +11,8 @@ from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
-from mapfilter.positioning.sensors.watch import SensorWatch, spread_m2, watched
+from mapfilter.positioning.sensors.unmeasured import spread_m2
+from mapfilter.positioning.sensors.watch import SensorWatch, watched
 
 
 def epoch(time_s, *lengths_m, radio=()):

@@ -28,7 +28,7 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
-from mapfilter.positioning.sensors.watch import spread_m2
+from mapfilter.positioning.sensors.unmeasured import spread_m2
 
 MapFilter = BeliefFilter[Start, Any, RadioReading]
 

@@ -12,9 +12,10 @@ CUSUM; Page, 1954). A heading that has never been another one is no compass's af
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import degrees, exp, isfinite, log, nan, sqrt
+from math import degrees, isfinite, log, nan
 
 from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.positioning.sensors.unmeasured import headless_step
 
 _PRIOR_ROWS, _PRIOR_REPEATS = 50.0, 49.0
 _MOST_NATS, _STILL_NATS = 1.0, 12.0
@@ -28,8 +29,6 @@ _COARSE_PER_DEG, _COARSE_PER_RAD = 100.0, 1000.0
 _PAIRS, _SOONER = 8, 0.8
 """Pairs of equal rows, and the interval within a pair relative to that between two of them."""
 _TURNS_RAD, _ROUNDING = 1e-9, 1e-4
-_STRAIGHT_M = 84.0
-"""Distance after which the direction of an unmeasured way is forgotten by 1/e."""
 
 _Row = tuple[float, float, float]
 
@@ -131,8 +130,7 @@ def without_repeats(
             why = Reason.HEADING_STUCK
             before_m = repeats.still_m
             repeats = replace(repeats, still_m=before_m + abs(step.step_m))
-            spread_m2 = _spread_m2(repeats.still_m) - _spread_m2(before_m)
-            step = MotionStep(step.step_m, nan, nan, sqrt(max(spread_m2, 0.0)))
+            step = headless_step(step.step_m, before_m)
         kept.append(step)
     return (repeats, steps, why) if why is Reason.USED else (repeats, tuple(kept), why)
 
@@ -190,9 +188,3 @@ def _is_fine(heading_rad: float) -> bool:
 
 def _equal(value: float, other: float) -> bool:
     return value == other or not (isfinite(value) or isfinite(other))
-
-
-def _spread_m2(way_m: float) -> float:
-    """Return the mean square of the distance of a way that forgets its direction."""
-    straight_m = _STRAIGHT_M
-    return 2 * straight_m * (way_m - straight_m * (1 - exp(-way_m / straight_m)))

@@ -14,7 +14,7 @@ those of a stroll, so levels decide (:mod:`mapfilter.positioning.sensors.rest`).
 from __future__ import annotations
 
 from dataclasses import replace
-from math import exp, isfinite, nan, sqrt
+from math import isfinite, nan
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
@@ -25,9 +25,8 @@ from mapfilter.positioning.sensors.pauses import RowTimes, longest_s, unrecorded
 from mapfilter.positioning.sensors.repeats import MotionRepeats, without_repeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.stale_radio import STALE_NATS, repeated_nats
+from mapfilter.positioning.sensors.unmeasured import unmeasured_step
 
-_STRAIGHT_S = 60.0
-"""Time after which the direction of an unmeasured way is forgotten by 1/e."""
 _STRETCH_M = 60.0
 """Way as measured after which levels that agree with it have shown a stroll."""
 
@@ -183,7 +182,7 @@ def _followed(
         if not was_carried and to_s > 0:
             # What the counter did not miss is in the belief already.
             missed = max(1 - rest.measured_m / (rest.pace_mps * to_s), 0.0)
-    step = _unmeasured(missed * pace.speed_mps, watch.unmeasured_s, to_s)
+    step = unmeasured_step(missed * pace.speed_mps, watch.unmeasured_s, to_s)
     if any(isfinite(one.turn_rad) for one in steps):
         step = replace(step, turned_sd_rad=0.0)
     watch = watch._replace(
@@ -197,7 +196,7 @@ def _after_a_pause(
 ) -> tuple[SensorWatch, Epoch, Reason]:
     """Add the way of a pause of the recording before an epoch's own motion."""
     to_s = watch.unmeasured_s + paused_s
-    step = _unmeasured(speed_mps, watch.unmeasured_s, to_s)
+    step = unmeasured_step(speed_mps, watch.unmeasured_s, to_s)
     watch = watch._moving(epoch.time_s)._replace(
         unmeasured_s=0.0 if going.measured else to_s, moved_m=watch.moved_m + step.step_m
     )
@@ -211,19 +210,3 @@ def _turns_of(steps: tuple[MotionStep, ...]) -> tuple[MotionStep, ...]:
         for step in steps
         if isfinite(step.step_m) or isfinite(step.turn_rad)
     )
-
-
-def _unmeasured(speed_mps: float, from_s: float, to_s: float) -> MotionStep:
-    """Return the step to all sides between two times since the last measured one."""
-    more_m2 = spread_m2(speed_mps, to_s) - spread_m2(speed_mps, from_s)
-    # The direction changes by a random walk, whose cosine is 1/e after that time in the mean.
-    turned_sd_rad = sqrt(2 * max(to_s - from_s, 0.0) / _STRAIGHT_S)
-    return MotionStep(
-        speed_mps * (to_s - from_s), nan, nan, sqrt(max(more_m2, 0.0)), turned_sd_rad=turned_sd_rad
-    )
-
-
-def spread_m2(speed_mps: float, time_s: float) -> float:
-    """Return the mean square of the distance of a way that forgets its direction."""
-    lasts_s = _STRAIGHT_S
-    return 2 * speed_mps**2 * lasts_s * (time_s - lasts_s * (1 - exp(-time_s / lasts_s)))

@@ -1,0 +1,44 @@
+"""Ways whose direction, or length, too, was not measured: steps to all sides.
+
+One goes on, and forgets the direction by and by: the mean cosine of the angle to the first
+direction is 1/e after a minute, or after the way of a minute's walk.
+"""
+
+from __future__ import annotations
+
+from math import exp, nan, sqrt
+
+from mapfilter.filters.contract import MotionStep
+
+_STRAIGHT_S, _STRAIGHT_M = 60.0, 84.0
+"""Time, and way, after which the direction is forgotten by 1/e."""
+
+
+def spread_m2(speed_mps: float, time_s: float) -> float:
+    """Return the mean square of the distance of such a way, by its time."""
+    return _mean_square(speed_mps, time_s, _STRAIGHT_S)
+
+
+def way_spread_m2(way_m: float) -> float:
+    """Return the mean square of the distance of such a way, by its length."""
+    return _mean_square(1.0, way_m, _STRAIGHT_M)
+
+
+def unmeasured_step(speed_mps: float, from_s: float, to_s: float) -> MotionStep:
+    """Return the step between two times since the last measured one."""
+    more_m2 = spread_m2(speed_mps, to_s) - spread_m2(speed_mps, from_s)
+    # That cosine is of a direction that changes by a random walk.
+    turned_sd_rad = sqrt(2 * max(to_s - from_s, 0.0) / _STRAIGHT_S)
+    return MotionStep(
+        speed_mps * (to_s - from_s), nan, nan, sqrt(max(more_m2, 0.0)), turned_sd_rad=turned_sd_rad
+    )
+
+
+def headless_step(step_m: float, from_m: float) -> MotionStep:
+    """Return a step of a known length after a way without headings."""
+    more_m2 = way_spread_m2(from_m + abs(step_m)) - way_spread_m2(from_m)
+    return MotionStep(step_m, nan, nan, sqrt(max(more_m2, 0.0)))
+
+
+def _mean_square(speed: float, gone: float, lasts: float) -> float:
+    return 2 * speed**2 * lasts * (gone - lasts * (1 - exp(-gone / lasts)))
