@@ -43,6 +43,14 @@ class ReportRow:
     censored: int
     timing_advance: float = nan
 
+    @property
+    def name(self) -> str:
+        """The cell as messages name it."""
+        if self.cell is not None:
+            return self.cell
+        bsic = "unknown" if self.bsic is None else self.bsic
+        return "" if self.arfcn is None else f"ARFCN {self.arfcn}, BSIC {bsic}"
+
 
 @dataclass(frozen=True, slots=True)
 class GnssFix:

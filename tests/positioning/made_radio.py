@@ -9,7 +9,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.filters.particle import Cloud
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.radio import RadioSource, name_of
+from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
@@ -42,7 +42,7 @@ def read(*rows, used=None, moved=START, options=OPTIONS):
 
 
 def unknown_cells(*rows, why=Reason.UNKNOWN_CELL):
-    return [UnusedReading(0.0, row.role, name_of(row), why) for row in rows]
+    return [UnusedReading(0.0, row.role, row.name, why) for row in rows]
 
 
 def inside(reading):

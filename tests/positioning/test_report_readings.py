@@ -25,7 +25,7 @@ from small_area import FLOOR_DBM, OPTIONS
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.path import DeadReckoning
-from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioSource, name_of
+from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
 
@@ -249,7 +249,7 @@ def test_a_serving_cell_is_as_probable_as_the_model_says_under_the_null_hypothes
 
 
 def test_names_of_cells_in_messages():
-    assert name_of(named("B", -80.0)) == "B"
-    assert name_of(carrier(61, 2, -80.0)) == "ARFCN 61, BSIC 2"
-    assert name_of(carrier(61, None, -80.0)) == "ARFCN 61, BSIC unknown"
-    assert name_of(carrier(None, 2, -80.0)) == ""
+    assert named("B", -80.0).name == "B"
+    assert carrier(61, 2, -80.0).name == "ARFCN 61, BSIC 2"
+    assert carrier(61, None, -80.0).name == "ARFCN 61, BSIC unknown"
+    assert carrier(None, 2, -80.0).name == ""

@@ -38,7 +38,7 @@ from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
-from mapfilter.positioning.bayes.radio import RadioSource, name_of
+from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesState, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
@@ -162,7 +162,7 @@ class BayesPositioner(Filter[BayesState]):
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         if radio is not Reason.USED:
-            unused += [UnusedReading(epoch.time_s, row.role, name_of(row), radio) for row in heard]
+            unused += [UnusedReading(epoch.time_s, row.role, row.name, radio) for row in heard]
         if repeated:
             unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REPEATED_FIX))
         state, updates = weighing.collected(state, epoch, spacing_m)

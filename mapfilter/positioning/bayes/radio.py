@@ -256,12 +256,4 @@ def _carrier(row: ReportRow) -> tuple[int, int]:
 
 
 def _unused(epoch: Epoch, rows: list[_Unplaced]) -> list[UnusedReading]:
-    return [UnusedReading(epoch.time_s, row.role, name_of(row), why) for row, why in rows]
-
-
-def name_of(row: ReportRow) -> str:
-    """Return the cell of a report's row as messages name it."""
-    if row.cell is not None:
-        return row.cell
-    bsic = "unknown" if row.bsic is None else row.bsic
-    return "" if row.arfcn is None else f"ARFCN {row.arfcn}, BSIC {bsic}"
+    return [UnusedReading(epoch.time_s, row.role, row.name, why) for row, why in rows]

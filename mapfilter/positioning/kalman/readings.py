@@ -43,7 +43,7 @@ def site_readings(sites: SiteModels, epoch: Epoch) -> SiteReadings:
             received.append((name, row.level_dbm))
         elif name is None or name not in timed:
             kind = SERVING if row.role == SERVING else NEIGHBOUR
-            unused.append(UnusedReading(epoch.time_s, kind, _what(row), reason))
+            unused.append(UnusedReading(epoch.time_s, kind, row.name, reason))
     known = {name: steps for name, steps in timed.items() if name in sites.cells}
     cells, levels_dbm = tuple(name for name, _ in received), tuple(level for _, level in received)
     return SiteReadings(cells, levels_dbm, tuple(known), tuple(known.values()), tuple(unused))
@@ -60,9 +60,3 @@ def _cell(sites: SiteModels, row: ReportRow, serving: str | None) -> tuple[str |
     if len(found) == 1:
         return found[0], Reason.NOT_USED_BY_FILTER
     return None, Reason.AMBIGUOUS_CELL if found else Reason.UNKNOWN_CELL
-
-
-def _what(row: ReportRow) -> str:
-    if row.cell is not None or row.arfcn is None:
-        return row.cell or ""
-    return f"ARFCN {row.arfcn}, BSIC {'unknown' if row.bsic is None else row.bsic}"

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, inf, isfinite, nan, pi, radians, sin
+from math import inf, isfinite, nan, pi
 
 import numpy as np
 
-from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import Method
 from mapfilter.models.gaussian import GaussianTerms
@@ -35,6 +34,7 @@ from mapfilter.positioning.kalman.level_errors import (
 from mapfilter.positioning.kalman.models import SiteModels, compiled
 from mapfilter.positioning.kalman.place import WITHIN_M, belief_tail, place_of, share_within
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
+from mapfilter.positioning.kalman.reckoning import Reckoning
 
 _LOST_NIS, _WINDOW = 5.0, 10
 _MOST_PARTS = 64
@@ -64,6 +64,8 @@ class KalmanState:
         The last one with a position.
     slots : CellSlots
         Cells whose errors of levels are in the state.
+    reckoning : Reckoning
+        What is known of the sensors.
     """
 
     layout: StateLayout
@@ -75,6 +77,7 @@ class KalmanState:
     motion: Motion | None = None
     last_fix: GnssFix | None = None
     slots: CellSlots = field(default_factory=lambda: CellSlots.empty(0))
+    reckoning: Reckoning = field(default_factory=Reckoning)
 
 
 class KalmanStep:
@@ -91,6 +94,7 @@ class KalmanStep:
         self.moved_m, self.status = state.moved_m, state.status
         self.recent_nis = list(state.recent_nis)
         self.motion, self.last_fix, self.slots = state.motion, state.last_fix, state.slots
+        self.reckoning = state.reckoning
         self.growth: Mapping[str, float] = {}
         self.unused: list[UnusedReading] = []
 
@@ -107,6 +111,7 @@ class KalmanStep:
             self.motion,
             self.last_fix,
             self.slots,
+            self.reckoning,
         )
 
     @property
@@ -116,6 +121,10 @@ class KalmanStep:
 
     def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
+        if self.own is POSITION:
+            # With a velocity in the state, nothing but what is weighed tells of motion.
+            self.reckoning, epoch, unused = self.reckoning.watched(epoch)
+            self.unused += unused if self.belief is not None else []
         given = site_readings(self.sites, epoch)
         self.motion = self._move(epoch, given.cells)
         reason = self._measure(epoch, given)
@@ -155,7 +164,9 @@ class KalmanStep:
             return (moving.transition, moving.noise, shift), self._speed_mps() * elapsed_s
         noise, moved_m = self.options.drift_m_per_sqrt_s**2 * elapsed_s * np.eye(2), 0.0
         for step in epoch.motion:
-            moved, spread = self._step(epoch, step)
+            self.reckoning, moved, spread, why = self.reckoning.moved(step, self.options)
+            if why is not Reason.USED:
+                self._label(epoch, (step,), why)
             shift, noise = shift + moved, noise + spread
             moved_m += abs(step.step_m) if isfinite(step.step_m) else 0.0
         return (transition, noise, shift), moved_m
@@ -166,21 +177,6 @@ class KalmanStep:
             raise AssertionError("asked once started")
         mean = self.belief.moments.mean
         return max(float(np.hypot(*mean[list(self.layout.velocity)])), _WALK_MPS)
-
-    def _step(self, epoch: Epoch, step: MotionStep) -> tuple[Floats, Floats]:
-        """Return a step's displacement and covariance; without a heading, zero and isotropic."""
-        if not isfinite(step.step_m):
-            self._label(epoch, (step,), Reason.NO_STEP)
-            return np.zeros(2), np.zeros((2, 2))
-        if not isfinite(step.heading_rad):
-            self._label(epoch, (step,), Reason.NO_HEADING)
-            return np.zeros(2), step.step_m**2 * np.eye(2)
-        along = np.array([cos(step.heading_rad), sin(step.heading_rad)])
-        across = np.array([-along[1], along[0]])
-        cross_m = step.step_m * radians(self.options.heading_sd_deg)
-        noise = self.options.step_sd_m**2 * np.outer(along, along)
-        noise += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
-        return step.step_m * along, noise + cross_m**2 * np.outer(across, across)
 
     def _measure(self, epoch: Epoch, given: SiteReadings) -> Reason:
         self.unused += given.unused
@@ -203,6 +199,8 @@ class KalmanStep:
                 lasting = self.options.lasting_levels
                 self.belief = lasting.extended_belief(self.belief, self.slots)
         taken = fix is not None and self._update_fix(fix)
+        if taken:
+            self.reckoning = self.reckoning.fixed(epoch.time_s)
         if given.cells or given.timed:
             step_m = self.options.timing_step_m
             reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
@@ -297,4 +295,5 @@ class KalmanStep:
             if radius_m <= self.options.converged_radius_m:
                 self.status = Status.CONVERGED
         else:
+            lost = lost or self.reckoning.may_have_left
             self.status = Status.LOST if lost else Status.TRACKING
