@@ -15,7 +15,7 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.gaussian import METHODS, Method
-from mapfilter.models.state import MOVING, POSITION
+from mapfilter.models.state import MOVING
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput, TrackEstimate
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
@@ -24,6 +24,7 @@ from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.level_errors import MOST_CELLS, CellSlots, with_levels
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.place import place_of
+from mapfilter.positioning.kalman.reckoning import RECKONED
 from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
@@ -90,7 +91,7 @@ class KalmanTracker(Filter[KalmanState]):
 
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> KalmanState:
         """Return the state before the first epoch."""
-        layout = POSITION if "motion" in kinds else MOVING
+        layout = RECKONED if "motion" in kinds else MOVING
         if self.sites.options.fix_lasting_m > 0:
             layout = extended_layout(layout)
         heard = {"serving", "neighbour"}.intersection(kinds)

@@ -67,6 +67,12 @@ class KalmanOptions(Options):
         Assumed deviation of a step's length.
     heading_sd_deg : float
         Assumed deviation of a heading, white; 0.2 rad.
+    bias_sd_deg : float
+        Assumed deviation of a heading's error that lasts, at the start.
+    drift_deg_per_sqrt_m : float
+        Assumed random walk of that error.
+    scale : float
+        Assumed deviation of the share by which steps are too short.
     drift_m_per_sqrt_s : float
         Assumed random walk of the position besides dead reckoning.
     acceleration_mps_per_sqrt_s : float
@@ -100,6 +106,9 @@ class KalmanOptions(Options):
     fix_lasting_s: Positive = 30.0
     step_sd_m: Positive = 0.3
     heading_sd_deg: Positive = 11.459155902616464
+    bias_sd_deg: Positive = 10.0
+    drift_deg_per_sqrt_m: NotNegative = 0.3
+    scale: Positive = 0.03
     drift_m_per_sqrt_s: Positive = 0.3
     acceleration_mps_per_sqrt_s: Positive = 0.7
     speed_sd_mps: Positive = 8.0

@@ -1,4 +1,15 @@
-"""Dead reckoning of a Kalman-type filter whose state is a position: what steps shift and spread."""
+"""Dead reckoning of a Kalman-type filter: what steps shift and spread, and what they lack.
+
+A compass that is mounted askew, or beside iron, is off by as much for long, and so is the length of
+steps. Taken as noise of each step, a hundred of them would lead astray by a tenth of that. So the
+heading error b, a random walk over the way, and the share k by which steps are too short are
+components of the state:
+
+    p' = p + s (1 + k) u(ψ + b) + w,
+
+linear about the mean of b and k. Positions that are measured find them, and are followed by better
+dead reckoning. The noise w is of each step alone.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +20,38 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.sensors.unmeasured import headless_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
+
+RECKONED = StateLayout(4, 0, 1)
+"""East, north, the heading error in rad, and the share by which steps are too short."""
+_TURNED, _SCALE = 2, 3
+
+
+def at_rest(layout: StateLayout) -> Motion:
+    """Return transition, noise and shift of no motion."""
+    size = layout.size
+    return np.eye(size), np.zeros((size, size)), np.zeros(size)
+
+
+def first_deviations(options: KalmanOptions) -> Floats:
+    """Return the deviations of the two errors before any position."""
+    return np.array([radians(options.bias_sd_deg), options.scale])
+
+
+def after_each_other(first: Motion, second: Motion) -> Motion:
+    """Return two motions as one."""
+    transition, noise, shift = second
+    return (
+        transition @ first[0],
+        transition @ first[1] @ transition.T + noise,
+        transition @ first[2] + shift,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,36 +102,49 @@ class Reckoning:
         return replace(self, watch=watch), epoch, unused
 
     def moved(
-        self, step: MotionStep, options: KalmanOptions
-    ) -> tuple[Reckoning, Floats, Floats, Reason]:
+        self, step: MotionStep, options: KalmanOptions, errors: Floats
+    ) -> tuple[Reckoning, Motion, Reason]:
         """Read a step.
+
+        Parameters
+        ----------
+        step : MotionStep
+        options : KalmanOptions
+        errors : (2,) array
+            Heading error (rad) and share of the scale, about which motion is linear.
 
         Returns
         -------
         reckoning : Reckoning
-        shift_m : (2,) array
-            East and north; zero without a heading.
-        covariance_m2 : (2, 2) array
-            Without a heading that of a way to all sides, which is straight for some time.
+        motion : tuple of arrays
+            Transition, noise and shift of :data:`RECKONED`. Without a heading that of a way to all
+            sides, which is straight for some time.
         reason : Reason
             ``USED``, ``NO_STEP`` or ``NO_HEADING``.
         """
+        transition, noise, shift = at_rest(RECKONED)
         if not isfinite(step.step_m):
-            return self, np.zeros(2), np.zeros((2, 2)), Reason.NO_STEP
+            return self, (transition, noise, shift), Reason.NO_STEP
         if not isfinite(step.heading_rad):
             after, why = self, Reason.USED
             if not isfinite(step.spread_m):
                 step, why = headless_step(step.step_m, self.headless_m), Reason.NO_HEADING
                 after = replace(self, headless_m=self.headless_m + abs(step.step_m))
-            return after, np.zeros(2), step.all_sides_m**2 / 2 * np.eye(2), why
-        along = np.array([cos(step.heading_rad), sin(step.heading_rad)])
+            noise[:2, :2] = step.all_sides_m**2 / 2 * np.eye(2)
+            return after, (transition, noise, shift), why
+        turned_rad, scale = float(errors[0]), float(errors[1])
+        heading_rad, length_m = step.heading_rad + turned_rad, step.step_m * (1 + scale)
+        along = np.array([cos(heading_rad), sin(heading_rad)])
         across = np.array([-along[1], along[0]])
+        transition[:2, _TURNED], transition[:2, _SCALE] = length_m * across, step.step_m * along
+        shift[:2] = length_m * along - transition[:2, 2:] @ errors
         cross_m = step.step_m * radians(options.heading_sd_deg)
-        noise = options.step_sd_m**2 * np.outer(along, along)
-        noise += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
-        noise += cross_m**2 * np.outer(across, across)
+        noise[:2, :2] = options.step_sd_m**2 * np.outer(along, along)
+        noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
+        noise[:2, :2] += cross_m**2 * np.outer(across, across)
+        noise[_TURNED, _TURNED] = radians(options.drift_deg_per_sqrt_m) ** 2 * abs(step.step_m)
         after = self if self.headless_m == 0 else replace(self, headless_m=0.0)
-        return after, step.step_m * along, noise, Reason.USED
+        return after, (transition, noise, shift), Reason.USED
 
     def fixed(self, time_s: float) -> Reckoning:
         """Return it after a fix was used."""

@@ -14,7 +14,7 @@ from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.signal_strength import with_errors
-from mapfilter.models.state import MOVING, POSITION, StateLayout
+from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.gaussian_tail import GaussianTail
@@ -34,7 +34,13 @@ from mapfilter.positioning.kalman.level_errors import (
 from mapfilter.positioning.kalman.models import SiteModels, compiled
 from mapfilter.positioning.kalman.place import WITHIN_M, belief_tail, place_of, share_within
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
-from mapfilter.positioning.kalman.reckoning import Reckoning
+from mapfilter.positioning.kalman.reckoning import (
+    RECKONED,
+    Reckoning,
+    after_each_other,
+    at_rest,
+    first_deviations,
+)
 
 _LOST_NIS, _WINDOW = 5.0, 10
 _MOST_PARTS = 64
@@ -48,8 +54,8 @@ class KalmanState:
     Parameters
     ----------
     layout : StateLayout
-        Position only where there is dead reckoning, else position and velocity; with the place that
-        fixes are of, where their errors last, and behind them the errors of levels.
+        Position and errors of dead reckoning where there is some, else position and velocity; with
+        the place that fixes are of, where their errors last, and behind them the errors of levels.
     belief : SumBelief or None
         None before the first measurement that it can start from.
     time_s : float
@@ -89,7 +95,7 @@ class KalmanStep:
         self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
         self.lasts = self.options.fix_lasting_m > 0
         # With a rate behind each coordinate north is the third component.
-        self.own = MOVING if state.layout.north == MOVING.north else POSITION
+        self.own = MOVING if state.layout.north == MOVING.north else RECKONED
         self.where = [self.layout.east, self.layout.north]
         self.moved_m, self.status = state.moved_m, state.status
         self.recent_nis = list(state.recent_nis)
@@ -121,7 +127,7 @@ class KalmanStep:
 
     def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
-        if self.own is POSITION:
+        if self.own is RECKONED:
             # With a velocity in the state, nothing but what is weighed tells of motion.
             self.reckoning, epoch, unused = self.reckoning.watched(epoch)
             self.unused += unused if self.belief is not None else []
@@ -151,25 +157,25 @@ class KalmanStep:
 
     def _own_motion(self, epoch: Epoch, elapsed_s: float) -> tuple[Motion, float]:
         """Return motion of the state without errors that last, and the distance travelled."""
-        size = self.own.size
-        transition, noise, shift = np.eye(size), np.zeros((size, size)), np.zeros(size)
+        motion, moved_m = at_rest(self.own), 0.0
         if self.belief is None:
             self._label(epoch, epoch.motion, Reason.NOT_STARTED)
-            return (transition, noise, shift), 0.0
+            return motion, 0.0
         if self.own is MOVING:
             if not elapsed_s > 0:
-                return (transition, noise, shift), 0.0
+                return motion, 0.0
             root = self.options.acceleration_mps_per_sqrt_s
             moving = constant_velocity(elapsed_s, root, noise="continuous")
-            return (moving.transition, moving.noise, shift), self._speed_mps() * elapsed_s
-        noise, moved_m = self.options.drift_m_per_sqrt_s**2 * elapsed_s * np.eye(2), 0.0
+            return (moving.transition, moving.noise, motion[2]), self._speed_mps() * elapsed_s
+        motion[1][self.where, self.where] = self.options.drift_m_per_sqrt_s**2 * elapsed_s
+        errors = self.belief.moments.mean[RECKONED.size - 2 : RECKONED.size]
         for step in epoch.motion:
-            self.reckoning, moved, spread, why = self.reckoning.moved(step, self.options)
+            self.reckoning, moved, why = self.reckoning.moved(step, self.options, errors)
             if why is not Reason.USED:
                 self._label(epoch, (step,), why)
-            shift, noise = shift + moved, noise + spread
+            motion = after_each_other(motion, moved)
             moved_m += abs(step.step_m) if isfinite(step.step_m) else 0.0
-        return (transition, noise, shift), moved_m
+        return motion, moved_m
 
     def _speed_mps(self) -> float:
         """Return the estimated speed, at least that of a walk."""
@@ -231,6 +237,8 @@ class KalmanStep:
         """Return the first belief: at a fix, on a timing advance's circle, or about a site."""
         options, east, north = self.options, *self.where
         mean, deviation = np.zeros(self.own.size), np.full(self.own.size, options.speed_sd_mps)
+        if self.own is RECKONED:
+            deviation[-2:] = first_deviations(options)
         if fix is not None:
             mean[self.where] = fix.east_m, fix.north_m
             deviation[self.where] = options.start_sd_m
