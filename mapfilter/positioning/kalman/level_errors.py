@@ -164,15 +164,15 @@ class LastingLevels:
         return wide, spread, np.concatenate([shift, np.zeros(more)])
 
 
-def with_own_spread(method: Method, slots: CellSlots) -> Method:
-    """Return a method whose sigma points lie as far out as without the errors of levels.
+def with_own_spread(method: Method, errors: int) -> Method:
+    """Return a method whose sigma points lie as far out as without so many errors that last.
 
-    Levels are linear in these, and the columns of the Cholesky factor that move the position are
-    the first ones: more components need no points that are farther out.
+    Levels are linear in these, or do not depend on them, and the columns of the Cholesky factor
+    that move the position are the first ones: more components need no points that are farther out.
     """
-    if method.sigma is None or not slots.size:
+    if method.sigma is None or not errors:
         return method
-    return replace(method, sigma=replace(method.sigma, kappa=method.sigma.kappa - slots.size))
+    return replace(method, sigma=replace(method.sigma, kappa=method.sigma.kappa - errors))
 
 
 def with_levels(layout: StateLayout, slots: CellSlots) -> StateLayout:

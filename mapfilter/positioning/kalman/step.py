@@ -91,11 +91,12 @@ class KalmanStep:
 
     def __init__(self, sites: SiteModels, method: Method, state: KalmanState) -> None:
         self.sites, self.options = sites, sites.options
-        self.method = with_own_spread(method, state.slots)
         self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
         self.lasts = self.options.fix_lasting_m > 0
         # With a rate behind each coordinate north is the third component.
         self.own = MOVING if state.layout.north == MOVING.north else RECKONED
+        reckoned = RECKONED.size - 2 if self.own is RECKONED else 0
+        self.method = with_own_spread(method, reckoned + state.slots.size)
         self.where = [self.layout.east, self.layout.north]
         self.moved_m, self.status = state.moved_m, state.status
         self.recent_nis = list(state.recent_nis)
