@@ -20,6 +20,8 @@ _FEWEST = 6
 _SHORTER, _LONGER = 0.6, 1.6
 _ALIKE, _MOSTLY = 1.2, 0.75
 _MOSTLY_UNKNOWN = 0.5
+_LEAST_STRAIGHT = 0.25
+"""Least share of pairs that are straight: of lines that are noise, one in ten or fewer."""
 _NAMED, _MOST_NAMED = 1.1, 2
 _REST_S, _REST_SHARE = 5.0, 0.1
 _STRAIGHT_RAD, _CORNER_RAD, _BACK_RAD = np.deg2rad(30.0), np.deg2rad(30.0), np.deg2rad(150.0)
@@ -212,7 +214,8 @@ def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Compl
     """Return pairs whose distance motion tells, and its moves.
 
     Moves have directions where most pairs bend by them as the positions do, or as a mirror image,
-    which has the same distances. Else they are lengths, and pairs are straight.
+    which has the same distances. Else they are lengths, and pairs are straight; there are none
+    where few are, as the lines are noise of positions then.
     """
     time_s, step_m = _column(motion, "time_s"), _known(motion, "step_m")
     heading_rad, unknown = _directions(motion)
@@ -223,7 +226,9 @@ def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Compl
     alike = known & (np.minimum(*off_rad) <= _AGREED_RAD)
     if alike.sum() >= max(_FEWEST, len(ways) / 2):
         return ways.where(alike), moved_m
-    return ways.where(np.abs(ways.turned_rad) <= _STRAIGHT_RAD), step_m.astype(np.complex128)
+    straight = np.abs(ways.turned_rad) <= _STRAIGHT_RAD
+    straight &= straight.sum() >= _LEAST_STRAIGHT * len(ways)
+    return ways.where(straight), step_m.astype(np.complex128)
 
 
 def _directions(motion: pd.DataFrame) -> tuple[Floats, Bools]:

@@ -12,7 +12,7 @@ from mapfilter._types import Bools, Complexes, Floats, Ints
 _USUAL_M, _SHORTEST_M, _LONGEST_M = 40.0, 25.0, 300.0
 _COVERED = 0.6
 _LONGEST_TIMES = 5.0
-_MOST, _FEWEST, _FEWER = 4096, 6, 1.4
+_FINEST, _FEWEST, _FEWER = 4096, 6, 1.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,9 @@ def stretches(places: pd.DataFrame, time_s: Floats, way_m: Floats) -> Stretches 
     if at_s.size <= _FEWEST or walked_m[-1] <= walked_m[0]:
         return None
     part = (walked_m - walked_m[0]) / (walked_m[-1] - walked_m[0])
-    parts = float(_MOST)
+    parts = float(_FINEST)
+    while parts < at_s.size:
+        parts *= _FEWER
     while parts >= _FEWEST:
         group = np.cumsum(np.diff(np.floor(parts * part), prepend=0.0) != 0)
         line_m, passed = np.diff(_means(place_m, group)), np.diff(_means(part, group).real)

@@ -30,33 +30,36 @@ def test_the_usual_errors():
 
 
 def test_cells_give_way_that_were_not_heard_within_the_memory():
-    heard = CellSlots.empty(3).hearing(["A", "B", "A"], 0.0, 300.0)
+    heard = CellSlots.empty(3).after_report(["A", "B", "A"], 0.0, 300.0)
     assert heard.slots.cells == ("A", "B", "")
     assert (heard.growth, heard.renewed) == ({"A": 1.0, "B": 1.0}, {0: 1.0, 1: 1.0})
-    heard = heard.slots.hearing(["C", "A"], 100.0, 300.0)
+    heard = heard.slots.after_report(["C", "A"], 100.0, 300.0)
     assert (heard.slots.cells, heard.renewed) == (("A", "B", "C"), {2: 1.0})
     # B was heard 299 m ago: D has no place.
-    heard = heard.slots.hearing(["D", "A"], 199.0, 300.0)
+    heard = heard.slots.after_report(["D", "A"], 199.0, 300.0)
     assert (heard.slots.cells, heard.renewed) == (("A", "B", "C"), {})
     assert heard.growth == {"D": 1.0, "A": 600 / 199}
     assert heard.slots.ago_m == {"A": 0.0, "B": 299.0, "C": 199.0, "D": 0.0}
     # B gives way, not C, which was heard later; D counts as if it had been heard once.
-    heard = heard.slots.hearing(["D", "E"], 100.0, 300.0)
+    heard = heard.slots.after_report(["D", "E"], 100.0, 300.0)
     assert (heard.slots.cells, heard.renewed) == (("A", "D", "C"), {1: 6.0})
     assert heard.slots.ago_m["B"] == 399.0
     # Of a report, no cell takes the place of another one.
-    heard = heard.slots.hearing(["E", "C", "D", "A"], 1e6, 300.0)
+    heard = heard.slots.after_report(["E", "C", "D", "A"], 1e6, 300.0)
     assert (heard.slots.cells, heard.renewed) == (("A", "D", "C"), {})
     assert heard.growth == dict.fromkeys("ECDA", 1.0)
-    heard = heard.slots.hearing(["E", "F", "G", "H"], 600.0, 300.0)
+    heard = heard.slots.after_report(["E", "F", "G", "H"], 600.0, 300.0)
     assert set(heard.slots.cells) == {"E", "F", "G"}
-    assert CellSlots.empty(0).hearing(["A"], 0.0, 300.0) == (CellSlots.empty(0), {}, {})
+    assert CellSlots.empty(0).after_report(["A"], 0.0, 300.0) == (CellSlots.empty(0), {}, {})
 
 
 def test_a_cell_that_is_heard_again_on_the_spot_tells_nothing():
-    heard = CellSlots.empty(1).hearing(["A", "B"], 0.0, 300.0)
-    heard = heard.slots.hearing(["A", "B"], 0.0, 300.0)
+    heard = CellSlots.empty(1).after_report(["A", "B"], 0.0, 300.0)
+    heard = heard.slots.after_report(["A", "B"], 0.0, 300.0)
     assert (heard.slots.cells, heard.growth["B"]) == (("A",), 6000.0)
+    # An error that lasts for less than that is another one each time.
+    heard = heard.slots.after_report(["A", "B"], 0.0, 1e-3)
+    assert heard.growth == {"A": 1.0, "B": 1.0}
 
 
 @given(
@@ -73,7 +76,7 @@ def test_slots_never_hold_a_cell_twice(reports):
     for names, moved_m in reports:
         at_m += moved_m
         before = slots
-        slots, growth, renewed = before.hearing(names, moved_m, 300.0)
+        slots, growth, renewed = before.after_report(names, moved_m, 300.0)
         held = [one for one in slots.cells if one]
         assert len(set(held)) == len(held)
         assert growth.keys() == set(names)

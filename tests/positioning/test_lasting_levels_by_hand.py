@@ -12,7 +12,7 @@ import pytest
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.gaussian import EKF
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
-from mapfilter.positioning.kalman.filter import KalmanTracker
+from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanTracker
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.radio.cells import Cell, CellPlan
 
@@ -47,7 +47,7 @@ class Oracle:
         sd[self.at] = options.start_sd_m
         sd[own], sd[own + 1 : -2] = options.level_offset_db, options.level_error_db
         sd[-2:] = options.fix_lasting_m
-        self.p, self.sd = np.diag(sd**2), sd
+        self.p, self.sd, self.past = np.diag(sd**2), sd, []
 
     def move(self, elapsed_s, steps):
         options, own = self.options, self.first
@@ -74,6 +74,7 @@ class Oracle:
         kept[-2:] = exp(-elapsed_s / options.fix_lasting_s)
         phi[range(own, self.n), range(own, self.n)] = kept[own:]
         q += np.diag((1 - kept**2) * self.sd**2)
+        self.past.append((self.x, self.p, phi, q, u))
         self.x, self.p = phi @ self.x + u, phi @ self.p @ phi.T + q
         self.moved_m += moved_m
 
@@ -114,13 +115,26 @@ class Oracle:
     def place(self):
         return self.x[self.at], self.p[np.ix_(self.at, self.at)]
 
+    def smoothed(self):
+        """Return means and covariances of the position, the last first (Rauch, Tung, Striebel)."""
+        x, p = self.x, self.p
+        found = [self.place]
+        for mean, covariance, phi, q, u in reversed(self.past):
+            ahead = phi @ covariance @ phi.T + q
+            # Where errors of fixes do not last, theirs is 0.
+            gain = covariance @ phi.T @ np.linalg.pinv(ahead, rcond=1e-13)
+            x = mean + gain @ (x - phi @ mean - u)
+            p = covariance + gain @ (p - ahead) @ gain.T
+            found.append((x[self.at], p[np.ix_(self.at, self.at)]))
+        return found
 
-def walked(plan, options, *, reckoned, hears, epochs, level_sd_db=6.0, fixes=(0,), fix_m2=100.0):
+
+def walked(oracle, smoother, hears, epochs, *, level_sd_db=6.0, fixes=(0,), fix_m2=100.0):
     """Yield the positions of filter and oracle after each epoch: means and covariances."""
-    rng = np.random.default_rng(5)
+    rng, reckoned = np.random.default_rng(5), oracle.reckoned
     kinds = ("serving", "neighbour", "gnss", *(["motion"] if reckoned else []))
-    tracker = KalmanTracker(SiteModels(plan, options), EKF)
-    state, oracle = tracker.begin(kinds), Oracle(plan, options, reckoned=reckoned)
+    tracker = KalmanTracker(SiteModels(oracle.plan, oracle.options), EKF)
+    state = tracker.begin(kinds)
     for k in range(epochs):
         steps = [(rng.uniform(3.0, 25.0), rng.uniform(-np.pi, np.pi))] if reckoned and k else []
         if k % 5 == 4:
@@ -145,41 +159,42 @@ def walked(plan, options, *, reckoned, hears, epochs, level_sd_db=6.0, fixes=(0,
         )
         motion = tuple(MotionStep(*step) for step in steps)
         epoch = Epoch(2.0 * k, motion, radio=rows, fix=fix)
-        state, found = tracker.step(state, epoch, rng)
-        yield (
-            np.array([found.fix.east_m, found.fix.north_m]),
-            found.fix.covariance_m2,
-            *oracle.place,
-        )
+        before, (state, found) = state, tracker.step(state, epoch, rng)
+        smoother.add(before, state)
+        place = np.array([found.fix.east_m, found.fix.north_m])
+        yield place, found.fix.covariance_m2, *oracle.place
 
 
 @pytest.mark.parametrize("reckoned", [True, False])
 @pytest.mark.parametrize("lasting_m", [0.0, 6.0])
 def test_walks_are_those_of_a_kalman_filter_with_an_error_for_every_cell(reckoned, lasting_m):
-    """Cells come, go and come back; none gives way."""
+    """Cells come, go and come back; none gives way. Smoothed ones are the same, too."""
     options = KalmanOptions(fix_lasting_m=lasting_m, start_sd_m=80.0)
+    oracle, smoother = Oracle(plan_of(12), options, reckoned=reckoned), KalmanSmoother()
 
     def hears(k):
         return [] if k % 4 == 3 else [(k + j) % 12 for j in range(1 + k % 3)]
 
-    for mean, covariance, expected, spread in walked(
-        plan_of(12), options, reckoned=reckoned, hears=hears, epochs=40, fixes=(0, 7, 8, 21)
-    ):
+    for mean, covariance, expected, spread in walked(oracle, smoother, hears, 40, fixes=(0, 7, 21)):
         np.testing.assert_allclose(mean, expected, rtol=0, atol=1e-7)
         np.testing.assert_allclose(covariance, spread, rtol=0, atol=1e-9 * np.trace(spread))
+    later = smoother.history.smoothed()[::-1]
+    for found, (expected, spread) in zip(later, oracle.smoothed(), strict=True):
+        at = smoother.where
+        np.testing.assert_allclose(found.mean[at], expected, rtol=0, atol=1e-6)
+        of_place = found.covariance[np.ix_(at, at)]
+        np.testing.assert_allclose(of_place, spread, rtol=0, atol=1e-8 * np.trace(spread))
 
 
 @pytest.mark.parametrize("count", [20, 40])
 def test_of_more_cells_than_are_kept_no_more_is_known_than_with_an_error_for_each(count):
     """Reports of one half and of the other in turn: what was forgotten is no news."""
-    options = KalmanOptions(start_sd_m=500.0)
+    oracle = Oracle(plan_of(count), KalmanOptions(start_sd_m=500.0), reckoned=True)
 
     def hears(k):
         return [i for i in range(count) if i % 2 == k % 2]
 
-    made = walked(
-        plan_of(count), options, reckoned=True, hears=hears, epochs=60, level_sd_db=0.0, fix_m2=4e4
-    )  # fmt: skip
+    made = walked(oracle, KalmanSmoother(), hears, 60, level_sd_db=0.0, fix_m2=4e4)
     for _, covariance, _, spread in made:
         assert np.linalg.eigvalsh(covariance - spread).min() > -1e-6
     # Hardly less, either.

@@ -191,6 +191,31 @@ def test_positions_that_are_wrong_for_a_part_of_the_log_blame_no_motion(
     assert motion_faults(motion, places) == {}
 
 
+@pytest.mark.parametrize(("sd_m", "white"), [(40.0, True), (80.0, False)])
+def test_positions_that_scatter_more_than_the_phone_moves_tell_nothing(sd_m, white):
+    """Lines between them are noise, of which some happen to be straight and of one length."""
+    for seed in range(50):
+        motion, truth = drive(seed)
+        places = fixes(truth, 0.0 if white else sd_m, seed)
+        if white:
+            off_m = np.random.default_rng(seed).normal(0, sd_m, (2, len(places)))
+            places["east_m"] += off_m[0]
+            places["north_m"] += off_m[1]
+        assert motion_faults(motion, places) == {}
+
+
+def test_a_drive_of_two_thousand_kilometres_is_checked_like_a_short_one():
+    time_s = np.arange(200_000.0)
+    turn = np.where(time_s % 10 == 5, np.pi / 2, 0.0) * np.where(time_s // 10 % 2 == 1, 1, -1)
+    heading = np.cumsum(turn)
+    east, north = (np.cumsum(10.0 * f(heading - turn / 2)) for f in (np.cos, np.sin))
+    truth = pd.DataFrame({"time_s": time_s, "east_m": east, "north_m": north})
+    motion = pd.DataFrame({"time_s": time_s, "step_m": 10.0, "heading_rad": np.nan})
+    assert motion_faults(motion.assign(turn_rad=turn), truth) == {}
+    wrong = motion.assign(turn_rad=-turn, step_m=36.0)
+    assert set(motion_faults(wrong, truth)) == {"turn_rad", "step_m"}
+
+
 @pytest.mark.parametrize("value", [0.0, np.nan])
 @pytest.mark.parametrize("period_s", [20.0, 400.0])
 def test_steps_of_a_dead_sensor_have_no_unit(value, period_s):

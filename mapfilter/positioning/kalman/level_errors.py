@@ -9,7 +9,7 @@ a tenth of the error. Here a level is
 
 with e common to all cells, e_c the cell's own, both first-order Gauss-Markov processes along the
 way (Gudmundson 1991; Bar-Shalom, Li & Kirubarajan 2001, sect. 8.2), and w noise. The state is
-extended by e and by the errors of a few cells. One that was heard within the memory of its error
+extended by e and by the errors of a few cells. One that was reported within the memory of its error
 keeps its place there; the error of a cell without a place is noise. Nothing that was forgotten
 counts again as if it were new: the variance of an error that is not kept grows so that the cell
 counts once over twice that distance.
@@ -38,7 +38,7 @@ LEAST_MOVED_M = 0.1
 """Shortest distance between two reports of one cell, for the growth of variances."""
 
 
-class Hearing(NamedTuple):
+class SlotUpdate(NamedTuple):
     """What a report changes.
 
     Parameters
@@ -47,7 +47,7 @@ class Hearing(NamedTuple):
         After the report.
     growth : mapping of str to float
         Of each cell reported, how many times as large the variance of its own error is where the
-        error was not kept; 1 for a cell that was not heard for long.
+        error was not kept; 1 for a cell that was not reported for long.
     renewed : mapping of int to float
         Slots that are another cell's now, and its growth.
     """
@@ -66,7 +66,7 @@ class CellSlots:
     cells : tuple of str
         Empty where there is none yet.
     ago_m : mapping of str to float
-        Distance travelled since each cell was heard, of those whose errors are still alike.
+        Distance travelled since each cell was reported, of those whose errors are still alike.
     """
 
     cells: tuple[str, ...]
@@ -82,26 +82,28 @@ class CellSlots:
         """Components of the state: the common error and one for each slot, or none."""
         return len(self.cells) + 1 if self.cells else 0
 
-    def hearing(self, names: Sequence[str], moved_m: float, memory_m: float) -> Hearing:
+    def after_report(self, names: Sequence[str], moved_m: float, memory_m: float) -> SlotUpdate:
         """Return what a report changes, a distance after the one before.
 
-        Cells take the slots of those that were not heard within the memory, in their order.
+        Cells take the slots of those that were not reported within the memory, in their order.
 
         Examples
         --------
-        >>> heard = CellSlots.empty(2).hearing(["A", "B"], 0.0, 300.0)
-        >>> heard = heard.slots.hearing(["C", "B"], 100.0, 300.0)
-        >>> heard.slots.cells, heard.growth
+        >>> update = CellSlots.empty(2).after_report(["A", "B"], 0.0, 300.0)
+        >>> update = update.slots.after_report(["C", "B"], 100.0, 300.0)
+        >>> update.slots.cells, update.growth
         (('A', 'B'), {'C': 1.0, 'B': 6.0})
-        >>> heard.slots.hearing(["C", "B"], 200.0, 300.0).slots.cells
+        >>> update.slots.after_report(["C", "B"], 200.0, 300.0).slots.cells
         ('C', 'B')
         """
         if not self.cells:
-            return Hearing(self, {}, {})
+            return SlotUpdate(self, {}, {})
         once_m = _ONCE * memory_m
         before = ((name, far_m + moved_m) for name, far_m in self.ago_m.items())
         ago_m = {name: far_m for name, far_m in before if far_m < once_m}
-        growth = {name: once_m / max(ago_m.get(name, once_m), LEAST_MOVED_M) for name in names}
+        growth = {
+            name: max(once_m / max(ago_m.get(name, inf), LEAST_MOVED_M), 1.0) for name in names
+        }
         cells, renewed = list(self.cells), dict[int, float]()
         far = [slot for slot, name in enumerate(cells) if ago_m.get(name, inf) >= memory_m]
         free = sorted(
@@ -112,7 +114,9 @@ class CellSlots:
         coming = [name for name in growth if name not in cells]
         for name, slot in zip(coming, free, strict=False):
             cells[slot], renewed[slot] = name, growth[name]
-        return Hearing(CellSlots(tuple(cells), ago_m | dict.fromkeys(growth, 0.0)), growth, renewed)
+        return SlotUpdate(
+            CellSlots(tuple(cells), ago_m | dict.fromkeys(growth, 0.0)), growth, renewed
+        )
 
     def components(self, names: Sequence[str], layout: StateLayout) -> list[tuple[int, int]]:
         """Return the components of the common and the own error of each cell; -1 for none."""

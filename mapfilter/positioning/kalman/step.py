@@ -148,7 +148,7 @@ class KalmanStep:
             lasting = options.fix_lasting_m, options.fix_lasting_s
             motion = extended_motion(motion, self.own, *lasting, elapsed_s)
         if self.slots.size:
-            self.slots, self.growth, renewed = self.slots.hearing(
+            self.slots, self.growth, renewed = self.slots.after_report(
                 names, moved_m, options.level_memory_m
             )
             motion = options.lasting_levels.extended_motion(motion, self.slots, renewed, moved_m)
