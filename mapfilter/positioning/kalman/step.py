@@ -95,9 +95,10 @@ class KalmanStep:
         self.lasts = self.options.fix_lasting_m > 0
         # With a rate behind each coordinate north is the third component.
         self.own = MOVING if state.layout.north == MOVING.north else RECKONED
-        reckoned = RECKONED.size - 2 if self.own is RECKONED else 0
-        self.method = with_own_spread(method, reckoned + state.slots.size)
         self.where = [self.layout.east, self.layout.north]
+        # Behind these components are errors that last.
+        self.compared = self.own.size if self.own is MOVING else len(self.where)
+        self.method = with_own_spread(method, self.layout.size - self.compared)
         self.moved_m, self.status = state.moved_m, state.status
         self.recent_nis = list(state.recent_nis)
         self.motion, self.last_fix, self.slots = state.motion, state.last_fix, state.slots
@@ -276,9 +277,7 @@ class KalmanStep:
         """Update with a measurement; return whether that could be done."""
         if self.belief is None:
             raise AssertionError("started before it measures")
-        self.belief, info = self.belief.update(
-            compiled(model), reading, self.method, self.layout.size - self.slots.size
-        )
+        self.belief, info = self.belief.update(compiled(model), reading, self.method, self.compared)
         if info.used:
             self.recent_nis = [*self.recent_nis, info.nis / len(reading)][-_WINDOW:]
         return info.used
