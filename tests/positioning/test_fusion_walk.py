@@ -16,7 +16,9 @@ from mapfilter.positioning.kalman.filter import KalmanSmoother
 from mapfilter.positioning.kalman.level_errors import CellSlots, with_levels
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
+from mapfilter.positioning.kalman.reckoning import RECKONED
 from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
+from mapfilter.positioning.sensors.unmeasured import way_spread_m2
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32629"
@@ -39,13 +41,17 @@ NOTHING = SiteReadings((), (), (), (), ())
 
 
 def walk(*, reckoned=True, sites=SITES):
-    return KalmanStep(sites, EKF, KalmanState(POSITION if reckoned else MOVING))
+    return KalmanStep(sites, EKF, KalmanState(RECKONED if reckoned else MOVING))
 
 
 def started(reckoned=True, **more):
     made = walk(reckoned=reckoned, **more)
     size = made.layout.size
-    made.belief = SumBelief.start(np.full(size, 5.0), np.diag(np.full(size, 9.0)))
+    mean, variances = np.full(size, 5.0), np.full(size, 9.0)
+    if reckoned:
+        # Headings and lengths of steps have no errors that last.
+        mean[2:] = variances[2:] = 0.0
+    made.belief = SumBelief.start(mean, np.diag(variances))
     made.time_s = 10.0
     return made
 
@@ -58,13 +64,14 @@ def test_the_usual_options():
         "timing_sd_m": 200.0, "timing_memory_m": 500.0,
         "fix_sd_m": 10.0, "fix_lasting_m": 0.0, "fix_lasting_s": 30.0,
         "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0, "step_sd_m": 0.3,
-        "heading_sd_deg": 11.459155902616464, "drift_m_per_sqrt_s": 0.3, "start_sd_m": 1500.0,
+        "heading_sd_deg": 11.459155902616464, "bias_sd_deg": 10.0, "drift_deg_per_sqrt_m": 0.3,
+        "scale": 0.03, "drift_m_per_sqrt_s": 0.3, "start_sd_m": 1500.0,
         "start_parts": 21, "start_spacing_m": 600.0, "reach_m": 35_000.0,
         "converged_radius_m": 1000.0,
     }  # fmt: skip
     for name in asdict(KalmanOptions()):
         for value in (0, -1.0, inf, nan):
-            if value == 0 and name == "fix_lasting_m":
+            if value == 0 and name in ("fix_lasting_m", "drift_deg_per_sqrt_m"):
                 continue
             with pytest.raises(ConfigError, match=f"KalmanOptions, {name}: expected a .*r (>|in)"):
                 KalmanOptions(**{name: value})
@@ -80,7 +87,13 @@ def test_steps_shift_and_spread():
     steps = (MotionStep(2.0, 0.5), MotionStep(3.0, nan), MotionStep(nan, 0.1), MotionStep(1.0, 2.0))
     made.moved_m = 7.0
     transition, noise, shift = made._move(Epoch(14.0, steps), ())
-    np.testing.assert_array_equal(transition, np.eye(2))
+    np.testing.assert_array_equal(transition[:, :2], np.eye(4)[:, :2])
+    # A heading error of 1 rad shifts each step to its left, a scale of 1 doubles it.
+    lengths, headings = np.array([2.0, 1.0]), np.array([0.5, 2.0])
+    along = np.stack([np.cos(headings), np.sin(headings)])
+    left = np.stack([-along[1], along[0]])
+    np.testing.assert_allclose(transition[:2, 2:], np.stack([left @ lengths, along @ lengths], 1))
+    np.testing.assert_array_equal(transition[2:], np.eye(4)[2:])
     expected = 0.09 * 4.0 * np.eye(2)
     way = np.zeros(2)
     for length_m, heading in ((2.0, 0.5), (1.0, 2.0)):
@@ -89,13 +102,19 @@ def test_steps_shift_and_spread():
         way += length_m * along
         expected += 0.09 * np.outer(along, along)
         expected += (0.2 * length_m) ** 2 * np.outer(across, across)
-    # Without a direction it may have led anywhere.
-    expected += 9.0 * np.eye(2)
-    np.testing.assert_allclose(shift, way)
-    np.testing.assert_allclose(noise, expected)
+    # Without a direction it may have led anywhere: by the length of its step, in any direction.
+    expected += way_spread_m2(3.0) / 2 * np.eye(2)
+    assert way_spread_m2(3.0) == pytest.approx(9.0, rel=0.02)
+    np.testing.assert_allclose(shift, [*way, 0.0, 0.0])
+    drift = radians(0.3) ** 2
+    # The error of headings drifts: of the first step, the second one has its drift.
+    expected += drift * 2.0 * 1.0**2 * np.outer(left[:, 1], left[:, 1])
+    np.testing.assert_allclose(noise[:2, :2], expected)
+    np.testing.assert_allclose(noise[2, :2], drift * 2.0 * left[:, 1])
+    np.testing.assert_allclose(noise[2:, 2:], np.diag([drift * 3.0, 0.0]))
     assert made.moved_m == 13.0
-    np.testing.assert_allclose(made.belief.means[0], 5.0 + way)
-    np.testing.assert_allclose(made.belief.covariances[0], 9.0 * np.eye(2) + expected)
+    np.testing.assert_allclose(made.belief.means[0], [*(5.0 + way), 0.0, 0.0])
+    np.testing.assert_allclose(made.belief.covariances[0, :2, :2], 9.0 * np.eye(2) + expected)
     assert [one.reason for one in made.unused] == [Reason.NO_HEADING, Reason.NO_STEP]
     assert {(one.time_s, one.kind, one.what) for one in made.unused} == {(14.0, "motion", "")}
 
@@ -145,26 +164,28 @@ def test_where_a_belief_starts():
     np.testing.assert_array_equal(at_fix.means, [[1.0, 0.0, 2.0, 0.0]])
     np.testing.assert_array_equal(at_fix.covariances[0], np.diag([1500.0, 8, 1500, 8]) ** 2)
     about = walk()._start(None, SiteReadings(("B",), (-70.0,), (), (), ()))
-    assert about.means.shape == (441, 2)
-    np.testing.assert_allclose(about.weights @ about.means, [EAST + 2000.0, NORTH])
-    np.testing.assert_allclose(
-        about.moments.covariance, 1500.0**2 * np.eye(2), rtol=1e-6, atol=1e-3
+    assert about.means.shape == (441, 4)
+    np.testing.assert_allclose(about.weights @ about.means, [EAST + 2000.0, NORTH, 0.0, 0.0])
+    expected = np.diag([1500.0, 1500.0, radians(10.0), 0.03]) ** 2
+    np.testing.assert_allclose(about.moments.covariance, expected, rtol=1e-6, atol=1e-3)
+    np.testing.assert_array_equal(
+        about.covariances[:, 2:, 2:], np.tile(expected[2:, 2:], (441, 1, 1))
     )
     on_circle = walk()._start(None, SiteReadings(("B",), (-70.0,), ("A",), (2,), ()))
     radius = 2.5 * KalmanOptions().timing_step_m
     # 8 694 m around by 600 m.
-    assert on_circle.means.shape == (14, 2)
+    assert on_circle.means.shape == (14, 4)
     np.testing.assert_allclose(on_circle.weights, 1 / 14)
-    np.testing.assert_allclose(np.hypot(*(on_circle.means - [EAST, NORTH]).T), radius)
-    np.testing.assert_allclose(on_circle.means[0], [EAST + radius, NORTH])
+    np.testing.assert_allclose(np.hypot(*(on_circle.means[:, :2] - [EAST, NORTH]).T), radius)
+    np.testing.assert_allclose(on_circle.means[0], [EAST + radius, NORTH, 0.0, 0.0])
     assert on_circle.means[1, 1] > NORTH
-    np.testing.assert_allclose(on_circle.covariances[0], 600.0**2 * np.eye(2))
+    np.testing.assert_allclose(on_circle.covariances[0, :2, :2], 600.0**2 * np.eye(2))
     near = walk()._start(None, SiteReadings((), (), ("A",), (0,), ()))
     assert near.weights.size == 8
     far = walk()._start(None, SiteReadings((), (), ("A",), (60,), ()))
     assert far.weights.size == 64
     around = 0.7 * 2 * pi * 60.5 * KalmanOptions().timing_step_m / 64
-    np.testing.assert_allclose(far.covariances[0], around**2 * np.eye(2))
+    np.testing.assert_allclose(far.covariances[0, :2, :2], around**2 * np.eye(2))
 
 
 def test_errors_that_last_are_told_once():
@@ -186,7 +207,7 @@ def test_errors_of_more_cells_than_are_kept_are_noise():
 
     def radius_m(count):
         slots = CellSlots.empty(count)
-        made = KalmanStep(SITES, EKF, KalmanState(with_levels(POSITION, slots), slots=slots))
+        made = KalmanStep(SITES, EKF, KalmanState(with_levels(RECKONED, slots), slots=slots))
         heard = tuple(ReportRow("serving", name, None, None, -70.0, 0) for name in ("B", "A"))
         made.take(Epoch(0.0, radio=heard))
         return float(made._fix(0.0, Reason.USED).radii_m[2])
@@ -197,8 +218,8 @@ def test_errors_of_more_cells_than_are_kept_are_noise():
 
 def test_errors_of_cells_that_are_not_kept_last_longer_than_noise():
     """Of two reports 30 m apart: noise lasts for 40 m, an error of 300 m counts once in 600 m."""
-    made = KalmanStep(SITES, EKF, KalmanState(POSITION, slots=CellSlots.empty(1)))
-    made.layout = with_levels(POSITION, made.slots)
+    made = KalmanStep(SITES, EKF, KalmanState(RECKONED, slots=CellSlots.empty(1)))
+    made.layout = with_levels(RECKONED, made.slots)
     heard = (-70.0, -80.0)
     made._move(Epoch(0.0), ("B", "A"))
     given = SiteReadings(("B", "A"), heard, (), (), ())
@@ -215,7 +236,7 @@ def test_noise_of_fixes():
     def gain(**variances):
         made = started()
         made._update_fix(GnssFix(9.0, 5.0, **variances))
-        return (made.belief.means[0] - 5.0) / 4.0
+        return (made.belief.means[0, :2] - 5.0) / 4.0
 
     np.testing.assert_allclose(gain(), [9 / 109, 0.0], atol=1e-12)
     assert gain(var_east_m2=3.0, var_north_m2=1.0)[0] == pytest.approx(9 / 12)
@@ -266,7 +287,7 @@ def test_an_epoch_is_moved_and_then_measured():
     made.take(Epoch(1.0, (MotionStep(30.0, 0.0),)))
     assert made.moved_m == 30.0
     smoother.add(None, made.state)
-    np.testing.assert_array_equal(smoother.history.shifts[1], [30.0, 0.0])
+    np.testing.assert_array_equal(smoother.history.shifts[1], [30.0, 0.0, 0.0, 0.0])
     at = GnssFix(EAST + 700.0, NORTH, 4.0, 4.0)
     fix = made.take(Epoch(2.0, fix=at))
     assert (fix.status, fix.reason, made.moved_m) == (Status.CONVERGED, Reason.USED, 30.0)

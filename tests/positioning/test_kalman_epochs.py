@@ -8,12 +8,13 @@ import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import EKF
-from mapfilter.models.state import MOVING, POSITION
+from mapfilter.models.state import MOVING
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.place import belief_tail, place_of
+from mapfilter.positioning.kalman.reckoning import RECKONED
 from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
 from mapfilter.radio.cells import Cell, CellPlan
 
@@ -22,10 +23,13 @@ PLAN = CellPlan(CRS, (Cell("A", "A", EAST, NORTH, 30.0, None, 50.0, 1800.0, "omn
 OPTIONS = KalmanOptions(timing_step_m=100.0, timing_sd_m=1.0)
 
 
-def begun(options=OPTIONS, *, sd_m=50.0, east_m=2000.0, layout=POSITION, **more):
+def begun(options=OPTIONS, *, sd_m=50.0, east_m=2000.0, layout=RECKONED, **more):
     """A filter whose belief lies east of the site, at 10 s."""
-    place = {POSITION: (EAST + east_m, NORTH), MOVING: (EAST + east_m, 3.0, NORTH, 4.0)}[layout]
-    belief = SumBelief.start(place, np.diag(np.full(layout.size, sd_m**2)))
+    place, known = (EAST + east_m, 3.0, NORTH, 4.0), np.ones(4)
+    if layout is RECKONED:
+        # Headings and lengths of steps have no errors that last.
+        place, known = (EAST + east_m, NORTH, 0.0, 0.0), np.array([1.0, 1.0, 0.0, 0.0])
+    belief = SumBelief.start(place, np.diag(known * sd_m**2))
     given = {"belief": belief, "time_s": 10.0, "moved_m": inf} | more
     return KalmanStep(SiteModels(PLAN, options), EKF, KalmanState(layout, **given))
 
@@ -47,7 +51,7 @@ def test_a_timing_advance_stands_for_the_middle_of_its_step(steps, measured_m):
 
 
 def test_a_start_by_a_timing_advance_lies_all_around_the_site():
-    work = KalmanStep(SiteModels(PLAN, OPTIONS), EKF, KalmanState(POSITION))
+    work = KalmanStep(SiteModels(PLAN, OPTIONS), EKF, KalmanState(RECKONED))
     fix = work.take(Epoch(0.0, radio=timed(17.0)))
     assert (fix.east_m, fix.north_m) == pytest.approx((EAST, NORTH), abs=1.0)
     # Of 18 parts, as 11 km are cut into pieces of 600 m; half of a circle's square on each axis.
@@ -71,16 +75,16 @@ def test_the_sampling_of_steps_widens_a_belief(step_m, sampling_m2):
     along, across = np.array([cos(0.5), sin(0.5)]), np.array([-sin(0.5), cos(0.5)])
     expected = (2500.0 + sampling_m2) * np.eye(2) + 0.09 * np.outer(along, along)
     expected += (0.2 * step_m) ** 2 * np.outer(across, across)
-    np.testing.assert_allclose(work.belief.covariances[0], expected)
-    np.testing.assert_allclose(work.belief.means[0], [EAST + 2000.0, NORTH] + step_m * along)
+    np.testing.assert_allclose(work.belief.covariances[0, :2, :2], expected)
+    np.testing.assert_allclose(work.belief.means[0, :2], [EAST + 2000.0, NORTH] + step_m * along)
 
 
 def test_where_errors_of_fixes_last_their_place_is_a_part_of_the_state():
     lasting = replace(OPTIONS, fix_lasting_m=6.0, start_sd_m=100.0)
-    state = KalmanState(extended_layout(POSITION))
+    state = KalmanState(extended_layout(RECKONED))
     work = KalmanStep(SiteModels(PLAN, lasting), EKF, state)
     fix = work.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
-    assert work.belief.means.shape == (1, 4)
+    assert work.belief.means.shape == (1, 6)
     # 64 of the fix's 100 m² are white, the rest lasts; a start is known to 100 m.
     place_m2 = 10_000.0 + 36.0
     gain = 10_000.0 / (place_m2 + 64.0)
@@ -91,9 +95,9 @@ def test_where_errors_of_fixes_last_their_place_is_a_part_of_the_state():
     before = KalmanStep(SiteModels(PLAN, lasting), EKF, state)
     before.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
     old = before.belief.covariances[0]
-    off_m2 = old[2, 2] - 2 * old[0, 2] + old[0, 0]
+    off_m2 = old[4, 4] - 2 * old[0, 4] + old[0, 0]
     new = work.belief.covariances[0]
-    assert new[2, 2] - 2 * new[0, 2] + new[0, 0] == pytest.approx(
+    assert new[4, 4] - 2 * new[0, 4] + new[0, 0] == pytest.approx(
         kept**2 * off_m2 + (1 - kept**2) * 36.0
     )
 
@@ -112,7 +116,7 @@ def test_without_dead_reckoning_a_belief_goes_on_at_its_speed(seconds):
 
 def test_with_a_velocity_a_fix_that_repeats_itself_shows_a_standstill():
     same = GnssFix(EAST + 2000.0, NORTH, 25.0, 25.0, 0.0)
-    for layout, used in ((MOVING, True), (POSITION, False)):
+    for layout, used in ((MOVING, True), (RECKONED, False)):
         work = begun(layout=layout, last_fix=same)
         fix = work.take(Epoch(10.0, fix=same))
         assert (fix.reason is Reason.USED) is used
@@ -153,17 +157,17 @@ def test_place_and_tail_are_those_of_east_and_north():
     np.testing.assert_allclose(found["radii_m"], 10.0 * np.sqrt(-2 * np.log([0.5, 0.33, 0.05])))
     assert found["mass_50m"] == pytest.approx(1 - np.exp(-12.5))
     # Of several parts it is that about the leading one.
-    work = begun(belief=replace(belief, means=means[:, [0, 2]], covariances=np.tile(
-        100.0 * np.eye(2), (2, 1, 1))))  # fmt: skip
+    places, known = np.pad(means[:, [0, 2]], ((0, 0), (0, 2))), np.diag([100.0, 100.0, 1e-6, 1e-6])
+    work = begun(belief=replace(belief, means=places, covariances=np.array([known] * 2)))
     assert work.take(Epoch(10.0)).mass_50m == pytest.approx(0.75 * (1 - np.exp(-12.5)))
-    assert hypot(*work.belief.moments.mean) == pytest.approx(hypot(15.0, 25.0))
+    assert hypot(*work.belief.moments.mean[:2]) == pytest.approx(hypot(15.0, 25.0))
 
 
 def fixed(fix, **more):
     """The variances and the covariance of east and north after a fix, of a belief of 50 m."""
     work = begun(**more)
     work.take(Epoch(10.0, fix=fix))
-    return work.belief.covariances[0]
+    return work.belief.covariances[0, :2, :2]
 
 
 def joined(noise_m2):
@@ -191,13 +195,13 @@ def test_errors_of_a_fix_that_no_law_has_are_those_of_one_without(stated):
 def test_errors_of_fixes_last_however_small_they_are():
     """Of 4 m², which a fix states, a quarter lasts: 0.5 m on each axis, squared."""
     options = replace(OPTIONS, fix_lasting_m=0.5)
-    work = KalmanStep(SiteModels(PLAN, options), EKF, KalmanState(extended_layout(POSITION)))
+    work = KalmanStep(SiteModels(PLAN, options), EKF, KalmanState(extended_layout(RECKONED)))
     work.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 4.0, 4.0, 0.0)))
-    assert work.belief.means.shape == (1, 4)
+    assert work.belief.means.shape == (1, 6)
 
 
 def test_before_the_first_measurement_there_is_no_tail():
-    work = KalmanStep(SiteModels(PLAN, OPTIONS), EKF, KalmanState(POSITION))
+    work = KalmanStep(SiteModels(PLAN, OPTIONS), EKF, KalmanState(RECKONED))
     work.take(Epoch(0.0))
     assert work.tail is None
     assert begun().tail is not None
@@ -207,7 +211,7 @@ def test_without_a_time_before_no_time_has_passed():
     """So the belief, of 50 m, has not become wider by a random walk."""
     work = begun(time_s=nan)
     work.take(Epoch(10.0))
-    np.testing.assert_allclose(work.belief.covariances[0], 2500.0 * np.eye(2))
+    np.testing.assert_allclose(work.belief.covariances[0, :2, :2], 2500.0 * np.eye(2))
 
 
 def test_levels_that_are_not_used_are_told():

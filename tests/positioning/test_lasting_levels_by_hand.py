@@ -30,12 +30,13 @@ def plan_of(count):
 
 
 class Oracle:
-    """East, north (each with its rate), the common error, each cell's, and that of fixes."""
+    """East, north (each with its rate, or both with the errors of headings and of the scale), the
+    common error of levels, each cell's, and that of fixes."""
 
     def __init__(self, plan, options, *, reckoned):
         self.plan, self.options, self.reckoned = plan, options, reckoned
         self.at = [0, 1] if reckoned else [0, 2]
-        self.first = 2 if reckoned else 4
+        self.first = 4
         self.n = self.first + 1 + len(plan.cells) + 2
         self.moved_m = np.inf
 
@@ -44,6 +45,8 @@ class Oracle:
         self.x, sd = np.zeros(self.n), np.zeros(self.n)
         self.x[self.at] = east_m, north_m
         sd[:own] = options.speed_sd_mps
+        if self.reckoned:
+            sd[2:4] = np.radians(options.bias_sd_deg), options.scale
         sd[self.at] = options.start_sd_m
         sd[own], sd[own + 1 : -2] = options.level_offset_db, options.level_error_db
         sd[-2:] = options.fix_lasting_m
@@ -56,11 +59,17 @@ class Oracle:
             q[:2, :2] += options.drift_m_per_sqrt_s**2 * elapsed_s * np.eye(2)
             moved_m = 0.0
             for step_m, heading in steps:
-                turn = np.array([[np.cos(heading), -np.sin(heading)],
-                                 [np.sin(heading), np.cos(heading)]])  # fmt: skip
+                turned, longer = self.x[2:4]
+                angle = heading + turned
+                turn = np.array([[np.cos(angle), -np.sin(angle)],
+                                 [np.sin(angle), np.cos(angle)]])  # fmt: skip
                 cross_m = step_m * np.radians(options.heading_sd_deg)
                 q[:2, :2] += turn @ np.diag([options.step_sd_m**2, cross_m**2]) @ turn.T
-                u[:2] += step_m * turn[:, 0]
+                q[2, 2] += np.radians(options.drift_deg_per_sqrt_m) ** 2 * step_m
+                # The derivatives of step (1 + k) (cos, sin)(heading + b) at the mean.
+                phi[:2, 2] = step_m * (1 + longer) * turn[:, 1]
+                phi[:2, 3] = step_m * turn[:, 0]
+                u[:2] = step_m * (1 + longer) * turn[:, 0] - phi[:2, 2:4] @ self.x[2:4]
                 moved_m += step_m
         else:
             moved_m = max(float(np.hypot(self.x[1], self.x[3])), 1.5) * elapsed_s

@@ -19,7 +19,6 @@ from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.radio import name_of
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.fixes import FixTerm, refutation, widened
@@ -172,10 +171,10 @@ def test_an_area_holds_a_belief_of_which_more_than_half_lies_inside():
 
 
 def test_names_of_rows_and_the_spacing_before_the_start():
-    assert name_of(ReportRow("serving", "A", 60, 1, -70.0, 0)) == "A"
-    assert name_of(ReportRow("neighbour", None, 60, 1, -70.0, 0)) == "ARFCN 60, BSIC 1"
-    assert name_of(ReportRow("neighbour", None, 60, None, -70.0, 0)) == "ARFCN 60, BSIC unknown"
-    assert name_of(ReportRow("neighbour", None, None, None, -70.0, 0)) == ""
+    assert ReportRow("serving", "A", 60, 1, -70.0, 0).name == "A"
+    assert ReportRow("neighbour", None, 60, 1, -70.0, 0).name == "ARFCN 60, BSIC 1"
+    assert ReportRow("neighbour", None, 60, None, -70.0, 0).name == "ARFCN 60, BSIC unknown"
+    assert ReportRow("neighbour", None, None, None, -70.0, 0).name == ""
     assert BayesState().particle_spacing_m == 5.0
 
 
