@@ -27,7 +27,7 @@ from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.tracks.clock_steps import with_clocks_gone_on
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import check_clocks, check_start, check_steps, early_ends
-from mapfilter.tracks.motion_faults import motion_faults
+from mapfilter.tracks.motion_faults import compared_places, motion_faults
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
 from mapfilter.tracks.tables import tidy_table
@@ -262,9 +262,9 @@ def make_log(
         check_clocks(tables, called, faults)
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
-        places = next((tables[name] for name in ("truth", "gnss") if len(tables[name]) > 1), None)
         # Of values that are refused nothing is told besides.
-        if places is not None and not faults.found:
+        if not faults.found:
+            places = compared_places(tables["truth"], tables["gnss"])
             for column, wrong in motion_faults(tables["motion"], places).items():
                 fault = f", {column}: {wrong}"
                 # A log that was written and read has its notes of then.

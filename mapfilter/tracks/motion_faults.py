@@ -14,7 +14,7 @@ import pandas as pd
 from mapfilter._types import Bools, Complexes, Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.headings import heading_fault
-from mapfilter.tracks.stretches import Stretches, stretches
+from mapfilter.tracks.stretches import FEWEST_PLACES, Stretches, known_places, stretches
 
 _FEWEST = 6
 _SHORTER, _LONGER = 0.6, 1.6
@@ -68,6 +68,18 @@ def motion_faults(motion: pd.DataFrame, places: pd.DataFrame) -> dict[str, str]:
     checks = {"heading_rad": heading_fault, "turn_rad": turn_fault, "step_m": step_fault}
     found = {column: check(motion, places) for column, check in checks.items()}
     return {column: fault for column, fault in found.items() if fault}
+
+
+def compared_places(truth: pd.DataFrame, gnss: pd.DataFrame) -> pd.DataFrame:
+    """Return the positions that motion is compared with: fixes where ground truth has hardly any.
+
+    Parameters
+    ----------
+    truth, gnss : pandas.DataFrame
+        time_s, east_m and north_m.
+    """
+    few = len(known_places(truth)[0]) <= FEWEST_PLACES
+    return gnss if few and len(gnss) > len(truth) else truth
 
 
 def fault_notes(notes: Iterable[str], column: str) -> list[str]:

@@ -12,7 +12,9 @@ from mapfilter._types import Bools, Complexes, Floats, Ints
 _USUAL_M, _SHORTEST_M, _LONGEST_M = 40.0, 25.0, 300.0
 _COVERED = 0.6
 _LONGEST_TIMES = 5.0
-_FINEST, _FEWEST, _FEWER = 4096, 6, 1.4
+_FINEST, _COARSEST, _FEWER = 4096, 6, 1.4
+FEWEST_PLACES = 6
+"""With so many positions or fewer there are no stretches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,13 +123,13 @@ def stretches(places: pd.DataFrame, time_s: Floats, way_m: Floats) -> Stretches 
         within = (at_s >= time_s[0]) & (at_s <= time_s[-1])
     at_s, place_m = at_s[within], (east_m + 1j * north_m)[within]
     walked_m = np.interp(at_s, time_s, way_m) if at_s.size else at_s
-    if at_s.size <= _FEWEST or walked_m[-1] <= walked_m[0]:
+    if at_s.size <= FEWEST_PLACES or walked_m[-1] <= walked_m[0]:
         return None
     part = (walked_m - walked_m[0]) / (walked_m[-1] - walked_m[0])
     parts = float(_FINEST)
     while parts < at_s.size:
         parts *= _FEWER
-    while parts >= _FEWEST:
+    while parts >= _COARSEST:
         group = np.cumsum(np.diff(np.floor(parts * part), prepend=0.0) != 0)
         line_m, passed = np.diff(_means(place_m, group)), np.diff(_means(part, group).real)
         length_m = np.abs(line_m)

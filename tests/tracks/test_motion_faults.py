@@ -275,6 +275,16 @@ def test_a_log_has_notes_on_its_motion():
     assert named.notes[0].startswith("walk.csv, turn_rad: turns run clockwise")
 
 
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_ground_truth_of_a_few_points_leaves_the_comparison_to_fixes(count):
+    motion, truth = drive(8)
+    wrong = motion.assign(step_m=motion["step_m"] / FOOT_M)
+    points = truth.iloc[:: len(truth) // count][:count]
+    log = mf.make_log("EPSG:32635", motion=wrong, gnss=fixes(truth, 3.0), truth=points)
+    assert len(fault_notes(log.notes, "step_m")) == 1
+    assert mf.make_log("EPSG:32635", motion=wrong, truth=points).notes == ()
+
+
 def test_a_speed_that_is_no_walkers_is_not_blamed_on_feet_where_positions_say_otherwise():
     motion, truth = drive(9, speed_mps=1.3)
     heading = np.nancumsum(motion["turn_rad"])
