@@ -21,11 +21,12 @@ RNG = np.random.default_rng(0)
 
 @pytest.mark.parametrize(
     ("kinds", "lasting_m", "size", "north"),
-    [({"motion", "gnss"}, 0.0, 2, 1), ({"gnss"}, 0.0, 4, 2), ({"motion"}, 0.5, 4, 1),
+    [({"motion", "gnss"}, 0.0, 4, 1), ({"gnss"}, 0.0, 4, 2), ({"motion"}, 0.5, 6, 1),
      ({"serving"}, 0.5, 6, 2)],
 )  # fmt: skip
 def test_a_velocity_stands_in_for_dead_reckoning(kinds, lasting_m, size, north):
-    """And the place that fixes are of is a part of the state where their errors last."""
+    """Else errors of headings and steps, and where errors of fixes last, the place that they are
+    of, are parts of the state."""
     layout = KalmanFilter(fix_lasting_m=lasting_m).over_sites(PLAN).begin(kinds).layout
     assert (layout.size, layout.east, layout.north) == (size, 0, north)
 

@@ -205,7 +205,7 @@ def test_errors_that_are_known_change_nothing(method):
     model = with_errors(model, [(2, 3), (2, 4), (2, 5)])
     covariance = np.diag([2500.0, 3600.0, *[1e-12] * 4])
     mean, reading = np.array([250.0, -120.0, *[0.0] * 4]), np.array([-60.0, -75.0, -90.0])
-    own = with_own_spread(method, slots)
+    own = with_own_spread(method, slots.size)
     found, _ = SumBelief.start(mean, covariance).update(compiled(model), reading, own)
     alone = SumBelief.start(mean[:2], covariance[:2, :2])
     alone, _ = alone.update(compiled(small), reading, method)
@@ -215,8 +215,8 @@ def test_errors_that_are_known_change_nothing(method):
 
 def test_linear_methods_have_no_sigma_points():
     for method in (EKF, IEKF):
-        assert with_own_spread(method, CellSlots.empty(3)) is method
-    assert with_own_spread(UKF, CellSlots.empty(0)) is UKF
+        assert with_own_spread(method, 4) is method
+    assert with_own_spread(UKF, 0) is UKF
 
 
 def test_parts_at_one_place_fall_together_and_keep_their_spread():

@@ -1,0 +1,202 @@
+"""Dead reckoning of Kalman-type filters: errors that last, dead sensors, ways without headings."""
+
+from math import degrees, hypot, nan, radians
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.gaussian import EKF, UKF
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.kalman.filter import KalmanTracker
+from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
+from mapfilter.positioning.kalman.reckoning import RECKONED, Reckoning, after_each_other
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.unmeasured import way_spread_m2
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.radio.cells import Cell, CellPlan
+
+EAST, NORTH = 500_000.0, 4_600_000.0
+PLAN = CellPlan("EPSG:32629", (
+    Cell("A", "A", EAST, NORTH + 900.0, 30.0, None, 50.0, 1800.0, "omni"),
+))  # fmt: skip
+OPTIONS = KalmanOptions()
+
+
+def walk(rng, count, *, askew_deg=0.0, longer=1.0, speed_mps=1.4):
+    """Steps a second apart in streets with corners, as measured, and the true positions."""
+    heading = np.cumsum(np.where(rng.random(count) < 0.02, rng.choice([-1, 1], count), 0)) * 1.57
+    way = np.cumsum(speed_mps * np.exp(1j * heading))
+    measured = heading + radians(askew_deg) + rng.normal(0, 0.1, count)
+    lengths = longer * speed_mps * (1 + rng.normal(0, 0.05, count))
+    return [MotionStep(*one) for one in zip(lengths, measured, strict=True)], way
+
+
+def followed(epochs, method=EKF, kinds=("motion", "gnss", "serving")):
+    """Return position, 95 % radius and status after each epoch, and the reasons of unused rows."""
+    tracker = KalmanTracker(SiteModels(PLAN, OPTIONS), method)
+    state, rows, why, rng = tracker.begin(kinds), [], [], np.random.default_rng(0)
+    for epoch in epochs:
+        state, out = tracker.step(state, epoch, rng)
+        fix = out.fix
+        rows.append((complex(fix.east_m - EAST, fix.north_m - NORTH), fix.radii_m[2], fix.status))
+        why.append({one.reason for one in out.unused if one.kind != "serving"})
+    places, radii_m, statuses = zip(*rows, strict=True)
+    return np.array(places), np.array(radii_m), statuses, why, state
+
+
+def at(place, sd_m, rng):
+    east_m, north_m = place.real + rng.normal(0, sd_m), place.imag + rng.normal(0, sd_m)
+    return GnssFix(EAST + east_m, NORTH + north_m, sd_m**2, sd_m**2, 0.0)
+
+
+@pytest.mark.parametrize("method", [EKF, UKF], ids=lambda one: one.name)
+@pytest.mark.parametrize(("askew_deg", "longer"), [(0.0, 1.0), (-15.0, 1.05), (90.0, 0.95)])
+def test_positions_find_how_a_compass_is_mounted(method, askew_deg, longer):
+    """Then ten minutes without any are followed: 840 m, of which 15° alone are 220 m."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        steps, way = walk(rng, 900, askew_deg=askew_deg, longer=longer)
+        fixes = [at(place, 5.0, rng) if k < 300 else None for k, place in enumerate(way)]
+        made = [Epoch(float(k), (step,), fix=fixes[k]) for k, step in enumerate(steps)]
+        places, radii_m, statuses, _, state = followed(made, method)
+        off_m = np.abs(places - way)[330:]
+        assert off_m.max() < 60.0
+        assert (off_m <= radii_m[330:]).mean() > 0.95
+        assert radii_m[-1] < 120.0
+        assert set(statuses[330:]) == {Status.TRACKING}
+        turned_rad, scale = state.belief.moments.mean[2:4]
+        assert degrees(turned_rad) == pytest.approx(-askew_deg, abs=10.0)
+        assert scale == pytest.approx(1 / longer - 1, abs=0.05)
+
+
+def test_without_positions_the_radius_grows_as_headings_may_be_off():
+    """By 10° and 3 % of the way, along a straight one, and by a random walk of the heading."""
+    steps = [MotionStep(1.0, 0.3)] * 1000
+    first = Epoch(0.0, fix=GnssFix(EAST, NORTH, 1e-4, 1e-4, 0.0))
+    made = [first, *(Epoch(1e-6 * k, (step,)) for k, step in enumerate(steps, 1))]
+    _, _, _, _, state = followed(made)
+    covariance = state.belief.moments.covariance[:2, :2]
+    along, across = np.array([np.cos(0.3), np.sin(0.3)]), np.array([-np.sin(0.3), np.cos(0.3)])
+    assert along @ covariance @ along == pytest.approx(30.0**2 + 1000 * 0.09, rel=1e-3)
+    white = 1000 * 0.2**2
+    drift = radians(0.3) ** 2 * 1000**3 / 3
+    expected = (1000 * radians(10.0)) ** 2 + white + drift
+    assert across @ covariance @ across == pytest.approx(expected, rel=3e-3)
+
+
+def test_motion_is_linear_about_the_errors_found_so_far():
+    """Its derivatives are those of the turned and lengthened step."""
+    errors, step = np.array([0.7, -0.1]), MotionStep(3.0, 0.4)
+
+    def moved(turned, scale):
+        return 3.0 * (1 + scale) * np.array([np.cos(0.4 + turned), np.sin(0.4 + turned)])
+
+    _, (transition, _, shift), why = Reckoning().moved(step, OPTIONS, errors)
+    assert why is Reason.USED
+    np.testing.assert_allclose((transition @ [0, 0, *errors] + shift)[:2], moved(*errors))
+    for i, more in enumerate(1e-6 * np.eye(2)):
+        slope = (moved(*(errors + more)) - moved(*(errors - more))) / 2e-6
+        np.testing.assert_allclose(transition[:2, 2 + i], slope, rtol=1e-8)
+
+
+def test_two_motions_are_one():
+    rng = np.random.default_rng(3)
+    first, second = ((rng.normal(size=(4, 4)), np.diag(rng.random(4)), rng.normal(size=4))
+                     for _ in range(2))  # fmt: skip
+    transition, noise, shift = after_each_other(first, second)
+    state, covariance = rng.normal(size=4), np.diag(rng.random(4))
+    once, spread = first[0] @ state + first[2], first[0] @ covariance @ first[0].T + first[1]
+    np.testing.assert_allclose(transition @ state + shift, second[0] @ once + second[2])
+    np.testing.assert_allclose(
+        transition @ covariance @ transition.T + noise,
+        second[0] @ spread @ second[0].T + second[1],
+    )
+
+
+def test_a_way_without_headings_is_straight_for_a_while():
+    """Until a fix or a heading comes; a hundred steps are no random walk of a hundred."""
+    made, spread_m2 = Reckoning(), 0.0
+    for _ in range(100):
+        made, (_, noise, shift), why = made.moved(MotionStep(1.0, nan), OPTIONS, np.zeros(2))
+        spread_m2 += noise[0, 0] + noise[1, 1]
+        assert (why, shift.any()) == (Reason.NO_HEADING, False)
+    assert made.headless_m == 100.0
+    assert spread_m2 == pytest.approx(way_spread_m2(100.0))
+    assert spread_m2 > 100 * 30.0
+    assert made.moved(MotionStep(1.0, 0.0), OPTIONS, np.zeros(2))[0].headless_m == 0.0
+    fixed = made.fixed(7.0)
+    assert (fixed.headless_m, fixed.fixed_s) == (0.0, 7.0)
+
+
+@pytest.mark.parametrize("fault", ["paused", "ended", "no length"])
+def test_dead_sensors_do_not_leave_a_narrow_belief_behind(fault):
+    """One goes straight on for a minute while motion is not measured; then it is again."""
+    rng = np.random.default_rng(2)
+    steps = [MotionStep(1.4, 0.0 + rng.normal(0, 0.05)) for _ in range(300)]
+    way = 1.4 * np.arange(1, 301) + 0j
+    made = []
+    for k, step in enumerate(steps):
+        fix = at(way[k], 5.0, rng) if k < 150 else None
+        heard = (ReportRow("serving", "A", None, None, nan, 0),)
+        if 150 <= k < 210:
+            if fault == "paused":
+                continue
+            step = None if fault == "ended" else MotionStep(nan, 0.0)
+        made.append(Epoch(float(k), () if step is None else (step,), radio=heard, fix=fix))
+    places, radii_m, _, why, _ = followed(made)
+    expected = {"paused": Reason.MOTION_MISSING, "ended": Reason.MOTION_MISSING,
+                "no length": Reason.NO_STEP}[fault]  # fmt: skip
+    assert any(expected in one for one in why)
+    truth = np.array([way[round(epoch.time_s)] for epoch in made])
+    late = slice(-80, None)
+    off_m = np.abs(places - truth)[late]
+    assert off_m.min() > 40.0
+    assert (off_m <= radii_m[late]).all()
+    # All is well before.
+    assert np.abs(places - truth)[100:149].max() < 10.0
+    assert radii_m[149] < 12.0
+
+
+def test_one_step_that_nothing_can_have_gone_is_none():
+    rng = np.random.default_rng(2)
+    steps, way = walk(rng, 100)
+    steps[80] = MotionStep(5000.0, steps[80].heading_rad)
+    made = [Epoch(float(k), (step,)) for k, step in enumerate(steps)]
+    made[0] = Epoch(0.0, fix=at(way[0], 1.0, rng))
+    places, radii_m, _, why, _ = followed(made)
+    assert why[80] == {Reason.IMPOSSIBLE_STEP}
+    assert (np.abs(places - way) <= radii_m).mean() > 0.95
+    assert np.abs(places - way).max() < 30.0
+
+
+def test_who_may_have_left_is_lost_until_a_fix_comes():
+    rest = Rest(100.0, is_doubtful=True)
+    made = Reckoning(SensorWatch(rest=rest), fixed_s=90.0)
+    assert made.may_have_left
+    assert not Reckoning(SensorWatch(rest=rest), fixed_s=101.0).may_have_left
+    assert not Reckoning(SensorWatch(rest=Rest(100.0)), fixed_s=90.0).may_have_left
+    assert not Reckoning().may_have_left
+
+
+def test_a_report_that_stands_still_while_one_walks_is_not_used():
+    rng = np.random.default_rng(1)
+    made = []
+    for k in range(400):
+        level = -70.0 + (rng.normal(0, 4) if k < 100 else 0.5)
+        heard = tuple(
+            ReportRow("neighbour", name, None, None, level - i, 0) for i, name in enumerate("AAAA")
+        )
+        fix = GnssFix(EAST, NORTH, 25.0, 25.0, 0.0) if k == 0 else None
+        made.append(Epoch(float(k), (MotionStep(1.4, 0.01 * k),), radio=heard, fix=fix))
+    tracker = KalmanTracker(SiteModels(PLAN, OPTIONS), EKF)
+    state, stale = tracker.begin(("motion", "neighbour", "gnss")), 0
+    for epoch in made:
+        state, out = tracker.step(state, epoch, rng)
+        stale += any(one.reason is Reason.STALE_RADIO for one in out.unused)
+    assert stale > 100
+
+
+def test_the_layout_has_errors_behind_the_position():
+    assert (RECKONED.size, RECKONED.east, RECKONED.north) == (4, 0, 1)
+    assert hypot(*Reckoning().moved(MotionStep(5.0, 1.0), OPTIONS, np.zeros(2))[1][2][:2]) == 5.0
