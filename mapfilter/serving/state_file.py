@@ -44,7 +44,7 @@ from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.integrity import SampleTail
 
-FORMAT, VERSION = "mapfilter session", 10
+FORMAT, VERSION = "mapfilter session", 11
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
