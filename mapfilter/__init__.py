@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from mapfilter.api.located import locate as locate
     from mapfilter.api.located import score as score
     from mapfilter.api.logs import read_log as read_log
+    from mapfilter.api.pictures import save_picture as save_picture
     from mapfilter.api.reports import locate_reports as locate_reports
     from mapfilter.api.studies import Sweep as Sweep
     from mapfilter.api.studies import sweep as sweep
@@ -72,6 +73,7 @@ _NAMES = {
     "api.journeys": "simulate",
     "api.located": "Score Track locate score",
     "api.logs": "read_log",
+    "api.pictures": "save_picture",
     "api.reports": "locate_reports",
     "api.studies": "Sweep sweep",
     "database.build": "build",

@@ -44,7 +44,9 @@ def nothing_left(*folders: Path) -> Iterator[None]:
             removed = False
             if not folder.is_symlink():
                 for inner in (Path(root) for root, _, _ in os.walk(folder, topdown=False)):
-                    removed = _remove_empty(inner)
+                    # What is hidden, and empty for now, may be what another process begins.
+                    hidden = any(part.startswith(".") for part in inner.relative_to(folder).parts)
+                    removed = not hidden and _remove_empty(inner)
             # Parents of a folder that was not made are of others, and those that hold anything.
             if removed:
                 all(map(_remove_empty, parents))

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
+from mapfilter._alone import writing_alone
 from mapfilter._code import code_digest
 from mapfilter._inputs import read_input
 from mapfilter._io import ensure_writable_folder, read_json, write_json
@@ -141,6 +142,8 @@ class FinishedParts:
     When the block succeeds, folders of the same result that were left by other inputs or other code
     are removed, too.
 
+    No other process writes the same result meanwhile: its parts would be taken for left ones.
+
     ``digest`` gives that of everything that determines the parts, and is called once, when it is
     first needed. With ``keep`` parts that are there already are taken over, else removed; their
     folder and files are called after ``name``.
@@ -151,6 +154,7 @@ class FinishedParts:
     ) -> None:
         self._result, self._digest, self._name = result, digest, name
         self.keep = keep
+        self._alone = contextlib.ExitStack()
 
     @cached_property
     def folder(self) -> Path:
@@ -165,11 +169,16 @@ class FinishedParts:
 
     def __enter__(self) -> FinishedParts:
         ensure_writable_folder(self._result.parent)
+        self._alone.enter_context(writing_alone(self._result))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, *_: object
     ) -> None:
+        with self._alone:
+            self._leave(kind, error)
+
+    def _leave(self, kind: type[BaseException] | None, error: BaseException | None) -> None:
         # Without a use there is no folder, and the digest may take long.
         used = "folder" in vars(self)
         if used and (kind is None or issubclass(kind, InputError | OutputError)):

@@ -105,7 +105,7 @@ class Track:
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the track and the ground truth over the streets of the database.
 
-        A script saves the picture with ``axes.figure.savefig("track.png")``.
+        A script saves the picture with ``mf.save_picture(axes, "track.png")``.
 
         Parameters
         ----------

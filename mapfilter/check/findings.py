@@ -30,6 +30,8 @@ REMEDIES = {
     "azimuth-off-lobe": "Correct the azimuth, or take the raster that belongs to the cell.",
     "azimuth-radians": "Turn the azimuths into degrees.",
     "cell-without-raster": "Add the rasters, or take the cells out of the plan.",
+    "code-reused-nearby": "Correct carrier (arfcn) or code (bsic) of one of them, or take out "
+    "the cell that is no more; filters weigh a neighbour less that may be either.",
     "crs-mixed": "Set the CRS that the numbers were made in (column crs of the plan, rasters.crs, "
     "area.crs), or project the file.",
     "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS.",
@@ -42,6 +44,8 @@ REMEDIES = {
     "frequency-unit": "Give the frequency in MHz.",
     "half-pixel-shift": "Find out whether the exporter wrote centres for corners of pixels; if so, "
     "move the raster by half a pixel.",
+    "identity-repeated": "Correct mcc, mnc, lac or ci of all but one, or take out the cell "
+    "that is no more.",
     "identical-rasters": "Export the raster of each cell anew; one was copied over the other.",
     "journeys-disagree": "Look at the cell; mapfilter learn proposes a patch with the evidence.",
     "journeys-off-map": "Add the way to the map; mapfilter learn proposes a patch.",
@@ -80,6 +84,7 @@ REMEDIES = {
     "plan-invalid": "Correct the field.",
     "quantity-unknown": "Set rasters.quantity: level (dBm) or loss (dB).",
     "raster-constant": "Export the raster anew.",
+    "raster-displaced": "Export the raster anew, or correct the corner in its header.",
     "raster-empty": "Export the raster anew, or take the cell out.",
     "raster-upside-down": "Write row 0 in the north and column 0 in the west.",
     "plan-columns": "Name the columns that are of use in [cells.columns].",

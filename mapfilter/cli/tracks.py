@@ -206,7 +206,7 @@ def replay(
     # What draws starts before the imports below, which take as long as its own.
     with nullcontext() if undrawn(config, settings or ()) else drawer_process() as drawers:
         from mapfilter.config.load import load_config
-        from mapfilter.workflows.replay import run_replay
+        from mapfilter.workflows.replay import run_replay, unnamed_database
         from mapfilter.workflows.replayed import replay_figures
 
         given = seeded(settings, seed, "journeys.seed")
@@ -238,6 +238,9 @@ def replay(
                 {"--declination": declination, "--step-length": step_length}, "track.steps = false"
             )
         check_custom_filter(loaded)
+        # With a configuration it is the one that `build` makes of the same file.
+        if config is None and (taken := unnamed_database(loaded)) is not None:
+            print_message(f"no --db: the database is {taken}")
         folder = (out or loaded.output.dir / "replay").absolute()
         with progress_bar("replay") as progress:
             result = run_replay(

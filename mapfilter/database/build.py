@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._alone import writing_alone
 from mapfilter._arguments import (
     FUNCTION,
     PATH,
@@ -26,7 +27,7 @@ from mapfilter._arguments import (
     executor_argument,
     items,
 )
-from mapfilter._io import atomic_dir
+from mapfilter._io import atomic_dir, ensure_writable_folder
 from mapfilter._parallel import Progress, SerialExecutor
 from mapfilter._resume import FinishedParts
 from mapfilter.database.build_job import BuildJob
@@ -137,7 +138,8 @@ def build(
         Rasters and plan hold different cells, rasters and roads do not align or overlap, a
         parameter is out of range, or no point has a level above the floor.
     OutputError
-        The folder cannot be written, or holds other files than a database.
+        The folder cannot be written, holds other files than a database, or another build is
+        writing it.
     ConfigError
         An argument is of another type.
     """
@@ -225,7 +227,8 @@ def build_roads(
     windows = [w for w in tile_windows(lattice, tile_px) if source.holds(lattice.window(*w))]
     check_database_replaceable(out)
     parameters = {"margin_db": MARGIN_DB, "floor_dbm": FLOOR_DBM, "tile_px": tile_px}
-    with atomic_dir(out) as folder:
+    ensure_writable_folder(out.parent)
+    with writing_alone(out), atomic_dir(out) as folder:
         tiles = (roads_tile(source.part(lattice.window(*window)), lattice) for window in windows)
         written = write_parts(folder, lattice.crs, (), tiles, len(windows), progress=progress)
         if written.points == 0:

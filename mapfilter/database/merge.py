@@ -16,6 +16,7 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
 from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.measured import MeasuredParts, merged_parts
+from mapfilter.database.merge_notes import names_apart
 from mapfilter.database.parquet import Window, WindowReader, point_geometry
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -46,7 +47,8 @@ def merge(
     Within its area a later database overrides earlier ones for all cells in its cell table. So new
     cells or areas are added, and rebuilt ones replace the older ones, without building the rest
     again. Databases of the same inputs but for cells or area give, merged, the parts that one
-    build of all would have given. Of a cell in several cell tables the last entry is kept. What
+    build of all would have given. Of a cell in several cell tables the last entry is kept
+    (:func:`mapfilter.database.merge_notes.merge_notes` tells which differ). What
     surveys measured is kept where all of the databases have it.
 
     Parameters
@@ -79,8 +81,10 @@ def merge(
     ]
     out = Path(out)
     check_database_replaceable(out)
+    names = names_apart([database.path for database in databases])
     inputs = tuple(
-        InputFile("database", database.path.name, database.generation) for database in databases
+        InputFile("database", name, database.generation)
+        for name, database in zip(names, databases, strict=True)
     )
     attribution = "; ".join(dict.fromkeys(filter(None, (d.attribution for d in databases))))
     with atomic_dir(out) as folder:

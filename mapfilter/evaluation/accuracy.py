@@ -184,7 +184,10 @@ def truth_notes(estimate: TrackEstimate, truth: Truth) -> tuple[str, ...]:
     inside = (estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1])
     if len(estimate) and not inside.any():
         own, its = (f"{one.time_s[0]:.0f} to {one.time_s[-1]:.0f} s" for one in (estimate, truth))
-        return (f"the ground truth ({its}) covers no epoch of the log ({own}): another clock?",)
+        return (
+            f"the ground truth ({its}) covers no epoch of the log ({own}): another "
+            "clock or time zone?",
+        )
     notes = []
     switch, told = estimate.converged_at, truth.tells(estimate.time_s)
     if switch is not None and not told[switch]:

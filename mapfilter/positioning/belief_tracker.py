@@ -21,6 +21,7 @@ from mapfilter.filters.contract import (
     checked_estimate,
     checked_pair,
 )
+from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
@@ -102,7 +103,14 @@ class BeliefTracker(Filter[TrackState]):
     def step(
         self, state: TrackState, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[TrackState, StepOutput]:
-        """Take one epoch: first move, then measure."""
+        """Take one epoch: first move, then measure.
+
+        Raises
+        ------
+        InputError
+            A value of the epoch is of another type or beyond its range.
+        """
+        check_epoch(epoch)
         cell, reason, unused = self._serving(epoch)
         belief, status, count = state.belief, state.status, state.hypotheses
         if belief is None:

@@ -17,6 +17,7 @@ from pyarrow.lib import ArrowException
 from mapfilter._arrow import open_parquet
 from mapfilter._inputs import json_value, open_input
 from mapfilter._io import atomic_file
+from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
@@ -129,43 +130,55 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
 
 
 def write_gpx(estimate: TrackEstimate, path: str | Path, name: str = "mapfilter") -> None:
-    """Write the located epochs as a GPX 1.1 track (lon/lat, WGS 84; times where known)."""
+    """Write the located epochs as a GPX 1.1 track (lon/lat, WGS 84; times where known).
+
+    Each stretch of located epochs is a segment.
+    """
     ElementTree.register_namespace("", _GPX)
     root = ElementTree.Element(f"{{{_GPX}}}gpx", version="1.1", creator="mapfilter")
     track = ElementTree.SubElement(root, f"{{{_GPX}}}trk")
     ElementTree.SubElement(track, f"{{{_GPX}}}name").text = name
-    segment = ElementTree.SubElement(track, f"{{{_GPX}}}trkseg")
-    located, lon, lat = _located_lonlat(estimate)
-    for index, x, y in zip(located, lon, lat, strict=True):
-        point = ElementTree.SubElement(segment, f"{{{_GPX}}}trkpt", lat=f"{y:.7f}", lon=f"{x:.7f}")
-        if np.isfinite(estimate.start_utc_s):
-            stamp = _utc_text(estimate.start_utc_s + float(estimate.time_s[index]))
-            ElementTree.SubElement(point, f"{{{_GPX}}}time").text = stamp
+    for located in _located_stretches(estimate):
+        segment = ElementTree.SubElement(track, f"{{{_GPX}}}trkseg")
+        lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
+        for index, x, y in zip(located.tolist(), lon.tolist(), lat.tolist(), strict=True):
+            place = {"lat": f"{y:.7f}", "lon": f"{x:.7f}"}
+            point = ElementTree.SubElement(segment, f"{{{_GPX}}}trkpt", place)
+            if np.isfinite(estimate.start_utc_s):
+                stamp = _utc_text(estimate.start_utc_s + float(estimate.time_s[index]))
+                ElementTree.SubElement(point, f"{{{_GPX}}}time").text = stamp
     with atomic_file(Path(path)) as temporary:
         ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
 
 
 def write_geojson(estimate: TrackEstimate, path: str | Path) -> None:
-    """Write the located epochs as GeoJSON points (lon/lat, WGS 84) and one line through them."""
-    located, lon, lat = _located_lonlat(estimate)
-    positions = [
-        [round(x, 7), round(y, 7)] for x, y in zip(lon.tolist(), lat.tolist(), strict=True)
-    ]
-    features = []
-    if len(positions) > 1:
-        features.append(_feature("LineString", positions, {"filter": estimate.filter}))
-    for index, position in zip(located.tolist(), positions, strict=True):
-        radius_m, level_m = float(estimate.radii_m[index, 2]), float(estimate.protection_m[index])
-        properties = {
-            "time_s": round(float(estimate.time_s[index]), 3),
-            "status": str(estimate.status[index]),
-            "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
-            "protection_m": round(level_m, 2) if np.isfinite(level_m) else None,
-        }
-        features.append(_feature("Point", position, properties))
+    """Write the located epochs as GeoJSON points (lon/lat, WGS 84), after a line for each stretch.
+
+    A stretch of a single epoch has no line.
+    """
+    lines, points = [], []
+    for located in _located_stretches(estimate):
+        lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
+        positions = [
+            [round(x, 7), round(y, 7)] for x, y in zip(lon.tolist(), lat.tolist(), strict=True)
+        ]
+        if len(positions) > 1:
+            lines.append(_feature("LineString", positions, {"filter": estimate.filter}))
+        for index, position in zip(located.tolist(), positions, strict=True):
+            points.append(_feature("Point", position, _point_properties(estimate, index)))
     with atomic_file(Path(path)) as temporary:
-        text = json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+        document = {"type": "FeatureCollection", "features": lines + points}
+        temporary.write_text(json.dumps(document, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _point_properties(estimate: TrackEstimate, index: int) -> dict[str, Any]:
+    radius_m, level_m = float(estimate.radii_m[index, 2]), float(estimate.protection_m[index])
+    return {
+        "time_s": round(float(estimate.time_s[index]), 3),
+        "status": str(estimate.status[index]),
+        "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
+        "protection_m": round(level_m, 2) if np.isfinite(level_m) else None,
+    }
 
 
 def _feature(kind: str, coordinates: Any, properties: dict[str, Any]) -> dict[str, Any]:
@@ -173,10 +186,16 @@ def _feature(kind: str, coordinates: Any, properties: dict[str, Any]) -> dict[st
     return {"type": "Feature", "geometry": geometry, "properties": properties}
 
 
-def _located_lonlat(estimate: TrackEstimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))
-    lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
-    return located, lon, lat
+def _located_stretches(estimate: TrackEstimate) -> list[Ints]:
+    """Return the epochs of each stretch in which a position is followed, in their order.
+
+    While a filter searches or is lost its position is no estimate of where the phone is.
+    """
+    followed = np.array([status.is_followed for status in estimate.status], dtype=bool)
+    followed &= np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m)
+    located = np.flatnonzero(followed)
+    stretches = np.split(located, np.flatnonzero(np.diff(located) > 1) + 1)
+    return [stretch for stretch in stretches if stretch.size]
 
 
 def _utc_text(utc_s: float) -> str:

@@ -41,7 +41,7 @@ def common_lattice(
         wanted_m, first.resolution_m
     ):
         return first, ()
-    lattice = _covering(lattices, wanted_m, str(files[0].path.parent))
+    lattice = _covering(files, wanted_m)
     notes = []
     if any(one.bounds_m != lattice.bounds_m for one in lattices):
         size = f"{lattice.rows} x {lattice.cols} pixels of {lattice.resolution_m:g} m"
@@ -106,8 +106,9 @@ def _alike(a_m: float, b_m: float) -> bool:
     return abs(a_m - b_m) <= 1e-6 * max(a_m, b_m)
 
 
-def _covering(lattices: Sequence[Lattice], side_m: float, where: str) -> Lattice:
+def _covering(files: Sequence[RasterFile], side_m: float) -> Lattice:
     """Return the lattice over all others, in step with most of those of its resolution."""
+    lattices = [file.lattice for file in files]
     alike = [one for one in lattices if _alike(one.resolution_m, side_m)]
     phases = [
         (round(one.west_m / side_m % 1, 3) % 1, round(one.north_m / side_m % 1, 3) % 1)
@@ -128,6 +129,8 @@ def _covering(lattices: Sequence[Lattice], side_m: float, where: str) -> Lattice
         expected = f"rasters that {_MOST_PX:.0e} pixels can cover"
         got = f"{(east - west) / 1000:.0f} km x {(north - south) / 1000:.0f} km at {side_m:g} m"
         hint = "a raster of another place, or a resolution in the wrong unit"
+        off_m = np.abs(bounds - np.median(bounds, axis=0)).max(axis=1)
+        where = f"{files[0].path.parent}, with {files[int(off_m.argmax())].path.name}"
         raise fail(InputError, where, expected, got, hint)
     west_m, north_m = origin_m[0] + left * side_m, origin_m[1] - top * side_m
     return Lattice(lattices[0].crs, float(west_m), float(north_m), side_m, rows, cols)

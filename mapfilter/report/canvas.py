@@ -12,10 +12,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -49,6 +51,12 @@ _DISTINCT = (
 )
 _TINTS = ((1.0, 0.5), (0.0, 0.35), (1.0, 0.72))
 """Grey level that is mixed in, and how much of it, from one round of the colours to the next."""
+
+_LETTERS_PT, _LEAST_LETTERS = 130.0, 12
+"""Points of type size times letters in an inch, of words and numbers in DejaVu Sans."""
+
+_BESIDE_IN = 0.6
+"""What the labels of the axes take of a figure's width, so that its middle is not theirs."""
 
 _GOLDEN, _ROOT_2, _ROOT_3 = (5**0.5 - 1) / 2, 2**0.5, 3**0.5
 """Irrational steps of hue, saturation and value from one further colour to the next."""
@@ -113,6 +121,23 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 def single_axes(given: Axes | None, width_in: float, height_in: float) -> Axes:
     """Return the axes given, or those of a new figure of a size in inches."""
     return new_figure(width_in, height_in).subplots() if given is None else given
+
+
+def letters_in(width_in: float, size_pt: float) -> int:
+    """Return about how many letters of running text fit into a width, at least a word's."""
+    return max(int(_LETTERS_PT * width_in / size_pt), _LEAST_LETTERS)
+
+
+def wrapped_title(axes: Axes, text: str) -> str:
+    """Return a title in as many lines as it needs over the axes; see :func:`letters_in`.
+
+    Over the only axes of a figure it may be as wide as that, otherwise as the axes.
+    """
+    figure = figure_of(axes)
+    alone = len(figure.axes) == 1
+    own_in = axes.get_window_extent().width / figure.dpi
+    room_in = figure.get_figwidth() - _BESIDE_IN if alone else own_in
+    return fill(text, letters_in(room_in, rcParams["axes.titlesize"]))
 
 
 def figure_of(axes: Axes) -> Figure:

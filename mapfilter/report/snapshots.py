@@ -33,13 +33,14 @@ from mapfilter.report.canvas import (
     Look,
     bottom_legend,
     grouped,
+    letters_in,
     mark,
     new_figure,
     styled,
 )
 from mapfilter.report.ground import MAX_PANELS as MAX_PANELS
 
-_PANEL_IN = 4.0
+_PANEL_IN, _TITLE_PT, _LINE_IN = 4.0, 10.5, 0.2
 _SIDE_M, _MOST_SQUARES = 10.0, 200
 _DECADES, _FAINTEST = 2.0, 0.12
 _FAINTEST_CANDIDATE = 0.15
@@ -149,6 +150,8 @@ def _plot_panels(
     height_in = rows * (map_height_in(base, _PANEL_IN) + 0.45) + (1.15 if note else 0.9)
     if columns == 1:
         height_in += 0.7  # the legend takes several lines
+    titles = _titles(snapshots, truth, text)
+    height_in += rows * _LINE_IN * ("\n" in titles[0])
     figure = new_figure(columns * (_PANEL_IN + 0.1) + 0.6, height_in)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for index, (axes, snapshot) in enumerate(zip(panels, snapshots, strict=False)):
@@ -156,12 +159,7 @@ def _plot_panels(
         frame = draw_base(axes, base, scale_bar=index == 0, north_at=north_at)
         draw(axes, frame, snapshot)
         _draw_path(axes, frame, snapshot, truth)
-        travelled = f"{snapshot.travelled_m:.0f} m by dead reckoning"
-        if truth is not None:
-            travelled = f"{float(truth.distance_at(snapshot.time_s)):.0f} m travelled"
-        letter = f"({'abcdef'[index]}) " if count > 1 else ""
-        title = f"{letter}{travelled}, {text(snapshot)}"
-        axes.set_title(title, fontsize=10.5)
+        axes.set_title(titles[index], fontsize=_TITLE_PT)
         if index % columns:
             axes.set_ylabel("")
             axes.set_yticklabels([])
@@ -182,6 +180,22 @@ def _plot_panels(
     line = int(_LETTERS_PER_IN * figure.get_figwidth())
     bottom_legend(figure, len(handles), handles, fill(note, line) or None)
     return figure
+
+
+def _titles(
+    snapshots: Sequence[Snapshot], truth: Truth | None, text: Callable[[Snapshot], str]
+) -> list[str]:
+    """Return the titles of the panels; all have two lines where one is too long for its panel."""
+    titles = []
+    for letter, snapshot in zip("abcdef", snapshots, strict=False):
+        travelled = f"{snapshot.travelled_m:.0f} m by dead reckoning"
+        if truth is not None:
+            travelled = f"{float(truth.distance_at(snapshot.time_s)):.0f} m travelled"
+        panel = f"({letter}) " if len(snapshots) > 1 else ""
+        titles.append((f"{panel}{travelled},", text(snapshot)))
+    most = letters_in(_PANEL_IN, _TITLE_PT)
+    long = any(len(" ".join(parts)) > most for parts in titles)
+    return [("\n" if long else " ").join(parts) for parts in titles]
 
 
 def story_bounds_m(snapshots: Sequence[Snapshot], truth: Truth | None, whole_m: Bounds) -> Bounds:

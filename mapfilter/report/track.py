@@ -29,6 +29,7 @@ from mapfilter.report.canvas import (
     mark,
     new_figure,
     styled,
+    wrapped_title,
 )
 
 _MAP_IN = 8.0
@@ -104,7 +105,8 @@ def plot_track(
             axes.plot(*ends, color=VERMILLION, linewidth=1.4, zorder=9)
             rim = Look(facecolors="white", edgecolors=GREEN, linewidths=2.0, zorder=9.5)
             axes.scatter(true_x, true_y, s=70, marker="D", label="truth at the switch", **rim)
-    axes.set_title(title or f"{estimate.filter} filter: {_outcome(estimate, truth)}")
+    words = title or f"{estimate.filter} filter: {_outcome(estimate, truth)}"
+    axes.set_title(wrapped_title(axes, words))
     attribute(axes, shown)
     legend(axes, ax, 3)
     return axes

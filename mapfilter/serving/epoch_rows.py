@@ -34,6 +34,10 @@ from mapfilter.tracks.schema import (
 MOST_EPOCHS = 300
 """Epochs in one request; more are sent one request after another."""
 
+MOST_GAP_S = 86_400.0
+"""Seconds from one epoch of a session to the next; a filter knows nothing any more after a day."""
+
+_OF_GAP = "another clock, or milliseconds for s; after a longer pause begin a new session"
 _MOST_ROWS = 200
 _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
@@ -62,7 +66,8 @@ def read_epochs(
     Raises
     ------
     RequestError
-        With all faults together; or the first epoch is not later than the last one (409).
+        With all faults together, such as an epoch more than a day after the one before; or the
+        first epoch is not later than the last one (409).
     """
     faults = Faults()
     check_keys(document, ("epochs",), "body", faults)
@@ -80,8 +85,14 @@ def read_epochs(
             for name in _TABLES
         }
         if time_s is not None:
-            if found and time_s <= found[-1].time_s:
-                expected = f"later than {found[-1].time_s:g}, the epoch before"
+            last_s = found[-1].time_s if found else after_s
+            if time_s - last_s > MOST_GAP_S:
+                # All later epochs would come too early after it.
+                expected = f"at most {MOST_GAP_S:g} s later than {last_s:.10g}, the epoch before"
+                faults.add(f"{where}.time_s", expected, f"{time_s:.10g}", _OF_GAP)
+                continue
+            if found and time_s <= last_s:
+                expected = f"later than {last_s:g}, the epoch before"
                 faults.add(f"{where}.time_s", expected, f"{time_s:g}", "epochs out of order")
             found.append(make_epoch(time_s, rows))
     if faults.found:

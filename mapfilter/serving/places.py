@@ -8,27 +8,22 @@ from typing import Any
 import numpy as np
 
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice, project, unproject
+from mapfilter.geodesy import Lattice, project
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.known_start import ELSEWHERE, MOST_SD_M, check_place
 from mapfilter.serving.documents import RequestError, check_keys, number
 from mapfilter.tracks.misplaced import (
     check_near,
     degrees_for_metres,
     misplaced_by,
     nearest_m,
-    outside_m,
 )
 
-START_REACH_M, START_REACH_SD = 500.0, 5.0
-"""A start is of this area up to so far outside, or up to so many of its own deviations."""
-
-_RANGES = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": 1e5}
+_RANGES = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": MOST_SD_M}
 _MOST_DEG = 180.0
 _FAR_M = 100_000.0
 """No cells of an area are heard so far outside; nearer, its mirror image may be a true place."""
-
-_ELSEWHERE = "a position of another area or zone"
 
 
 def start_of(
@@ -57,14 +52,9 @@ def start_of(
     if not (np.isfinite(east_m).all() and np.isfinite(north_m).all()):
         faults.add("start", f"a place that {lattice.crs} covers", "one beyond it")
         return None
-    reach_m = max(START_REACH_M, START_REACH_SD * sd_m)
-    away_m = float(outside_m(east_m, north_m, lattice)[0])
-    if away_m > reach_m:
-        expected = f"a place in the area ({_box_deg(lattice)}), or at most {reach_m:.0f} m outside"
-        got = f"latitude {lat_deg:g}, longitude {lon_deg:g}, {away_m / 1000:.1f} km outside"
-        faults.add("start", expected, got, misplaced_by(east_m, north_m, lattice) or _ELSEWHERE)
-        return None
-    return float(east_m[0]), float(north_m[0]), sd_m
+    place = float(east_m[0]), float(north_m[0]), sd_m
+    check_place("start", *place, lattice, faults, f"latitude {lat_deg:g}, longitude {lon_deg:g}")
+    return place if len(faults.found) == before else None
 
 
 def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -> None:
@@ -92,7 +82,7 @@ def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -
     mistake = mistake or degrees_for_metres(east_m, north_m, lattice)
     if not mistake and before.belief is None:
         if not any(one.radio for one in epochs):
-            mistake = _ELSEWHERE
+            mistake = ELSEWHERE
         elif nearest_m(east_m, north_m, lattice) > _FAR_M:
             mistake = misplaced_by(east_m, north_m, lattice)
     if not mistake:
@@ -101,10 +91,3 @@ def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -
     check_near(where, east_m, north_m, lattice, faults, mistake)
     if faults.found:
         raise RequestError.of(InputError(tuple(faults.found)))
-
-
-def _box_deg(lattice: Lattice) -> str:
-    west, south, east, north = lattice.bounds_m
-    lon_deg, lat_deg = unproject(lattice.crs, [west, west, east, east], [south, north] * 2)
-    latitudes = f"latitude {lat_deg.min():.4f} to {lat_deg.max():.4f}"
-    return f"{latitudes}, longitude {lon_deg.min():.4f} to {lon_deg.max():.4f}"

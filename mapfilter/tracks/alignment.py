@@ -87,7 +87,10 @@ def _apart(recordings: Sequence[Recording], offsets_s: Sequence[float]) -> list[
     if not gaps_s:
         return []
     hours = max(gaps_s) / 3600
-    return [f"recordings lie up to {hours:.1f} h apart; of several journeys convert each alone"]
+    return [
+        f"recordings lie up to {hours:.1f} h apart (likely: a wrong time zone; or several "
+        "journeys: convert each alone)"
+    ]
 
 
 def _reference(recordings: Sequence[Recording]) -> int:

@@ -36,7 +36,7 @@ class OpenOptions:
     zone : str
         Zone of local times that state none.
     columns : mapping of str to str
-        For plain CSV: column of each field.
+        For plain CSV: column of each field. Of several files each has those of them that are in it.
     combine : CombineOptions
     """
 
@@ -147,17 +147,32 @@ def read_recordings(
         parse_zone(options.zone)
     inner, notes = _expanded(paths)
     truth = [path for path in options.combine.truth if path not in inner]
-    reading = ReadOptions(options.zone, options.columns)
+    files = [*dict.fromkeys(inner), *dict.fromkeys(truth)]
+    reading = ReadOptions(options.zone, options.columns, shared=len(files) > 1)
     recordings, faults = [], Faults()
-    for path in [*dict.fromkeys(inner), *dict.fromkeys(truth)]:
+    for path in files:
         try:
             recordings.append(read_recording(path, options.format, reading))
         except ConfigError:
             raise
         except MapfilterError as error:
             faults.found.extend(error.faults)
+    if reading.shared and not faults.found:
+        _check_named(recordings, options.columns, faults)
     faults.raise_if_any(InputError)
     return recordings, notes
+
+
+def _check_named(
+    recordings: Sequence[Recording], columns: Mapping[str, str], faults: Faults
+) -> None:
+    """Note columns that none of several recordings has."""
+    names = ", ".join(one.path.name for one in recordings)
+    named = {name for one in recordings for name in one.named}
+    for name, column in columns.items():
+        if name not in named:
+            expected = f"a column {column} for {name} in a plain CSV among them"
+            faults.add(names, expected, "none", "misspelt; files of other formats need no columns")
 
 
 def with_measured(options: CombineOptions, paths: Sequence[Path]) -> CombineOptions:

@@ -33,7 +33,10 @@ _TURN_RAD = 2 * pi + 1e-9
 _LARGEST_ID = nextafter(2.0**63, 0.0)
 _DEGREES, _SIGMA = "degrees given for radians", "metres in 0.001..100000"
 _NANOSECONDS = "nanoseconds given for metres"
-_RANGE_HINT = "kilometres or seconds for metres, or a leap second or week in the times"
+_RANGE_HINT = (
+    "kilometres or seconds for metres, or times that are off by a leap second, by hours (time "
+    "zone) or by weeks"
+)
 
 
 @dataclass(frozen=True, slots=True)

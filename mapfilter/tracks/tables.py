@@ -16,6 +16,7 @@ from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.identities import LIMITS
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
+from mapfilter.tracks.cut_times import cut_times
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SATELLITE, SCHEMA, SERVING, Column
 
 _LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
@@ -175,6 +176,8 @@ def _check_milliseconds(table: str, rows: pd.DataFrame, found: TableFaults) -> N
 def _sorted_unique(
     table: pd.DataFrame, where: str, notes: tuple[str, ...]
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    if "step_m" in table and (cut := cut_times(table["time_s"].to_numpy())):
+        notes += (f"{where}: {cut}",)
     duplicate = _repeated(table)
     if duplicate.any():
         notes += (f"{where}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped",)

@@ -12,7 +12,9 @@ from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
+from mapfilter.check.extent_checks import check_extents
 from mapfilter.check.findings import CheckResult, Findings, Severity
+from mapfilter.check.identity_checks import check_identities
 from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
@@ -68,6 +70,8 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
     if area is not None and not placed:
         lattice = None
     plan = check.plan(lattice)
+    if plan is not None:
+        check_identities(plan, check.plan_name, findings)
     done(2)
     if rasters is not None and lattice is not None:
         check.check_rasters(rasters, plan)
@@ -211,6 +215,8 @@ class _Checks:
             # Antennas were located from the same levels, and may well stand outside.
             return
         outside = check_sites(plan, rasters.lattice, self.plan_name, findings)
+        # Where a raster lies elsewhere, it tells nothing of its site.
+        outside |= check_extents(rasters, plan, findings)
         if is_surveyed(rasters):
             # Measured along some ways only: without lobes, and without the plan's EIRP.
             return

@@ -11,6 +11,7 @@ from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
 from mapfilter.database.merge import merge
+from mapfilter.database.merge_notes import merge_notes
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
 
@@ -30,7 +31,8 @@ def run_merge(
         merged = merge(opened, out, without=without, progress=progress)
     points = int(merged.manifest["counts"]["points"])
     seconds = time.perf_counter() - began_s
-    return {"points": points, "cells": len(merged.cell_ids), "database": out, "seconds": seconds}
+    found = {"points": points, "cells": len(merged.cell_ids), "database": out, "seconds": seconds}
+    return {**found, "notes": merge_notes(opened)}
 
 
 def run_export(database: Path, to: Path) -> dict[str, Any]:

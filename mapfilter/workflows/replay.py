@@ -239,6 +239,14 @@ def _with_view(
     return replace(replayed, outputs=(*replayed.outputs, into / REPLAY_HTML))
 
 
+def unnamed_database(config: Config) -> Path | None:
+    """Return the database of a replay where neither an option nor the configuration names one."""
+    needs_none = isinstance(filter_choice(config.filter), KalmanFilter)
+    if needs_none or config.database.path is not None or not config.database_path.exists():
+        return None
+    return config.database_path
+
+
 def _database(config: Config, options: FilterOptions) -> RadioRouteDatabase | None:
     """Open the database, unless the filter only needs sites, or not even these."""
     stated = config.database.path is not None

@@ -184,3 +184,18 @@ def test_a_file_that_is_not_written_leaves_no_folder(tmp_path):
 def test_a_place_that_cannot_be_looked_at_is_left_to_what_writes(tmp_path):
     with nothing_left(tmp_path / ("a" * 300) / "b"):
         pass
+
+
+def test_what_another_process_begins_is_empty_for_now_and_stays(tmp_path):
+    hidden = tmp_path / "out" / ".database.partial-1-x" / "new"
+
+    def make_folders_and_fail():
+        hidden.mkdir(parents=True)
+        (tmp_path / "out" / ".database.tiles-1").mkdir()
+        (tmp_path / "out" / "empty").mkdir()
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"), nothing_left(tmp_path / "out"):
+        make_folders_and_fail()
+    assert hidden.is_dir()
+    assert names(tmp_path / "out") == [".database.partial-1-x", ".database.tiles-1"]

@@ -63,7 +63,7 @@ def test_the_ten_lines_of_the_readme_save_a_picture(demo, monkeypatch, capsys):
     (code,) = re.findall(r"```python\n(.+?)```", README, flags=re.DOTALL)
     assert len([line for line in code.splitlines() if line.strip()]) == 10
     exec(code, {})
-    (name,) = re.findall(r'savefig\("(.+?)"\)', code)
+    (name,) = re.findall(r'save_picture\(axes, "(.+?)"\)', code)
     with Image.open(folder / name) as picture:
         assert min(picture.size) > 500
     assert capsys.readouterr().out.startswith("Score: converged after ")

@@ -198,7 +198,7 @@ def test_what_the_truth_does_not_tell_is_noted():
             [(1000, 0, 0, C), (1200, 0, 0, T)],
             (
                 "the ground truth (0 to 151 s) covers no epoch of the log (1000 to 1200 s): "
-                "another clock?",
+                "another clock or time zone?",
             ),
         ),
     ):

@@ -1,7 +1,9 @@
 """What stands in the files of an estimate, besides what is read back."""
 
 import json
+from itertools import chain
 from math import nan
+from xml.etree import ElementTree
 
 import geopandas
 import numpy as np
@@ -18,9 +20,9 @@ from mapfilter.positioning.estimate_store import (
 )
 
 
-def fix(time_s, east_m, north_m):
+def fix(time_s, east_m, north_m, status=Status.TRACKING):
     covariance, radii_m = np.array([[4.0, 1.0], [1.0, 9.0]]), np.array([3.0, 4.5, 9.25])
-    return Fix(time_s, east_m, north_m, covariance, radii_m, Status.TRACKING, 1, 0.5, 0, nan,
+    return Fix(time_s, east_m, north_m, covariance, radii_m, status, 1, 0.5, 0, nan,
                Reason.USED)  # fmt: skip
 
 
@@ -55,9 +57,8 @@ def test_a_gpx_file_declares_itself_and_its_namespace(tmp_path, estimate):
 
 def test_coordinates_have_seven_decimals_which_is_a_centimetre(tmp_path, estimate):
     write_geojson(estimate, tmp_path / "one.geojson")
-    line, *points = json.loads((tmp_path / "one.geojson").read_text())["features"]
-    assert [one["geometry"]["coordinates"] for one in points] == line["geometry"]["coordinates"]
-    for place in line["geometry"]["coordinates"]:
+    points = json.loads((tmp_path / "one.geojson").read_text())["features"]
+    for place in (one["geometry"]["coordinates"] for one in points):
         assert [len(str(one).partition(".")[2]) for one in place] == [7, 7]
 
 
@@ -71,3 +72,42 @@ def test_points_state_milliseconds_and_centimetres_and_one_alone_is_no_line(tmp_
     assert point["properties"] == {
         "time_s": 12.346, "status": "TRACKING", "radius_95_m": 9.26, "protection_m": 21.26,
     }  # fmt: skip
+
+
+S, C, T, U, L, O = Status  # noqa: E741
+
+
+@pytest.mark.parametrize(
+    ("status", "stretches"),
+    [
+        ([S, S, C, T, U, L, L, U, T, O], [[2, 3, 4], [7, 8]]),
+        ([C, T, S, C, L, C, T], [[0, 1], [3], [5, 6]]),
+        ([S, L, O], []),
+    ],
+)
+def test_only_located_epochs_are_written_and_the_track_is_broken_between(
+    tmp_path, status, stretches
+):
+    fixes = [
+        fix(float(i), 531_000.0 + i, 4_555_990.0, one) for i, one in enumerate(status)
+    ]  # fmt: skip
+    estimate = TrackEstimate.of_fixes("EPSG:32629", "made", fixes, start_utc_s=0.0)
+    write_gpx(estimate, tmp_path / "one.gpx")
+    root, space = (
+        ElementTree.parse(tmp_path / "one.gpx").getroot(),
+        "{http://www.topografix.com/GPX/1/1}",
+    )
+    segments = [
+        [int(point.findtext(f"{space}time")[17:19]) for point in segment.iter(f"{space}trkpt")]
+        for segment in root.iter(f"{space}trkseg")
+    ]
+    assert segments == stretches
+    write_geojson(estimate, tmp_path / "one.geojson")
+    features = json.loads((tmp_path / "one.geojson").read_text())["features"]
+    points = [one for one in features if one["geometry"]["type"] == "Point"]
+    assert [one["properties"]["time_s"] for one in points] == list(chain.from_iterable(stretches))
+    assert {one["properties"]["status"] for one in points} <= set(map(str, (C, T, U)))
+    lines = [one["geometry"]["coordinates"] for one in features if one not in points]
+    assert list(map(len, lines)) == [len(one) for one in stretches if len(one) > 1]
+    places = {one["properties"]["time_s"]: one["geometry"]["coordinates"] for one in points}
+    assert lines == [[places[i] for i in one] for one in stretches if len(one) > 1]

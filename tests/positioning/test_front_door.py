@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from cross_world import make_database, walk_log
+from matplotlib.figure import Figure
 
 import mapfilter as mf
 from mapfilter.evaluation.accuracy import Truth
@@ -60,6 +61,20 @@ def test_a_track_as_tables_and_a_picture(track, database):
     assert places.crs == database.lattice.crs
     assert track.plot().get_title()
     assert "<table" in track._repr_html_()
+
+
+def test_a_picture_is_saved_as_the_commands_save_theirs(track, tmp_path):
+    """Also one of several in a figure, whose axes have a part of it as their figure."""
+    path = mf.save_picture(track.plot(), str(tmp_path / "new" / "track.png"))
+    assert path == tmp_path / "new" / "track.png"
+    again = mf.save_picture(track.plot(), tmp_path / "again.png")
+    assert path.read_bytes() == again.read_bytes()
+    figure = Figure()
+    left, _ = figure.subfigures(1, 2)
+    mf.save_picture(track.plot(left.subplots()), tmp_path / "parts.svg")
+    assert (tmp_path / "parts.svg").read_text().startswith("<?xml")
+    with pytest.raises(mf.MapfilterError, match=r"\.png, \.svg or \.pdf"):
+        mf.save_picture(figure, tmp_path / "track.bmp")
 
 
 @pytest.mark.parametrize("filter_", [mf.CandidateFilter(), "candidate"], ids=str)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from cross_world import LATTICE, make_database, make_routes, walk_log
+from matplotlib.figure import Figure
 
 import mapfilter as mf
 from mapfilter.errors import ConfigError
@@ -64,6 +65,7 @@ def good(tmp_path_factory):
         "read_fingerprint_table": {"path": folder / "table.csv"},
         "read_log": {"paths": folder},
         "read_routes": {"roads": "helsinki", "lattice": LATTICE},
+        "save_picture": {"picture": Figure(), "path": folder / "picture.png"},
         "score": {"track": mf.locate(log, database, "candidate"), "truth": log.truth},
         "simulate": world | {"cells": database.plan},
         "sweep": world | {"database": database, "filters": {"a": "bayes"}},

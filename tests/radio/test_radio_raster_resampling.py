@@ -243,7 +243,7 @@ def test_forty_thousand_million_pixels_are_the_most():
     with pytest.raises(InputError) as caught:
         common_lattice([made(one), made(replace(corner, cols=3))], None, "nearest")
     (fault,) = caught.value.faults
-    assert fault.where == "rasters"
+    assert fault.where == "rasters, with a.tif"
     assert (fault.expected, fault.got) == (
         "rasters that 4e+10 pixels can cover", "1000 km x 1000 km at 5 m")  # fmt: skip
 

@@ -419,3 +419,39 @@ def test_a_damaged_file_is_named_to_the_log_only(positioner, cross, tmp_path, ca
     assert (answer.code, answer.reason) == (500, "backendError")
     assert str(tmp_path) not in answer.body.decode()
     assert str(tmp_path) in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("at", [0, 7])
+def test_an_epoch_of_another_clock_is_refused_and_the_session_goes_on(positioner, cross, whole, at):
+    sent = documents(COUNT)[0]
+    with service(positioner, cross.plan) as made:
+
+        async def run():
+            app = made.app()
+            session = await begin(app)
+            assert await post(app, session, sent[:20]) == whole[:20]
+            later = sent[20:40]
+            wrong = [*later[:at], {**later[at], "time_s": 1e9}, *later[at + 1 :]]
+            answer = await ask(app, "POST", f"/sessions/{session}/epochs", {"epochs": wrong})
+            assert (answer.code, answer.reason) == (400, "invalid")
+            (fault,) = answer.json["error"]["errors"]
+            assert fault["location"] == f"epochs[{at}].time_s"
+            before = sent[20 + at - 1]["time_s"]
+            assert f"expected at most 86400 s later than {before:.10g}" in fault["message"]
+            assert await post(app, session, sent[20:]) == whole[20:]
+
+        asyncio.run(run())
+
+
+def test_a_session_may_begin_at_any_time_and_pause_for_hours(positioner, cross):
+    sent = [
+        {**one, "time_s": 1.7e9 + 40_000.0 * number}
+        for number, one in enumerate(documents(COUNT)[0][:3])
+    ]
+    with service(positioner, cross.plan) as made:
+
+        async def run():
+            app = made.app()
+            assert len(await post(app, await begin(app), sent)) == 3
+
+        asyncio.run(run())

@@ -64,3 +64,18 @@ def test_a_cluster_gives_the_same_bytes(own_world):
 
 def test_a_wrong_cluster(world):
     assert_refused(mapfilter("build", "-c", world.toml, "--cluster", "local:x"), "local:N")
+
+
+def test_cells_that_differ_between_databases_are_noted(own_world, world, tmp_path):
+    text = own_world.plan.read_text()
+    lines = text.splitlines()
+    at = lines[0].split(",").index("eirp_dbm")
+    row = lines[1].split(",")
+    before, row[at] = row[at], "33.25"
+    own_world.plan.write_text("\n".join([lines[0], ",".join(row), *lines[2:]]) + "\n")
+    assert_done(mapfilter("build", "-c", own_world.toml))
+    given = "merge", world.database, own_world.database, "--out", tmp_path / "db"
+    (note,) = assert_done(mapfilter(*given, "--json")).json["notes"]
+    cell = row[lines[0].split(",").index("cell")]
+    assert "1 cell differs from an earlier database, and the later entry is kept: " in note
+    assert f"{cell} (eirp_dbm {float(before):g}, now 33.25)" in note

@@ -66,10 +66,14 @@ def test_the_risk_of_protection_levels(log, replay, tmp_path):
     # Infinite where the null hypothesis is more probable than the risk.
     assert (rare[known] > usual[known]).all()
     assert np.isfinite(rare).sum() > 20
-    points = json.loads((tmp_path / "out" / "estimate.geojson").read_text())["features"][1:]
+    features = json.loads((tmp_path / "out" / "estimate.geojson").read_text())["features"]
+    points = [one for one in features if one["geometry"]["type"] == "Point"]
     levels = [point["properties"]["protection_m"] for point in points]
+    estimate = read_estimate(tmp_path / "out" / "estimate.parquet")
+    located = [status.is_followed for status in estimate.status]
     expected = [
-        None if not np.isfinite(level) else pytest.approx(level, abs=0.01) for level in rare
+        None if not np.isfinite(level) else pytest.approx(level, abs=0.01)
+        for level in rare[located]
     ]
     assert levels == expected
 
@@ -415,3 +419,15 @@ def test_only_logs_that_know_their_start_give_times_in_gpx(log, replay, tmp_path
     assert_done(replay(log))
     assert "<time>2023-11-14T22:16:18.000Z<" in gpx.read_text()
     assert assert_done(mapfilter("info", log, "--json")).json["start_utc_s"] == 1_700_000_000
+
+
+def test_a_database_that_nobody_names_is_named(log, world, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "database").symlink_to(world.out / "database")
+    few = settings(output__pictures="none")
+    done = mapfilter("replay", "--log", log, *few, "--json")
+    taken = tmp_path / "out" / "database"
+    assert (done.code, done.err) == (0, f"mapfilter: no --db: the database is {taken}\n")
+    named = "--db", taken
+    assert_done(mapfilter("replay", "--log", log, *named, *few, "--json"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from functools import cached_property
@@ -66,6 +67,12 @@ class AreaFrame(ABC):
         way_id : int
             0 where the largest share lies in squares, off all ways.
         """
+
+    @cached_property
+    def checksum(self) -> str:
+        """Checksum of lattice, floor and cells, by which states are told from those of others."""
+        made_of = (self.lattice, self.floor_dbm, self.cell_ids)
+        return hashlib.sha256(repr(made_of).encode()).hexdigest()
 
     @cached_property
     def origin_m(self) -> tuple[float, float]:

@@ -40,15 +40,17 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
-from mapfilter.positioning.bayes.state import BayesState, step_output
+from mapfilter.positioning.bayes.state import BayesState, check_state, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.bayes.weighing import Weighing
+from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
+from mapfilter.positioning.known_start import check_start
 from mapfilter.positioning.sensors.watch import UNMEASURED, watched
 
 _LEAST_AT_START = 0.8
@@ -132,7 +134,8 @@ class BayesPositioner(Filter[BayesState]):
 
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> BayesState:  # noqa: ARG002
         """Return the state before the first epoch."""
-        return BayesState(sources={source.name: source.begin() for source in self.sources})
+        sources = {source.name: source.begin() for source in self.sources}
+        return BayesState(sources=sources, area=self.area.checksum)
 
     def begin_at(
         self, east_m: float, north_m: float, sd_m: float, rng: np.random.Generator
@@ -140,7 +143,14 @@ class BayesPositioner(Filter[BayesState]):
         """Return the state at a known start, in the CRS of the database.
 
         It is tracked from there, unless ``sd_m`` is so large that it counts as several places.
+
+        Raises
+        ------
+        InputError
+            The start lies farther outside the area than 500 m and than five deviations, as degrees
+            given for metres do, or is no number.
         """
+        check_start(east_m, north_m, sd_m, self.area.lattice)
         belief = self.beliefs.by_compass[True].init(Start(None, True, east_m, north_m, sd_m), rng)
         near = -expm1(-0.5 * (NEAR_M / sd_m) ** 2) if sd_m > 0 else 1.0
         least = max(self.options.split_mass, _LEAST_AT_START)
@@ -151,7 +161,16 @@ class BayesPositioner(Filter[BayesState]):
     def step(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[BayesState, StepOutput]:
-        """Process one epoch."""
+        """Process one epoch.
+
+        Raises
+        ------
+        InputError
+            A value is of another type or beyond its range, such as a level of None; or the state
+            is one of another area.
+        """
+        check_epoch(epoch)
+        check_state(state, self.area)
         epoch, repeated = _with_a_new_fix(state, epoch)
         spacing_m, hold = state.particle_spacing_m, state.hold
         state = _tracked(state)

@@ -214,6 +214,7 @@ def moved(
         unaided=unaided,
         proven=state.proven,
         alone_from_m=state.alone_from_m,
+        area=state.area,
     ), unused
 
 

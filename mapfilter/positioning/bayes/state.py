@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from math import isfinite, nan, sqrt
 from typing import Any, NamedTuple
 
+from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
@@ -85,6 +86,8 @@ class BayesState:
     alone_from_m : float
         Distance travelled at the start of the last belief without positions that took over; NaN if
         none did.
+    area : str
+        Checksum of the area that it is of; empty where nobody states it.
     """
 
     belief: MapBelief | None = None
@@ -110,6 +113,7 @@ class BayesState:
     unaided: tuple[HeldOtherwise, ...] = ()
     proven: bool = False
     alone_from_m: float = nan
+    area: str = ""
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -137,6 +141,7 @@ class BayesState:
             unaided=self.unaided,
             proven=self.proven,
             alone_from_m=self.alone_from_m,
+            area=self.area,
         )
 
     @property
@@ -157,6 +162,26 @@ class BayesState:
             return FIRST_SPACING_M
         area_m2 = _STREET_SHARE * belief.bins.size_m**2 * belief.summary.effective_bins
         return max(sqrt(area_m2 / belief.count), _MIN_SPACING_M)
+
+
+def check_state(state: BayesState, area: AreaFrame) -> None:
+    """Check that a state, which may have been saved, is one of this area.
+
+    Raises
+    ------
+    InputError
+        It is of another area, or no state of this filter.
+    """
+    given: Any = state
+    if not isinstance(given, BayesState):
+        got = f"a {type(given).__name__}"
+    elif given.area and given.area != area.checksum:
+        got = "one of another"
+    else:
+        return
+    expected = "a state of this database, of begin, begin_at or step"
+    hint = "the database was built again; begin anew"
+    raise fail(InputError, "state", expected, got, hint)
 
 
 class Reported(NamedTuple):

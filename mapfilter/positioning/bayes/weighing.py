@@ -213,6 +213,7 @@ class Weighing:
             unaided=beside_alternative(state, before) if now.taken_over else state.unaided,
             proven=self._proven(state, now, before),
             alone_from_m=state.alone_from_m,
+            area=state.area,
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))

@@ -16,6 +16,7 @@ import numpy as np
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.gaussian import METHODS, Method
 from mapfilter.models.state import MOVING
+from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput, TrackEstimate
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
@@ -104,7 +105,14 @@ class KalmanTracker(Filter[KalmanState]):
         epoch: Epoch,
         rng: np.random.Generator,  # noqa: ARG002
     ) -> tuple[KalmanState, StepOutput]:
-        """Take one epoch: first move, then measure."""
+        """Take one epoch: first move, then measure.
+
+        Raises
+        ------
+        InputError
+            A value of the epoch is of another type or beyond its range.
+        """
+        check_epoch(epoch)
         work = KalmanStep(self.sites, self.method, state)
         output = StepOutput(work.take(epoch), unused=tuple(work.unused))
         return work.state, output.protected(work.tail)

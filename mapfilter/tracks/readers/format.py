@@ -20,10 +20,14 @@ class ReadOptions:
         unknown.
     columns : mapping of str to str
         For plain CSV: column of each field, such as ``{"time": "Zeit", "lat_deg": "Breite"}``.
+    shared : bool
+        Whether these are the columns of several files: one that a file lacks is another's, and its
+        field has a usual name here, or none.
     """
 
     zone: str = ""
     columns: Mapping[str, str] = field(default_factory=dict)
+    shared: bool = False
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,7 @@ def read_recording(
     own = options is not None and bool(options.columns)
     if own and not name and (known is None or (known is tems.FORMAT and _named(text, options))):
         # The columns of such an export are chosen, and may be named.
-        known = plain_csv.FORMAT
+        known = plain_csv.FORMAT if _is_of(text, options) else None
     if known is None:
         raise _unknown(path, text)
     reading = Reading(path, notes=list(text.notes))
@@ -151,6 +151,14 @@ def _named(text: Text, options: ReadOptions | None) -> bool:
     columns = {} if options is None else options.columns
     names = header_names(text.first_line, likely_separator(text.first_line))
     return all(column.lower() in names for column in columns.values())
+
+
+def _is_of(text: Text, options: ReadOptions | None) -> bool:
+    """Return whether a column map may be that of a file: of several it names a column of it."""
+    if options is None or not options.shared:
+        return True
+    names = header_names(text.first_line, likely_separator(text.first_line))
+    return any(column.lower() in names for column in options.columns.values())
 
 
 def _other_separators(path: Path, text: Text) -> str:

@@ -89,8 +89,9 @@ def _matches(text: Text) -> bool:
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "CSV"
     rows = header_columns(text.data, reading, text.line)
-    _check_map(rows, reading, options.columns)
-    mapped = _Mapped(rows, options.columns)
+    own = _own_columns(rows, reading, options)
+    mapped = _Mapped(rows, own)
+    reading.named = tuple(own)
     reading.tallies.columns |= {
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
     }
@@ -139,15 +140,21 @@ def _add(
         reading.add(table, *only(columns, rows.line, there))
 
 
-def _check_map(rows: Columns, reading: Reading, own: Mapping[str, str]) -> None:
-    """Raise InputError with every fault of a column map, and where times are missing."""
-    faults = Faults()
+def _own_columns(rows: Columns, reading: Reading, options: ReadOptions) -> dict[str, str]:
+    """Return the part of a column map that is of this file.
+
+    Raises InputError with every fault of it, and where times are missing.
+    """
+    faults, own = Faults(), dict(options.columns)
     present = f"{', '.join(rows.names)[:300]}"
     check_fields(own, faults)
-    for field, column in own.items():
+    for field, column in options.columns.items():
         if field not in FIELDS:
             continue
         if column.lower() not in rows.names:
+            if options.shared:
+                del own[field]
+                continue
             faults.add(f"{reading.path} header", f"a column {column} for {field}", present)
         elif rows.names.count(column.lower()) > 1:
             faults.add(f"{reading.path} header", f"one column {column}", "several")
@@ -155,6 +162,7 @@ def _check_map(rows: Columns, reading: Reading, own: Mapping[str, str]) -> None:
         hint = "--column time=COLUMN"
         faults.add(f"{reading.path} header", "a column of times", present, hint)
     faults.raise_if_any(InputError)
+    return own
 
 
 def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.tracks.cut_times import cut_times
 from mapfilter.tracks.readers.recorded_values import (
     checked_values,
     duplicates,
@@ -22,6 +23,7 @@ from mapfilter.tracks.readers.recorded_values import (
 )
 from mapfilter.tracks.readers.tables import RECORDED, Field
 from mapfilter.tracks.readers.tallies import Tallies
+from mapfilter.tracks.schema import NEIGHBOUR
 
 ClockKind = Literal["utc", "gps", "local", "monotonic"]
 
@@ -29,6 +31,8 @@ _LINES_KEPT = 3
 _EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
 _JUMP_S = 86_400.0
 _STRAY_SHARE = 0.1
+_SEVERAL = ("radio", "satellites", "ephemerides")
+"""Tables that have several rows for each moment."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,8 @@ class Recording:
     fields, unread : tuple of str
         Of a plain CSV: the fields that it has, and columns that were not used, each with the field
         that its name resembles.
+    named : tuple of str
+        Of a plain CSV: the fields of a column map whose columns it has.
     """
 
     path: Path
@@ -116,6 +122,7 @@ class Recording:
     ignored: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
+    named: tuple[str, ...] = ()
 
     @property
     def losses(self) -> tuple[str, ...]:
@@ -153,6 +160,7 @@ class Reading:
     ignored: list[str] = field(default_factory=list)
     fields: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
+    named: tuple[str, ...] = ()
     tallies: Tallies = field(default_factory=Tallies)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
 
@@ -283,8 +291,10 @@ class Reading:
         if not self.tables:
             raise nothing_usable(self.path, name, self.rows, refused, rows_word)
         self.tallies.check(self.path, RECORDED)
+        radio = self.tables.get("radio", ())
+        by_cell = any((part["role"] == NEIGHBOUR).any() for part in radio)
         kept = {
-            table: self._tidy(table, joined_parts(self.tables.pop(table)))
+            table: self._tidy(table, joined_parts(self.tables.pop(table)), by_cell=by_cell)
             for table in RECORDED
             if table in self.tables
         }
@@ -301,9 +311,11 @@ class Reading:
             tuple(note for note in self.ignored if note in self.notes),
             self.fields,
             self.unread,
+            self.named,
         )
 
-    def _tidy(self, table: str, rows: pd.DataFrame) -> pd.DataFrame:
+    def _tidy(self, table: str, rows: pd.DataFrame, *, by_cell: bool) -> pd.DataFrame:
+        """Sort a table and drop exact duplicates; ``by_cell`` where a file lists neighbours."""
         if "time_s" not in rows:
             return rows
         time = rows["time_s"].to_numpy()
@@ -317,6 +329,10 @@ class Reading:
                     f"{table}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped"
                 )
                 rows = rows[~duplicate].reset_index(drop=True)
+            # Equal steps are distance lost; a file with a row for each cell repeats them.
+            counted = time if table == "motion" and not by_cell else rows["time_s"]
+            if table not in _SEVERAL and (cut := cut_times(np.asarray(counted))):
+                self.ignore(f"{table}: {cut}")
         return rows
 
 

@@ -1,0 +1,188 @@
+"""Epochs that a program makes itself: values of the types and ranges that a log's tables have.
+
+Those of a log were checked when it was read; the test that all is well costs them little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf, isnan, nan
+from typing import Any
+
+from mapfilter._inputs import shown
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.filters.contract import MotionStep
+from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
+from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SCHEMA, SERVING, Column
+
+_COLUMNS = {table: {column.name: column for column in columns} for table, columns in SCHEMA.items()}
+_TIME = SCHEMA["motion"][0]
+_SPREAD = Column("spread_m", 0, inf, "metres >= 0")
+_ROLES = (SERVING, NEIGHBOUR)
+_FIELDS: dict[type, dict[str, Column]] = {
+    MotionStep: {
+        "step_m": _COLUMNS["motion"]["step_m"],
+        "heading_rad": _COLUMNS["motion"]["heading_rad"],
+        "turn_rad": _COLUMNS["motion"]["turn_rad"],
+        "spread_m": _SPREAD,
+        "sampling_sd_m": _COLUMNS["motion"]["sampling_sd_m"],
+    },
+    ReportRow: {
+        name: _COLUMNS["radio"][name]
+        for name in ("role", "cell", "arfcn", "bsic", "level_dbm", "censored", "timing_advance")
+    },
+    GnssFix: {
+        # A position beyond all numbers is none, as is one of NaN.
+        "east_m": replace(_COLUMNS["gnss"]["east_m"], low=-inf, high=inf),
+        "north_m": replace(_COLUMNS["gnss"]["north_m"], low=-inf, high=inf),
+        **{
+            name: _COLUMNS["gnss"][name]
+            for name in ("var_east_m2", "var_north_m2", "cov_east_north_m2")
+        },
+    },
+    Pseudorange: {
+        "satellite": _COLUMNS["pseudoranges"]["satellite"],
+        # With a receiver's clock that runs away.
+        "range_m": Column("range_m", -1e12, 1e12, "metres"),
+        "sigma_m": _COLUMNS["pseudoranges"]["sigma_m"],
+    },
+    Difference: {
+        name: _COLUMNS["tdoa"][name]
+        for name in ("cell", "reference", "difference_m", "sigma_m", "reference_sigma_m")
+    },
+}
+"""The column of a log's tables that each field of a row is checked by."""
+_FLOATS = ("timing_advance",)
+"""Whole numbers that rows hold as floats, NaN where they are missing."""
+_RANGES = {
+    kind: tuple(
+        (name, column.low, column.high, column.kind == "integer" and name not in _FLOATS)
+        for name, column in columns.items()
+        if column.kind != "text"
+    )
+    for kind, columns in _FIELDS.items()
+}
+_TEXTS = {
+    kind: tuple(
+        (name, column.required) for name, column in columns.items() if column.kind == "text"
+    )
+    for kind, columns in _FIELDS.items()
+}
+_PLACE = _COLUMNS["pseudoranges"][PLACE[0]]
+_KINDS = {
+    "motion": MotionStep,
+    "radio": ReportRow,
+    "ranges": Pseudorange,
+    "differences": Difference,
+}
+
+
+def check_epoch(epoch: Epoch) -> None:
+    """Check the values of an epoch: numbers in their ranges, or NaN where they were not measured.
+
+    Raises
+    ------
+    InputError
+        With all faults of the epoch together, in the words of a log's tables.
+    """
+    if _is_well(epoch):
+        return
+    faults = Faults()
+    given: Any = epoch
+    if not isinstance(given, Epoch):
+        raise fail(InputError, "epoch", "an Epoch", shown(given))
+    _check_number("epoch, time_s", epoch.time_s, _TIME, faults)
+    for where, kind, row in _rows(epoch, faults):
+        if not isinstance(row, kind):
+            faults.add(where, f"a {kind.__name__}", shown(row))
+            continue
+        for name, column in _FIELDS[kind].items():
+            _check(f"{where}.{name}", getattr(row, name), column, faults)
+        if isinstance(row, Pseudorange):
+            _check_place(f"{where}.place_m", row.place_m, faults)
+    faults.raise_if_any(InputError)
+
+
+def _is_well(epoch: Any) -> bool:
+    """Return whether all values are as expected; most epochs end here."""
+    if not (isinstance(epoch, Epoch) and _is_within(epoch.time_s, _TIME.low, _TIME.high)):
+        return False
+    try:
+        rows = (*epoch.motion, *epoch.radio, *epoch.ranges, *epoch.differences)
+        return all(map(_row_is_well, rows if epoch.fix is None else (*rows, epoch.fix)))
+    except (TypeError, ValueError, KeyError):
+        return False
+
+
+def _is_within(value: Any, low: float, high: float) -> bool:
+    try:
+        return bool(low <= value <= high)
+    except TypeError:
+        return False
+
+
+def _row_is_well(row: Any) -> bool:
+    kind = type(row)
+    for name, low, high, may_lack in _RANGES[kind]:
+        value = getattr(row, name)
+        # NaN is the only number that is not itself.
+        if not (may_lack and value is None) and not (low <= value <= high or value != value):
+            return False
+    for name, required in _TEXTS[kind]:
+        value = getattr(row, name)
+        if not (isinstance(value, str) or (value is None and not required)):
+            return False
+    if kind is ReportRow:
+        return row.role in _ROLES
+    if kind is Pseudorange:
+        x_m, y_m, z_m = row.place_m
+        return all(_PLACE.low <= one <= _PLACE.high or one != one for one in (x_m, y_m, z_m))
+    return True
+
+
+def _rows(epoch: Epoch, faults: Faults) -> Iterator[tuple[str, type, Any]]:
+    for name, kind in _KINDS.items():
+        rows = getattr(epoch, name)
+        if not isinstance(rows, tuple | list):
+            faults.add(f"epoch, {name}", f"a tuple of {kind.__name__}", shown(rows))
+            continue
+        for number, row in enumerate(rows):
+            yield f"epoch, {name}[{number}]", kind, row
+    if epoch.fix is not None:
+        yield "epoch, fix", GnssFix, epoch.fix
+
+
+def _check(where: str, value: object, column: Column, faults: Faults) -> None:
+    if column.name == "role":
+        if value not in _ROLES:
+            faults.add(where, column.expected, shown(value))
+    elif column.kind == "text":
+        if not isinstance(value, str) and (column.required or value is not None):
+            faults.add(where, column.expected, shown(value), "None where it is not known")
+    elif column.kind == "integer" and column.name not in _FLOATS:
+        if value is not None:
+            _check_number(where, value, column, faults)
+    else:
+        _check_number(where, value, column, faults)
+
+
+def _check_number(where: str, value: Any, column: Column, faults: Faults) -> None:
+    if value is None:
+        faults.add(where, column.expected, "None", "give NaN where it was not measured")
+        return
+    try:
+        number = nan if isinstance(value, str | bytes) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = inf
+    is_missing = isnan(number) and not isinstance(value, str | bytes) and column is not _TIME
+    if not (is_missing or column.low <= number <= column.high):
+        faults.add(where, column.expected, shown(value), column.hint)
+
+
+def _check_place(where: str, value: object, faults: Faults) -> None:
+    if not isinstance(value, tuple | list) or len(value) != len(PLACE):
+        faults.add(where, "three numbers, metres from the earth's centre", shown(value))
+        return
+    for name, one in zip(PLACE, value, strict=True):
+        _check_number(f"{where}, {name}", one, _COLUMNS["pseudoranges"][name], faults)

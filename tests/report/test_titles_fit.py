@@ -1,0 +1,92 @@
+"""Titles fit into pictures of any shape, and do not run into each other."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.positioned_track import Snapshot
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.snapshots import plot_belief, plot_candidates
+from mapfilter.report.track import plot_track
+
+SHAPES = [(400.0, 400.0), (60.0, 900.0), (900.0, 60.0)]
+
+
+def base(size_m):
+    return BaseMap((0.0, 0.0, *size_m))
+
+
+def extents(figure):
+    """Return the boxes of all titles in pixels, and that of the figure."""
+    renderer = figure.canvas.get_renderer()
+    figure.draw(renderer)
+    return [axes.title.get_window_extent(renderer) for axes in figure.axes], figure.bbox
+
+
+def estimate(size_m):
+    statuses = [Status.SEARCHING, Status.CONVERGED, *[Status.TRACKING] * 7, Status.LOST]
+    fixes = [
+        Fix(
+            1234.0 * k, size_m[0] * k / 10, size_m[1] * k / 10, np.full((2, 2), np.nan),
+            np.full(3, np.nan), one, 1, np.nan, 0, np.nan, Reason.USED,
+        )
+        for k, one in enumerate(statuses)
+    ]  # fmt: skip
+    return TrackEstimate.of_fixes("EPSG:32635", "my_package.filters:CarefulFilter", fixes)
+
+
+def truth(size_m):
+    time_s = np.arange(0.0, 12_001.0, 20.0)
+    return Truth(time_s, size_m[0] * time_s / 12_000, np.full(len(time_s), -20_000.0))
+
+
+@pytest.mark.parametrize("size_m", SHAPES)
+@pytest.mark.parametrize("width_in", [None, 3.5])
+def test_the_title_of_a_track_is_whole(size_m, width_in):
+    axes = None
+    if width_in is not None:
+        figure = Figure(figsize=(width_in, 5.0), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots()
+    drawn = plot_track(estimate(size_m), truth(size_m), base(size_m), axes, zoom=False)
+    (title,), whole = extents(drawn.figure)
+    assert title.x0 >= whole.x0
+    assert title.x1 <= whole.x1
+    assert title.y1 <= whole.y1
+    words = " ".join(drawn.get_title().split())
+    assert words.startswith("my_package.filters:CarefulFilter filter: converged after 1234 s, ")
+    assert words.endswith("lost at the end")
+
+
+def snapshots(size_m, count):
+    at = np.linspace(0.4, 0.6, 50)
+    statuses = [*[Status.SEARCHING] * (count - 1), Status.CONVERGED]
+    return [
+        Snapshot(
+            100.0 * k, 12_345.0 * k, size_m[0] * at, size_m[1] * at, np.full(50, 0.02),
+            size_m[0] / 2, size_m[1] / 2, one,
+        )
+        for k, one in enumerate(statuses)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("size_m", SHAPES)
+@pytest.mark.parametrize("count", [1, 2, 3, 6])
+@pytest.mark.parametrize("plot", [plot_belief, plot_candidates])
+def test_titles_of_panels_stand_beside_each_other(size_m, count, plot):
+    figure = plot(snapshots(size_m, count), None, base(size_m))
+    titles, whole = extents(figure)
+    columns = count if count <= 3 else 3
+    for first in range(0, count, columns):
+        row = titles[first : first + columns]
+        assert row[0].x0 >= whole.x0
+        assert row[-1].x1 <= whole.x1
+        assert all(left.x1 < right.x0 for left, right in pairwise(row))
+    if plot is plot_belief:
+        assert figure.axes[count - 1].get_title().endswith("within 50 m: converged")

@@ -1,0 +1,69 @@
+"""Named columns of several files of a journey count in those that have them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.geodesy import unproject
+from mapfilter.tracks.open_log import OpenOptions, read_recordings
+
+TIME_S = 1_777_629_600 + np.arange(60)
+
+
+@pytest.fixture
+def files(tmp_path):
+    """A track with German names, an odometer with usual ones, and a GPX file."""
+    east_m = 385_900.0 + np.arange(60)
+    lon, lat = unproject("EPSG:32635", east_m, np.full(60, 6_671_900.0))
+    track, wheel, gpx = (tmp_path / name for name in ("track.csv", "wheel.csv", "track.gpx"))
+    pd.DataFrame({"Zeit": TIME_S, "Breite": lat, "Laenge": lon}).to_csv(track, index=False)
+    speeds = {"time": TIME_S, "wheel_speed_mps": 1.0, "yaw_rate_radps": 0.0}
+    pd.DataFrame(speeds).to_csv(wheel, index=False)
+    points = "".join(
+        f'<trkpt lat="{y}" lon="{x}"><time>{pd.Timestamp(t, unit="s").isoformat()}Z</time></trkpt>'
+        for t, x, y in zip(TIME_S, lon, lat, strict=True)
+    )
+    gpx.write_text(f'<gpx version="1.1"><trk><trkseg>{points}</trkseg></trk></gpx>')
+    return track, wheel, gpx
+
+
+NAMED = {"time": "Zeit", "lat_deg": "Breite", "lon_deg": "Laenge"}
+
+
+def test_a_file_that_lacks_a_named_column_is_read_by_usual_names(files):
+    recordings, _ = read_recordings(files, OpenOptions(columns=NAMED))
+    assert [sorted(one.tables) for one in recordings] == [
+        ["positions"], ["odometry"], ["positions"],
+    ]  # fmt: skip
+    assert [one.named for one in recordings] == [tuple(NAMED), (), ()]
+    assert all(len(rows) == 60 for one in recordings for rows in one.tables.values())
+
+
+def test_each_file_may_have_some_of_the_columns(files):
+    named = {**NAMED, "wheel_speed_kmh": "wheel_speed_mps"}
+    _, wheel, _ = read_recordings(files, OpenOptions(columns=named))[0]
+    assert wheel.named == ("wheel_speed_kmh",)
+    assert wheel.tables["odometry"]["speed_mps"].to_numpy() == pytest.approx(1 / 3.6)
+
+
+def test_a_column_that_no_file_has_is_an_error(files):
+    named = {**NAMED, "level_dbm": "Pegel", "cell": "Zelle"}
+    with pytest.raises(InputError) as caught:
+        read_recordings(files, OpenOptions(columns=named))
+    assert [str(fault) for fault in caught.value.faults] == [
+        f"track.csv, wheel.csv, track.gpx: expected a column {column} for {name} in a plain CSV "
+        "among them, found none (likely: misspelt; files of other formats need no columns)"
+        for name, column in (("level_dbm", "Pegel"), ("cell", "Zelle"))
+    ]
+
+
+def test_a_single_file_has_to_have_every_column(files):
+    with pytest.raises(InputError, match=r"wheel\.csv header: expected a column Zeit for"):
+        read_recordings(files[1:2], OpenOptions(columns=NAMED))
+
+
+def test_a_file_with_none_of_the_columns_is_no_plain_table(files, tmp_path):
+    (tmp_path / "notes.txt").write_text("a;b\n1;2\n")
+    with pytest.raises(InputError, match=r"notes.txt: expected a recording in a known format"):
+        read_recordings([*files, tmp_path / "notes.txt"], OpenOptions(columns=NAMED))
