@@ -36,6 +36,7 @@ from mapfilter.survey.cell_model import (
     locate_antenna,
     most_telling,
 )
+from mapfilter.survey.exchanged_sectors import CALIBRATION
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.weakest_reported import WeakestReported, weakest_reported
@@ -47,7 +48,6 @@ _ROUNDS = 2
 _LOCATED_FROM = 300
 _PHONE_HEIGHT_M = 1.5
 _Count = Annotated[int, Ge(1), Le(1_000_000)]
-_CALIBRATION = {"slope": 1.0, "slope_deviation": 0.2}
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,7 +243,7 @@ def fit_survey(
         prior = Prior(level_dbm)
         covariate: Covariate | None = None
         if predicted is not None:
-            prior = Prior(level_dbm, **_CALIBRATION)
+            prior = Prior(level_dbm, **CALIBRATION)
             covariate = predicted[points.cell_id]
         elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
             cell = plan[points.cell_id]

@@ -38,7 +38,7 @@ from mapfilter.workflows.check_places import (
     check_ways,
 )
 from mapfilter.workflows.stated_power import cells_without_eirp
-from mapfilter.workflows.survey import survey_inputs
+from mapfilter.workflows.survey_inputs import survey_inputs
 from mapfilter.workflows.world import World, planned_rasters, roads_lattice
 
 _STAGES = 5

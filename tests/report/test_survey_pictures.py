@@ -16,9 +16,8 @@ from mapfilter.survey.leave_out import LeftOut, leave_out
 from mapfilter.survey.measured_map import SurveyOptions, fit_survey
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.survey_rasters import write_survey
-from mapfilter.workflows import served
-from mapfilter.workflows import survey as survey_pictures
-from mapfilter.workflows.survey import SurveyEvidence, draw_survey
+from mapfilter.workflows import served, survey_pictures
+from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_672_000.0, 5.0, 40, 50)

@@ -124,6 +124,22 @@ def test_a_survey_calibrates_a_prediction(survey, world, tmp_path):
     assert found["validation"]["rmse_db"] < 2.5
 
 
+def test_levels_far_from_the_prediction_are_not_calibrated_away_silently(survey, world, tmp_path):
+    """As of a receiver behind an attenuator of 20 dB."""
+    header, *rows = (survey / "drives" / "drive-0.csv").read_text().splitlines()
+    fields = [row.split(",") for row in rows]
+    weak = [",".join([*row[:3], f"{float(row[3]) - 20:.1f}", *row[4:]]) for row in fields]
+    (tmp_path / "weak.csv").write_text("\n".join([header, *weak]))
+    more = settings(
+        prediction__survey__calibrate=world.rasters,
+        prediction__survey__files=tmp_path / "weak.csv",
+        prediction__survey__cross_validate="false",
+    )
+    given = "predict", "-c", survey / "survey.toml", "--out", tmp_path / "out", "--json", *more
+    (note,) = [one for one in assert_done(mapfilter(*given)).json["notes"] if "calibrated" in one]
+    assert note.startswith("levels are 20 dB below the prediction (median of 3 cells)")
+
+
 def test_what_is_said_of_rasters_is_said_of_those_to_calibrate(survey, world, tmp_path):
     """Levels as tenths of dB, without the unit that would tell it."""
     rasters = open_rasters(world.rasters)
