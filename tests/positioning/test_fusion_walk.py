@@ -37,6 +37,7 @@ PLAN = CellPlan(CRS, (
     cell("C", 3000.0, antenna="sector", azimuth_deg=90.0, arfcn=601, bsic=3),
 ))  # fmt: skip
 SITES = SiteModels(PLAN, KalmanOptions())
+MAY_BE_0 = ("fix_lasting_m", "bias_sd_deg", "drift_deg_per_sqrt_m", "scale")
 NOTHING = SiteReadings((), (), (), (), ())
 
 
@@ -71,7 +72,7 @@ def test_the_usual_options():
     }  # fmt: skip
     for name in asdict(KalmanOptions()):
         for value in (0, -1.0, inf, nan):
-            if value == 0 and name in ("fix_lasting_m", "drift_deg_per_sqrt_m"):
+            if value == 0 and name in MAY_BE_0:
                 continue
             with pytest.raises(ConfigError, match=f"KalmanOptions, {name}: expected a .*r (>|in)"):
                 KalmanOptions(**{name: value})

@@ -106,9 +106,9 @@ class KalmanOptions(Options):
     fix_lasting_s: Positive = 30.0
     step_sd_m: Positive = 0.3
     heading_sd_deg: Positive = 11.459155902616464
-    bias_sd_deg: Positive = 10.0
+    bias_sd_deg: NotNegative = 10.0
     drift_deg_per_sqrt_m: NotNegative = 0.3
-    scale: Positive = 0.03
+    scale: NotNegative = 0.03
     drift_m_per_sqrt_s: Positive = 0.3
     acceleration_mps_per_sqrt_s: Positive = 0.7
     speed_sd_mps: Positive = 8.0

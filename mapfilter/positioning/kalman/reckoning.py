@@ -30,7 +30,7 @@ from mapfilter.positioning.sensors.watch import SensorWatch, watched
 
 RECKONED = StateLayout(4, 0, 1)
 """East, north, the heading error in rad, and the share by which steps are too short."""
-_TURNED, _SCALE = 2, 3
+_TURNED, _SCALE, _LEAST = 2, 3, 1e-6
 
 
 def at_rest(layout: StateLayout) -> Motion:
@@ -40,8 +40,8 @@ def at_rest(layout: StateLayout) -> Motion:
 
 
 def first_deviations(options: KalmanOptions) -> Floats:
-    """Return the deviations of the two errors before any position."""
-    return np.array([radians(options.bias_sd_deg), options.scale])
+    """Return the deviations of the two errors before any position; sigma points need some."""
+    return np.maximum([radians(options.bias_sd_deg), options.scale], _LEAST)
 
 
 def after_each_other(first: Motion, second: Motion) -> Motion:
