@@ -7,6 +7,7 @@ import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import EKF, UKF
+from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.filter import KalmanTracker
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
@@ -27,7 +28,7 @@ def walk(rng, count, *, askew_deg=0.0, longer=1.0, speed_mps=1.4):
     """Steps a second apart in streets with corners, as measured, and the true positions."""
     heading = np.cumsum(np.where(rng.random(count) < 0.02, rng.choice([-1, 1], count), 0)) * 1.57
     way = np.cumsum(speed_mps * np.exp(1j * heading))
-    measured = heading + radians(askew_deg) + rng.normal(0, 0.1, count)
+    measured = wrap_rad(heading + radians(askew_deg) + rng.normal(0, 0.1, count))
     lengths = longer * speed_mps * (1 + rng.normal(0, 0.05, count))
     return [MotionStep(*one) for one in zip(lengths, measured, strict=True)], way
 
