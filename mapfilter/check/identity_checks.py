@@ -15,7 +15,7 @@ from mapfilter.radio.identities import parse_cgi
 _UNIQUE_IN_NETWORK = ("LTE", "NR")
 """Technologies whose cell identity is unique in a network, whatever the tracking area."""
 _SITES_ABOUT = 6
-_NEAR_M = 10_000.0
+_NEAR_M, _ROUNDED_M = 10_000.0, 2.0
 
 
 def check_identities(plan: CellPlan, where: str, findings: Findings) -> None:
@@ -63,7 +63,7 @@ def _check_codes(plan: CellPlan, where: str, findings: Findings) -> None:
     pairs: dict[frozenset[str], tuple[float, str]] = {}
     for cells in groups:
         for one, (other, away_m) in zip(cells, _nearest(cells), strict=True):
-            if away_m <= max(reach_m[one.site], reach_m[other.site]):
+            if away_m <= max(reach_m[one.id], reach_m[other.id]) + _ROUNDED_M:
                 said = f"{one.id} and {other.id} ({one.arfcn}, {one.bsic}) are {away_m:.0f} m apart"
                 pairs.setdefault(frozenset((one.id, other.id)), (away_m, said))
     if not pairs:
@@ -98,9 +98,13 @@ def _nearest(cells: Sequence[Cell]) -> list[tuple[Cell, float]]:
 
 
 def _reach_m(plan: CellPlan) -> dict[str, float]:
-    """Return the distance of each site to the sixth nearest other one, at most 10 km."""
-    site_at = {cell.site: (cell.east_m, cell.north_m) for cell in reversed(plan.cells)}
-    places_m = np.array(list(site_at.values()))
+    """Return the distance of each cell to the sixth nearest other site, at most 10 km.
+
+    Cells at one place, to the metre, are of one site, whatever it is called.
+    """
+    cells_m = np.round([(cell.east_m, cell.north_m) for cell in plan.cells])
+    places_m, of_cell = np.unique(cells_m, axis=0, return_inverse=True)
     count = min(_SITES_ABOUT + 1, len(places_m))
     far_m, _ = cKDTree(places_m).query(places_m, k=[count])
-    return dict(zip(site_at, np.minimum(far_m[:, 0], _NEAR_M).tolist(), strict=True))
+    reach_m = np.minimum(far_m[:, 0], _NEAR_M)[of_cell.ravel()]
+    return dict(zip(plan.ids, reach_m.tolist(), strict=True))
