@@ -14,6 +14,9 @@ from pathlib import Path
 
 from mapfilter.errors import OutputError, fail
 
+# A link there leads to a file of somebody else, and a pipe is not waited for.
+_FLAGS = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+
 
 @contextlib.contextmanager
 def writing_alone(result: Path) -> Iterator[None]:
@@ -42,7 +45,7 @@ def _locked(lock: Path, result: Path) -> int:
     """Return the descriptor of a locked file that is still there."""
     while True:
         try:
-            handle = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            handle = os.open(lock, _FLAGS, 0o666)
         except OSError as error:
             got = error.strerror or error
             raise fail(OutputError, str(result), "a place that can be written", got) from error

@@ -28,7 +28,8 @@ _LEAST_CORRELATION = 0.5
 _METRES_PER_DEGREE = 111_195.0
 _REMARKABLE_S = 1.5
 
-_APART_S = 3600.0
+_HOUR_S = 3600.0
+_APART_S = _HOUR_S
 
 _Track = tuple[Floats, Floats, Floats]
 
@@ -79,11 +80,13 @@ def _apart(recordings: Sequence[Recording], offsets_s: Sequence[float]) -> list[
         (begin + offset, end + offset)
         for (begin, end), offset in zip(map(_span, recordings), offsets_s, strict=True)
     ]
-    latest, gaps_s = -np.inf, []
-    for begin, end in sorted(spans):
-        if begin - latest > _APART_S and np.isfinite(latest):
-            gaps_s.append(begin - latest)
-        latest = max(latest, end)
+    gaps_s = []
+    before, *others = sorted(spans)
+    for span in others:
+        gap_s = span[0] - before[1]
+        if gap_s > _APART_S or (gap_s > 0 and _hours_off(before, span)):
+            gaps_s.append(gap_s)
+        before = max(before, span, key=lambda one: one[1])
     if not gaps_s:
         return []
     hours = max(gaps_s) / 3600
@@ -91,6 +94,14 @@ def _apart(recordings: Sequence[Recording], offsets_s: Sequence[float]) -> list[
         f"recordings lie up to {hours:.1f} h apart (likely: a wrong time zone; or several "
         "journeys: convert each alone)"
     ]
+
+
+def _hours_off(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Return whether most of the shorter of two spans lies in the other one some hours earlier."""
+    apart_s = other[0] - one[0]
+    hours = round(apart_s / _HOUR_S)
+    shorter_s = min(end - begin for begin, end in (one, other))
+    return hours > 0 and abs(apart_s - hours * _HOUR_S) < 0.5 * shorter_s
 
 
 def _reference(recordings: Sequence[Recording]) -> int:

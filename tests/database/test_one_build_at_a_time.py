@@ -131,3 +131,10 @@ def test_a_link_and_its_target_are_one_result(tmp_path):
     (tmp_path / "link").symlink_to("database")
     with writing_alone(tmp_path / "link"), pytest.raises(OutputError, match=TOLD):
         writing_alone(tmp_path / "database").__enter__()
+
+
+def test_a_link_in_place_of_the_lock_is_not_followed(tmp_path):
+    (tmp_path / ".database.lock").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(OutputError, match="a place that can be written"):
+        writing_alone(tmp_path / "database").__enter__()
+    assert not (tmp_path / "elsewhere").exists()

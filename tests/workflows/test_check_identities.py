@@ -103,3 +103,36 @@ def test_codes_are_used_again_far_away(spacing_m, again_at, is_near):
     plan = rows_of_sites(20, spacing_m, again_at)
     check_identities(plan, "cells.csv", findings)
     assert [found.code for found in findings.found] == ["code-reused-nearby"] * is_near
+
+
+def test_sectors_whose_sites_have_their_own_names_are_of_one_site():
+    cells = [
+        Cell(
+            f"C{n}", f"C{n}", 385_000.0 + 500.0 * (n // 3), 6_673_000.0, 30.0, 120.0 * (n % 3),
+            43.0, 1800.0, arfcn=600, bsic=0 if n in (0, 12) else n,
+        )
+        for n in range(60)
+    ]  # fmt: skip
+    findings = Findings()
+    check_identities(CellPlan(CRS, tuple(cells)), "cells.csv", findings)
+    (found,) = findings.found
+    assert "C0 and C12 (600, 0) are 2000 m apart" in found.evidence
+
+
+def test_many_cells_of_one_placeholder_take_no_long_time():
+    cells = [
+        Cell(
+            f"C{n}", f"S{n}", 385_000.0 + 90.0 * (n % 100), 6_673_000.0 + 90.0 * (n // 100), 30.0,
+            None, 43.0, 1800.0, antenna="omni", arfcn=0, bsic=0, ci=0,
+        )
+        for n in range(10_000)
+    ]  # fmt: skip
+    findings = Findings()
+    check_identities(CellPlan(CRS, tuple(cells)), "cells.csv", findings)
+    assert [found.code for found in findings.found] == ["identity-repeated", "code-reused-nearby"]
+    assert all(len(found.evidence) < 600 for found in findings.found)
+
+
+def test_cells_of_gsm_and_umts_may_have_one_identity(world):
+    world.row("S2B").update(ci=100, technology="UMTS")
+    assert check(world) == (0, [])

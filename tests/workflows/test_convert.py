@@ -285,6 +285,17 @@ def test_places_where_no_satellite_can_be_are_left_out(made, tmp_path):
     assert read_log(tmp_path / "log").pseudoranges["x_m"].isna().sum() == 1
 
 
+@pytest.mark.parametrize(("hours", "is_noted"), [(1, True), (2, True), (0.5, False), (0, False)])
+def test_a_recording_by_the_time_of_another_zone_is_named(tmp_path, hours, is_noted):
+    for name, shift_s in (("phone", 0.0), ("watch", 60.0 + 3600 * hours)):
+        rows = "".join(f"{1_777_629_600 + shift_s + k},60.1{k:03},24.9\n" for k in range(600))
+        (tmp_path / f"{name}.csv").write_text(f"time,lat,lon\n{rows}")
+    files = [tmp_path / "phone.csv", tmp_path / "watch.csv"]
+    noted = [note for note in run_convert(files, tmp_path / "log").notes if " h apart" in note]
+    assert bool(noted) == is_noted
+    assert all("(likely: a wrong time zone; or several journeys" in note for note in noted)
+
+
 def test_recordings_of_several_journeys_are_named(tmp_path):
     for number, day_s in enumerate([0, 300, 86_400]):
         rows = "".join(f"{1_777_629_600 + day_s + k},60.1{k},24.9\n" for k in range(9))
