@@ -32,6 +32,7 @@ class _Values:
     first: float = np.nan
     first_line: int = 0
     whole: bool = True
+    different: set[float] = field(default_factory=set)
 
 
 @dataclass(slots=True)
@@ -79,6 +80,8 @@ class Tallies:
             found.first, found.first_line = float(bad[0]), int(line[0])
         found.outside += bad.size
         found.whole &= bool((bad % 1 == 0).all())
+        if len(found.different) <= known.marks:
+            found.different.update(np.unique(bad)[: known.marks + 1].tolist())
         found.low = min(found.low, float(bad.min()))
         found.high = max(found.high, float(bad.max()))
 
@@ -108,10 +111,10 @@ class Tallies:
                 got = f"{bad} of {given} values that are none, such as {examples[0][:40]!r}"
                 faults.add(self._where(path, name), "numbers", got, "a unit in each field")
         for (table, name), values in self._values.items():
+            of = next(one for one in known[table] if one.name == name)
             # One and the same number is a mark of missing values.
-            mark = values.low >= values.high
-            if not mark and values.outside > _MOSTLY * values.given and self._sure(table, name):
-                of = next(one for one in known[table] if one.name == name)
+            marks = len(values.different) <= of.marks
+            if not marks and values.outside > of.mostly * values.given and self._sure(table, name):
                 got = (
                     f"{values.outside} of {values.given} values outside, {values.low:g} to "
                     f"{values.high:g} (first {values.first:g} in line {values.first_line})"
@@ -141,4 +144,4 @@ def _mistake(known: Field, values: _Values) -> str:
     if known.name == "level_dbm" and (values.high <= 0 or not values.whole):
         # ASU, RXLEV and bars are whole numbers.
         return LOST_SIGN if values.low >= 0 and values.high <= -known.low else ""
-    return next((hint for low, high, hint in known.hints if low <= most <= high), "")
+    return known.mistake(most)
