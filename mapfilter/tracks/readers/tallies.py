@@ -11,6 +11,7 @@ import numpy as np
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs
+from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
 from mapfilter.tracks.readers.tables import Field
 from mapfilter.tracks.readers.wound import Winding
 
@@ -54,6 +55,8 @@ class Tallies:
         Names in the file of columns that must hold numbers, by field.
     signs : Signs
         Of levels in a column that holds dBm or ASU.
+    levels : LevelCounts
+        Of all levels.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
@@ -61,6 +64,7 @@ class Tallies:
     _texts: dict[tuple[str, int], _Texts] = field(default_factory=dict)
     _windings: dict[tuple[str, str], Winding] = field(default_factory=dict)
     signs: Signs = field(default_factory=Signs)
+    levels: LevelCounts = field(default_factory=LevelCounts)
 
     def add_values(
         self, table: str, known: Field, values: Floats, given: int, outside: Bools, line: Ints
@@ -68,6 +72,8 @@ class Tallies:
         """Count the values of a vital column that are given, and those out of range."""
         found = self._values.setdefault((table, known.name), _Values())
         found.given += given
+        if known.name == "level_dbm":
+            self.levels.add(values)
         if not outside.any():
             return
         bad, line = values[outside], line[outside]
@@ -126,6 +132,9 @@ class Tallies:
             expected = f"dBm below 0, or ASU up to {LARGEST_ASU}"
             where = self._where(path, "level_dbm")
             faults.add(where, expected, f"{got}{LARGEST_ASU}", LOST_SIGN)
+        if self.levels.are_qualities:
+            where = self._where(path, "level_dbm")
+            faults.add(where, LEVELS_EXPECTED, self.levels, QUALITY)
         faults.raise_if_any(InputError)
 
     def _sure(self, table: str, name: str) -> bool:
