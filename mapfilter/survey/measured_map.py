@@ -211,6 +211,11 @@ def fit_survey(
     notes = []
     if predicted is not None:
         strange = [cell_id for cell_id in found if cell_id not in predicted]
+        if len(strange) == len(found):
+            expected = f"cells of the prediction, such as {next(iter(predicted), 'none')}"
+            got = f"none in {number_of(len(found), 'cell')}, such as {strange[0]}"
+            hint = "other names or identities, or another network"
+            raise fail(InputError, "measurements", expected, got, hint)
         if strange:
             notes.append(f"{number_of(len(strange), 'cell')} left out: not in the prediction")
         found = {
@@ -226,14 +231,12 @@ def fit_survey(
         left = number_of(few, "cell")
         notes.append(f"{left} left out: received in fewer than {options.min_points} squares")
     if not points:
-        hint = "cells named differently than in the prediction" if predicted else ""
         expected = f"a cell received in at least {options.min_points} squares"
         raise fail(
             InputError,
             "measurements",
             expected,
             f"{number_of(len(found), 'cell')}, none of them",
-            hint,
         )
     level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
     plan = plan.to_crs(measurements.crs) if plan is not None else None

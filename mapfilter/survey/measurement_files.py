@@ -19,11 +19,13 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
+from mapfilter._header_units import header_unit
 from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs, is_above_asu
 from mapfilter.radio.identities import technology
+from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
 from mapfilter.radio.tables import number
 from mapfilter.survey.measurement_rows import FIELDS, IDENTITY, REQUIRED, Rows
 
@@ -149,9 +151,12 @@ class _Signs:
             self.first = f"{text[:20]} in line {line}"
 
     def check(self, where: str) -> None:
-        """Raise InputError where levels have no sign: neither dBm nor ASU."""
-        signs = Signs()
-        signs.add(np.array(self.levels))
+        """Raise InputError where levels are a quality, or have no sign: neither dBm nor ASU."""
+        signs, counts, levels = Signs(), LevelCounts(), np.array(self.levels)
+        signs.add(levels)
+        counts.add(levels)
+        if counts.are_qualities:
+            raise fail(InputError, where, LEVELS_EXPECTED, counts, QUALITY)
         if signs.lost:
             got = f"{signs.positive} of {signs.levels} positive, {signs.above} of them above "
             got += f"{LARGEST_ASU} (first {self.first})"
@@ -218,6 +223,13 @@ def _places(path: Path, header: Sequence[str], dialect: Dialect) -> dict[str, tu
             near = difflib.get_close_matches(columns.lower(), header, n=1, cutoff=0.5)
             expected = f"a column {columns}" + (f" for {name}" if columns != name else "")
             faults.add(where, expected, "none", f"{near[0]} meant" if near else "")
+    for name, some in places.items():
+        for column in (header[place] for place in some):
+            unit = header_unit(name, column)
+            if unit is not None and unit.factor != 1.0:
+                hint = QUALITY if name == "level_dbm" and unit.written == "db" else ""
+                own = "dBm" if name == "level_dbm" else "metres" if name == "accuracy_m" else name
+                faults.add(where, f"{own} for {name}", f"{unit.written} in {column}", hint)
     checked = set(IDENTITY) <= set(dialect.required)
     if not (checked or places["cell"] or all(places[name] for name in IDENTITY)):
         faults.add(where, "a column cell, or mcc, mnc, lac and ci", "none", "name the columns")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -40,7 +41,9 @@ FIELDS = (
 """Fields that a column map may name."""
 
 NO_TIME = "times not understood (levels kept)"
-_TIMES = "expected ISO 8601 (2026-05-01T10:00:00+02:00) or Unix s, ms or µs"
+_TIMES = "expected ISO 8601 (2026-05-01T10:00:00+02:00), 31.12.2026 10:00:00 or Unix s, ms or µs"
+_DOTTED = re.compile(r"(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)[ T]+(\d\d?):(.*)", re.ASCII)
+"""Day, month and year with dots, which no one writes in another order, and a time."""
 
 Identity = tuple[int, int, int, int]
 """mcc, mnc, lac (tac in LTE) and ci."""
@@ -177,17 +180,24 @@ class Rows:
 
 
 def unix_seconds(text: str) -> float:
-    """Return Unix seconds of an ISO 8601 time (UTC by default) or of s, ms or µs; else NaN.
+    """Return Unix seconds of a time (UTC by default) or of s, ms or µs; else NaN.
+
+    Times are ISO 8601, or begin with day, month and year with dots.
 
     Examples
     --------
     >>> unix_seconds("1599319703000"), unix_seconds("2020-09-05T15:28:23Z")
     (1599319703.0, 1599319703.0)
+    >>> unix_seconds("05.09.2020 15:28:23"), unix_seconds("05.09.2020")
+    (1599319703.0, nan)
     """
     seconds = number(text)
     if seconds is not None:
         seconds /= 1e6 if seconds > 1e14 else 1e3 if seconds > 1e11 else 1.0
     else:
+        if dotted := _DOTTED.fullmatch(text.strip()):
+            day, month, year, hour, rest = dotted.groups()
+            text = f"{year}-{int(month):02d}-{int(day):02d}T{int(hour):02d}:{rest.strip()}"
         try:
             moment = datetime.fromisoformat(text)
             seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()

@@ -11,8 +11,10 @@ from mapfilter.tracks.identify import PlanNames, ReportedCell
 from mapfilter.tracks.schema import SERVING
 
 
-def foreign_cells(names: Collection[str], plan: CellPlan) -> str:
+def foreign_cells(names: Collection[str], plan: CellPlan, of: str = "database") -> str:
     """Return why a plan may not have some cells that are named by identities; "" for no reason.
+
+    ``of`` is what has that plan, in words.
 
     Examples
     --------
@@ -47,7 +49,7 @@ def foreign_cells(names: Collection[str], plan: CellPlan) -> str:
     }
     if not networks or not own or networks & own:
         return ""
-    return f"they are of {_named(networks)}, the database holds {_named(own, '')}"
+    return f"they are of {_named(networks)}, the {of} holds {_named(own, '')}"
 
 
 def _named(networks: Collection[tuple[int, int]], what: str = "network ") -> str:

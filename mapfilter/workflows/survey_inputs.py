@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mapfilter._words import number_of
 from mapfilter.config.sections import Config
-from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.errors import ConfigError, InputError, fail, listed
 from mapfilter.geodesy import Lattice, projected_crs
-from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.measured_map import SurveyOptions
 from mapfilter.survey.measurements import Measurements, named_after
+from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.planned_cells import planned_cells
 from mapfilter.workflows.stated_power import check_eirp_stated
@@ -75,7 +77,34 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
     if config.cells.plan is None:
         return found, None
     plan = planned_cells(config, found.crs)
-    return named_after(found, plan), plan
+    found = named_after(found, plan)
+    if note := _unplanned(found, plan, str(config.cells.plan)):
+        found = replace(found, notes=(*found.notes, note))
+    return found, plan
+
+
+def _unplanned(measurements: Measurements, plan: CellPlan, where: str) -> str:
+    """Return a note where none of the cells received is in the plan; "" where one is."""
+    ids = measurements.cell_ids
+    if any(cell_id in plan for cell_id in ids):
+        return ""
+    known = measurements.identities
+    names = ["-".join(map(str, known[one])) if one in known else one for one in ids]
+    why = foreign_cells(names, plan, "plan")
+    why = why or "other names or identities, or another network"
+    held = [_with_identity(cell) for cell in plan.cells[:1]]
+    return (
+        f"none of {number_of(len(ids), 'cell')} received is in {where}: they are such as "
+        f"{listed(names, 1)}, the plan's such as {listed(held)} (likely: {why}); antennas are "
+        "located from their levels"
+    )
+
+
+def _with_identity(cell: Cell) -> str:
+    parts = (cell.mcc, cell.mnc, cell.lac, cell.ci)
+    if cell.ci is None:
+        return f"{cell.id} without an identity"
+    return f"{cell.id} ({'-'.join('?' if part is None else str(part) for part in parts)})"
 
 
 def _lattice_about(measurements: Measurements, reach_m: float, resolution_m: float) -> Lattice:

@@ -236,7 +236,8 @@ def test_calibration_finds_offset_and_slope_of_a_prediction():
 
 def test_cells_that_were_not_predicted_are_told():
     rows, _ = shadowed(drives=1)
-    with pytest.raises(InputError, match="cells named differently than in the prediction"):
+    told = r"cells of the prediction, such as B, found none in 1 cell, such as A \(likely: other"
+    with pytest.raises(InputError, match=told):
         fit_survey(rows, SurveyOptions(), predicted={"B": lambda e, _: e})
 
 

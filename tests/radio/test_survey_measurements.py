@@ -1,6 +1,7 @@
 """Reading measurements: every dialect, and bad rows that lose nothing but themselves."""
 
 import math
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -359,3 +360,51 @@ def test_a_few_values_above_the_largest_asu_lose_their_rows_only(family, levels,
     found = read_measurements([path])
     assert sorted(found.level_dbm) == [level - 140.0 for level in levels]
     assert any(f"{len(strays)} of {len(rows)} rows left out" in note for note in found.notes)
+
+
+def test_days_with_dots_are_read(tmp_path):
+    text = PLAIN + "A,60.18,24.95,-80,27.11.2026 10:00:05,10\nA,60.181,24.951,-81,27.11.2026,9\n"
+    found = read_measurements([write(tmp_path, text)])
+    assert found.time_s[-2] == datetime(2026, 11, 27, 10, 0, 5, tzinfo=UTC).timestamp()
+    # A day alone is no time.
+    assert np.isnan(found.time_s[-1])
+    (note,) = found.notes
+    assert "1 time not understood (levels kept), such as '27.11.2026' in" in note
+    assert "31.12.2026 10:00:00" in note
+
+
+def qualities(column):
+    rows = [f"A,60.1{i:02d},24.9,{-3.5 - i / 2},," for i in range(20)]
+    return "\n".join([f"cell,lat,lon,{column},time,accuracy_m", *rows])
+
+
+def test_qualities_are_no_levels(tmp_path):
+    """RSRQ was taken for RSRP: levels of -3 to -13 dBm everywhere."""
+    path = write(tmp_path, qualities("rsrq"))
+    told = (
+        r"column rsrq: expected levels in dBm, such as RSRP in -140..-44 or RxLev in -110..-47, "
+        r"found 20 of 20 values from -13 to -3.5 \(likely: a quality in dB, such as RSRQ"
+    )
+    with pytest.raises(InputError, match=told):
+        read_measurements([path], columns={"level_dbm": "rsrq"})
+
+
+@pytest.mark.parametrize(
+    ("column", "told"),
+    [
+        ("RSRQ [dB]", r"expected dBm for level_dbm, found dB in rsrq \[db\] \(likely: a quality"),
+        ("RSSI [dBuV]", r"expected dBm for level_dbm, found dbuv in"),
+    ],
+)
+def test_units_of_levels_are_looked_at(tmp_path, column, told):
+    path = write(tmp_path, qualities(column))
+    with pytest.raises(InputError, match=f"(?i){told}"):
+        read_measurements([path], columns={"level_dbm": column})
+
+
+def test_strong_levels_are_levels(tmp_path):
+    """A scanner beside an antenna."""
+    rows = [f"A,60.1{i:02d},24.9,{-20 - 2 * i},," for i in range(30)]
+    text = "\n".join(["cell,lat,lon,RSRP [dBm],time,accuracy_m", *rows])
+    columns = {"level_dbm": "RSRP [dBm]"}
+    assert len(read_measurements([write(tmp_path, text)], columns=columns)) == 30

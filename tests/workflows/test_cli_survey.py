@@ -235,3 +235,21 @@ def test_what_cannot_be_surveyed_is_told(survey, tmp_path):
     assert_done(mapfilter("predict", *given, *quick))
     (tmp_path / "good" / "rxlev-deviation.tif").rename(lost)
     refused("levels or losses", "deviations", prediction__survey__calibrate=lost)
+
+
+def test_measurements_of_another_network_are_told(survey, world, tmp_path):
+    """Cells that the plan lacks are located from their levels: nobody may take them for its own."""
+    rows = (survey / "drives" / "drive-0.csv").read_text().splitlines()[1:]
+    identity = {"A": "244,5,3021,11701", "B": "244,5,3021,11702", "C": "244,5,3021,11703"}
+    lines = [",".join([identity[row[0]], row[2:]]) for row in rows]
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("mcc,mnc,lac,ci," + HEADER.partition(",")[2] + "\n".join(lines))
+    more = settings(prediction__survey__files=foreign, prediction__survey__cross_validate="false")
+    given = "predict", "-c", survey / "survey.toml", "--out", tmp_path / "out", "--json", *more
+    (note,) = [one for one in assert_done(mapfilter(*given)).json["notes"] if "received is" in one]
+    assert note.startswith("none of 3 cells received is in ")
+    assert "they are such as 244-5-3021-11701 and 2 more, the plan's such as A" in note
+    assert "(likely: " in note
+    calibrate = settings(prediction__survey__calibrate=world.rasters)
+    told = "expected cells of the prediction, such as A, found none in 3 cells, such as 244-5-3021"
+    assert_refused(mapfilter(*given, *calibrate), told)

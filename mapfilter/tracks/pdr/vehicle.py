@@ -14,6 +14,7 @@ from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import motion_from_odometry, odometry_gaps
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S, Compass, YawOffset, yaw_offset
+from mapfilter.tracks.pdr.odometry_rows import usable_rows
 from mapfilter.tracks.pdr.signals import inertial_signals
 
 _STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
@@ -47,7 +48,7 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     imu : ImuNoise
     notes : tuple of str
     """
-    rows = rows.drop_duplicates("time_s")
+    rows, unusable = usable_rows(rows.drop_duplicates("time_s"))
     motion = motion_from_odometry(rows)
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     speed = rows["speed_mps"].to_numpy(dtype=np.float64)
@@ -56,7 +57,7 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     found = _bias(time_s, rate, standing, None)
     correction = np.interp(time_s, found.time_s, found.offset_rad)
     turn = motion["turn_rad"].to_numpy() + np.diff(correction, prepend=correction[0])
-    notes = _notes(
+    notes = unusable + _notes(
         found, int(np.sum(standing & np.isfinite(rate))), has_rate=bool(np.isfinite(rate).any())
     )
     speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan

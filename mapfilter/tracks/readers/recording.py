@@ -242,7 +242,10 @@ class Reading:
         if (ignored := good & outside).any():
             first = line[ignored][0]
             some = number_of(int(ignored.sum()), "value is", "values are")
-            self.ignore(f"{label}: {some} not {known.expected}, ignored (first in line {first})")
+            # Elsewhere few bad values say nothing of their cause.
+            hint = known.mistake(float(np.abs(values[ignored]).max())) if known.marks > 1 else ""
+            where = f"first in line {first}" + (f"; likely: {hint}" if hint else "")
+            self.ignore(f"{label}: {some} not {known.expected}, ignored ({where})")
             checked[known.name] = np.where(outside, np.nan, values)
         return np.ones(len(line), dtype=bool)
 

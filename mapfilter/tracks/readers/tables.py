@@ -36,6 +36,11 @@ class Field:
         Whether a file is refused most of whose values are out of range, as a log needs them.
     winds : bool
         Whether values are headings in radians, which may be unwrapped.
+    marks : int
+        Up to so many different values out of range are marks of missing ones, and no reason to
+        refuse a file.
+    mostly : float
+        Share of other values out of range above which it is refused.
     """
 
     name: str
@@ -47,6 +52,12 @@ class Field:
     hints: tuple[tuple[float, float, str], ...] = ()
     vital: bool = False
     winds: bool = False
+    marks: int = 1
+    mostly: float = 0.5
+
+    def mistake(self, largest: float) -> str:
+        """Return the likely mistake behind values out of range, by the largest; "" for none."""
+        return next((hint for low, high, hint in self.hints if low <= largest <= high), "")
 
     @property
     def kind(self) -> str:
@@ -101,6 +112,10 @@ _EAST, _NORTH = (
 )
 _DEGREES = ((6.3, 360.0, "degrees given for radians"),)
 _RATES = ((20.0, 2000.0, "degrees for radians per second"),)
+FASTEST_VEHICLE_MPS, FASTEST_TURN_RADPS = 120.0, 3.5
+"""No road vehicle or usual train exceeds 432 km/h, none turns by 200 degrees in a second; the yaw
+rates of a vehicle's bus end at 3.92 rad/s (SAE J1939), above which they are marks."""
+_NO_VALUE = "what a bus sends where it has no value, such as"
 _TURN = Field("turn_rad", -6.3, 6.3, "radians in -2π..2π", hints=_DEGREES, vital=True)
 _LEVEL = Field(
     *("level_dbm", -200, 0, "dBm in -200..0"),
@@ -174,8 +189,22 @@ RECORDED: dict[str, tuple[Field, ...]] = {
     ),
     "odometry": (
         _TIME,
-        Field("speed_mps", -150, 350, "m/s in -150..350", required=True, vital=True),
-        Field("yaw_rate_radps", -20, 20, "rad/s in -20..20", hints=_RATES, vital=True),
+        Field(
+            *("speed_mps", -FASTEST_VEHICLE_MPS, FASTEST_VEHICLE_MPS, "m/s in -120..120"),
+            required=True,
+            hints=((FASTEST_VEHICLE_MPS, np.inf, f"{_NO_VALUE} 655.35 km/h, or another unit"),),
+            vital=True,
+            marks=3,
+        ),
+        Field(
+            *("yaw_rate_radps", -FASTEST_TURN_RADPS, FASTEST_TURN_RADPS, "rad/s in -3.5..3.5"),
+            hints=(
+                (FASTEST_TURN_RADPS, np.inf, f"degrees for radians, or {_NO_VALUE} 327.67 deg/s"),
+            ),
+            vital=True,
+            marks=3,
+            mostly=0.1,
+        ),
         Field("speed_sd_mps", 0, 100, "m/s >= 0"),
         Field("yaw_rate_sd_radps", 0, 10, "rad/s >= 0"),
     ),

@@ -11,6 +11,7 @@ import numpy as np
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs
+from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
 from mapfilter.tracks.readers.tables import Field
 from mapfilter.tracks.readers.wound import Winding
 
@@ -32,6 +33,7 @@ class _Values:
     first: float = np.nan
     first_line: int = 0
     whole: bool = True
+    different: set[float] = field(default_factory=set)
 
 
 @dataclass(slots=True)
@@ -53,6 +55,8 @@ class Tallies:
         Names in the file of columns that must hold numbers, by field.
     signs : Signs
         Of levels in a column that holds dBm or ASU.
+    levels : LevelCounts
+        Of all levels.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
@@ -60,6 +64,7 @@ class Tallies:
     _texts: dict[tuple[str, int], _Texts] = field(default_factory=dict)
     _windings: dict[tuple[str, str], Winding] = field(default_factory=dict)
     signs: Signs = field(default_factory=Signs)
+    levels: LevelCounts = field(default_factory=LevelCounts)
 
     def add_values(
         self, table: str, known: Field, values: Floats, given: int, outside: Bools, line: Ints
@@ -67,6 +72,8 @@ class Tallies:
         """Count the values of a vital column that are given, and those out of range."""
         found = self._values.setdefault((table, known.name), _Values())
         found.given += given
+        if known.name == "level_dbm":
+            self.levels.add(values)
         if not outside.any():
             return
         bad, line = values[outside], line[outside]
@@ -79,6 +86,8 @@ class Tallies:
             found.first, found.first_line = float(bad[0]), int(line[0])
         found.outside += bad.size
         found.whole &= bool((bad % 1 == 0).all())
+        if len(found.different) <= known.marks:
+            found.different.update(np.unique(bad)[: known.marks + 1].tolist())
         found.low = min(found.low, float(bad.min()))
         found.high = max(found.high, float(bad.max()))
 
@@ -108,10 +117,10 @@ class Tallies:
                 got = f"{bad} of {given} values that are none, such as {examples[0][:40]!r}"
                 faults.add(self._where(path, name), "numbers", got, "a unit in each field")
         for (table, name), values in self._values.items():
+            of = next(one for one in known[table] if one.name == name)
             # One and the same number is a mark of missing values.
-            mark = values.low >= values.high
-            if not mark and values.outside > _MOSTLY * values.given and self._sure(table, name):
-                of = next(one for one in known[table] if one.name == name)
+            marks = len(values.different) <= of.marks
+            if not marks and values.outside > of.mostly * values.given and self._sure(table, name):
                 got = (
                     f"{values.outside} of {values.given} values outside, {values.low:g} to "
                     f"{values.high:g} (first {values.first:g} in line {values.first_line})"
@@ -123,6 +132,9 @@ class Tallies:
             expected = f"dBm below 0, or ASU up to {LARGEST_ASU}"
             where = self._where(path, "level_dbm")
             faults.add(where, expected, f"{got}{LARGEST_ASU}", LOST_SIGN)
+        if self.levels.are_qualities:
+            where = self._where(path, "level_dbm")
+            faults.add(where, LEVELS_EXPECTED, self.levels, QUALITY)
         faults.raise_if_any(InputError)
 
     def _sure(self, table: str, name: str) -> bool:
@@ -141,4 +153,4 @@ def _mistake(known: Field, values: _Values) -> str:
     if known.name == "level_dbm" and (values.high <= 0 or not values.whole):
         # ASU, RXLEV and bars are whole numbers.
         return LOST_SIGN if values.low >= 0 and values.high <= -known.low else ""
-    return next((hint for low, high, hint in known.hints if low <= most <= high), "")
+    return known.mistake(most)

@@ -1,0 +1,62 @@
+"""Columns taken for levels that hold another quantity: qualities in dB, such as RSRQ and SNR."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapfilter._types import Floats
+
+LEVELS_EXPECTED = "levels in dBm, such as RSRP in -140..-44 or RxLev in -110..-47"
+QUALITY = "a quality in dB, such as RSRQ (-20 to -3)"
+
+_BEST_DB, _WORST_DB = 0.0, -30.0
+_SHARE, _FEWEST = 0.9, 10
+
+
+@dataclass(slots=True)
+class LevelCounts:
+    """Counts of the levels of a column, and of those that only a quality has.
+
+    Parameters
+    ----------
+    levels, qualities : int
+        How many there are, and how many of them are between -30 and 0: levels that no phone and
+        hardly a scanner reports.
+    low, high : float
+        The least and the largest of the latter.
+    """
+
+    levels: int = 0
+    qualities: int = 0
+    low: float = np.inf
+    high: float = -np.inf
+
+    def add(self, levels: Floats) -> None:
+        """Count levels; NaN is none."""
+        self.levels += int(np.count_nonzero(~np.isnan(levels)))
+        found = levels[(levels >= _WORST_DB) & (levels < _BEST_DB)]
+        self.qualities += found.size
+        if found.size:
+            self.low = min(self.low, float(found.min()))
+            self.high = max(self.high, float(found.max()))
+
+    @property
+    def are_qualities(self) -> bool:
+        """Whether nearly all are such, of ten or more.
+
+        Examples
+        --------
+        >>> counts = LevelCounts()
+        >>> counts.add(np.linspace(-19.5, -6.0, 28))
+        >>> counts.are_qualities, str(counts)
+        (True, '28 of 28 values from -19.5 to -6')
+        >>> counts.add(np.array([-87.0, -91.0, -99.0, -104.0]))
+        >>> counts.are_qualities
+        False
+        """
+        return self.levels >= _FEWEST and self.qualities >= _SHARE * self.levels
+
+    def __str__(self) -> str:
+        return f"{self.qualities} of {self.levels} values from {self.low:g} to {self.high:g}"

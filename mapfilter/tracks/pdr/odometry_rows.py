@@ -1,0 +1,100 @@
+"""Rows of a vehicle's odometry that state no motion: values that its bus sends for missing ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Bools, Floats
+from mapfilter._words import number_of
+
+_JUMP_MPS, _JUMP_MPS2 = 15.0, 30.0
+"""Three times what brakes reach."""
+_FULL_SCALE_MPS = 55.0
+"""Marks are the ends of scales (255 km/h, 65 m/s): other speeds between zeros are good ones."""
+_NEAR_S = 1.0
+
+
+def usable_rows(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Return odometry without speeds that come and go at once, and with yaw rates joined.
+
+    A speed that stays the same to the last digit, far above those before and after it, is no
+    motion: its rows are dropped. A missing yaw rate between rows that have one, each at most a
+    second away, is theirs in proportion to time.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        time_s, rising; speed_mps, yaw_rate_radps.
+
+    Returns
+    -------
+    rows : pandas.DataFrame
+    notes : tuple of str
+
+    Examples
+    --------
+    >>> rows = pd.DataFrame({"time_s": [0.0, 0.1, 0.2, 0.3], "speed_mps": [9.0, 71.1, 71.1, 9.1],
+    ...     "yaw_rate_radps": [0.1, 0.1, 0.1, 0.1]})
+    >>> kept, notes = usable_rows(rows)
+    >>> kept["speed_mps"].tolist()
+    [9.0, 9.1]
+    >>> notes[0][:56]
+    'odometry: 2 speeds that come and go at once, such as 71.'
+    """
+    time_s = rows["time_s"].to_numpy(dtype=np.float64)
+    speed = rows["speed_mps"].to_numpy(dtype=np.float64)
+    notes: tuple[str, ...] = ()
+    marks = _sudden(time_s, np.abs(speed))
+    if count := int(marks.sum()):
+        first = float(speed[np.flatnonzero(marks)[0]])
+        notes += (
+            f"odometry: {number_of(count, 'speed')} that come and go at once, such as "
+            f"{first:.1f} m/s ({3.6 * first:.0f} km/h), taken as missing (likely: what a bus sends "
+            "where it has no value)",
+        )
+        rows, time_s = rows[~marks].reset_index(drop=True), time_s[~marks]
+    rate = rows["yaw_rate_radps"].to_numpy(dtype=np.float64)
+    joined = _between(time_s, rate)
+    if count := int(np.isfinite(joined).sum() - np.isfinite(rate).sum()):
+        notes += (f"odometry: {number_of(count, 'yaw rate')} taken from the rows around",)
+        rows = rows.assign(yaw_rate_radps=joined)
+    return rows, notes
+
+
+def _sudden(time_s: Floats, speed: Floats) -> Bools:
+    """Return the rows of runs of one speed that is reached, and left, as no vehicle could."""
+    if speed.size < 3:
+        return np.zeros(speed.size, dtype=np.bool_)
+    begin = np.flatnonzero(np.concatenate([[True], speed[1:] != speed[:-1]]))
+    end = np.append(begin[1:], speed.size)
+    number = np.repeat(np.arange(begin.size), end - begin)
+    value, inner = speed[begin], slice(1, begin.size - 1)
+    rise = np.diff(value)
+    fast = np.abs(rise) > np.maximum(
+        _JUMP_MPS, _JUMP_MPS2 * (time_s[begin[1:]] - time_s[end[:-1] - 1])
+    )
+    up, down = fast & (rise > 0), fast & (rise < 0)
+    found = np.zeros(begin.size, dtype=np.bool_)
+    found[inner] = up[:-1] & down[1:]
+    if begin.size > 1:
+        found[0], found[-1] = down[0], up[-1]
+    return np.asarray((found & (value > _FULL_SCALE_MPS))[number])
+
+
+def _between(time_s: Floats, rate: Floats) -> Floats:
+    """Return rates with missing ones between those of rows at most a second away."""
+    known = np.flatnonzero(np.isfinite(rate))
+    missing = np.flatnonzero(~np.isfinite(rate))
+    if not known.size or not missing.size:
+        return rate
+    after = np.searchsorted(known, missing)
+    inside = (after > 0) & (after < known.size)
+    missing, after = missing[inside], after[inside]
+    early, late = known[after - 1], known[after]
+    near = (time_s[missing] - time_s[early] <= _NEAR_S) & (
+        time_s[late] - time_s[missing] <= _NEAR_S
+    )
+    joined = rate.copy()
+    joined[missing[near]] = np.interp(time_s[missing[near]], time_s[known], rate[known])
+    return joined

@@ -1,0 +1,60 @@
+"""Cells in a plain CSV: identities, carriers, levels and bars."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
+from mapfilter.tracks.readers.columns import only
+from mapfilter.tracks.readers.csv_mapped import Mapped
+from mapfilter.tracks.readers.identities import add_radio, parse_identities
+from mapfilter.tracks.readers.recording import Reading
+
+
+def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
+    """Add the rows that hold a cell or a level."""
+    if not any(map(mapped.has, ("level_dbm", "bars", "ci", "cell"))):
+        return
+    identity = {name: mapped.whole(name) for name in ("mcc", "mnc", "lac", "ci")}
+    if mapped.has("cgi"):
+        given = parse_identities(mapped.texts("cgi"))
+        identity = {
+            name: np.where(np.isnan(values), given[name], values)
+            for name, values in identity.items()
+        }
+    columns = {
+        **identity,
+        "time_s": time_s,
+        **{name: mapped.number(name) for name in ("level_dbm", "level_step_db")},
+        **{name: mapped.whole(name) for name in ("arfcn", "bsic", "timing_advance")},
+    }
+    if mapped.has("technology"):
+        columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
+    if mapped.has("bars"):
+        _add_bars(mapped, columns)
+    cell = mapped.texts("cell")
+    identified = (cell != "") | ~np.isnan(identity["ci"])
+    there = identified | ~np.isnan(columns["level_dbm"])
+    if mapped.has("cell"):
+        columns["cell"] = cell
+    serving = mapped.rows.flags(*mapped.names("role"), true=("serving",))
+    neighbour = mapped.rows.flags(*mapped.names("role"), true=("neighbour", "neighbor"))
+    serving |= identified & ~neighbour
+    columns["role"] = np.array(["neighbour", "serving"], dtype=object)[serving.astype(np.int64)]
+    add_radio(reading, *only(columns, mapped.rows.line, there))
+
+
+def _add_bars(mapped: Mapped, columns: dict[str, np.ndarray]) -> None:
+    """Give rows without a level that of their bars, as in LTE where the technology is unknown."""
+    bars = mapped.number("bars")
+    families = columns.get("technology", np.full(len(bars), None, dtype=object))
+    families = np.array([one if one in BARS_DBM else "LTE" for one in families], dtype=object)
+    names = ("level_dbm", "level_step_db", "censored")
+    found = {name: columns.get(name, np.zeros(len(bars))).copy() for name in names}
+    without = np.isnan(columns["level_dbm"])
+    for family in BARS_DBM:
+        of = without & (families == family)
+        for name, values in zip(names, levels_of_bars(bars[of], family), strict=True):
+            found[name][of] = values
+    columns |= found

@@ -1,0 +1,122 @@
+"""Columns of a plain CSV by field: found by name or by a map, in the units of the fields."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapfilter._header_units import HeaderUnit, header_unit
+from mapfilter._types import Floats
+from mapfilter.errors import Faults, InputError
+from mapfilter.tracks.readers.columns import Columns, only
+from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields
+from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.identities import available
+from mapfilter.tracks.readers.recording import Reading
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Columns by field.
+
+    Parameters
+    ----------
+    rows : Columns
+    own : mapping of str to str
+        Columns of fields by a user's map; other fields have columns of their usual names.
+    """
+
+    rows: Columns
+    own: Mapping[str, str]
+
+    def names(self, field: str) -> tuple[str, ...]:
+        """Return the names of columns that may hold a field."""
+        return (self.own[field].lower(),) if field in self.own else FIELDS[field]
+
+    def has(self, *fields: str) -> bool:
+        """Return whether there are columns of all these fields."""
+        return all(self.rows.find(*self.names(field)) is not None for field in fields)
+
+    def number(self, field: str) -> Floats:
+        """Return a field's numbers, NaN where missing; by the unit in the column's name."""
+        values = self.rows.number(*self.names(field))
+        unit = self.unit(field)
+        if unit is None or unit.factor == 1.0:
+            return values
+        column = self.rows.find(*self.names(field))
+        note = f"{field}: {unit.unit} by the name of its column ({column}), converted"
+        if field == "heading_rad":
+            note += "; counter-clockwise from grid east (a compass is compass_deg)"
+        self.rows.reading.note(note)
+        return values * unit.factor
+
+    def unit(self, field: str) -> HeaderUnit | None:
+        """Return the unit that the name of a field's column states."""
+        column = self.rows.find(*self.names(field))
+        return None if column is None else header_unit(field, column)
+
+    def radians(self, name: str, per: str = "") -> Floats:
+        """Return a field that may be in degrees as radians."""
+        if self.has(f"{name}_deg{per}"):
+            return np.radians(self.number(f"{name}_deg{per}"))
+        return self.number(f"{name}_rad{per}")
+
+    def whole(self, field: str) -> Floats:
+        """Return a field's whole numbers, NaN where missing."""
+        return available(*self.rows.whole(*self.names(field)))
+
+    def texts(self, field: str) -> np.ndarray:
+        """Return a field's texts, "" where missing."""
+        return self.rows.texts(*self.names(field))
+
+
+def add_rows(
+    reading: Reading,
+    table: str,
+    columns: Mapping[str, np.ndarray],
+    rows: Columns,
+    there: np.ndarray,
+) -> None:
+    """Add the rows of a table that hold something of it."""
+    if there.any():
+        reading.add(table, *only(columns, rows.line, there))
+
+
+def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Mapped:
+    """Return the columns of a file, with the part of a user's map that is of it.
+
+    Raises
+    ------
+    InputError
+        A field or column that does not exist or is there twice, a unit of another quantity in a
+        column's name, no column of times.
+    """
+    elsewhere = {
+        field
+        for field, column in options.columns.items()
+        if options.shared and field in FIELDS and column.lower() not in rows.names
+    }
+    own = {field: name for field, name in options.columns.items() if field not in elsewhere}
+    mapped, faults = Mapped(rows, own), Faults()
+    where, present = f"{reading.path} header", f"{', '.join(rows.names)[:300]}"
+    check_fields(own, faults)
+    for field, column in own.items():
+        if field not in FIELDS:
+            continue
+        if column.lower() not in rows.names:
+            faults.add(where, f"a column {column} for {field}", present)
+        elif rows.names.count(column.lower()) > 1:
+            faults.add(where, f"one column {column}", "several")
+    for field in FIELDS:
+        unit = mapped.unit(field)
+        if unit is not None and not unit.unit:
+            hint = "another quantity, or a name to be written without brackets"
+            got = f"{unit.written} in {rows.find(*mapped.names(field))}"
+            faults.add(where, f"{unit.known} for {field}", got, hint)
+    if "time" not in own and rows.find(*FIELDS["time"]) is None:
+        hint = "--column time=COLUMN"
+        faults.add(where, "a column of times", present, hint)
+    faults.raise_if_any(InputError)
+    return mapped
