@@ -18,7 +18,7 @@ def files(tmp_path):
     lon, lat = unproject("EPSG:32635", east_m, np.full(60, 6_671_900.0))
     track, wheel, gpx = (tmp_path / name for name in ("track.csv", "wheel.csv", "track.gpx"))
     pd.DataFrame({"Zeit": TIME_S, "Breite": lat, "Laenge": lon}).to_csv(track, index=False)
-    speeds = {"time": TIME_S, "wheel_speed_mps": 1.0, "yaw_rate_radps": 0.0}
+    speeds = {"time": TIME_S, "wheel_speed_mps": 1.0, "yaw_rate_radps": 0.0, "tempo": 7.2}
     pd.DataFrame(speeds).to_csv(wheel, index=False)
     points = "".join(
         f'<trkpt lat="{y}" lon="{x}"><time>{pd.Timestamp(t, unit="s").isoformat()}Z</time></trkpt>'
@@ -41,10 +41,10 @@ def test_a_file_that_lacks_a_named_column_is_read_by_usual_names(files):
 
 
 def test_each_file_may_have_some_of_the_columns(files):
-    named = {**NAMED, "wheel_speed_kmh": "wheel_speed_mps"}
+    named = {**NAMED, "wheel_speed_kmh": "tempo"}
     _, wheel, _ = read_recordings(files, OpenOptions(columns=named))[0]
     assert wheel.named == ("wheel_speed_kmh",)
-    assert wheel.tables["odometry"]["speed_mps"].to_numpy() == pytest.approx(1 / 3.6)
+    assert wheel.tables["odometry"]["speed_mps"].to_numpy() == pytest.approx(2.0)
 
 
 def test_a_column_that_no_file_has_is_an_error(files):
