@@ -236,7 +236,7 @@ def test_errors_of_cells_that_are_not_kept_last_longer_than_noise():
 def test_noise_of_fixes():
     def gain(**variances):
         made = started()
-        made._update_fix(GnssFix(9.0, 5.0, **variances))
+        made._update_fix(GnssFix(9.0, 5.0, **variances), 10.0)
         return (made.belief.means[0, :2] - 5.0) / 4.0
 
     np.testing.assert_allclose(gain(), [9 / 109, 0.0], atol=1e-12)
@@ -270,10 +270,10 @@ def test_statuses():
     assert made.status is Status.LOST
     # Ten readings are remembered, each by its square for one component.
     for _ in range(12):
-        made._update_fix(GnssFix(5.0, 5.0 + 1e-9))
+        made._update_fix(GnssFix(5.0, 5.0 + 1e-9), 10.0)
     assert len(made.recent_nis) == 10
     far = started()
-    far._update_fix(GnssFix(5.0 + 109**0.5 * 2, 5.0))
+    far._update_fix(GnssFix(5.0 + 109**0.5 * 2, 5.0), 10.0)
     assert far.recent_nis == [pytest.approx(2.0)]
 
 

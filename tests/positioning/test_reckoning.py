@@ -126,7 +126,7 @@ def test_a_way_without_headings_is_straight_for_a_while():
     assert spread_m2 == pytest.approx(way_spread_m2(100.0))
     assert spread_m2 > 100 * 30.0
     assert made.moved(MotionStep(1.0, 0.0), OPTIONS, np.zeros(2))[0].headless_m == 0.0
-    fixed = made.fixed(7.0)
+    fixed, _ = made.fixed(7.0, GnssFix(EAST, NORTH), np.eye(2))
     assert (fixed.headless_m, fixed.fixed_s) == (0.0, 7.0)
 
 

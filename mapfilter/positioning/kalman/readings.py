@@ -5,8 +5,11 @@ from __future__ import annotations
 from math import isfinite
 from typing import NamedTuple
 
+import numpy as np
+
+from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason
-from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.kalman.models import SiteModels
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
@@ -60,3 +63,11 @@ def _cell(sites: SiteModels, row: ReportRow, serving: str | None) -> tuple[str |
     if len(found) == 1:
         return found[0], Reason.NOT_USED_BY_FILTER
     return None, Reason.AMBIGUOUS_CELL if found else Reason.UNKNOWN_CELL
+
+
+def fix_covariance_m2(fix: GnssFix, usual_sd_m: float) -> Floats:
+    """Return the covariance of a fix, (2, 2); that of a usual one where no law has the stated."""
+    cross_m2 = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
+    stated = np.array([[fix.var_east_m2, cross_m2], [cross_m2, fix.var_north_m2]])
+    is_valid = np.isfinite(stated).all() and stated[0, 0] > 0 and np.linalg.det(stated) > 0
+    return stated if is_valid else usual_sd_m**2 * np.eye(2)

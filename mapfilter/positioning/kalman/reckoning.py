@@ -21,8 +21,10 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.models.state import StateLayout
-from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.kalman.alignment import Alignment, Direction
+from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.sensors.unmeasured import headless_step
@@ -66,11 +68,14 @@ class Reckoning:
         Way without headings since the last heading or fix.
     fixed_s : float
         Time of the last fix that was used.
+    alignment : Alignment
+        Of motion that has turns only.
     """
 
     watch: SensorWatch = field(default_factory=SensorWatch)
     headless_m: float = 0.0
     fixed_s: float = -inf
+    alignment: Alignment = field(default_factory=Alignment)
 
     @property
     def may_have_left(self) -> bool:
@@ -94,9 +99,11 @@ class Reckoning:
         unused = []
         if motion is not Reason.USED:
             unused.append(UnusedReading(time_s, "motion", "", motion))
-            # Turns alone say nothing of a position.
-            known = tuple(step for step in epoch.motion if isfinite(step.step_m))
-            epoch = replace(epoch, motion=known)
+            # Turns of rows whose length is not known still turn.
+            measured = (
+                one if isfinite(one.step_m) else replace(one, step_m=0.0) for one in epoch.motion
+            )
+            epoch = replace(epoch, motion=tuple(measured))
         if radio is not Reason.USED:
             unused += [UnusedReading(time_s, row.role, row.name, radio) for row in heard]
         return replace(self, watch=watch), epoch, unused
@@ -123,14 +130,18 @@ class Reckoning:
             ``USED``, ``NO_STEP`` or ``NO_HEADING``.
         """
         transition, noise, shift = at_rest(RECKONED)
+        alignment, step = self.alignment.headed(step)
+        after = self if alignment is self.alignment else replace(self, alignment=alignment)
         if not isfinite(step.step_m):
-            return self, (transition, noise, shift), Reason.NO_STEP
+            return after, (transition, noise, shift), Reason.NO_STEP
         if not isfinite(step.heading_rad):
-            after, why = self, Reason.USED
+            why = Reason.USED
             if not isfinite(step.spread_m):
                 step, why = headless_step(step.step_m, self.headless_m), Reason.NO_HEADING
-                after = replace(self, headless_m=self.headless_m + abs(step.step_m))
+                after = replace(after, headless_m=self.headless_m + abs(step.step_m))
             noise[:2, :2] = step.all_sides_m**2 / 2 * np.eye(2)
+            if alignment.known:
+                noise[_TURNED, _TURNED] = step.turned_sd_rad**2
             return after, (transition, noise, shift), why
         turned_rad, scale = float(errors[0]), float(errors[1])
         heading_rad, length_m = step.heading_rad + turned_rad, step.step_m * (1 + scale)
@@ -143,9 +154,22 @@ class Reckoning:
         noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
         noise[:2, :2] += cross_m**2 * np.outer(across, across)
         noise[_TURNED, _TURNED] = radians(options.drift_deg_per_sqrt_m) ** 2 * abs(step.step_m)
-        after = self if self.headless_m == 0 else replace(self, headless_m=0.0)
+        after = after if self.headless_m == 0 else replace(after, headless_m=0.0)
         return after, (transition, noise, shift), Reason.USED
 
-    def fixed(self, time_s: float) -> Reckoning:
-        """Return it after a fix was used."""
-        return Reckoning(self.watch.positioned(time_s), 0.0, time_s)
+    def fixed(
+        self, time_s: float, fix: GnssFix, covariance_m2: Floats
+    ) -> tuple[Reckoning, Direction | None]:
+        """Return it after a fix with a covariance, and the direction of turns if found now."""
+        sd_m = float(np.sqrt(np.trace(covariance_m2) / 2))
+        alignment, found = self.alignment.at_fix(fix.east_m, fix.north_m, sd_m)
+        return Reckoning(self.watch.positioned(time_s), 0.0, time_s, alignment), found
+
+
+def turned_to(belief: SumBelief, direction: Direction) -> SumBelief:
+    """Return a belief with the heading error that turns have, on the ground."""
+    means, covariances = belief.means.copy(), belief.covariances.copy()
+    means[:, _TURNED] = direction.turned_rad
+    covariances[:, _TURNED] = covariances[:, :, _TURNED] = 0.0
+    covariances[:, _TURNED, _TURNED] = direction.sd_rad**2
+    return replace(belief, means=means, covariances=covariances)

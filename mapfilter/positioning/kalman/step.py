@@ -33,13 +33,18 @@ from mapfilter.positioning.kalman.level_errors import (
 )
 from mapfilter.positioning.kalman.models import SiteModels, compiled
 from mapfilter.positioning.kalman.place import WITHIN_M, belief_tail, place_of, share_within
-from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
+from mapfilter.positioning.kalman.readings import (
+    SiteReadings,
+    fix_covariance_m2,
+    site_readings,
+)
 from mapfilter.positioning.kalman.reckoning import (
     RECKONED,
     Reckoning,
     after_each_other,
     at_rest,
     first_deviations,
+    turned_to,
 )
 
 _LOST_NIS, _WINDOW = 5.0, 10
@@ -206,9 +211,7 @@ class KalmanStep:
             if self.slots.size:
                 lasting = self.options.lasting_levels
                 self.belief = lasting.extended_belief(self.belief, self.slots)
-        taken = fix is not None and self._update_fix(fix)
-        if taken:
-            self.reckoning = self.reckoning.fixed(epoch.time_s)
+        taken = fix is not None and self._update_fix(fix, epoch.time_s)
         if given.cells or given.timed:
             step_m = self.options.timing_step_m
             reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
@@ -261,17 +264,16 @@ class KalmanStep:
         }
         return SumBelief.around(mean, np.diag(deviation**2), places)
 
-    def _update_fix(self, fix: GnssFix) -> bool:
-        cross_m2 = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
-        noise = np.array([[fix.var_east_m2, cross_m2], [cross_m2, fix.var_north_m2]])
-        valid = np.isfinite(noise).all() and noise[0, 0] > 0 and np.linalg.det(noise) > 0
-        if not valid:
-            noise = np.eye(2) * self.options.fix_sd_m**2
-        layout = self.layout
+    def _update_fix(self, fix: GnssFix, time_s: float) -> bool:
+        noise, layout = fix_covariance_m2(fix, self.options.fix_sd_m), self.layout
+        self.reckoning, found = self.reckoning.fixed(time_s, fix, noise)
         if self.lasts:
             layout = fix_layout(layout, self.own.size)
             noise = white_part(noise, self.options.fix_lasting_m)
-        return self._update(position_fix(layout, noise), [fix.east_m, fix.north_m])
+        taken = self._update(position_fix(layout, noise), [fix.east_m, fix.north_m])
+        if found is not None and self.belief is not None:
+            self.belief = turned_to(self.belief, found)
+        return taken
 
     def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
         """Update with a measurement; return whether that could be done."""
