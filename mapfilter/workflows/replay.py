@@ -240,9 +240,10 @@ def _with_view(
 
 
 def unnamed_database(config: Config) -> Path | None:
-    """Return the database of a replay where neither an option nor the configuration names one."""
+    """Return the database of a replay where no setting names it, nor the folder that it lies in."""
     needs_none = isinstance(filter_choice(config.filter), KalmanFilter)
-    if needs_none or config.database.path is not None or not config.database_path.exists():
+    is_named = config.database.path is not None or config.output.dir != Path.cwd() / "out"
+    if needs_none or is_named or not config.database_path.exists():
         return None
     return config.database_path
 
