@@ -23,6 +23,7 @@ from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.positioning.log_lacks import NO_MOTION, advice_of, lack_of_log
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
+from mapfilter.positioning.undirected_steps import with_joined_steps
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.placeless import in_frame
@@ -188,10 +189,12 @@ def locate(
     )
     alone = by_streets_alone(options, log, database)
     notes = (*notes, STREETS_ALONE) if alone else notes
+    given, undirected = with_joined_steps(log, options)
+    notes = (*notes, *undirected)
     bound = as_filter(options, database.without_cells() if alone else database, ways=ways)
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     trace = TraceRecorder(bound) if record else None
-    found = loop.locate(log, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)
+    found = loop.locate(given, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)
     notes = _not_located(log, options, found.estimate, database)
     if alone or not database.cell_ids:
         notes += advice_of(log, options, found.estimate)

@@ -27,6 +27,7 @@ from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.tracks.clock_steps import with_clocks_gone_on
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import check_clocks, check_start, check_steps, early_ends
+from mapfilter.tracks.log_times import seconds_of_tables
 from mapfilter.tracks.motion_faults import compared_places, motion_faults
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
@@ -120,45 +121,6 @@ class TrackLog:
         return float(np.sum(np.hypot(np.diff(east), np.diff(north))))
 
 
-def _seconds(
-    given: Mapping[str, Any], start_utc_s: float, names: Mapping[str, str], faults: Faults
-) -> tuple[dict[str, pd.DataFrame], float]:
-    """Convert timestamps to seconds; return the tables and the start in UTC seconds."""
-    tables: dict[str, pd.DataFrame] = {}
-    times: dict[str, pd.Series] = {}
-    for table, rows in given.items():
-        where = names.get(table, table)
-        if not isinstance(rows, pd.DataFrame):
-            faults.add(where, "a pandas.DataFrame", type(rows).__name__)
-            continue
-        if not rows.columns.is_unique:
-            twice = ", ".join(map(str, rows.columns[rows.columns.duplicated()].unique()))
-            faults.add(where, "each column once", f"{twice} more often")
-            continue
-        tables[table] = rows
-        name = "time_s" if "time_s" in rows else "time"
-        time = rows[name].infer_objects() if name in rows else pd.Series(dtype=float)
-        if isinstance(time.dtype, pd.DatetimeTZDtype):
-            tables[table], times[table] = rows.drop(columns=name), time
-        elif pd.api.types.is_datetime64_any_dtype(time.dtype):
-            hint = 'UTC or local time? add it, such as by .dt.tz_localize("UTC")'
-            faults.add(f"{where}, {name}", "timestamps with a time zone", "none", hint)
-            del tables[table]
-    known = [time.min() for time in times.values() if time.notna().any()]
-    if known and np.isnan(start_utc_s):
-        origin, offset_s = min(known), 0.0
-        start_utc_s = origin.timestamp()
-        if plain := [names.get(t, t) for t in tables if t not in times and len(tables[t])]:
-            got, hint = f"seconds in {', '.join(plain)}", "give start_utc_s, UTC seconds at 0"
-            faults.add("log, time_s", "timestamps in every table, or a start", got, hint)
-    else:
-        origin, offset_s = pd.Timestamp(0, tz="UTC"), start_utc_s
-    for table, time in times.items():
-        time_s = (time - origin).dt.total_seconds() - offset_s
-        tables[table] = tables[table].assign(time_s=time_s)
-    return tables, start_utc_s
-
-
 def make_log(
     crs: Any,
     *,
@@ -250,7 +212,7 @@ def make_log(
     except InputError as error:
         faults.found.extend(error.faults)
     present = {table: rows for table in TABLES if (rows := arguments[table]) is not None}
-    given, start_utc_s = _seconds(present, float(start_utc_s), called, faults)
+    given, start_utc_s = seconds_of_tables(present, float(start_utc_s), called, faults)
     given, of_clocks = with_clocks_gone_on(given, called)
     tables, every_note = dict[str, pd.DataFrame](), (*notes, *of_clocks)
     for table in TABLES:

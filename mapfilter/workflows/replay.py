@@ -26,6 +26,7 @@ from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_lacks import advice_of
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
+from mapfilter.positioning.undirected_steps import with_joined_steps
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
@@ -151,6 +152,8 @@ def run_replay(
         notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))
         if database is not None and by_streets_alone(fitted, log, database):
             notes = (*notes, STREETS_ALONE)
+        given, undirected = with_joined_steps(log, fitted)
+        notes = (*notes, *undirected)
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
         log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
@@ -165,7 +168,7 @@ def run_replay(
                 pictures.update(begin_belief(snapshots, has_evidence, truth, base, drawing))
 
         track = locate(
-            log,
+            given,
             filter_,
             rng,
             snapshots=drawn,

@@ -86,3 +86,17 @@ def test_a_turn_in_a_gap_is_no_fault_of_the_log(tmp_path):
     rows = {"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "yaw_rate_radps": rate}
     path = written(tmp_path / "gap.csv", pd.DataFrame(rows)[kept])
     assert len(open_log([path], options=UTM).log.motion) == kept.sum()
+
+
+def test_where_a_vehicle_drives_without_a_yaw_rate_is_not_known():
+    """Steps without a direction were followed to all sides, each on its own: a rest, in the sum."""
+    blind = (TIME_S > 20.0) & (TIME_S < 30.0)
+    rate = np.where(blind, np.nan, RATE_RADPS)
+    rows = pd.DataFrame({"time_s": TIME_S, "speed_mps": SPEED_MPS, "yaw_rate_radps": rate})
+    motion, _, notes = reckon_odometry(rows)
+    unknown = motion["step_m"].isna().to_numpy()
+    # The interval that begins with the last of them has no turn, either.
+    assert np.array_equal(unknown, blind | (np.abs(TIME_S - 30.0) < 0.05))
+    assert any("no yaw rate over 10.0 s of driving" in note for note in notes)
+    standing = rows.assign(speed_mps=np.where(blind, 0.0, SPEED_MPS))
+    assert reckon_odometry(standing)[0]["step_m"].isna().sum() <= 2

@@ -57,9 +57,14 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     found = _bias(time_s, rate, standing, None)
     correction = np.interp(time_s, found.time_s, found.offset_rad)
     turn = motion["turn_rad"].to_numpy() + np.diff(correction, prepend=correction[0])
-    notes = unusable + _notes(
-        found, int(np.sum(standing & np.isfinite(rate))), has_rate=bool(np.isfinite(rate).any())
-    )
+    has_rate = bool(np.isfinite(rate).any())
+    notes = unusable + _notes(found, int(np.sum(standing & np.isfinite(rate))), has_rate=has_rate)
+    # Which way it went meanwhile is as little known as over a gap.
+    blind = has_rate & np.isnan(turn) & (np.abs(motion["step_m"].to_numpy()) > 0)
+    if blind.any():
+        blind_s = float(np.diff(time_s, prepend=time_s[0])[blind].sum())
+        notes += (f"odometry: no yaw rate over {blind_s:.1f} s of driving: motion is not known",)
+        motion = motion.assign(step_m=motion["step_m"].where(~blind))
     speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
     imu = _noise(time_s, found, float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS)
     gaps = np.flatnonzero(odometry_gaps(time_s, speed))
