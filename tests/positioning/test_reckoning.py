@@ -224,7 +224,9 @@ def test_a_report_that_stands_still_while_one_walks_is_not_used():
     state, stale = tracker.begin(("motion", "neighbour", "gnss")), 0
     for epoch in made:
         state, out = tracker.step(state, epoch, rng)
-        stale += any(one.reason is Reason.STALE_RADIO for one in out.unused)
+        is_stale = any(one.reason is Reason.STALE_RADIO for one in out.unused)
+        assert (out.fix.reason is Reason.STALE_RADIO) is is_stale
+        stale += is_stale
     assert stale > 100
 
 

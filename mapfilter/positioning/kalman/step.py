@@ -128,6 +128,7 @@ class KalmanStep:
 
     def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
+        heard = epoch.radio
         if self.own is RECKONED:
             # With a velocity in the state, nothing but what is weighed tells of motion.
             self.reckoning, epoch, unused = self.reckoning.watched(epoch)
@@ -135,6 +136,8 @@ class KalmanStep:
         given = site_readings(self.sites, epoch)
         self.motion = self._move(epoch, given.cells)
         reason = self._measure(epoch, given)
+        if reason is Reason.NO_READING and heard and not epoch.radio:
+            reason = Reason.STALE_RADIO
         self.time_s = epoch.time_s
         return self._fix(epoch.time_s, reason)
 
