@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf, isnan, nan
+from math import inf, isnan
 from typing import Any
 
 from mapfilter._inputs import shown
@@ -19,6 +19,7 @@ from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SCHEMA, SERVING, Column
 _COLUMNS = {table: {column.name: column for column in columns} for table, columns in SCHEMA.items()}
 _TIME = SCHEMA["motion"][0]
 _SPREAD = Column("spread_m", 0, inf, "metres >= 0")
+_TURNED = Column("turned_sd_rad", 0, 1e6, "radians >= 0")
 _ROLES = (SERVING, NEIGHBOUR)
 _FIELDS: dict[type, dict[str, Column]] = {
     MotionStep: {
@@ -27,6 +28,7 @@ _FIELDS: dict[type, dict[str, Column]] = {
         "turn_rad": _COLUMNS["motion"]["turn_rad"],
         "spread_m": _SPREAD,
         "sampling_sd_m": _COLUMNS["motion"]["sampling_sd_m"],
+        "turned_sd_rad": _TURNED,
     },
     ReportRow: {
         name: _COLUMNS["radio"][name]
@@ -55,6 +57,8 @@ _FIELDS: dict[type, dict[str, Column]] = {
 """The column of a log's tables that each field of a row is checked by."""
 _FLOATS = ("timing_advance",)
 """Whole numbers that rows hold as floats, NaN where they are missing."""
+_ALWAYS = ("time_s", "sampling_sd_m", "turned_sd_rad")
+"""Numbers that are never missing; 0 where there is no such error."""
 _RANGES = {
     kind: tuple(
         (name, column.low, column.high, column.kind == "integer" and name not in _FLOATS)
@@ -126,8 +130,10 @@ def _row_is_well(row: Any) -> bool:
     kind = type(row)
     for name, low, high, may_lack in _RANGES[kind]:
         value = getattr(row, name)
+        if (may_lack and value is None) or low <= value <= high:
+            continue
         # NaN is the only number that is not itself.
-        if not (may_lack and value is None) and not (low <= value <= high or value != value):
+        if value == value or name in _ALWAYS:
             return False
     for name, required in _TEXTS[kind]:
         value = getattr(row, name)
@@ -169,13 +175,17 @@ def _check(where: str, value: object, column: Column, faults: Faults) -> None:
 
 def _check_number(where: str, value: Any, column: Column, faults: Faults) -> None:
     if value is None:
-        faults.add(where, column.expected, "None", "give NaN where it was not measured")
+        hint = "" if column.name in _ALWAYS else "give NaN where it was not measured"
+        faults.add(where, column.expected, "None", hint)
+        return
+    if isinstance(value, str | bytes):
+        faults.add(where, column.expected, shown(value), "a text given for a number")
         return
     try:
-        number = nan if isinstance(value, str | bytes) else float(value)
+        number = float(value)
     except (TypeError, ValueError, OverflowError):
         number = inf
-    is_missing = isnan(number) and not isinstance(value, str | bytes) and column is not _TIME
+    is_missing = isnan(number) and column.name not in _ALWAYS
     if not (is_missing or column.low <= number <= column.high):
         faults.add(where, column.expected, shown(value), column.hint)
 

@@ -189,8 +189,9 @@ def make_epoch(time_s: float, rows: Mapping[str, Sequence[Sequence[Any]]]) -> Ep
 
     Examples
     --------
-    >>> make_epoch(1.0, {"motion": [(1.4, 0.5, nan)]}).motion
-    (MotionStep(step_m=1.4, heading_rad=0.5, turn_rad=nan, spread_m=nan, sampling_sd_m=0.0),)
+    >>> (step,) = make_epoch(1.0, {"motion": [(1.4, 0.5, nan)]}).motion
+    >>> step.step_m, step.heading_rad, step.turn_rad
+    (1.4, 0.5, nan)
     """
     made = {name: [_FIELDS[name].row(*values) for values in rows[name]] for name in rows}
     return Epoch(

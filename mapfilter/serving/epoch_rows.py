@@ -88,12 +88,12 @@ def read_epochs(
             last_s = found[-1].time_s if found else after_s
             if time_s - last_s > MOST_GAP_S:
                 # All later epochs would come too early after it.
-                expected = f"at most {MOST_GAP_S:g} s later than {last_s:.10g}, the epoch before"
-                faults.add(f"{where}.time_s", expected, f"{time_s:.10g}", _OF_GAP)
+                expected = f"at most {MOST_GAP_S:g} s later than {last_s!r}, the epoch before"
+                faults.add(f"{where}.time_s", expected, f"{time_s!r}", _OF_GAP)
                 continue
             if found and time_s <= last_s:
-                expected = f"later than {last_s:g}, the epoch before"
-                faults.add(f"{where}.time_s", expected, f"{time_s:g}", "epochs out of order")
+                expected = f"later than {last_s!r}, the epoch before"
+                faults.add(f"{where}.time_s", expected, f"{time_s!r}", "epochs out of order")
             found.append(make_epoch(time_s, rows))
     if faults.found:
         raise RequestError.of(InputError(tuple(faults.found)))

@@ -17,6 +17,7 @@ from mapfilter.positioning.kalman.level_errors import CellSlots, with_levels
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.positioning.kalman.reckoning import RECKONED
+from mapfilter.positioning.kalman.start import first_belief
 from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
 from mapfilter.positioning.sensors.unmeasured import way_spread_m2
 from mapfilter.radio.cells import Cell, CellPlan
@@ -24,6 +25,10 @@ from mapfilter.radio.cells import Cell, CellPlan
 CRS = "EPSG:32629"
 # On the central meridian of the zone.
 EAST, NORTH = 500_000.0, 4_600_000.0
+
+
+def begun(step, fix, given):
+    return first_belief(step.sites, step.own, fix, given)
 
 
 def cell(name, east_m, **more):
@@ -108,11 +113,11 @@ def test_steps_shift_and_spread():
     assert way_spread_m2(3.0) == pytest.approx(9.0, rel=0.02)
     np.testing.assert_allclose(shift, [*way, 0.0, 0.0])
     drift = radians(0.3) ** 2
-    # The error of headings drifts: of the first step, the second one has its drift.
-    expected += drift * 2.0 * 1.0**2 * np.outer(left[:, 1], left[:, 1])
+    # The error of headings drifts: the last step has the drift of the 5 m before it.
+    expected += drift * 5.0 * 1.0**2 * np.outer(left[:, 1], left[:, 1])
     np.testing.assert_allclose(noise[:2, :2], expected)
-    np.testing.assert_allclose(noise[2, :2], drift * 2.0 * left[:, 1])
-    np.testing.assert_allclose(noise[2:, 2:], np.diag([drift * 3.0, 0.0]))
+    np.testing.assert_allclose(noise[2, :2], drift * 5.0 * left[:, 1])
+    np.testing.assert_allclose(noise[2:, 2:], np.diag([drift * 6.0, 0.0]))
     assert made.moved_m == 13.0
     np.testing.assert_allclose(made.belief.means[0], [*(5.0 + way), 0.0, 0.0])
     np.testing.assert_allclose(made.belief.covariances[0, :2, :2], 9.0 * np.eye(2) + expected)
@@ -161,10 +166,10 @@ def test_before_the_start_nothing_moves():
 
 def test_where_a_belief_starts():
     made = walk(reckoned=False)
-    at_fix = made._start(GnssFix(1.0, 2.0), NOTHING)
+    at_fix = begun(made, GnssFix(1.0, 2.0), NOTHING)
     np.testing.assert_array_equal(at_fix.means, [[1.0, 0.0, 2.0, 0.0]])
     np.testing.assert_array_equal(at_fix.covariances[0], np.diag([1500.0, 8, 1500, 8]) ** 2)
-    about = walk()._start(None, SiteReadings(("B",), (-70.0,), (), (), ()))
+    about = begun(walk(), None, SiteReadings(("B",), (-70.0,), (), (), ()))
     assert about.means.shape == (441, 4)
     np.testing.assert_allclose(about.weights @ about.means, [EAST + 2000.0, NORTH, 0.0, 0.0])
     expected = np.diag([1500.0, 1500.0, radians(10.0), 0.03]) ** 2
@@ -172,7 +177,7 @@ def test_where_a_belief_starts():
     np.testing.assert_array_equal(
         about.covariances[:, 2:, 2:], np.tile(expected[2:, 2:], (441, 1, 1))
     )
-    on_circle = walk()._start(None, SiteReadings(("B",), (-70.0,), ("A",), (2,), ()))
+    on_circle = begun(walk(), None, SiteReadings(("B",), (-70.0,), ("A",), (2,), ()))
     radius = 2.5 * KalmanOptions().timing_step_m
     # 8 694 m around by 600 m.
     assert on_circle.means.shape == (14, 4)
@@ -181,9 +186,9 @@ def test_where_a_belief_starts():
     np.testing.assert_allclose(on_circle.means[0], [EAST + radius, NORTH, 0.0, 0.0])
     assert on_circle.means[1, 1] > NORTH
     np.testing.assert_allclose(on_circle.covariances[0, :2, :2], 600.0**2 * np.eye(2))
-    near = walk()._start(None, SiteReadings((), (), ("A",), (0,), ()))
+    near = begun(walk(), None, SiteReadings((), (), ("A",), (0,), ()))
     assert near.weights.size == 8
-    far = walk()._start(None, SiteReadings((), (), ("A",), (60,), ()))
+    far = begun(walk(), None, SiteReadings((), (), ("A",), (60,), ()))
     assert far.weights.size == 64
     around = 0.7 * 2 * pi * 60.5 * KalmanOptions().timing_step_m / 64
     np.testing.assert_allclose(far.covariances[0, :2, :2], around**2 * np.eye(2))

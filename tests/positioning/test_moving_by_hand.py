@@ -20,6 +20,7 @@ from mapfilter.positioning.bayes.moving import moved
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.sensors.pace import Pace
+from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 
 SEARCHING, TRACKING = Status.SEARCHING, Status.TRACKING
@@ -304,7 +305,9 @@ def test_a_measured_position_leaves_no_doubt_of_a_jump():
 )
 def test_hypotheses_are_carried_on_once_steps_are_counted_again(left, rest, carried):
     watch = SensorWatch(rest=rest)
-    found, _, asked = move(walking(), beliefs=Beliefs(left=left), watch=watch)
+    rested = walking()
+    rested = replace(rested, watch=rested.watch._replace(rest=Rest(4.0)))
+    found, _, asked = move(rested, beliefs=Beliefs(left=left), watch=watch)
     # Since the last step at the usual pace, at 4 s.
     assert asked == ([("carried on", 6.0)] if carried else [])
     assert (found.belief.log_evidence == -77.0) is carried

@@ -1,5 +1,6 @@
 """Pauses of a recording, after which the first row tells of one interval alone."""
 
+from dataclasses import replace
 from math import isnan, nan, sqrt
 
 import pytest
@@ -29,6 +30,23 @@ def test_times_of_rows():
     assert (times.epoch_s, times.report_s, times.interval_s, times.reports) == (7.0, 6.0, 3.0, 3)
 
 
+def test_a_pause_soon_after_the_start_leaves_the_next_one_noticeable():
+    times = RowTimes()
+    for time_s in (0.0, 2.0, 4.0, 304.0, *(306.0 + 2.0 * k for k in range(8))):
+        times = times.read(time_s, has_report=True)
+    assert times.interval_s < 3.5
+    assert times.silent_s(380.0) == 60.0
+
+
+def test_reports_that_come_rarely_are_no_pauses():
+    """Also where the first two came together."""
+    times = RowTimes()
+    for time_s in (0.0, 0.01, *(30.0 * k for k in range(1, 30))):
+        assert times.silent_s(time_s) == 0.0
+        times = times.read(time_s, has_report=True)
+    assert times.interval_s > 25.0
+
+
 def test_a_pause_changes_the_usual_interval_by_a_bounded_share():
     times = EVERY_2_S.read(100_000.0, has_report=True)
     assert times.interval_s == pytest.approx(2.0 + (10.0 - 2.0) / 20)
@@ -55,16 +73,17 @@ def test_a_recording_is_silent_beyond_ten_seconds_and_three_intervals(
 
 def test_a_step_after_rows_that_come_always_tells_of_one_interval():
     never = RowTimes()
-    assert unrecorded_s(ALWAYS, never, 130.0, STEP, rested=False) == 29.0
+    assert unrecorded_s(ALWAYS, never, 130.0, STEP, 100.0, rested=False) == 29.0
     # No longer than five seconds are usual.
-    assert unrecorded_s(ALWAYS, never, 105.0, STEP, rested=False) == 0.0
+    assert unrecorded_s(ALWAYS, never, 105.0, STEP, 100.0, rested=False) == 0.0
     # Motion rows alone are missing: that is told at the epochs between.
-    assert unrecorded_s(ALWAYS, never, 130.0, NONE, rested=False) == 0.0
+    assert unrecorded_s(ALWAYS, never, 130.0, NONE, 100.0, rested=False) == 0.0
 
 
 @pytest.mark.parametrize(("gone_m", "missing"), [(2.0, True), (2.1, False), (42.0, False)])
 def test_a_row_longer_than_any_before_covers_the_pause(gone_m, missing):
-    found_s = unrecorded_s(ALWAYS, RowTimes(), 130.0, Going(gone_m, True, True), rested=False)
+    going = Going(gone_m, True, True)
+    found_s = unrecorded_s(ALWAYS, RowTimes(), 130.0, going, 100.0, rested=False)
     assert found_s == (29.0 if missing else 0.0)
 
 
@@ -72,23 +91,22 @@ def test_a_row_that_is_as_far_as_the_usual_speed_covers_the_pause():
     drive = Pace(100.0, 100.0, 100, 1.0, rests=True, speed_mps=5.0, fastest_mps=40.0)
     for gone_m, missing_s in ((40.0, 0.0), (2.0, 9.0)):
         going = Going(gone_m, True, True)
-        assert unrecorded_s(drive, RowTimes(), 110.0, going, rested=False) == missing_s
+        assert unrecorded_s(drive, RowTimes(), 110.0, going, 100.0, rested=False) == missing_s
 
 
 def test_whoever_rests_before_and_after_a_pause_has_rested():
     rest = Going(0.0, True, False)
-    assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, rest, rested=True) == 0.0
-    assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, rest, rested=False) == 399.0
-    assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, STEP, rested=True) == 399.0
+    assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, rest, 100.0, rested=True) == 0.0
+    assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, rest, 100.0, rested=False) == 399.0
+    assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, STEP, 100.0, rested=True) == 399.0
 
 
 def test_a_pedometer_pauses_only_where_reports_do():
     """It has no rows at rest, but a modem goes on."""
-    assert (
-        unrecorded_s(STEPS_ONLY, EVERY_2_S._replace(epoch_s=158.0), 160.0, STEP, rested=True) == 0
-    )
-    assert unrecorded_s(STEPS_ONLY, EVERY_2_S, 160.0, STEP, rested=True) == 59.5
-    assert unrecorded_s(STEPS_ONLY, EVERY_2_S, 160.0, NONE, rested=False) == 60.0
+    heard = EVERY_2_S._replace(epoch_s=158.0)
+    assert unrecorded_s(STEPS_ONLY, heard, 160.0, STEP, 100.0, rested=True) == 0.0
+    assert unrecorded_s(STEPS_ONLY, EVERY_2_S, 160.0, STEP, 100.0, rested=True) == 59.5
+    assert unrecorded_s(STEPS_ONLY, EVERY_2_S, 160.0, NONE, 100.0, rested=False) == 60.0
 
 
 def test_the_way_of_a_pause_is_put_before_the_step_after_it():
@@ -109,12 +127,12 @@ def test_the_way_of_a_pause_is_put_before_the_step_after_it():
 
 
 def test_what_is_in_the_belief_already_is_not_added_again():
-    """Epochs with reports alone have told of the first 40 s."""
+    """Epochs with reports alone have told of the first 40 s, and the step tells of the last."""
     told = SensorWatch(ALWAYS, 100.0, 140.0, Rest(100.0), 40.0, times=EVERY_2_S)
     _, seen, _ = watched(told._replace(times=RowTimes()), Epoch(145.0, (MotionStep(1.4, 0.3),)))
     way, _ = seen.motion
-    assert way.step_m == pytest.approx(5 * 1.4)
-    assert way.spread_m**2 == pytest.approx(spread_m2(1.4, 45.0) - spread_m2(1.4, 40.0))
+    assert way.step_m == pytest.approx(4 * 1.4)
+    assert way.spread_m**2 == pytest.approx(spread_m2(1.4, 44.0) - spread_m2(1.4, 40.0))
 
 
 def test_a_report_alone_after_a_pause_leaves_the_direction_open():
@@ -126,6 +144,23 @@ def test_a_report_alone_after_a_pause_leaves_the_direction_open():
     # It then goes on from there.
     watch, seen, (why, _) = watched(watch, Epoch(132.0, (), HEARD))
     assert (why, seen.motion) == (Reason.USED, ())
+
+
+def test_who_is_carried_on_after_a_pause_goes_on_from_its_end():
+    """No step follows the pause, and levels show after 70 s that the phone is carried."""
+    watch = SensorWatch(STEPS_ONLY, 100.0, 100.0, times=EVERY_2_S)
+    watch, _, _ = watched(watch, Epoch(400.0, (), HEARD))
+    watch, _, _ = watched(watch, Epoch(402.0, (), HEARD))
+    assert watch.rest.since_s == 400.0
+    rest = replace(watch.rest, carried_nats=6.0)
+    carried = watch._replace(rest=rest, times=RowTimes())
+    watch, seen, (why, _) = watched(carried, Epoch(470.0, (), HEARD))
+    assert why is Reason.MOTION_MISSING
+    (way,) = seen.motion
+    assert way.step_m == pytest.approx(70 * 1.4)
+    assert way.spread_m**2 == pytest.approx(spread_m2(1.4, 370.0) - spread_m2(1.4, 300.0))
+    assert way.turned_sd_rad == pytest.approx(sqrt(2 * 70 / 60))
+    assert (watch.known_s, watch.unmeasured_s) == (470.0, 370.0)
 
 
 @pytest.mark.parametrize(("turn_rad", "sd_rad"), [(nan, sqrt(2 / 60)), (0.1, 0.0)])

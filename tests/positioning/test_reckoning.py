@@ -1,5 +1,6 @@
 """Dead reckoning of Kalman-type filters: errors that last, dead sensors, ways without headings."""
 
+from dataclasses import replace
 from math import degrees, hypot, nan, radians
 
 import numpy as np
@@ -12,8 +13,9 @@ from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.filter import KalmanTracker
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.reckoning import RECKONED, Reckoning, after_each_other
+from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.rest import Rest
-from mapfilter.positioning.sensors.unmeasured import way_spread_m2
+from mapfilter.positioning.sensors.unmeasured import spread_m2, way_spread_m2
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.radio.cells import Cell, CellPlan
 
@@ -117,14 +119,14 @@ def test_two_motions_are_one():
 
 def test_a_way_without_headings_is_straight_for_a_while():
     """Until a fix or a heading comes; a hundred steps are no random walk of a hundred."""
-    made, spread_m2 = Reckoning(), 0.0
+    made, gone_m2 = Reckoning(), 0.0
     for _ in range(100):
         made, (_, noise, shift), why = made.moved(MotionStep(1.0, nan), OPTIONS, np.zeros(2))
-        spread_m2 += noise[0, 0] + noise[1, 1]
+        gone_m2 += noise[0, 0] + noise[1, 1]
         assert (why, shift.any()) == (Reason.NO_HEADING, False)
     assert made.headless_m == 100.0
-    assert spread_m2 == pytest.approx(way_spread_m2(100.0))
-    assert spread_m2 > 100 * 30.0
+    assert gone_m2 == pytest.approx(way_spread_m2(100.0))
+    assert gone_m2 > 100 * 30.0
     assert made.moved(MotionStep(1.0, 0.0), OPTIONS, np.zeros(2))[0].headless_m == 0.0
     fixed, _ = made.fixed(7.0, GnssFix(EAST, NORTH), np.eye(2))
     assert (fixed.headless_m, fixed.fixed_s) == (0.0, 7.0)
@@ -178,6 +180,34 @@ def test_who_may_have_left_is_lost_until_a_fix_comes():
     assert not Reckoning(SensorWatch(rest=rest), fixed_s=101.0).may_have_left
     assert not Reckoning(SensorWatch(rest=Rest(100.0)), fixed_s=90.0).may_have_left
     assert not Reckoning().may_have_left
+    # A vehicle at a light stands.
+    driven = SensorWatch(rest=Rest(100.0, is_doubtful=True, pace_mps=9.0))
+    assert not Reckoning(driven, fixed_s=90.0).may_have_left
+
+
+def test_a_rest_in_doubt_is_told_and_its_way_is_missing_once_steps_are_counted():
+    """Levels say neither: half of a minute's way at 1.4 m/s, less 12 m that were measured."""
+    rest = Rest(100.0, pace_mps=1.4, is_doubtful=True, measured_m=12.0, still_nats=-5.0)
+    pace = Pace(160.0, 100.0, 100, 1.0, rests=True, speed_mps=1.4, recent_mps=1.4)
+    made = Reckoning(SensorWatch(pace, 100.0, 160.0, rest), fixed_s=90.0)
+    step = MotionStep(1.4, 0.3)
+    for before, expected in ((made, 1), (made.fixed(150.0), 0), (replace(made, fixed_s=130.0), 0)):
+        after, seen, unused = before.watched(Epoch(161.0, (step,)))
+        assert (seen.motion[-1], len(seen.motion), unused) == (step, 1 + expected, [])
+        assert not after.may_have_left
+    missed = made.watched(Epoch(161.0, (step,)))[1].motion[0]
+    missed_mps = 1.4 - 12.0 / 61.0
+    assert missed.spread_m**2 == pytest.approx(spread_m2(missed_mps, 61.0) / 2)
+    assert missed.step_m == pytest.approx(61.0 * missed_mps / 2)
+    after, seen, unused = made.watched(Epoch(161.0, (MotionStep(0.0, 0.3),)))
+    assert [one.reason for one in unused] == [Reason.MOTION_STUCK]
+    assert (len(seen.motion), after.may_have_left) == (1, True)
+
+
+def test_the_heading_error_goes_on_over_a_way_that_was_not_measured():
+    for step in (MotionStep(80.0, 0.1), MotionStep(80.0, nan), MotionStep(80.0, nan, nan, 70.0)):
+        _, (_, noise, _), _ = Reckoning().moved(step, OPTIONS, np.zeros(2))
+        assert noise[2, 2] == pytest.approx(80.0 * radians(0.3) ** 2)
 
 
 def test_a_report_that_stands_still_while_one_walks_is_not_used():
@@ -194,7 +224,9 @@ def test_a_report_that_stands_still_while_one_walks_is_not_used():
     state, stale = tracker.begin(("motion", "neighbour", "gnss")), 0
     for epoch in made:
         state, out = tracker.step(state, epoch, rng)
-        stale += any(one.reason is Reason.STALE_RADIO for one in out.unused)
+        is_stale = any(one.reason is Reason.STALE_RADIO for one in out.unused)
+        assert (out.fix.reason is Reason.STALE_RADIO) is is_stale
+        stale += is_stale
     assert stale > 100
 
 

@@ -23,6 +23,7 @@ AREA = make_area()
 POSITIONER = BayesPositioner(BayesModel(AREA), FEW)
 EAST_M, NORTH_M = WEST_M + 35.0, SOUTH_M + 45.0
 ROW = ReportRow("serving", AREA.cell_ids[0], None, None, -70.0, 0)
+STEP = MotionStep(1.0, 0.0)
 SATELLITE = Pseudorange("G07", 2.2e7, 5.0, (2.6e7, 0.0, 0.0))
 DIFFERENCE = Difference("A", "B", 120.0)
 
@@ -62,7 +63,7 @@ def test_what_was_not_measured_is_nan_and_no_fault():
             "level_dbm: expected dBm in -200..0, found 40.0 (likely: raw RXLEV given for dBm)",
         ),
         ({"level_dbm": "-70"}, "level_dbm: expected dBm in -200..0, found '-70' "
-         "(likely: raw RXLEV given for dBm)"),
+         "(likely: a text given for a number)"),
         ({"timing_advance": None}, "timing_advance: expected steps in 0..3846, found None "
          "(likely: give NaN where it was not measured)"),
         ({"role": "server"}, "role: expected serving or neighbour, found 'server'"),
@@ -79,6 +80,9 @@ def test_a_row_that_is_none_of_a_log_is_named(row, fault):
     ("epoch", "fault"),
     [
         (Epoch(None), "epoch, time_s: expected seconds, found None"),
+        (Epoch(0.0, (MotionStep(1.0, 0.0, nan, nan, nan),)), "sampling_sd_m: expected metres >= 0"),
+        (Epoch(0.0, (replace(STEP, turned_sd_rad=None),)), "turned_sd_rad: expected radians >= 0"),
+        (Epoch(0.0, (replace(STEP, turned_sd_rad=nan),)), "turned_sd_rad: expected radians >= 0"),
         (Epoch(nan), "epoch, time_s: expected seconds, found nan"),
         (Epoch(0.0, motion=MotionStep(1.0, 0.0)), "epoch, motion: expected a tuple of MotionStep"),
         (Epoch(0.0, motion=(1.0,)), "epoch, motion[0]: expected a MotionStep, found 1.0"),

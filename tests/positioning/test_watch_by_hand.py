@@ -142,7 +142,8 @@ def test_a_stroll_of_60_m_that_levels_do_not_contradict_is_learnt():
 
 
 def test_the_speed_of_a_stroll_is_that_since_the_last_usual_step():
-    watch = after(epoch(102.0, 0.7), watch=strolling()._replace(moving_s=40.0))
+    watch = strolling()
+    watch = after(epoch(102.0, 0.7), watch=watch._replace(rest=replace(watch.rest, since_s=40.0)))
     assert watch.pace.speed_mps == pytest.approx((1.5 + 60.2 / 62.0) / 2)
 
 

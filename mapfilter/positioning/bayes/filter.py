@@ -15,11 +15,9 @@ from math import expm1, isfinite
 import numpy as np
 
 from mapfilter._device import PROCESSOR, Device
-from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.fingerprint import BoundReading
-from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.alternative import (
     AlternativeRules,
     report,
@@ -31,7 +29,6 @@ from mapfilter.positioning.bayes.claims import judged
 from mapfilter.positioning.bayes.evidence import (
     EvidenceSource,
     EvidenceUpdate,
-    RadioReading,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
@@ -42,6 +39,7 @@ from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesState, check_state, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
+from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
@@ -256,15 +254,8 @@ class BayesPositioner(Filter[BayesState]):
 
     @cached_property
     def _is_warm(self) -> bool:
-        model, rng = self.model, np.random.default_rng(0)
-        west, south = model.area.origin_m
-        small = replace(self, options=replace(self.options, max_particles=64, min_particles=32))
-        state = small.begin_at(west, south, 1.0, rng)
-        state, _ = small.step(state, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
-        if state.belief is not None and model.area.cell_ids:
-            update, reading = small.beliefs.by_compass[True].update, _every_kind()
-            belief, _ = update(state.belief, reading, rng)
-            update(belief, replace(reading, length_m=5.0, tracked=True), rng)
+        few = replace(self.options, max_particles=64, min_particles=32)
+        run_kernels(replace(self, options=few))
         return True
 
     def smoother(self) -> BayesSmoother | None:
@@ -315,9 +306,3 @@ def _with_a_new_fix(state: BayesState, epoch: Epoch) -> tuple[Epoch, bool]:
     repeated = fix.repeats(state.last_fix)
     known = isfinite(fix.east_m) and isfinite(fix.north_m)
     return (epoch if known and not repeated else replace(epoch, fix=None)), repeated
-
-
-def _every_kind() -> RadioReading:
-    one, none = np.full(1, -60, dtype=np.float32), np.zeros(1, dtype=np.int32)
-    levels = LevelReport(none, one, none, -100.0, 1.0)
-    return RadioReading(0, 1.0, levels, (BoundReading(none, -60.0, 1, 8.0, 1.0),))

@@ -111,7 +111,8 @@ def mirrored_step(step: MotionStep) -> MotionStep:
 
     Examples
     --------
-    >>> mirrored_step(MotionStep(1.0, 0.5, 0.1))
-    MotionStep(step_m=1.0, heading_rad=-0.5, turn_rad=-0.1, spread_m=nan, sampling_sd_m=0.0)
+    >>> step = mirrored_step(MotionStep(1.0, 0.5, 0.1))
+    >>> step.step_m, step.heading_rad, step.turn_rad
+    (1.0, -0.5, -0.1)
     """
     return replace(step, heading_rad=-step.heading_rad, turn_rad=-step.turn_rad)

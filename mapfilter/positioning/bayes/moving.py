@@ -119,8 +119,9 @@ def moved(
         gone_m, pulls = reckoning.travelled_m, beliefs.pulls
         alone = without_positions(pulls, belief, state.null, hold, gone_m, own.beginning)
         unaided = (*unaided, alone)
-    if belief is not None and watch.rest is None and beliefs.may_have_left(state):
-        gone_s = epoch.time_s - state.watch.moving_s
+    rested = state.watch.rest if watch.rest is None else None
+    if belief is not None and rested is not None and beliefs.may_have_left(state):
+        gone_s = epoch.time_s - rested.since_s
         belief = beliefs.carried_on(state, belief, gone_s, own_rng(epoch.time_s, _AWAY))
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)

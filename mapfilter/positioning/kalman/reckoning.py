@@ -27,7 +27,8 @@ from mapfilter.positioning.kalman.alignment import Alignment, Direction
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
-from mapfilter.positioning.sensors.unmeasured import headless_step
+from mapfilter.positioning.sensors.pace import WALKERS_MPS
+from mapfilter.positioning.sensors.unmeasured import headless_step, missed_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
 
 RECKONED = StateLayout(4, 0, 1)
@@ -79,9 +80,14 @@ class Reckoning:
 
     @property
     def may_have_left(self) -> bool:
-        """Whether one may have gone on though no step is counted, since the last fix."""
+        """Whether a walker may have gone on though no step is counted, since the last fix.
+
+        Wheels that stand still are no counter that misses steps.
+        """
         rest = self.watch.rest
-        return rest is not None and rest.is_doubtful and self.fixed_s < rest.since_s
+        if rest is None or not rest.is_doubtful or rest.pace_mps > WALKERS_MPS:
+            return False
+        return self.fixed_s < rest.since_s
 
     def watched(self, epoch: Epoch) -> tuple[Reckoning, Epoch, list[UnusedReading]]:
         """Look at the sensors of an epoch (:func:`mapfilter.positioning.sensors.watch.watched`).
@@ -90,12 +96,16 @@ class Reckoning:
         -------
         reckoning : Reckoning
         epoch : Epoch
-            With a step to all sides for motion that was not measured, without a stale report.
+            With a step to all sides for motion that was not measured, or that may have been missed
+            before steps are counted again; without a stale report.
         unused : list of UnusedReading
             Why that is so.
         """
-        time_s, heard = epoch.time_s, epoch.radio
+        time_s, heard, rested = epoch.time_s, epoch.radio, self.watch.rest
         watch, epoch, (motion, radio) = watched(self.watch, epoch)
+        after = replace(self, watch=watch)
+        if motion is Reason.USED and after.may_have_left:
+            motion = Reason.MOTION_STUCK
         unused = []
         if motion is not Reason.USED:
             unused.append(UnusedReading(time_s, "motion", "", motion))
@@ -106,7 +116,9 @@ class Reckoning:
             epoch = replace(epoch, motion=tuple(measured))
         if radio is not Reason.USED:
             unused += [UnusedReading(time_s, row.role, row.name, radio) for row in heard]
-        return replace(self, watch=watch), epoch, unused
+        if rested is not None and watch.rest is None and self.may_have_left:
+            epoch = replace(epoch, motion=(missed_step(rested, time_s), *epoch.motion))
+        return after, epoch, unused
 
     def moved(
         self, step: MotionStep, options: KalmanOptions, errors: Floats
@@ -134,6 +146,7 @@ class Reckoning:
         after = self if alignment is self.alignment else replace(self, alignment=alignment)
         if not isfinite(step.step_m):
             return after, (transition, noise, shift), Reason.NO_STEP
+        noise[_TURNED, _TURNED] = radians(options.drift_deg_per_sqrt_m) ** 2 * abs(step.step_m)
         if not isfinite(step.heading_rad):
             why = Reason.USED
             if not isfinite(step.spread_m):
@@ -141,7 +154,7 @@ class Reckoning:
                 after = replace(after, headless_m=self.headless_m + abs(step.step_m))
             noise[:2, :2] = step.all_sides_m**2 / 2 * np.eye(2)
             if alignment.known:
-                noise[_TURNED, _TURNED] = step.turned_sd_rad**2
+                noise[_TURNED, _TURNED] += step.turned_sd_rad**2
             return after, (transition, noise, shift), why
         turned_rad, scale = float(errors[0]), float(errors[1])
         heading_rad, length_m = step.heading_rad + turned_rad, step.step_m * (1 + scale)
@@ -153,7 +166,6 @@ class Reckoning:
         noise[:2, :2] = options.step_sd_m**2 * np.outer(along, along)
         noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
         noise[:2, :2] += cross_m**2 * np.outer(across, across)
-        noise[_TURNED, _TURNED] = radians(options.drift_deg_per_sqrt_m) ** 2 * abs(step.step_m)
         after = after if self.headless_m == 0 else replace(after, headless_m=0.0)
         return after, (transition, noise, shift), Reason.USED
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite, nan, pi
+from math import inf, isfinite, nan
 
 import numpy as np
 
@@ -43,12 +43,11 @@ from mapfilter.positioning.kalman.reckoning import (
     Reckoning,
     after_each_other,
     at_rest,
-    first_deviations,
     turned_to,
 )
+from mapfilter.positioning.kalman.start import first_belief
 
 _LOST_NIS, _WINDOW = 5.0, 10
-_MOST_PARTS = 64
 _WALK_MPS = 1.5
 
 
@@ -134,6 +133,7 @@ class KalmanStep:
 
     def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
+        heard = epoch.radio
         if self.own is RECKONED:
             # With a velocity in the state, nothing but what is weighed tells of motion.
             self.reckoning, epoch, unused = self.reckoning.watched(epoch)
@@ -141,6 +141,8 @@ class KalmanStep:
         given = site_readings(self.sites, epoch)
         self.motion = self._move(epoch, given.cells)
         reason = self._measure(epoch, given)
+        if reason is Reason.NO_READING and heard and not epoch.radio:
+            reason = Reason.STALE_RADIO
         self.time_s = epoch.time_s
         return self._fix(epoch.time_s, reason)
 
@@ -205,7 +207,7 @@ class KalmanStep:
         if fix is None and not given.cells and not given.timed:
             return Reason.UNKNOWN_CELL if epoch.radio else Reason.NO_READING
         if self.belief is None:
-            self.belief = self._start(fix, given)
+            self.belief = first_belief(self.sites, self.own, fix, given)
             if self.lasts:
                 self.belief = extended_belief(self.belief, self.own, self.options.fix_lasting_m)
             if self.slots.size:
@@ -237,32 +239,6 @@ class KalmanStep:
         """Return a model with noise for errors that last: reports in a row count once."""
         growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, LEAST_MOVED_M)))
         return replace(model, noise=model.noise * np.outer(growth, growth))
-
-    def _start(self, fix: GnssFix | None, given: SiteReadings) -> SumBelief:
-        """Return the first belief: at a fix, on a timing advance's circle, or about a site."""
-        options, east, north = self.options, *self.where
-        mean, deviation = np.zeros(self.own.size), np.full(self.own.size, options.speed_sd_mps)
-        if self.own is RECKONED:
-            deviation[-2:] = first_deviations(options)
-        if fix is not None:
-            mean[self.where] = fix.east_m, fix.north_m
-            deviation[self.where] = options.start_sd_m
-            return SumBelief.start(mean, np.diag(deviation**2))
-        cell = self.sites.cells[(given.timed or given.cells)[0]]
-        mean[self.where] = cell.east_m, cell.north_m
-        if not given.timed:
-            deviation[self.where] = options.start_sd_m
-            parts = {east: options.start_parts, north: options.start_parts}
-            return SumBelief.start(mean, np.diag(deviation**2), parts)
-        radius_m = (given.steps[0] + 0.5) * options.timing_step_m
-        count = min(max(round(2 * pi * radius_m / options.start_spacing_m), 8), _MOST_PARTS)
-        deviation[self.where] = max(options.start_spacing_m, 0.7 * 2 * pi * radius_m / count)
-        angle = 2 * pi * np.arange(count) / count
-        places = {
-            east: cell.east_m + radius_m * np.cos(angle),
-            north: cell.north_m + radius_m * np.sin(angle),
-        }
-        return SumBelief.around(mean, np.diag(deviation**2), places)
 
     def _update_fix(self, fix: GnssFix, time_s: float) -> bool:
         noise, layout = fix_covariance_m2(fix, self.options.fix_sd_m), self.layout

@@ -24,7 +24,7 @@ _STRIDE_S = 1.6
 _RECENT_S, _SPEED_S, _SPEED_ROWS = 2.5, 20.0, 30
 """Times in s of the means of the recent and of the usual speed, of rows a second apart or less;
 rows by which the latter is known."""
-_SLOW_SHARE, _SLOWER_SHARE, _WALKERS_MPS = 0.3, 0.5, 2.5
+_SLOW_SHARE, _SLOWER_SHARE, WALKERS_MPS = 0.3, 0.5, 2.5
 """A walker, who is no faster than this in m/s in the mean, and slower for some seconds than the
 first share of it, may have a counter that misses steps. Below the second one the speed is not
 learnt: else a counter that fades out would be followed. Both are readings of the field, chosen on
@@ -112,7 +112,7 @@ class Pace:
         if measured and step_s > 0:
             recent_mps += -expm1(-step_s / _RECENT_S) * (gone_m / step_s - recent_mps)
         goes = gone_m > _REST_MPS * row_s
-        is_walker = self.is_known and step_unit_m * self.speed_mps <= _WALKERS_MPS
+        is_walker = self.is_known and step_unit_m * self.speed_mps <= WALKERS_MPS
         share = recent_mps / self.speed_mps if is_walker else 1.0
         moves = goes and share >= _SLOW_SHARE
         if not motion:

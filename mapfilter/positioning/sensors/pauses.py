@@ -44,9 +44,8 @@ class RowTimes(NamedTuple):
             return self._replace(epoch_s=time_s)
         since_s, interval_s = time_s - self.report_s, self.interval_s
         if isfinite(since_s) and since_s > 0:
-            # What a pause says of the usual interval is bounded.
-            known = self.reports > _KNOWN_REPORTS
-            lasted_s = min(since_s, 5 * interval_s) if known else since_s
+            # What a pause says of the usual interval is bounded, also of one soon after the start.
+            lasted_s = min(since_s, max(5 * interval_s, _SILENT_S))
             interval_s += (lasted_s - interval_s) / min(self.reports, _RECENT_REPORTS)
         return RowTimes(time_s, time_s, interval_s, self.reports + 1)
 
@@ -64,7 +63,7 @@ def longest_s(pace: Pace) -> float:
 
 
 def unrecorded_s(
-    pace: Pace, times: RowTimes, time_s: float, going: Going, *, rested: bool
+    pace: Pace, times: RowTimes, time_s: float, going: Going, known_s: float, *, rested: bool
 ) -> float:
     """Return the time before an epoch of which its motion rows do not tell; 0 if they do.
 
@@ -76,6 +75,8 @@ def unrecorded_s(
         Time of the epoch.
     going : Going
         Of its motion rows.
+    known_s : float
+        Time until which the way is in the belief: rows without steps may have told of a part.
     rested : bool
         Whether the rows before were those of a rest.
     """
@@ -87,10 +88,13 @@ def unrecorded_s(
         since_s = time_s - pace.motion_s
         if going.measured and since_s > longest_s(pace):
             silent_s = since_s
-    if silent_s == 0 or not going.measured:
-        return silent_s
+    if silent_s == 0:
+        return 0.0
+    lacking_s = min(silent_s, time_s - known_s)
+    if not going.measured:
+        return max(lacking_s, 0.0)
     is_one_row = going.gone_m <= pace.fastest_mps * max(pace.interval_s, 1.0)
     missing_s = silent_s - going.gone_m / pace.speed_mps if pace.speed_mps > 0 else silent_s
     if not is_one_row or missing_s <= longest_s(pace):
         return 0.0
-    return silent_s - min(pace.interval_s, silent_s)
+    return max(lacking_s - pace.interval_s, 0.0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import exp, nan, sqrt
 
 from mapfilter.filters.contract import MotionStep
+from mapfilter.positioning.sensors.rest import Rest
 
 _STRAIGHT_S, _STRAIGHT_M = 60.0, 84.0
 """Time, and way, after which the direction is forgotten by 1/e."""
@@ -38,6 +39,18 @@ def headless_step(step_m: float, from_m: float) -> MotionStep:
     """Return a step of a known length after a way without headings."""
     more_m2 = way_spread_m2(from_m + abs(step_m)) - way_spread_m2(from_m)
     return MotionStep(step_m, nan, nan, sqrt(max(more_m2, 0.0)))
+
+
+def missed_step(rest: Rest, time_s: float) -> MotionStep:
+    """Return the step of a rest that levels left in doubt, once steps are counted again.
+
+    It is that of a way at the pace before, less what was measured, by its probability.
+    """
+    gone_s = time_s - rest.since_s
+    missed_mps = max(rest.pace_mps - rest.measured_m / gone_s, 0.0) if gone_s > 0 else 0.0
+    share = rest.left_probability
+    spread_m = sqrt(share * spread_m2(missed_mps, gone_s))
+    return MotionStep(share * missed_mps * gone_s, nan, nan, spread_m)
 
 
 def _mean_square(speed: float, gone: float, lasts: float) -> float:

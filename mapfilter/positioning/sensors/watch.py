@@ -40,7 +40,7 @@ class SensorWatch(NamedTuple):
         How often motion rows come, and how fast one moves.
     moving_s : float
         Time of the last step at the usual pace, or of what has shown since that slow ones are
-        right; NaN before the first row.
+        right; since then the way is unmeasured, or at rest. NaN before the first row.
     known_s : float
         Time until which the way is measured, or in the belief as an unmeasured one.
     rest : Rest or None
@@ -146,8 +146,7 @@ def _followed(
     )
     if isfinite(watch.moving_s):
         rested = watch.rest is not None
-        paused_s = unrecorded_s(known, times, time_s, going, rested=rested)
-        paused_s = min(paused_s, time_s - watch.known_s)  # rows without steps may tell of a part
+        paused_s = unrecorded_s(known, times, time_s, going, watch.known_s, rested=rested)
         if paused_s > 0:
             return _after_a_pause(watch, epoch, paused_s, known.speed_mps, going)
     if going.moves:
@@ -156,7 +155,7 @@ def _followed(
         if not steps:
             return watch, epoch, Reason.USED
         watch = watch._moving(time_s)
-    rest = watch.rest or Rest(watch.moving_s, pace_mps=step_unit_m * pace.speed_mps)
+    rest = watch.rest or Rest(watch.known_s, pace_mps=step_unit_m * pace.speed_mps)
     was_carried = rest.is_carried
     rest = rest.heard(time_s, epoch.radio, step_unit_m * going.gone_m)
     why = Reason.USED
@@ -169,7 +168,7 @@ def _followed(
         why = Reason.MOTION_STUCK if steps else Reason.MOTION_MISSING
     if why is Reason.USED:
         if rest.measured_m >= _STRETCH_M and not rest.is_doubtful:
-            strolled_mps = rest.measured_m / step_unit_m / (time_s - watch.moving_s)
+            strolled_mps = rest.measured_m / step_unit_m / (time_s - rest.since_s)
             slower = watch._replace(pace=pace.slowed(strolled_mps))
             return slower._moving(time_s), epoch, why
         known_s = time_s if going.measured else watch.known_s
@@ -178,10 +177,10 @@ def _followed(
     to_s = watch.unmeasured_s + time_s - watch.known_s
     missed = 1.0
     if rest.is_carried:
-        to_s = time_s - watch.moving_s
-        if not was_carried and to_s > 0:
+        to_s, rested_s = time_s - watch.moving_s, time_s - rest.since_s
+        if not was_carried and rested_s > 0:
             # What the counter did not miss is in the belief already.
-            missed = max(1 - rest.measured_m / (rest.pace_mps * to_s), 0.0)
+            missed = max(1 - rest.measured_m / (rest.pace_mps * rested_s), 0.0)
     step = unmeasured_step(missed * pace.speed_mps, watch.unmeasured_s, to_s)
     if any(isfinite(one.turn_rad) for one in steps):
         step = replace(step, turned_sd_rad=0.0)
@@ -197,9 +196,10 @@ def _after_a_pause(
     """Add the way of a pause of the recording before an epoch's own motion."""
     to_s = watch.unmeasured_s + paused_s
     step = unmeasured_step(speed_mps, watch.unmeasured_s, to_s)
-    watch = watch._moving(epoch.time_s)._replace(
-        unmeasured_s=0.0 if going.measured else to_s, moved_m=watch.moved_m + step.step_m
-    )
+    watch = watch._moving(epoch.time_s)._replace(moved_m=watch.moved_m + step.step_m)
+    if not going.measured:
+        # The way may go on, with the direction that it has.
+        watch = watch._replace(moving_s=epoch.time_s - to_s, unmeasured_s=to_s)
     return watch, replace(epoch, motion=(step, *epoch.motion)), Reason.MOTION_MISSING
 
 
