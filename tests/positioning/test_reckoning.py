@@ -191,7 +191,8 @@ def test_a_rest_in_doubt_is_told_and_its_way_is_missing_once_steps_are_counted()
     pace = Pace(160.0, 100.0, 100, 1.0, rests=True, speed_mps=1.4, recent_mps=1.4)
     made = Reckoning(SensorWatch(pace, 100.0, 160.0, rest), fixed_s=90.0)
     step = MotionStep(1.4, 0.3)
-    for before, expected in ((made, 1), (made.fixed(150.0), 0), (replace(made, fixed_s=130.0), 0)):
+    fixed, _ = made.fixed(150.0, GnssFix(EAST, NORTH), np.eye(2))
+    for before, expected in ((made, 1), (fixed, 0), (replace(made, fixed_s=130.0), 0)):
         after, seen, unused = before.watched(Epoch(161.0, (step,)))
         assert (seen.motion[-1], len(seen.motion), unused) == (step, 1 + expected, [])
         assert not after.may_have_left

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from math import hypot, nan, pi
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -19,7 +18,7 @@ from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, epoch_columns, epochs, headed, make_epoch
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.kalman.step import KalmanStep
+from mapfilter.positioning.kalman.reckoning import Reckoning
 from mapfilter.tracks.log import make_log
 
 EXACT = MotionErrors(
@@ -131,11 +130,13 @@ def test_a_row_of_length_0_is_a_rest_without_such_an_error(positioner):
 
 
 def test_kalman_filters_add_it_to_steps_and_not_to_rests():
-    filter_ = SimpleNamespace(options=KalmanFilter())
     for step, expected in ((STEP, ROUGH**2), (replace(STEP, step_m=0.0), 0.0)):
-        _, rough = KalmanStep._step(filter_, Epoch(1.0), step)
-        _, fine = KalmanStep._step(filter_, Epoch(1.0), replace(step, sampling_sd_m=0.0))
-        np.testing.assert_allclose(rough - fine, expected * np.eye(2), atol=1e-9)
+        fine = replace(step, sampling_sd_m=0.0)
+        rough_m2, fine_m2 = (
+            Reckoning().moved(one, KalmanFilter(), np.zeros(2))[1][1][:2, :2]
+            for one in (step, fine)
+        )
+        np.testing.assert_allclose(rough_m2 - fine_m2, expected * np.eye(2), atol=1e-9)
 
 
 def test_variances_of_steps_add_up():
