@@ -69,15 +69,18 @@ def motion_from_odometry(rows: pd.DataFrame) -> pd.DataFrame:
     rows = rows.drop_duplicates("time_s")
     time = rows["time_s"].to_numpy(dtype=np.float64)
     speed = rows["speed_mps"].to_numpy(dtype=np.float64)
-    gap = odometry_gaps(time, speed)
+    gap, turn = (
+        odometry_gaps(time, speed),
+        _integrated(time, rows["yaw_rate_radps"].to_numpy(dtype=np.float64)),
+    )
+    # Whoever stands does not turn: one reading of a gyroscope would be that of the whole gap.
+    turn[_long_gaps(time) & ~gap] = 0.0
     return pd.DataFrame(
         {
             "time_s": time,
             "step_m": np.where(gap, np.nan, _integrated(time, speed)),
             "heading_rad": np.nan,
-            "turn_rad": np.where(
-                gap, np.nan, _integrated(time, rows["yaw_rate_radps"].to_numpy(dtype=np.float64))
-            ),
+            "turn_rad": np.where(gap, np.nan, turn),
         }
     )
 
@@ -97,12 +100,18 @@ def odometry_gaps(time_s: Floats, speed_mps: Floats) -> Bools:
     >>> odometry_gaps(time_s, np.zeros(5)).any()
     np.False_
     """
+    gap = _long_gaps(time_s)
+    moves = np.abs(speed_mps) > _STANDING_MPS
+    gap[1:] &= moves[1:] | moves[:-1]
+    return gap
+
+
+def _long_gaps(time_s: Floats) -> Bools:
+    """Return which rows come long after the ones before."""
     gap = np.zeros(time_s.size, dtype=np.bool_)
     if time_s.size > 2:
         lasted_s = np.diff(time_s)
-        longest_s = max(_LEAST_GAP_S, _ROWS_OF_A_GAP * float(np.median(lasted_s)))
-        moved = (np.abs(speed_mps[1:]) > _STANDING_MPS) | (np.abs(speed_mps[:-1]) > _STANDING_MPS)
-        gap[1:] = (lasted_s > longest_s) & moved
+        gap[1:] = lasted_s > max(_LEAST_GAP_S, _ROWS_OF_A_GAP * float(np.median(lasted_s)))
     return gap
 
 

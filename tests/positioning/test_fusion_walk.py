@@ -263,6 +263,8 @@ def test_statuses():
     made._set_status(1000.0)
     assert made.status is Status.CONVERGED
     made._set_status(5000.0)
+    assert made.status is Status.UNCERTAIN
+    made._set_status(1000.0)
     assert made.status is Status.TRACKING
     made.recent_nis = [5.1] * 9
     made._set_status(5.0)

@@ -142,7 +142,7 @@ def test_a_narrow_belief_has_converged(before, status):
     fix = work.take(Epoch(10.0))
     assert (fix.status, work.state.status, fix.hypotheses) == (status, status, 1)
     wide = begun(sd_m=500.0, status=before).take(Epoch(10.0))
-    assert wide.status is (Status.SEARCHING if before is Status.SEARCHING else Status.TRACKING)
+    assert wide.status is (Status.SEARCHING if before is Status.SEARCHING else Status.UNCERTAIN)
 
 
 def test_place_and_tail_are_those_of_east_and_north():

@@ -79,6 +79,16 @@ def test_rests_and_slow_rows_are_no_gaps():
     assert not odometry_gaps(np.array([0.0]), np.array([9.0])).any()
 
 
+def test_who_stands_before_and_after_a_gap_has_not_turned():
+    """Half a degree a second of a gyroscope's bias would be 15° in 30 s."""
+    time_s = np.r_[np.arange(0.0, 10.0, 0.1), np.arange(40.0, 50.0, 0.1)]
+    rows = pd.DataFrame({"time_s": time_s, "speed_mps": 0.0, "yaw_rate_radps": 0.009})
+    motion = motion_from_odometry(rows)
+    assert motion["turn_rad"].to_numpy()[100] == 0.0
+    assert motion["step_m"].to_numpy()[100] == 0.0
+    np.testing.assert_allclose(np.delete(motion["turn_rad"].to_numpy(), [0, 100]), 0.0009)
+
+
 def test_a_turn_in_a_gap_is_no_fault_of_the_log(tmp_path):
     """Seven radians in 25 s at the rate of the next row were refused as degrees."""
     kept = (TIME_S < 10.0) | (TIME_S >= 35.0)

@@ -282,4 +282,7 @@ class KalmanStep:
                 self.status = Status.CONVERGED
         else:
             lost = lost or self.reckoning.may_have_left
-            self.status = Status.LOST if lost else Status.TRACKING
+            near = radius_m <= self.options.converged_radius_m
+            self.status = Status.TRACKING if near else Status.UNCERTAIN
+            if lost:
+                self.status = Status.LOST
