@@ -69,10 +69,8 @@ def motion_from_odometry(rows: pd.DataFrame) -> pd.DataFrame:
     rows = rows.drop_duplicates("time_s")
     time = rows["time_s"].to_numpy(dtype=np.float64)
     speed = rows["speed_mps"].to_numpy(dtype=np.float64)
-    gap, turn = (
-        odometry_gaps(time, speed),
-        _integrated(time, rows["yaw_rate_radps"].to_numpy(dtype=np.float64)),
-    )
+    turn = _integrated(time, rows["yaw_rate_radps"].to_numpy(dtype=np.float64))
+    gap = odometry_gaps(time, speed)
     # Whoever stands does not turn: one reading of a gyroscope would be that of the whole gap.
     turn[_long_gaps(time) & ~gap] = 0.0
     return pd.DataFrame(

@@ -252,8 +252,7 @@ class BeliefFilters:
             return belief
         count = belief.log_weight.size
         gone = rng.random(count) < rest.left_probability
-        missed_mps = max(rest.pace_mps - rest.measured_m / gone_s, 0.0) if gone_s > 0 else 0.0
-        far_m = sqrt(spread_m2(missed_mps, gone_s) / 2)
+        far_m = sqrt(spread_m2(rest.missed_mps(gone_s), gone_s) / 2)
         moved = belief.state.copy()
         moved[: NORTH + 1, gone] += far_m * rng.standard_normal((NORTH + 1, int(gone.sum())))
         return replace(belief, state=moved)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep
 from mapfilter.geodesy import wrap_one_rad
+from mapfilter.positioning.epochs import headed
 
 _LEAST_M, _DEVIATIONS = 30.0, 8.0
 """Way between two fixes from which on they tell a direction: in m, and in deviations of a fix."""
@@ -64,11 +65,10 @@ class Alignment:
             return Alignment() if isfinite(self.heading_rad) else self, step
         if not isfinite(step.turn_rad):
             return self._unmeasured(step), step
-        heading_rad = wrap_one_rad((self.heading_rad if isfinite(self.heading_rad) else 0.0)
-                                   + step.turn_rad)  # fmt: skip
+        with_heading, heading_rad = headed(step, self.heading_rad)
         after = replace(self, heading_rad=heading_rad)
         if self.known:
-            return after, replace(step, heading_rad=heading_rad)
+            return after, with_heading
         if not isfinite(step.step_m):
             return replace(after, first=None), step
         return replace(

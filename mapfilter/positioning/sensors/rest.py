@@ -147,6 +147,10 @@ class Rest:
         shown_nats = _SHOWN_AGAIN_NATS if self.is_doubtful else _SHOWN_NATS
         return far and still_nats <= _SHOWABLE_NATS and left_nats > shown_nats
 
+    def missed_mps(self, gone_s: float) -> float:
+        """Return the pace before less what was measured, over a time since it began."""
+        return max(self.pace_mps - self.measured_m / gone_s, 0.0) if gone_s > 0 else 0.0
+
     @property
     def is_carried(self) -> bool:
         """Whether the phone is carried on though no motion is reported."""

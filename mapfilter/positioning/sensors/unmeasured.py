@@ -47,8 +47,7 @@ def missed_step(rest: Rest, time_s: float) -> MotionStep:
     It is that of a way at the pace before, less what was measured, by its probability.
     """
     gone_s = time_s - rest.since_s
-    missed_mps = max(rest.pace_mps - rest.measured_m / gone_s, 0.0) if gone_s > 0 else 0.0
-    share = rest.left_probability
+    missed_mps, share = rest.missed_mps(gone_s), rest.left_probability
     spread_m = sqrt(share * spread_m2(missed_mps, gone_s))
     return MotionStep(share * missed_mps * gone_s, nan, nan, spread_m)
 
