@@ -1,7 +1,7 @@
 """What becomes of hypotheses: carried on after a rest, turned at a jump, remounted, on a grid."""
 
 from dataclasses import replace
-from math import exp, inf, nan, pi
+from math import copysign, exp, inf, log, nan, pi
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,6 +18,7 @@ from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.positioning.sensors.rest import Rest
 
 COUNT = 40_000
 FILTERS = BeliefFilters(BayesModel(make_area(), MotionErrors(bias_sd_rad=0.05)))
@@ -50,7 +51,8 @@ def with_rest(rest, *, compass=True, unit_m=1.0, travelled_m=100.0, **gnss):
 
 
 def carried(gone_s, *, left=1.0, pace_mps=1.5, measured_m=0.0):
-    rest = SimpleNamespace(left_probability=left, pace_mps=pace_mps, measured_m=measured_m)
+    left_nats = log(left / (1 - left)) if 0 < left < 1 else copysign(inf, left - 0.5)
+    rest = Rest(0.0, left_nats=left_nats, pace_mps=pace_mps, measured_m=measured_m)
     rng = np.random.default_rng(5)
     return FILTERS.carried_on(with_rest(rest), belief(), gone_s, rng).state
 
@@ -84,7 +86,7 @@ def test_without_a_rest_and_on_a_grid_nothing_is_carried_on():
     rng = np.random.default_rng(1)
     given, mass = belief(), on_grid(3)
     assert FILTERS.carried_on(with_rest(None), given, 40.0, rng) is given
-    rest = SimpleNamespace(left_probability=1.0, pace_mps=1.5, measured_m=0.0)
+    rest = Rest(0.0, left_nats=inf, pace_mps=1.5)
     assert FILTERS.carried_on(with_rest(rest), mass, 40.0, rng) is mass
 
 
