@@ -48,12 +48,13 @@ def by_compass(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
 def motion_from_odometry(rows: pd.DataFrame) -> pd.DataFrame:
     """Integrate speed and yaw rate over each interval, by the mean of its ends.
 
-    What a vehicle did while rows are missing is not known: neither step nor turn.
+    What a vehicle did while rows are missing is not known: neither step nor turn. Where speeds
+    alone are missing its turns are.
 
     Parameters
     ----------
     rows : pandas.DataFrame
-        time_s, speed_mps, yaw_rate_radps (counter-clockwise positive; NaN where unknown).
+        time_s, speed_mps, yaw_rate_radps (counter-clockwise positive); NaN where unknown.
 
     Returns
     -------
@@ -89,6 +90,7 @@ def odometry_gaps(time_s: Floats, speed_mps: Floats) -> Bools:
     Parameters
     ----------
     time_s, speed_mps : (N,) arrays
+        Where a speed is NaN it may move.
 
     Examples
     --------
@@ -99,7 +101,7 @@ def odometry_gaps(time_s: Floats, speed_mps: Floats) -> Bools:
     np.False_
     """
     gap = _long_gaps(time_s)
-    moves = np.abs(speed_mps) > _STANDING_MPS
+    moves = ~(np.abs(speed_mps) <= _STANDING_MPS)
     gap[1:] &= moves[1:] | moves[:-1]
     return gap
 

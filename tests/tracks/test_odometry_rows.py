@@ -110,3 +110,48 @@ def test_where_a_vehicle_drives_without_a_yaw_rate_is_not_known():
     assert any("no yaw rate over 10.0 s of driving" in note for note in notes)
     standing = rows.assign(speed_mps=np.where(blind, 0.0, SPEED_MPS))
     assert reckon_odometry(standing)[0]["step_m"].isna().sum() <= 2
+
+
+@pytest.mark.parametrize("gone", ["empty", "mark", "stuck", "rows"])
+def test_turns_while_speeds_are_missing_are_known(tmp_path, gone):
+    """The way is not known, its turns are: a bus that lacks speeds for eight seconds."""
+    lost = (TIME_S > 20.0) & (TIME_S < 28.0)
+    rows = {"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS}
+    missing = {"empty": np.nan, "mark": 182.04, "stuck": 71.1, "rows": np.nan}[gone]
+    rows["wheel_speed_mps"] = np.where(lost, missing, SPEED_MPS)
+    if gone == "rows":
+        # Yaw rates in rows of their own, ten times in a second.
+        rows = {"time": np.r_[TIME_S, TIME_S + 0.05]}
+        rows["wheel_speed_mps"] = np.r_[np.where(lost, np.nan, SPEED_MPS), np.full(600, np.nan)]
+        rows["yaw_rate_radps"] = np.r_[np.full(600, np.nan), RATE_RADPS]
+    log = open_log([written(tmp_path / "bus.csv", rows)], options=UTM).log
+    time_s, steps_m = log.motion["time_s"].to_numpy(), log.motion["step_m"].to_numpy()
+    unknown = np.isnan(steps_m)
+    assert time_s[unknown].min() == pytest.approx(20.1, abs=0.06)
+    assert time_s[unknown].max() == pytest.approx(28.0, abs=0.06)
+    assert unknown.sum() >= 80
+    way_m = np.trapezoid(SPEED_MPS, TIME_S) - np.trapezoid(SPEED_MPS[200:281], TIME_S[200:281])
+    assert np.nansum(steps_m) == pytest.approx(way_m, rel=2e-3)
+    whole = motion_from_odometry(
+        pd.DataFrame({"time_s": TIME_S, "speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS})
+    )
+    turned = np.interp(time_s, TIME_S, np.cumsum(whole["turn_rad"]))
+    np.testing.assert_allclose(np.cumsum(log.motion["turn_rad"]), turned, atol=0.02)
+    assert any("1 gap (longest 8.0 s), over which turns alone are known" in n for n in log.notes)
+
+
+def test_short_lacks_of_speeds_are_no_gaps():
+    """Rows without a speed between others close by are joined over, as before."""
+    speed = np.where(np.arange(TIME_S.size) % 3 == 1, np.nan, SPEED_MPS)
+    rows = pd.DataFrame({"time_s": TIME_S, "speed_mps": speed, "yaw_rate_radps": RATE_RADPS})
+    motion, _, notes = reckon_odometry(rows)
+    assert len(motion) == 400
+    assert motion["step_m"].notna().all()
+    assert not any("gap" in note for note in notes)
+
+
+def test_a_bus_without_any_speed_turns_nevertheless():
+    rows = pd.DataFrame({"time_s": TIME_S, "speed_mps": np.nan, "yaw_rate_radps": RATE_RADPS})
+    motion, _, _ = reckon_odometry(rows)
+    assert motion["step_m"].iloc[1:].isna().all()
+    assert motion["turn_rad"].sum() == pytest.approx(np.trapezoid(RATE_RADPS, TIME_S), abs=1e-9)

@@ -1,4 +1,4 @@
-"""Rows of a vehicle's odometry that state no motion: values that its bus sends for missing ones."""
+"""Rows of a vehicle's odometry without a speed or a yaw rate, or with what a bus sends for these."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
+from mapfilter.tracks.moved import odometry_gaps
 
 _JUMP_MPS, _JUMP_MPS2 = 15.0, 30.0
 """Three times what brakes reach."""
@@ -19,8 +20,9 @@ def usable_rows(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Return odometry without speeds that come and go at once, and with yaw rates joined.
 
     A speed that stays the same to the last digit, far above those before and after it, is no
-    motion: its rows are dropped. A missing yaw rate between rows that have one, each at most a
-    second away, is theirs in proportion to time.
+    motion, and missing. A missing yaw rate between rows that have one, each at most a second away,
+    is theirs in proportion to time. Rows without a speed are dropped but for those with a yaw rate
+    where speeds are missing for long: there they tell how it turned.
 
     Parameters
     ----------
@@ -30,6 +32,7 @@ def usable_rows(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
     Returns
     -------
     rows : pandas.DataFrame
+        Where nothing is missing the same table.
     notes : tuple of str
 
     Examples
@@ -53,17 +56,36 @@ def usable_rows(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
             f"{first:.1f} m/s ({3.6 * first:.0f} km/h), taken as missing (likely: what a bus sends "
             "where it has no value)",
         )
-        rows, time_s = rows[~marks].reset_index(drop=True), time_s[~marks]
+        rows = rows.assign(speed_mps=np.where(marks, np.nan, speed))
     rate = rows["yaw_rate_radps"].to_numpy(dtype=np.float64)
     joined = _between(time_s, rate)
     if count := int(np.isfinite(joined).sum() - np.isfinite(rate).sum()):
         notes += (f"odometry: {number_of(count, 'yaw rate')} taken from the rows around",)
         rows = rows.assign(yaw_rate_radps=joined)
-    return rows, notes
+    kept = _telling(time_s, rows["speed_mps"].to_numpy(dtype=np.float64), joined)
+    return rows if kept.all() else rows[kept].reset_index(drop=True), notes
+
+
+def _telling(time_s: Floats, speed: Floats, rate: Floats) -> Bools:
+    """Return the rows with speeds, and between them, over gaps of these, those with yaw rates."""
+    kept = np.isfinite(speed)
+    if not kept.any():
+        return ~kept
+    known, others = np.flatnonzero(kept), np.flatnonzero(~kept & np.isfinite(rate))
+    after = np.searchsorted(known, others)
+    between = (after > 0) & (after < known.size)
+    gaps = odometry_gaps(time_s[known], speed[known])
+    kept[others[between][gaps[after[between]]]] = True
+    return kept
 
 
 def _sudden(time_s: Floats, speed: Floats) -> Bools:
     """Return the rows of runs of one speed that is reached, and left, as no vehicle could."""
+    given = np.isfinite(speed)
+    if not given.all():
+        found = np.zeros(speed.size, dtype=np.bool_)
+        found[given] = _sudden(time_s[given], speed[given])
+        return found
     if speed.size < 3:
         return np.zeros(speed.size, dtype=np.bool_)
     begin = np.flatnonzero(np.concatenate([[True], speed[1:] != speed[:-1]]))

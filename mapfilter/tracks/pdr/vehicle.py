@@ -34,7 +34,8 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     """Return the motion of a vehicle with a speedometer and a yaw rate, and its errors.
 
     The gyroscope's bias is the yaw rate while the vehicle stands, smoothed over the recording;
-    without a yaw rate there are no turns.
+    without a yaw rate there are no turns. Where speeds alone are missing steps are not known, but
+    turns are.
 
     Parameters
     ----------
@@ -67,11 +68,7 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
         motion = motion.assign(step_m=motion["step_m"].where(~blind))
     speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
     imu = _noise(time_s, found, float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS)
-    gaps = np.flatnonzero(odometry_gaps(time_s, speed))
-    if gaps.size:
-        longest_s = float((time_s[gaps] - time_s[gaps - 1]).max())
-        words = number_of(gaps.size, "gap")
-        notes += (f"odometry: {words} (longest {longest_s:.1f} s), over which motion is not known",)
+    notes += _gap_notes(time_s, speed, turn)
     return motion.assign(turn_rad=turn), imu, notes
 
 
@@ -126,6 +123,24 @@ def reckon_velocity(
     )
     notes = _notes(found, int(standing.sum()), has_rate=True)
     return motion, _noise(time_s, found, _SPEED_SD_MPS), notes
+
+
+def _gap_notes(time_s: Floats, speed: Floats, turn: Floats) -> tuple[str, ...]:
+    """Return what is said of gaps, by whether turns are known over them."""
+    known = np.flatnonzero(np.isfinite(speed))
+    gaps = np.flatnonzero(odometry_gaps(time_s[known], speed[known]))
+    if not gaps.size:
+        return ()
+    first, last = known[gaps - 1], known[gaps]
+    unknown = np.concatenate([[0], np.cumsum(np.isnan(turn))])
+    turned = unknown[last + 1] == unknown[first + 1]
+    notes: tuple[str, ...] = ()
+    for of, what in ((~turned, "motion is not known"), (turned, "turns alone are known")):
+        if of.any():
+            longest_s = float((time_s[last] - time_s[first])[of].max())
+            words = number_of(int(of.sum()), "gap")
+            notes += (f"odometry: {words} (longest {longest_s:.1f} s), over which {what}",)
+    return notes
 
 
 def _settled(time_s: Floats, standing: Bools) -> Bools:

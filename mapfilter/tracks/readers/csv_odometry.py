@@ -16,7 +16,7 @@ _SPEEDS = ("speed_mps", "speed_kmh")
 
 
 def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
-    """Add the rows with a vehicle's speed, and yaw rates of rows beside them."""
+    """Add the rows with a vehicle's speed or yaw rate, and yaw rates of rows beside them."""
     wheels = mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh")
     turned = mapped.has("yaw_rate_radps") or mapped.has("yaw_rate_degps")
     if not wheels:
@@ -36,7 +36,10 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         speed = _KMH * mapped.number(f"{name}_kmh")
     yaw = _at_speeds(reading, time_s, speed, mapped.radians("yaw_rate", "ps"))
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
-    add_rows(reading, "odometry", columns, mapped.rows, np.isfinite(speed))
+    if not np.isfinite(speed).any():
+        return
+    turns = np.isfinite(yaw) & (np.isfinite(speed) | (np.abs(yaw) <= FASTEST_TURN_RADPS))
+    add_rows(reading, "odometry", columns, mapped.rows, np.isfinite(speed) | turns)
 
 
 def _at_speeds(reading: Reading, time_s: Floats, speed: Floats, yaw: Floats) -> Floats:

@@ -191,7 +191,6 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         _TIME,
         Field(
             *("speed_mps", -FASTEST_VEHICLE_MPS, FASTEST_VEHICLE_MPS, "m/s in -120..120"),
-            required=True,
             hints=((FASTEST_VEHICLE_MPS, np.inf, f"{_NO_VALUE} 655.35 km/h, or another unit"),),
             vital=True,
             marks=3,
