@@ -181,8 +181,7 @@ def _motion_by_signs(log: TrackLog) -> tuple[bool | None, str]:
 def _motion_errors(log: TrackLog) -> dict[str, float]:
     """Return the errors of dead reckoning that a log states, by the names of a filter's options.
 
-    The random walk of the heading is by distance there, at the log's median speed. A constant rate
-    error of a gyroscope has no option, and is left out.
+    The random walk of the heading is by distance there, at the log's median speed.
     """
     imu = log.imu
     if imu is None:
@@ -194,6 +193,7 @@ def _motion_errors(log: TrackLog) -> dict[str, float]:
         found["bias_sd_deg"] = imu.bias_sd_deg
     else:
         walk_deg = hypot(walk_deg, imu.gyro_noise_deg_per_sqrt_s)
+        found["turn_rate_sd_deg_per_s"] = imu.gyro_bias_deg_per_s
     usual_mps = _usual_mps(log)
     if walk_deg > 0 and usual_mps > 0:
         found["drift_deg_per_sqrt_m"] = walk_deg / usual_mps**0.5

@@ -42,7 +42,13 @@ PLAN = CellPlan(CRS, (
     cell("C", 3000.0, antenna="sector", azimuth_deg=90.0, arfcn=601, bsic=3),
 ))  # fmt: skip
 SITES = SiteModels(PLAN, KalmanOptions())
-MAY_BE_0 = ("fix_lasting_m", "bias_sd_deg", "drift_deg_per_sqrt_m", "scale")
+MAY_BE_0 = (
+    "fix_lasting_m",
+    "bias_sd_deg",
+    "drift_deg_per_sqrt_m",
+    "turn_rate_sd_deg_per_s",
+    "scale",
+)
 NOTHING = SiteReadings((), (), (), (), ())
 
 
@@ -71,6 +77,7 @@ def test_the_usual_options():
         "fix_sd_m": 10.0, "fix_lasting_m": 0.0, "fix_lasting_s": 30.0,
         "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0, "step_sd_m": 0.3,
         "heading_sd_deg": 11.459155902616464, "bias_sd_deg": 10.0, "drift_deg_per_sqrt_m": 0.3,
+        "turn_rate_sd_deg_per_s": 0.05,
         "scale": 0.03, "drift_m_per_sqrt_s": 0.3, "start_sd_m": 1500.0,
         "start_parts": 21, "start_spacing_m": 600.0, "reach_m": 35_000.0,
         "converged_radius_m": 1000.0,
@@ -93,13 +100,14 @@ def test_steps_shift_and_spread():
     steps = (MotionStep(2.0, 0.5), MotionStep(3.0, nan), MotionStep(nan, 0.1), MotionStep(1.0, 2.0))
     made.moved_m = 7.0
     transition, noise, shift = made._move(Epoch(14.0, steps), ())
-    np.testing.assert_array_equal(transition[:, :2], np.eye(4)[:, :2])
+    np.testing.assert_array_equal(transition[:, :2], np.eye(5)[:, :2])
     # A heading error of 1 rad shifts each step to its left, a scale of 1 doubles it.
     lengths, headings = np.array([2.0, 1.0]), np.array([0.5, 2.0])
     along = np.stack([np.cos(headings), np.sin(headings)])
     left = np.stack([-along[1], along[0]])
-    np.testing.assert_allclose(transition[:2, 2:], np.stack([left @ lengths, along @ lengths], 1))
-    np.testing.assert_array_equal(transition[2:], np.eye(4)[2:])
+    np.testing.assert_allclose(transition[:2, 2:4], np.stack([left @ lengths, along @ lengths], 1))
+    np.testing.assert_array_equal(transition[2:], np.eye(5)[2:])
+    assert not transition[:2, 4].any()
     expected = 0.09 * 4.0 * np.eye(2)
     way = np.zeros(2)
     for length_m, heading in ((2.0, 0.5), (1.0, 2.0)):
@@ -111,15 +119,15 @@ def test_steps_shift_and_spread():
     # Without a direction it may have led anywhere: by the length of its step, in any direction.
     expected += way_spread_m2(3.0) / 2 * np.eye(2)
     assert way_spread_m2(3.0) == pytest.approx(9.0, rel=0.02)
-    np.testing.assert_allclose(shift, [*way, 0.0, 0.0])
+    np.testing.assert_allclose(shift, [*way, 0.0, 0.0, 0.0])
     drift = radians(0.3) ** 2
     # The error of headings drifts: the last step has the drift of the 5 m before it.
     expected += drift * 5.0 * 1.0**2 * np.outer(left[:, 1], left[:, 1])
     np.testing.assert_allclose(noise[:2, :2], expected)
     np.testing.assert_allclose(noise[2, :2], drift * 5.0 * left[:, 1])
-    np.testing.assert_allclose(noise[2:, 2:], np.diag([drift * 6.0, 0.0]))
+    np.testing.assert_allclose(noise[2:, 2:], np.diag([drift * 6.0, 0.0, 0.0]))
     assert made.moved_m == 13.0
-    np.testing.assert_allclose(made.belief.means[0], [*(5.0 + way), 0.0, 0.0])
+    np.testing.assert_allclose(made.belief.means[0], [*(5.0 + way), 0.0, 0.0, 0.0])
     np.testing.assert_allclose(made.belief.covariances[0, :2, :2], 9.0 * np.eye(2) + expected)
     assert [one.reason for one in made.unused] == [Reason.NO_HEADING, Reason.NO_STEP]
     assert {(one.time_s, one.kind, one.what) for one in made.unused} == {(14.0, "motion", "")}
@@ -170,9 +178,9 @@ def test_where_a_belief_starts():
     np.testing.assert_array_equal(at_fix.means, [[1.0, 0.0, 2.0, 0.0]])
     np.testing.assert_array_equal(at_fix.covariances[0], np.diag([1500.0, 8, 1500, 8]) ** 2)
     about = begun(walk(), None, SiteReadings(("B",), (-70.0,), (), (), ()))
-    assert about.means.shape == (441, 4)
-    np.testing.assert_allclose(about.weights @ about.means, [EAST + 2000.0, NORTH, 0.0, 0.0])
-    expected = np.diag([1500.0, 1500.0, radians(10.0), 0.03]) ** 2
+    assert about.means.shape == (441, 5)
+    np.testing.assert_allclose(about.weights @ about.means, [EAST + 2000.0, NORTH, 0.0, 0.0, 0.0])
+    expected = np.diag([1500.0, 1500.0, radians(10.0), 0.03, radians(0.05)]) ** 2
     np.testing.assert_allclose(about.moments.covariance, expected, rtol=1e-6, atol=1e-3)
     np.testing.assert_array_equal(
         about.covariances[:, 2:, 2:], np.tile(expected[2:, 2:], (441, 1, 1))
@@ -180,10 +188,10 @@ def test_where_a_belief_starts():
     on_circle = begun(walk(), None, SiteReadings(("B",), (-70.0,), ("A",), (2,), ()))
     radius = 2.5 * KalmanOptions().timing_step_m
     # 8 694 m around by 600 m.
-    assert on_circle.means.shape == (14, 4)
+    assert on_circle.means.shape == (14, 5)
     np.testing.assert_allclose(on_circle.weights, 1 / 14)
     np.testing.assert_allclose(np.hypot(*(on_circle.means[:, :2] - [EAST, NORTH]).T), radius)
-    np.testing.assert_allclose(on_circle.means[0], [EAST + radius, NORTH, 0.0, 0.0])
+    np.testing.assert_allclose(on_circle.means[0], [EAST + radius, NORTH, 0.0, 0.0, 0.0])
     assert on_circle.means[1, 1] > NORTH
     np.testing.assert_allclose(on_circle.covariances[0, :2, :2], 600.0**2 * np.eye(2))
     near = begun(walk(), None, SiteReadings((), (), ("A",), (0,), ()))
@@ -295,7 +303,7 @@ def test_an_epoch_is_moved_and_then_measured():
     made.take(Epoch(1.0, (MotionStep(30.0, 0.0),)))
     assert made.moved_m == 30.0
     smoother.add(None, made.state)
-    np.testing.assert_array_equal(smoother.history.shifts[1], [30.0, 0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(smoother.history.shifts[1], [30.0, 0.0, 0.0, 0.0, 0.0])
     at = GnssFix(EAST + 700.0, NORTH, 4.0, 4.0)
     fix = made.take(Epoch(2.0, fix=at))
     assert (fix.status, fix.reason, made.moved_m) == (Status.CONVERGED, Reason.USED, 30.0)

@@ -28,7 +28,7 @@ def begun(options=OPTIONS, *, sd_m=50.0, east_m=2000.0, layout=RECKONED, **more)
     place, known = (EAST + east_m, 3.0, NORTH, 4.0), np.ones(4)
     if layout is RECKONED:
         # Headings and lengths of steps have no errors that last.
-        place, known = (EAST + east_m, NORTH, 0.0, 0.0), np.array([1.0, 1.0, 0.0, 0.0])
+        place, known = (EAST + east_m, NORTH, 0.0, 0.0, 0.0), np.array([1.0, 1.0, 0.0, 0.0, 0.0])
     belief = SumBelief.start(place, np.diag(known * sd_m**2))
     given = {"belief": belief, "time_s": 10.0, "moved_m": inf} | more
     return KalmanStep(SiteModels(PLAN, options), EKF, KalmanState(layout, **given))
@@ -84,7 +84,7 @@ def test_where_errors_of_fixes_last_their_place_is_a_part_of_the_state():
     state = KalmanState(extended_layout(RECKONED))
     work = KalmanStep(SiteModels(PLAN, lasting), EKF, state)
     fix = work.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
-    assert work.belief.means.shape == (1, 6)
+    assert work.belief.means.shape == (1, 7)
     # 64 of the fix's 100 m² are white, the rest lasts; a start is known to 100 m.
     place_m2 = 10_000.0 + 36.0
     gain = 10_000.0 / (place_m2 + 64.0)
@@ -95,9 +95,9 @@ def test_where_errors_of_fixes_last_their_place_is_a_part_of_the_state():
     before = KalmanStep(SiteModels(PLAN, lasting), EKF, state)
     before.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
     old = before.belief.covariances[0]
-    off_m2 = old[4, 4] - 2 * old[0, 4] + old[0, 0]
+    off_m2 = old[5, 5] - 2 * old[0, 5] + old[0, 0]
     new = work.belief.covariances[0]
-    assert new[4, 4] - 2 * new[0, 4] + new[0, 0] == pytest.approx(
+    assert new[5, 5] - 2 * new[0, 5] + new[0, 0] == pytest.approx(
         kept**2 * off_m2 + (1 - kept**2) * 36.0
     )
 
@@ -157,7 +157,7 @@ def test_place_and_tail_are_those_of_east_and_north():
     np.testing.assert_allclose(found["radii_m"], 10.0 * np.sqrt(-2 * np.log([0.5, 0.33, 0.05])))
     assert found["mass_50m"] == pytest.approx(1 - np.exp(-12.5))
     # Of several parts it is that about the leading one.
-    places, known = np.pad(means[:, [0, 2]], ((0, 0), (0, 2))), np.diag([100.0, 100.0, 1e-6, 1e-6])
+    places, known = np.pad(means[:, [0, 2]], ((0, 0), (0, 3))), np.diag([100.0, 100.0, *[1e-6] * 3])
     work = begun(belief=replace(belief, means=places, covariances=np.array([known] * 2)))
     assert work.take(Epoch(10.0)).mass_50m == pytest.approx(0.75 * (1 - np.exp(-12.5)))
     assert hypot(*work.belief.moments.mean[:2]) == pytest.approx(hypot(15.0, 25.0))
@@ -197,7 +197,7 @@ def test_errors_of_fixes_last_however_small_they_are():
     options = replace(OPTIONS, fix_lasting_m=0.5)
     work = KalmanStep(SiteModels(PLAN, options), EKF, KalmanState(extended_layout(RECKONED)))
     work.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 4.0, 4.0, 0.0)))
-    assert work.belief.means.shape == (1, 6)
+    assert work.belief.means.shape == (1, 7)
 
 
 def test_before_the_first_measurement_there_is_no_tail():

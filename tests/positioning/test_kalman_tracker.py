@@ -21,7 +21,7 @@ RNG = np.random.default_rng(0)
 
 @pytest.mark.parametrize(
     ("kinds", "lasting_m", "size", "north"),
-    [({"motion", "gnss"}, 0.0, 4, 1), ({"gnss"}, 0.0, 4, 2), ({"motion"}, 0.5, 6, 1),
+    [({"motion", "gnss"}, 0.0, 5, 1), ({"gnss"}, 0.0, 4, 2), ({"motion"}, 0.5, 7, 1),
      ({"serving"}, 0.5, 6, 2)],
 )  # fmt: skip
 def test_a_velocity_stands_in_for_dead_reckoning(kinds, lasting_m, size, north):

@@ -185,6 +185,14 @@ def test_errors_of_a_gyroscope_are_a_drift():
     assert fitted.step_sd_m == 0.05
 
 
+def test_the_bias_of_a_gyroscope_is_a_lasting_error_of_the_rate_of_turns():
+    given = moving(turns="gyro", gyro_bias_deg_per_s=0.2)
+    assert fitted_to_log(KalmanFilter(), given)[0].turn_rate_sd_deg_per_s == 0.2
+    kept = KalmanFilter(turn_rate_sd_deg_per_s=0.3)
+    assert fitted_to_log(kept, given)[0].turn_rate_sd_deg_per_s == 0.3
+    assert fitted_to_log(KalmanFilter(), moving())[0].turn_rate_sd_deg_per_s == 0.05
+
+
 def turning(speed_mps, lasts_s=120, **columns):
     time_s = np.arange(lasts_s, dtype=np.float64)
     rows = {"time_s": time_s, "step_m": speed_mps, "turn_rad": 0.01} | columns

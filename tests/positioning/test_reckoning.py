@@ -10,6 +10,7 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import EKF, UKF
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.kalman.alignment import Alignment
 from mapfilter.positioning.kalman.filter import KalmanTracker
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.reckoning import RECKONED, Reckoning, after_each_other
@@ -90,17 +91,65 @@ def test_without_positions_the_radius_grows_as_headings_may_be_off():
 
 def test_motion_is_linear_about_the_errors_found_so_far():
     """Its derivatives are those of the turned and lengthened step."""
-    errors, step = np.array([0.7, -0.1]), MotionStep(3.0, 0.4)
+    errors, step = np.array([0.7, -0.1, 0.3]), MotionStep(3.0, 0.4)
 
     def moved(turned, scale):
         return 3.0 * (1 + scale) * np.array([np.cos(0.4 + turned), np.sin(0.4 + turned)])
 
-    _, (transition, _, shift), why = Reckoning().moved(step, OPTIONS, errors)
+    _, (transition, _, shift), why = Reckoning().moved(step, 1.0, OPTIONS, errors)
     assert why is Reason.USED
-    np.testing.assert_allclose((transition @ [0, 0, *errors] + shift)[:2], moved(*errors))
+    np.testing.assert_allclose((transition @ [0, 0, *errors] + shift)[:2], moved(*errors[:2]))
     for i, more in enumerate(1e-6 * np.eye(2)):
-        slope = (moved(*(errors + more)) - moved(*(errors - more))) / 2e-6
+        slope = (moved(*(errors[:2] + more)) - moved(*(errors[:2] - more))) / 2e-6
         np.testing.assert_allclose(transition[:2, 2 + i], slope, rtol=1e-8)
+
+
+def test_a_lasting_error_of_a_rate_turns_headings_by_its_time():
+    """Where headings are sums of turns, whose direction was found."""
+    made = Reckoning(alignment=Alignment(0.4, known=True), turned_s=3.0)
+    step, errors = MotionStep(3.0, nan, 0.1), np.array([0.7, -0.1, 0.02])
+    after, (transition, _, shift), why = made.moved(step, 8.0, OPTIONS, errors)
+    assert (why, after.turned_s) == (Reason.USED, 8.0)
+
+    def moved(turned, scale, rate):
+        heading = 0.4 + 0.1 + turned + 5.0 * rate
+        return 3.0 * (1 + scale) * np.array([np.cos(heading), np.sin(heading)])
+
+    np.testing.assert_allclose((transition @ [0, 0, *errors] + shift)[:2], moved(*errors))
+    for i, more in enumerate(1e-6 * np.eye(3)):
+        slope = (moved(*(errors + more)) - moved(*(errors - more))) / 2e-6
+        np.testing.assert_allclose(transition[:2, 2 + i], slope, rtol=1e-7)
+    np.testing.assert_allclose(transition[2], [0, 0, 1, 0, 5.0])
+    assert shift[2] == 0.0
+    # At rest it goes on, but where a gyroscope reads nothing at all, and by a compass.
+    for step_m, heading, turn, lasted_s in (
+        (0.0, nan, 1e-4, 5.0), (0.0, nan, 0.0, 0.0), (3.0, 0.2, nan, 0.0), (3.0, 0.2, 0.1, 0.0)
+    ):  # fmt: skip
+        _, (seen, _, _), _ = made.moved(MotionStep(step_m, heading, turn), 8.0, OPTIONS, errors)
+        assert seen[2, 4] == lasted_s
+    first = replace(made, turned_s=nan)
+    assert first.moved(step, 8.0, OPTIONS, errors)[1][0][2, 4] == 0.0
+
+
+@pytest.mark.parametrize("rate_deg_per_s", [0.0, 0.05, -0.1])
+def test_positions_find_the_bias_of_a_gyroscope(rate_deg_per_s):
+    """Ten minutes after the last one 0.1 deg/s would be 60° off."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        _, way = walk(rng, 1200, speed_mps=8.0)
+        moves = np.diff(way, prepend=way[0] - 8.0)
+        turn = wrap_rad(np.diff(np.angle(moves), prepend=0.0)) + rng.normal(0, 1e-3, 1200)
+        turn += radians(rate_deg_per_s)
+        steps = [MotionStep(8.0, nan, one) for one in turn]
+        fixes = [at(place, 5.0, rng) if k < 600 else None for k, place in enumerate(way)]
+        made = [Epoch(float(k), (step,), fix=fixes[k]) for k, step in enumerate(steps)]
+        places, radii_m, _, _, state = followed(made)
+        off_m = np.abs(places - way)[630:]
+        assert (off_m <= radii_m[630:]).mean() > 0.95
+        assert off_m.max() < 400.0
+        mean, sd = state.belief.moments.mean[4], state.belief.moments.covariance[4, 4] ** 0.5
+        assert abs(mean + radians(rate_deg_per_s)) < 3 * sd
+        assert sd < radians(0.05)
 
 
 def test_two_motions_are_one():
@@ -142,13 +191,13 @@ def test_a_way_without_headings_is_straight_for_a_while():
     """Until a fix or a heading comes; a hundred steps are no random walk of a hundred."""
     made, gone_m2 = Reckoning(), 0.0
     for _ in range(100):
-        made, (_, noise, shift), why = made.moved(MotionStep(1.0, nan), OPTIONS, np.zeros(2))
+        made, (_, noise, shift), why = made.moved(MotionStep(1.0, nan), 1.0, OPTIONS, np.zeros(3))
         gone_m2 += noise[0, 0] + noise[1, 1]
         assert (why, shift.any()) == (Reason.NO_HEADING, False)
     assert made.headless_m == 100.0
     assert gone_m2 == pytest.approx(way_spread_m2(100.0))
     assert gone_m2 > 100 * 30.0
-    assert made.moved(MotionStep(1.0, 0.0), OPTIONS, np.zeros(2))[0].headless_m == 0.0
+    assert made.moved(MotionStep(1.0, 0.0), 1.0, OPTIONS, np.zeros(3))[0].headless_m == 0.0
     fixed, _ = made.fixed(7.0, GnssFix(EAST, NORTH), np.eye(2))
     assert (fixed.headless_m, fixed.fixed_s) == (0.0, 7.0)
 
@@ -228,7 +277,7 @@ def test_a_rest_in_doubt_is_told_and_its_way_is_missing_once_steps_are_counted()
 
 def test_the_heading_error_goes_on_over_a_way_that_was_not_measured():
     for step in (MotionStep(80.0, 0.1), MotionStep(80.0, nan), MotionStep(80.0, nan, nan, 70.0)):
-        _, (_, noise, _), _ = Reckoning().moved(step, OPTIONS, np.zeros(2))
+        _, (_, noise, _), _ = Reckoning().moved(step, 1.0, OPTIONS, np.zeros(3))
         assert noise[2, 2] == pytest.approx(80.0 * radians(0.3) ** 2)
 
 
@@ -253,5 +302,7 @@ def test_a_report_that_stands_still_while_one_walks_is_not_used():
 
 
 def test_the_layout_has_errors_behind_the_position():
-    assert (RECKONED.size, RECKONED.east, RECKONED.north) == (4, 0, 1)
-    assert hypot(*Reckoning().moved(MotionStep(5.0, 1.0), OPTIONS, np.zeros(2))[1][2][:2]) == 5.0
+    assert (RECKONED.size, RECKONED.east, RECKONED.north) == (5, 0, 1)
+    assert (
+        hypot(*Reckoning().moved(MotionStep(5.0, 1.0), 1.0, OPTIONS, np.zeros(3))[1][2][:2]) == 5.0
+    )

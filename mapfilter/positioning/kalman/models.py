@@ -71,6 +71,8 @@ class KalmanOptions(Options):
         Assumed deviation of a heading's error that lasts, at the start.
     drift_deg_per_sqrt_m : float
         Assumed random walk of that error.
+    turn_rate_sd_deg_per_s : float
+        Assumed deviation of the lasting error of a rate of turns, where headings are their sums.
     scale : float
         Assumed deviation of the share by which steps are too short.
     drift_m_per_sqrt_s : float
@@ -108,6 +110,7 @@ class KalmanOptions(Options):
     heading_sd_deg: Positive = 11.459155902616464
     bias_sd_deg: NotNegative = 10.0
     drift_deg_per_sqrt_m: NotNegative = 0.3
+    turn_rate_sd_deg_per_s: NotNegative = 0.05
     scale: NotNegative = 0.03
     drift_m_per_sqrt_s: Positive = 0.3
     acceleration_mps_per_sqrt_s: Positive = 0.7

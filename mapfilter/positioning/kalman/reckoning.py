@@ -7,14 +7,16 @@ components of the state:
 
     p' = p + s (1 + k) u(ψ + b) + w,
 
-linear about the mean of b and k. Positions that are measured find them, and are followed by better
-dead reckoning. The noise w is of each step alone.
+linear about the mean of b and k. Headings that turns add up to are also off by a lasting error of
+their rate, r, such as a gyroscope's bias, which is a third component: b' = b + r Δt. Positions that
+are measured find them, and are followed by better dead reckoning. The noise w is of each step
+alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, inf, isfinite, radians, sin
+from math import cos, inf, isfinite, nan, radians, sin
 
 import numpy as np
 
@@ -31,9 +33,12 @@ from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.positioning.sensors.unmeasured import headless_step, missed_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
 
-RECKONED = StateLayout(4, 0, 1)
-"""East, north, the heading error in rad, and the share by which steps are too short."""
-_TURNED, _SCALE, _LEAST = 2, 3, 1e-6
+RECKONED = StateLayout(5, 0, 1)
+"""East, north, the heading error in rad, the share by which steps are too short, and the error of
+the rate of turns in rad/s."""
+ERRORS = slice(2, 5)
+"""Components that are errors of dead reckoning."""
+_TURNED, _SCALE, _RATE, _LEAST = 2, 3, 4, 1e-6
 
 
 def at_rest(layout: StateLayout) -> Motion:
@@ -43,8 +48,9 @@ def at_rest(layout: StateLayout) -> Motion:
 
 
 def first_deviations(options: KalmanOptions) -> Floats:
-    """Return the deviations of the two errors before any position; sigma points need some."""
-    return np.maximum([radians(options.bias_sd_deg), options.scale], _LEAST)
+    """Return the deviations of the errors before any position; sigma points need some."""
+    rate_radps = radians(options.turn_rate_sd_deg_per_s)
+    return np.maximum([radians(options.bias_sd_deg), options.scale, rate_radps], _LEAST)
 
 
 def after_each_other(first: Motion, second: Motion) -> Motion:
@@ -71,12 +77,15 @@ class Reckoning:
         Time of the last fix that was used.
     alignment : Alignment
         Of motion that has turns only.
+    turned_s : float
+        Time of the last turn that was measured; NaN before the first.
     """
 
     watch: SensorWatch = field(default_factory=SensorWatch)
     headless_m: float = 0.0
     fixed_s: float = -inf
     alignment: Alignment = field(default_factory=Alignment)
+    turned_s: float = nan
 
     @property
     def may_have_left(self) -> bool:
@@ -121,16 +130,19 @@ class Reckoning:
         return after, epoch, unused
 
     def moved(
-        self, step: MotionStep, options: KalmanOptions, errors: Floats
+        self, step: MotionStep, time_s: float, options: KalmanOptions, errors: Floats
     ) -> tuple[Reckoning, Motion, Reason]:
         """Read a step.
 
         Parameters
         ----------
         step : MotionStep
+        time_s : float
+            When it ended.
         options : KalmanOptions
-        errors : (2,) array
-            Heading error (rad) and share of the scale, about which motion is linear.
+        errors : (3,) array
+            Heading error (rad), share of the scale and error of the rate of turns (rad/s), about
+            which motion is linear.
 
         Returns
         -------
@@ -142,11 +154,17 @@ class Reckoning:
             ``USED``, ``NO_STEP`` or ``NO_HEADING``.
         """
         transition, noise, shift = at_rest(RECKONED)
+        turned_s = time_s if isfinite(step.turn_rad) else self.turned_s
+        # Who stands without any turn has none: nothing was read of a gyroscope.
+        by_rate = isfinite(self.turned_s) and not isfinite(step.heading_rad)
+        by_rate = by_rate and (step.step_m != 0 or step.turn_rad != 0)
         alignment, step = self.alignment.headed(step)
-        after = self if alignment is self.alignment else replace(self, alignment=alignment)
+        after = replace(self, alignment=alignment, turned_s=turned_s)
         if not isfinite(step.step_m):
             return after, (transition, noise, shift), Reason.NO_STEP
         noise[_TURNED, _TURNED] = radians(options.drift_deg_per_sqrt_m) ** 2 * abs(step.step_m)
+        if by_rate and alignment.known:
+            transition[_TURNED, _RATE] = turned_s - self.turned_s
         if not isfinite(step.heading_rad):
             why = Reason.USED
             if not isfinite(step.spread_m):
@@ -156,11 +174,12 @@ class Reckoning:
             if alignment.known:
                 noise[_TURNED, _TURNED] += step.turned_sd_rad**2
             return after, (transition, noise, shift), why
-        turned_rad, scale = float(errors[0]), float(errors[1])
+        turned_rad, scale = float(transition[_TURNED, 2:] @ errors), float(errors[1])
         heading_rad, length_m = step.heading_rad + turned_rad, step.step_m * (1 + scale)
         along = np.array([cos(heading_rad), sin(heading_rad)])
         across = np.array([-along[1], along[0]])
-        transition[:2, _TURNED], transition[:2, _SCALE] = length_m * across, step.step_m * along
+        transition[:2, 2:] = np.outer(length_m * across, transition[_TURNED, 2:])
+        transition[:2, _SCALE] = step.step_m * along
         shift[:2] = length_m * along - transition[:2, 2:] @ errors
         cross_m = step.step_m * radians(options.heading_sd_deg)
         noise[:2, :2] = options.step_sd_m**2 * np.outer(along, along)
@@ -175,7 +194,8 @@ class Reckoning:
         """Return it after a fix with a covariance, and the direction of turns if found now."""
         sd_m = float(np.sqrt(np.trace(covariance_m2) / 2))
         alignment, found = self.alignment.at_fix(fix.east_m, fix.north_m, sd_m)
-        return Reckoning(self.watch.positioned(time_s), 0.0, time_s, alignment), found
+        watch = self.watch.positioned(time_s)
+        return Reckoning(watch, 0.0, time_s, alignment, self.turned_s), found
 
 
 def turned_to(belief: SumBelief, direction: Direction) -> SumBelief:

@@ -11,7 +11,7 @@ from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.models import SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings
-from mapfilter.positioning.kalman.reckoning import RECKONED, first_deviations
+from mapfilter.positioning.kalman.reckoning import ERRORS, RECKONED, first_deviations
 
 _MOST_PARTS = 64
 
@@ -33,7 +33,7 @@ def first_belief(
     where = [east, north]
     mean, deviation = np.zeros(layout.size), np.full(layout.size, options.speed_sd_mps)
     if layout is RECKONED:
-        deviation[-2:] = first_deviations(options)
+        deviation[ERRORS] = first_deviations(options)
     if fix is not None:
         mean[where] = fix.east_m, fix.north_m
         deviation[where] = options.start_sd_m

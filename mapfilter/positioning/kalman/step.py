@@ -39,6 +39,7 @@ from mapfilter.positioning.kalman.readings import (
     site_readings,
 )
 from mapfilter.positioning.kalman.reckoning import (
+    ERRORS,
     RECKONED,
     Reckoning,
     after_each_other,
@@ -177,9 +178,9 @@ class KalmanStep:
             moving = constant_velocity(elapsed_s, root, noise="continuous")
             return (moving.transition, moving.noise, motion[2]), self._speed_mps() * elapsed_s
         motion[1][self.where, self.where] = self.options.drift_m_per_sqrt_s**2 * elapsed_s
-        errors = self.belief.moments.mean[RECKONED.size - 2 : RECKONED.size]
+        errors, options = self.belief.moments.mean[ERRORS], self.options
         for step in epoch.motion:
-            self.reckoning, moved, why = self.reckoning.moved(step, self.options, errors)
+            self.reckoning, moved, why = self.reckoning.moved(step, epoch.time_s, options, errors)
             if why is not Reason.USED:
                 self._label(epoch, (step,), why)
             motion = after_each_other(motion, moved)
