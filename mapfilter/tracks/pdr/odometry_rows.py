@@ -1,4 +1,4 @@
-"""Rows of a vehicle's odometry without a speed or a yaw rate, or with what a bus sends for these."""
+"""Rows of a vehicle's odometry without a speed or yaw rate, or with what a bus sends for them."""
 
 from __future__ import annotations
 
