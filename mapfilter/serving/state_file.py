@@ -45,7 +45,7 @@ from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 
-FORMAT, VERSION = "mapfilter session", 11
+FORMAT, VERSION = "mapfilter session", 12
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000

@@ -187,6 +187,28 @@ def test_a_drive_from_stop_to_stop_may_lie_in_a_pause(paused_s, status):
         assert radii_m[-1] < 25.0
 
 
+@pytest.mark.parametrize("dead", [False, True])
+def test_an_odometer_of_zeros_with_a_corner_is_dead(dead):
+    """30 s around a corner at 8 m/s; or a rest of 30 s, which is one."""
+    rng = np.random.default_rng(5)
+    lost = np.isin(np.arange(300), np.arange(200, 230))
+    heading = np.where(np.arange(300) > 210, 1.57, 0.0) * dead
+    way = np.cumsum(np.where(lost & (not dead), 0.0, 8.0) * np.exp(1j * heading))
+    turn = np.diff(heading, prepend=0.0) + rng.normal(0, 1e-3, 300)
+    steps = [
+        MotionStep(0.0 if gone else 8.0, nan, one) for gone, one in zip(lost, turn, strict=True)
+    ]
+    fixes = [at(place, 5.0, rng) if k < 180 else None for k, place in enumerate(way)]
+    made = [Epoch(float(k), (step,), fix=fixes[k]) for k, step in enumerate(steps)]
+    places, radii_m, _, why, _ = followed(made)
+    stuck = [k for k, one in enumerate(why) if Reason.MOTION_STUCK in one]
+    assert stuck == (list(range(211, 230)) if dead else [])
+    off_m = np.abs(places - way)
+    assert (off_m[230:] <= radii_m[230:]).all()
+    assert (off_m[-1] > 100.0) == dead
+    assert radii_m[-1] > 200.0 if dead else radii_m[-1] < 60.0
+
+
 def test_a_way_without_headings_is_straight_for_a_while():
     """Until a fix or a heading comes; a hundred steps are no random walk of a hundred."""
     made, gone_m2 = Reckoning(), 0.0

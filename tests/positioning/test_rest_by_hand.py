@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import ReportRow
 from mapfilter.positioning.sensors.rest import Rest, _added, _carried, _left, levels_of
 
@@ -197,3 +198,45 @@ def test_half_of_what_a_block_says_of_being_elsewhere_counts(before, change_db, 
 def test_the_probability_of_having_left():
     assert Rest(0.0).left_probability == 0.5
     assert Rest(0.0, left_nats=2.0).left_probability == pytest.approx(1 / (1 + exp(-2)))
+
+
+def turning(rest, turns_rad, *, period_s=1.0, heading_rad=nan):
+    """The rest after rows of turns without a way."""
+    for k, turn_rad in enumerate(turns_rad):
+        rest = rest.turned(k * period_s, (MotionStep(0.0, heading_rad, turn_rad),))
+    return rest
+
+
+def test_a_vehicle_that_takes_a_corner_does_not_stand():
+    """Turns of the last seconds count: those of 10 s before with 1/e."""
+    car = Rest(0.0, pace_mps=9.0)
+    assert turning(car, [0.2] * 4).turned_rad == pytest.approx(
+        0.2 * sum(exp(-k / 10) for k in range(4))
+    )
+    assert not turning(car, [0.2] * 4).is_carried
+    assert turning(car, [0.2] * 5).is_carried
+    assert turning(car, [-0.2] * 5).is_carried
+    carried = turning(car, [0.2] * 5)
+    assert carried.heard(9.0, ()).is_carried
+    assert carried.turned(9.0, (MotionStep(0.0, nan, 9.0),)) is carried
+
+
+@pytest.mark.parametrize(
+    ("pace_mps", "turns_rad", "heading_rad"),
+    [
+        # A walker turns at rest, courses of a receiver do, and the bias of a gyroscope adds up.
+        (1.4, [0.5] * 9, nan),
+        (9.0, [0.5] * 9, 1.0),
+        (9.0, [0.05] * 900, nan),
+        (9.0, [nan] * 9, nan),
+        (9.0, [0.6, -0.6] * 9, nan),
+    ],
+)
+def test_turns_that_are_no_corner(pace_mps, turns_rad, heading_rad):
+    assert not turning(Rest(0.0, pace_mps=pace_mps), turns_rad, heading_rad=heading_rad).is_carried
+
+
+def test_turns_are_kept_while_reports_come():
+    rest = turning(Rest(0.0, pace_mps=9.0), [0.2] * 3)
+    heard = rest.heard(3.0, (row("A", -70.0),))
+    assert (heard.turned_rad, heard.turned_s) == (rest.turned_rad, 2.0)

@@ -8,15 +8,19 @@ A walker whose steps are no longer counted is 50 m away before that ratio can be
 rest itself has to be shown, too: where levels could have shown it, and did not, the position is in
 doubt from 45 m on, at the pace before, beyond what is measured. How levels change then depends on
 the distance.
+
+A vehicle does not turn where it stands: an odometer of zeros with the turn of a corner is dead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import exp, isfinite, log, nan, sqrt
+from dataclasses import dataclass, field, replace
+from math import exp, inf, isfinite, log, nan, radians, sqrt
 
+from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import ReportRow
+from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.tracks.schema import SERVING
 
 _BLOCK_S = 10.0
@@ -42,6 +46,8 @@ _STROLL_SHARE = 0.5
 """Share of that variance which a way as measured explains, where it is compared with being
 elsewhere: with all of it, the two could hardly be told apart after 30 m."""
 _LEFT_M, _SHOWABLE_NATS = 45.0, -2.5
+_CORNER_RAD, _CORNER_S = radians(45.0), 10.0
+"""Turn within some seconds that no bias of a gyroscope adds up to, nor a vehicle that creeps."""
 _SHOWN_NATS, _SHOWN_AGAIN_NATS = -1.0, -5.0
 """Way from which on a position is in doubt, and sum of levels that do not change at all above which
 levels could not show a rest; the sum at or below which they do, and do again after a doubt."""
@@ -77,6 +83,8 @@ class Rest:
         Whether levels could have shown the rest by now, and did not.
     measured_m : float
         Way in m that was measured since then: 0 at rest.
+    turned_rad, turned_s : float
+        Sum of recent turns that were measured without a way or a heading, and the time of the last.
     """
 
     since_s: float
@@ -92,6 +100,23 @@ class Rest:
     still_nats: float = 0.0
     is_doubtful: bool = False
     measured_m: float = 0.0
+    turned_rad: float = 0.0
+    turned_s: float = -inf
+
+    def turned(self, time_s: float, steps: tuple[MotionStep, ...]) -> Rest:
+        """Add turns without a way: a vehicle that takes a corner is carried on.
+
+        Headings beside them may be courses of a receiver, which turn at rest.
+        """
+        if self.is_carried or self.pace_mps <= WALKERS_MPS:
+            return self
+        turns = [s.turn_rad for s in steps if isfinite(s.turn_rad) and not isfinite(s.heading_rad)]
+        if not turns:
+            return self
+        kept = exp((self.turned_s - time_s) / _CORNER_S)
+        turned_rad = kept * self.turned_rad + sum(turns)
+        nats = _CARRIED_NATS if abs(turned_rad) >= _CORNER_RAD else self.carried_nats
+        return replace(self, turned_rad=turned_rad, turned_s=time_s, carried_nats=nats)
 
     def heard(self, time_s: float, rows: tuple[ReportRow, ...], gone_m: float = 0.0) -> Rest:
         """Add a report, and what was measured since the last one.
@@ -137,6 +162,8 @@ class Rest:
             still_nats,
             self._in_doubt(time_s, left_nats, still_nats, measured_m) and nats < _CARRIED_NATS,
             measured_m,
+            self.turned_rad,
+            self.turned_s,
         )
 
     def _in_doubt(

@@ -8,7 +8,8 @@ in that time, so the belief grows as it must; a report that stands still while t
 taken out.
 
 Rows that are missing, or lengths of zero, can also be those of a phone that rests, and short ones
-those of a stroll, so levels decide (:mod:`mapfilter.positioning.sensors.rest`).
+those of a stroll, so levels decide (:mod:`mapfilter.positioning.sensors.rest`), or the turns of a
+vehicle.
 """
 
 from __future__ import annotations
@@ -157,7 +158,7 @@ def _followed(
         watch = watch._moving(time_s)
     rest = watch.rest or Rest(watch.known_s, pace_mps=step_unit_m * pace.speed_mps)
     was_carried = rest.is_carried
-    rest = rest.heard(time_s, epoch.radio, step_unit_m * going.gone_m)
+    rest = rest.heard(time_s, epoch.radio, step_unit_m * going.gone_m).turned(time_s, steps)
     why = Reason.USED
     if steps and not going.measured:
         why = Reason.NO_STEP
