@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.filters.gaussian import EKF, UKF
+from mapfilter.filters.gaussian import EKF, UKF, Gaussian
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.alignment import Alignment
@@ -25,6 +25,7 @@ PLAN = CellPlan("EPSG:32629", (
     Cell("A", "A", EAST, NORTH + 900.0, 30.0, None, 50.0, 1800.0, "omni"),
 ))  # fmt: skip
 OPTIONS = KalmanOptions()
+KNOWN = Gaussian(np.zeros(5), 0.01 * np.eye(5))
 
 
 def walk(rng, count, *, askew_deg=0.0, longer=1.0, speed_mps=1.4):
@@ -220,7 +221,7 @@ def test_a_way_without_headings_is_straight_for_a_while():
     assert gone_m2 == pytest.approx(way_spread_m2(100.0))
     assert gone_m2 > 100 * 30.0
     assert made.moved(MotionStep(1.0, 0.0), 1.0, OPTIONS, np.zeros(3))[0].headless_m == 0.0
-    fixed, _ = made.fixed(7.0, GnssFix(EAST, NORTH), np.eye(2))
+    fixed, _ = made.fixed(7.0, GnssFix(EAST, NORTH), np.eye(2), KNOWN, OPTIONS)
     assert (fixed.headless_m, fixed.fixed_s) == (0.0, 7.0)
 
 
@@ -283,7 +284,7 @@ def test_a_rest_in_doubt_is_told_and_its_way_is_missing_once_steps_are_counted()
     pace = Pace(160.0, 100.0, 100, 1.0, rests=True, speed_mps=1.4, recent_mps=1.4)
     made = Reckoning(SensorWatch(pace, 100.0, 160.0, rest), fixed_s=90.0)
     step = MotionStep(1.4, 0.3)
-    fixed, _ = made.fixed(150.0, GnssFix(EAST, NORTH), np.eye(2))
+    fixed, _ = made.fixed(150.0, GnssFix(EAST, NORTH), np.eye(2), KNOWN, OPTIONS)
     for before, expected in ((made, 1), (fixed, 0), (replace(made, fixed_s=130.0), 0)):
         after, seen, unused = before.watched(Epoch(161.0, (step,)))
         assert (seen.motion[-1], len(seen.motion), unused) == (step, 1 + expected, [])

@@ -16,12 +16,13 @@ alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, inf, isfinite, nan, radians, sin
+from math import cos, hypot, inf, isfinite, nan, radians, sin, sqrt
 
 import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.filters.gaussian import Gaussian
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import UnusedReading
@@ -29,6 +30,7 @@ from mapfilter.positioning.kalman.alignment import Alignment, Direction
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
+from mapfilter.positioning.kalman.turned import FIX_S, RecentWay, Turn
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.positioning.sensors.unmeasured import headless_step, missed_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
@@ -79,6 +81,8 @@ class Reckoning:
         Of motion that has turns only.
     turned_s : float
         Time of the last turn that was measured; NaN before the first.
+    recent : RecentWay
+        By which headings that have jumped are found.
     """
 
     watch: SensorWatch = field(default_factory=SensorWatch)
@@ -86,6 +90,7 @@ class Reckoning:
     fixed_s: float = -inf
     alignment: Alignment = field(default_factory=Alignment)
     turned_s: float = nan
+    recent: RecentWay = field(default_factory=RecentWay)
 
     @property
     def may_have_left(self) -> bool:
@@ -159,7 +164,8 @@ class Reckoning:
         by_rate = isfinite(self.turned_s) and not isfinite(step.heading_rad)
         by_rate = by_rate and (step.step_m != 0 or step.turn_rad != 0)
         alignment, step = self.alignment.headed(step)
-        after = replace(self, alignment=alignment, turned_s=turned_s)
+        recent = self.recent.moved(step)
+        after = replace(self, alignment=alignment, turned_s=turned_s, recent=recent)
         if not isfinite(step.step_m):
             return after, (transition, noise, shift), Reason.NO_STEP
         noise[_TURNED, _TURNED] = radians(options.drift_deg_per_sqrt_m) ** 2 * abs(step.step_m)
@@ -189,13 +195,59 @@ class Reckoning:
         return after, (transition, noise, shift), Reason.USED
 
     def fixed(
-        self, time_s: float, fix: GnssFix, covariance_m2: Floats
-    ) -> tuple[Reckoning, Direction | None]:
-        """Return it after a fix with a covariance, and the direction of turns if found now."""
+        self,
+        time_s: float,
+        fix: GnssFix,
+        covariance_m2: Floats,
+        belief: Gaussian,
+        options: KalmanOptions,
+    ) -> tuple[Reckoning, Direction | Turn | None]:
+        """Return it after a fix with a covariance, and what that has found of headings.
+
+        It is the direction of turns, or the jump of headings by which the belief is off.
+        """
         sd_m = float(np.sqrt(np.trace(covariance_m2) / 2))
-        alignment, found = self.alignment.at_fix(fix.east_m, fix.north_m, sd_m)
-        watch = self.watch.positioned(time_s)
-        return Reckoning(watch, 0.0, time_s, alignment, self.turned_s), found
+        place = fix.east_m, fix.north_m
+        alignment, found = self.alignment.at_fix(*place, sd_m)
+        turned_rad, variance = belief.mean[_TURNED], belief.covariance[_TURNED, _TURNED]
+        # Errors that last, and are alike at several fixes, count once in that time.
+        alike = 1 + 2 * options.fix_lasting_s / FIX_S
+        way_sd_m = hypot(sd_m, options.fix_lasting_m * sqrt(alike))
+        recent, jump = self.recent.at_fix(*place, way_sd_m, float(turned_rad), sqrt(variance))
+        after = replace(
+            self,
+            watch=self.watch.positioned(time_s),
+            headless_m=0.0,
+            fixed_s=time_s,
+            alignment=alignment,
+            recent=recent if found is None else RecentWay(),
+        )
+        return after, found or jump
+
+
+def jump_to(turn: Turn, belief: Gaussian, layout: StateLayout, *, lasts: bool) -> Motion:
+    """Return the motion of a jump of headings: to their error, and to where it has led.
+
+    Parameters
+    ----------
+    belief : Gaussian
+        Before it.
+    lasts : bool
+        Whether the place that fixes are of is a part of the state, too.
+    """
+    transition, noise, shift = at_rest(layout)
+    target, variances = [turn.east_m, turn.north_m], turn.sd_m**2 * np.eye(2)
+    own = [layout.east, layout.north]
+    shift[own] = target - belief.mean[own]
+    noise[np.ix_(own, own)] = variances
+    if lasts:
+        seen = [RECKONED.size, RECKONED.size + 1]
+        shift[seen] = shift[own]
+        for one, other in ((seen, seen), (own, seen), (seen, own)):
+            noise[np.ix_(one, other)] = variances
+    shift[_TURNED] = turn.turned_rad - belief.mean[_TURNED]
+    noise[_TURNED, _TURNED] = turn.sd_rad**2
+    return transition, noise, shift
 
 
 def turned_to(belief: SumBelief, direction: Direction) -> SumBelief:

@@ -18,6 +18,7 @@ from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.gaussian_tail import GaussianTail
+from mapfilter.positioning.kalman.alignment import Direction
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import (
     Motion,
@@ -44,9 +45,11 @@ from mapfilter.positioning.kalman.reckoning import (
     Reckoning,
     after_each_other,
     at_rest,
+    jump_to,
     turned_to,
 )
 from mapfilter.positioning.kalman.start import first_belief
+from mapfilter.positioning.kalman.turned import Turn
 
 _LOST_NIS, _WINDOW = 5.0, 10
 _WALK_MPS = 1.5
@@ -242,15 +245,30 @@ class KalmanStep:
         return replace(model, noise=model.noise * np.outer(growth, growth))
 
     def _update_fix(self, fix: GnssFix, time_s: float) -> bool:
+        if self.belief is None:
+            raise AssertionError("started before it measures")
         noise, layout = fix_covariance_m2(fix, self.options.fix_sd_m), self.layout
-        self.reckoning, found = self.reckoning.fixed(time_s, fix, noise)
+        if self.own is RECKONED:
+            moments = self.belief.moments
+            self.reckoning, found = self.reckoning.fixed(time_s, fix, noise, moments, self.options)
+            if isinstance(found, Turn):
+                self._jump(jump_to(found, moments, layout, lasts=self.lasts))
+                self.unused.append(UnusedReading(time_s, "motion", "", Reason.PHONE_TURNED))
+                return True
         if self.lasts:
             layout = fix_layout(layout, self.own.size)
             noise = white_part(noise, self.options.fix_lasting_m)
         taken = self._update(position_fix(layout, noise), [fix.east_m, fix.north_m])
-        if found is not None and self.belief is not None:
+        if self.own is RECKONED and isinstance(found, Direction):
             self.belief = turned_to(self.belief, found)
         return taken
+
+    def _jump(self, motion: Motion) -> None:
+        """Move on by a jump of headings: what was measured before it said nothing of a loss."""
+        if self.belief is None or self.motion is None:
+            raise AssertionError("moved before it measures")
+        self.belief = self.belief.predict(*motion)
+        self.motion, self.recent_nis = after_each_other(self.motion, motion), []
 
     def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
         """Update with a measurement; return whether that could be done."""
