@@ -83,7 +83,8 @@ def columns_of_motion(opened: OpenedLog) -> str:
     for one in tables:
         found = [field for field in MOTION_FIELDS if field in one.fields]
         text += f"; {one.path.name} has {', '.join(found) or 'none of them'}"
-        text += f", columns not used: {listed(one.unread)} (--column)" if one.unread else ""
+        unread = [name for name in one.unread if name not in found]
+        text += f", columns not used: {listed(unread)} (--column)" if unread else ""
     return text
 
 

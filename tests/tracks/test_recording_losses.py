@@ -107,7 +107,11 @@ def test_names_of_columns_that_resemble_a_field_are_told(walk, tmp_path):
     names = {"steps": "stepcount", "compass_deg": "compas", "latitude": "compass_rad"}
     walk.rename(columns=names).to_csv(tmp_path / "phone.csv", index=False)
     recording = read_recording(tmp_path / "phone.csv")
-    assert recording.unread == ("stepcount (steps?)", "compas (compass_deg?)", "compass_rad")
+    assert recording.unread == (
+        "stepcount (steps?)",
+        "compas (compass_deg?)",
+        "compass_rad (compass_deg?)",
+    )
     assert "steps" not in recording.fields
     assert "level_dbm" in recording.fields
 
