@@ -59,8 +59,6 @@ class ReplayedLog:
         Equal for logs with the same true path; empty without a truth.
     baseline : SingleReports or None
         Errors of the reports, each located by itself; None without truth, reports or cells.
-    losses : tuple of str
-        Rows and values of its recordings that are not used; they are among the notes, too.
     foreign : str
         Why the database may lack all of its unknown cells, or an empty text.
     """
@@ -74,7 +72,6 @@ class ReplayedLog:
     outputs: tuple[Path, ...]
     route: str = ""
     baseline: SingleReports | None = None
-    losses: tuple[str, ...] = ()
     foreign: str = ""
 
     @property
@@ -127,11 +124,6 @@ class ReplayResult:
             names = [log.name for log in self.logs if log.lack == lack]
             found.append(f"nothing is located in {_named(names)}: {lack}")
         return tuple(found)
-
-    @property
-    def losses(self) -> tuple[str, ...]:
-        """Rows and values of recordings that are not used."""
-        return tuple(dict.fromkeys(loss for log in self.logs for loss in log.losses))
 
 
 def route_of(log: TrackLog) -> str:

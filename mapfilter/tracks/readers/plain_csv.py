@@ -55,6 +55,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
     }
     time_s = _times(mapped, reading, options)
+    reading.last_s = max([reading.last_s, *time_s[np.isfinite(time_s)][-1:].tolist()])
     if mapped.has("lat_deg", "lon_deg"):
         names = ("lat_deg", "lon_deg", "altitude_m", "accuracy_m", "course_deg")
         columns = {name: mapped.number(name) for name in names}

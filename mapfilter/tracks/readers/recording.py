@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +20,7 @@ from mapfilter.tracks.readers.recorded_values import (
     checked_values,
     duplicates,
     joined_parts,
+    late_rows,
     reordered,
 )
 from mapfilter.tracks.readers.tables import RECORDED, Field
@@ -146,8 +148,7 @@ class Recording:
 class Reading:
     """Collects the tables, bad rows and notes of one file while it is read.
 
-    ``absolute`` tells whether times are seconds of UTC (or of local time as if it were UTC), so
-    that they can be checked against the calendar.
+    ``last_s`` is the last time of the file's rows, used or not.
     """
 
     path: Path
@@ -162,6 +163,7 @@ class Reading:
     unread: tuple[str, ...] = ()
     named: tuple[str, ...] = ()
     tallies: Tallies = field(default_factory=Tallies)
+    last_s: float = -inf
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
 
     def refuse(self, lines: ArrayLike, reason: str) -> None:
@@ -294,6 +296,8 @@ class Reading:
         if not self.tables:
             raise nothing_usable(self.path, name, self.rows, refused, rows_word)
         self.tallies.check(self.path, RECORDED)
+        if late := late_rows(self.tables.values(), self.last_s, read=not self.unread):
+            self.ignore(late)
         radio = self.tables.get("radio", ())
         by_cell = any((part["role"] == NEIGHBOUR).any() for part in radio)
         kept = {
