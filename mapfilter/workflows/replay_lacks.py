@@ -33,6 +33,11 @@ _UNLOCATED = {
     Status.OUTSIDE: "as nothing on the map explains the readings",
 }
 
+_CONTRADICTING = (
+    "steps in another unit, turns the other way round, another journey, or positions whose "
+    "latitude and longitude are swapped"
+)
+
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
     """Note a log in another CRS than the database, or far outside its lattice.
@@ -156,6 +161,8 @@ def early_end_note(opened: OpenedLog, estimate: TrackEstimate) -> tuple[str, ...
         unused[one.reason] += one.readings if one.time_s > last_s else 0
     reason, count = unused.most_common(1)[0] if unused else (Reason.USED, 0)
     text += f"{status} from there on, {_UNLOCATED[status]}"
+    if status is Status.LOST and len(opened.log.gnss) and len(opened.log.motion):
+        text += f" (likely: {_CONTRADICTING})"
     return (f"{text}; {count} readings: {reason} ({REASONS[reason]})" if count else text,)
 
 

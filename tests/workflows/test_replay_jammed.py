@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import assert_done, mapfilter
+from command_line import assert_done, assert_refused, mapfilter
 
 from mapfilter.positioning.estimate_store import read_estimate
 
@@ -136,3 +136,19 @@ def test_motion_alone_has_nothing_to_start_from(drive, replay):
     done = replay({"odometry": apart(drive)["odometry"]})
     assert done.code == 3
     assert "nothing is located in odometry: no positions and no radio to start from" in done.err
+
+
+def test_exchanged_degrees_of_the_truth_are_refused(drive, replay, tmp_path):
+    names = {"latitude": "longitude", "longitude": "latitude"}
+    truth = apart(drive)["positions"].rename(columns=names)
+    truth.to_csv(tmp_path / "truth.csv", index=False)
+    done = replay(apart(drive), "--truth", tmp_path / "truth.csv")
+    told = "truth.csv, latitude and longitude", "latitude and longitude swapped in one of the two"
+    assert_refused(done, *told)
+
+
+def test_a_track_that_is_lost_by_exchanged_degrees_names_them(drive, replay):
+    names = {"latitude": "longitude", "longitude": "latitude"}
+    tables = apart(drive)
+    tables["positions"] = tables["positions"].rename(columns=names)
+    assert "latitude and longitude are swapped)" in replay(tables).err
