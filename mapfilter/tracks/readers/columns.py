@@ -195,7 +195,9 @@ class Columns:
         self.reading.tallies.add_texts(name, part, pc.sum(good).as_py() + count, count, examples)
         if bad:
             some = number_of(bad, "value is no number", "values are no numbers")
-            self.reading.ignore(f"{name}: {some}, taken as missing")
+            at = pc.index(wrong, value=True).as_py()
+            first = f"first {column[at].as_py()[:40]!r} in line {self.line[at]}"
+            self.reading.ignore(f"{name}: {some}, taken as missing ({first})")
         column = pc.replace_substring_regex(column, r"^\+", "")
         return pc.cast(pc.if_else(good, column, None), kind)
 

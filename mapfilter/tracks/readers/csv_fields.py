@@ -122,6 +122,7 @@ def check_fields(columns: Mapping[str, str], faults: Faults) -> None:
     """Note each field of a column map that does not exist, with the most similar one."""
     for field in columns:
         if field not in FIELDS:
-            near = get_close_matches(field, FIELDS, 1)
-            expected = f"one of {', '.join(FIELDS)}"
+            near = get_close_matches(field, FIELDS, 3)
+            # The list of all would hide the likely ones.
+            expected = f"a field such as {', '.join(near or FIELDS)}"
             faults.add(f"--column {field}", expected, field, near[0] if near else "")

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
+from mapfilter.tracks.readers.csv_fields import meant
 
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
@@ -110,6 +111,20 @@ def fields_meant(column: str) -> tuple[str, ...]:
     # One of several units is as good as the other where the header states it.
     others = {} if unit else _OTHER_UNIT
     return tuple(one for field in some for one in (field, others.get(field)) if one)
+
+
+def likely_fields(column: str, taken: Collection[str]) -> list[str]:
+    """Return the fields that a column may be, by the words or the letters of its name.
+
+    Parameters
+    ----------
+    taken : collection of str
+        Fields that other columns hold.
+    """
+    if stated := [field for field in fields_meant(column) if field not in taken]:
+        return stated
+    near = "" if "[" in column or "(" in column else meant(column, taken)
+    return [near] if near else []
 
 
 def _fits(field: str, unit: str) -> bool:

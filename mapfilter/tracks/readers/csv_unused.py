@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mapfilter.errors import listed
-from mapfilter.tracks.readers.csv_fields import FIELDS, column_option, meant
-from mapfilter.tracks.readers.csv_headers import fields_meant
+from mapfilter.tracks.readers.csv_fields import FIELDS, column_option
+from mapfilter.tracks.readers.csv_headers import likely_fields
 from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.readers.csv_odometry import has_odometry, has_unused_odometry
 
@@ -27,7 +27,9 @@ def unused_columns(mapped: Mapped) -> tuple[str, ...]:
     for name in mapped.rows.names:
         if not name or name in taken:
             continue
-        likely = [_OF_WHEELS.get(columns[name], "")] if name in columns else _likely(name, found)
+        likely = (
+            [_OF_WHEELS.get(columns[name], "")] if name in columns else likely_fields(name, found)
+        )
         texts.append(_with_fields(name, [field for field in likely if field]))
     return tuple(texts)
 
@@ -40,13 +42,6 @@ def unused_note(unread: tuple[str, ...]) -> str:
     name, _, fields = guessed[:-2].rpartition(" (")
     option = column_option(fields.split(" or ")[0], name)
     return f"columns not used: {listed(unread)} (likely: {option})"
-
-
-def _likely(name: str, found: list[str]) -> list[str]:
-    if stated := [field for field in fields_meant(name) if field not in found]:
-        return stated
-    near = "" if "[" in name or "(" in name else meant(name, found)
-    return [near] if near else []
 
 
 def _with_fields(name: str, fields: list[str]) -> str:

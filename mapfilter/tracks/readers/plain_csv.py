@@ -55,6 +55,8 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
     }
     time_s = _times(mapped, reading, options)
+    reading.columns |= mapped.stated
+    reading.columns |= {field: name.lower() for field, name in mapped.own.items()}
     reading.last_s = max([reading.last_s, *time_s[np.isfinite(time_s)][-1:].tolist()])
     if mapped.has("lat_deg", "lon_deg"):
         names = ("lat_deg", "lon_deg", "altitude_m", "accuracy_m", "course_deg")
@@ -88,7 +90,7 @@ def _times(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     if known.size >= 0.5 * len(number) and known.size and abs(float(np.median(known))) < _UNIX_S:
         reading.clock = Clock("monotonic")
         return number
-    reading.notes[:] = [note for note in reading.notes if not note.endswith("taken as missing")]
+    reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
     names = mapped.names("time")
     # A zone that is given is that of the local times of all files.
     zone = "UTC" if "utc" in (mapped.rows.find(*names) or "") else options.zone
