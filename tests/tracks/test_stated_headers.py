@@ -150,3 +150,35 @@ def test_a_header_states_that_times_are_utc(tmp_path):
 def test_a_file_without_anything_that_is_known_is_refused(tmp_path):
     with pytest.raises(InputError):
         read(tmp_path, {"time": TIME_S, "velocity": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("date", "time"),
+    [("28.05.2026", "23:26:4{}"), ("2026-05-28", "23:26:4{}"), ("", "28-May-2026 23:26:4{}.0")],
+)
+def test_dates_and_times_as_loggers_write_them(tmp_path, date, time):
+    columns = {"Date": date} if date else {}
+    rows = {"Time": [time.format(k) for k in range(9)], "lat": PLACES["latitude"][:9], "lon": 24.0}
+    path = tmp_path / "walk.csv"
+    pd.DataFrame({**columns, **rows}).assign(**columns).to_csv(path, index=False)
+    found = read_recording(path, options=ReadOptions(zone="Europe/Helsinki"))
+    np.testing.assert_allclose(found.tables["positions"]["time_s"], 1.78e9 + np.arange(9))
+    assert not found.unread
+    assert ("time: columns date and time" in found.notes) == bool(date)
+
+
+def test_counted_steps_are_found_by_words(tmp_path):
+    found = read(tmp_path, {"time": TIME_S, "Step count": np.arange(40), "Heading (°)": 90.0})
+    assert {"steps", "compass"} <= set(found.tables)
+
+
+def test_an_export_of_a_cars_diagnosis_is_read(tmp_path):
+    path = tmp_path / "trackLog.csv"
+    head = "GPS Time, Device Time, Longitude, Latitude,GPS Speed (Meters/second), Bearing, G(x),"
+    clock = "Thu May 28 23:26:4{0} GMT+03:00 2026,28-May-2026 23:26:4{0}.000"
+    rows = "".join(f"{clock.format(k)},24.9,60.1,10.0,90,0.1,36\n" for k in range(9))
+    path.write_text(f"{head}Speed (OBD)(km/h)\n{rows}")
+    found = read_recording(path)
+    np.testing.assert_allclose(found.tables["odometry"]["speed_mps"], 10.0)
+    np.testing.assert_allclose(found.tables["positions"]["speed_mps"], 10.0)
+    assert found.unread == ("gps time", "g(x)")

@@ -11,7 +11,7 @@ from mapfilter.tracks.readers.csv_fields import meant
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "timestamp", "date time", "utc time", "local time", "unix time", "epoch time"),
-        *("elapsed time", "time elapsed", "seconds elapsed", "device time", "gps time"),
+        *("elapsed time", "time elapsed", "seconds elapsed", "device time", "gps time", "date"),
     ),
     "lat_deg": ("latitude", "lat", "gps latitude", "gps lat"),
     "lon_deg": ("longitude", "lon", "lng", "long", "gps longitude", "gps lon"),
@@ -32,6 +32,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "east_m": ("easting", "east"),
     "north_m": ("northing", "north"),
     "step_m": ("step",),
+    "steps": ("steps", "step count", "step counter", "total steps"),
     "turn_rad": ("turn", "turn angle", "heading change"),
     "compass_deg": ("compass", "heading", "azimuth", "compass heading"),
     "yaw_rate_radps": ("yaw rate", "turn rate", "turning rate"),
@@ -49,8 +50,8 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 }
 """Words for the quantity of a field, in any order; times of the first of several columns."""
 
-_UNITLESS = ("time",)
-"""Fields whose unit is found by their values."""
+_UNITLESS = ("time", "steps")
+"""Fields without a unit, or whose unit is found by their values."""
 _COMPASS_UNITS = ("deg", "gon")
 """Radians of a heading count from east elsewhere than in a compass."""
 _OTHER_UNIT = {
@@ -130,6 +131,8 @@ def likely_fields(column: str, taken: Collection[str]) -> list[str]:
 def _fits(field: str, unit: str) -> bool:
     if field in _UNITLESS and not unit:
         return True
+    if not quantity_of(field):
+        return False
     if field == "compass_deg":
         return unit in _COMPASS_UNITS
     return unit in UNITS[quantity_of(field)]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.identities import available
 from mapfilter.tracks.readers.recording import Reading
 
+_DATE = "date"
+_OF_DAY = re.compile(r"\d{1,2}:\d\d")
+
 
 @dataclass(frozen=True)
 class Mapped:
@@ -29,11 +33,14 @@ class Mapped:
         Columns of fields by a user's map; other fields have columns of their usual names.
     stated : mapping of str to str
         Columns of other fields, whose headers state quantity and unit.
+    beside : tuple of str
+        Columns that are used with those of fields.
     """
 
     rows: Columns
     own: Mapping[str, str]
     stated: Mapping[str, str]
+    beside: tuple[str, ...] = ()
 
     def names(self, field: str) -> tuple[str, ...]:
         """Return the names of columns that may hold a field."""
@@ -130,6 +137,15 @@ def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Map
         faults.add(where, "a column of times", present, hint)
     faults.raise_if_any(InputError)
     return mapped
+
+
+def with_dates(mapped: Mapped) -> Mapped:
+    """Return columns with times of day after the dates of the column ``date``, if there is one."""
+    rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
+    if name in (None, _DATE) or not rows.has(_DATE) or not _OF_DAY.match(rows.first_text(name)):
+        return mapped
+    rows.reading.note(f"time: columns {_DATE} and {name}")
+    return replace(mapped, rows=rows.joined(_DATE, name), beside=(_DATE,))
 
 
 def _stated(rows: Columns, own: Mapping[str, str]) -> dict[str, str]:

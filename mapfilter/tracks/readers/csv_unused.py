@@ -23,6 +23,7 @@ def unused_columns(mapped: Mapped) -> tuple[str, ...]:
     useless = _MEASURED.intersection(found) - _useful(mapped)
     columns = {mapped.rows.find(*mapped.names(field)): field for field in useless}
     taken = {name for field in FIELDS for name in mapped.names(field)} - set(columns)
+    taken.update(mapped.beside)
     texts = []
     for name in mapped.rows.names:
         if not name or name in taken:

@@ -16,7 +16,7 @@ from mapfilter.tracks.readers.columns import (
 from mapfilter.tracks.readers.csv_cells import add_cells
 from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
 from mapfilter.tracks.readers.csv_headers import stated_fields
-from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows, mapped_columns
+from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows, mapped_columns, with_dates
 from mapfilter.tracks.readers.csv_odometry import add_odometry, speeds_of
 from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
 from mapfilter.tracks.readers.format import Format, ReadOptions
@@ -49,7 +49,8 @@ def _matches(text: Text) -> bool:
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "CSV"
     rows = header_columns(text.data, reading, text.line)
-    mapped = mapped_columns(rows, reading, options)
+    mapped = with_dates(mapped_columns(rows, reading, options))
+    rows = mapped.rows
     reading.named = tuple(mapped.own)
     reading.tallies.columns |= {
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
@@ -93,8 +94,9 @@ def _times(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
     names = mapped.names("time")
     # A zone that is given is that of the local times of all files.
-    zone = "UTC" if "utc" in (mapped.rows.find(*names) or "") else options.zone
-    time_s, zoned = mapped.rows.times(*names, zone=zone)
+    rows, name = mapped.rows, mapped.rows.find(*names) or ""
+    zone = "UTC" if "utc" in name else options.zone
+    time_s, zoned = rows.times(*names, zone=zone)
     reading.clock = Clock("utc") if zoned else Clock("local", zone)
     if len(time_s) and not np.isfinite(time_s).any():
         texts = mapped.texts("time").tolist()
