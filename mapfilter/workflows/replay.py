@@ -189,7 +189,7 @@ def run_replay(
         if truth is not None:
             log = replace(log, notes=(*log.notes, *truth_notes(track.estimate, truth)))
         fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
-        ends = early_end_note(opened, track.estimate)
+        ends = early_end_note(opened, track.estimate, over_map=database is not None)
         log = replace(log, notes=(*log.notes, *fixes, *ends))
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)

@@ -134,13 +134,17 @@ def fixes_note(
     return (text if len(log.truth) else f"{text}, --truth {placed[0].path.name} scores by them",)
 
 
-def early_end_note(opened: OpenedLog, estimate: TrackEstimate) -> tuple[str, ...]:
+def early_end_note(
+    opened: OpenedLog, estimate: TrackEstimate, *, over_map: bool
+) -> tuple[str, ...]:
     """Return a note where a track is located until long before its rows end, and why; else none.
 
     Parameters
     ----------
     opened : OpenedLog
         The log as it was opened, with its sensors.
+    over_map : bool
+        Whether a map may lack the way that was gone.
     """
     followed = [status.is_followed for status in estimate.status]
     if not any(followed):
@@ -162,7 +166,7 @@ def early_end_note(opened: OpenedLog, estimate: TrackEstimate) -> tuple[str, ...
     reason, count = unused.most_common(1)[0] if unused else (Reason.USED, 0)
     text += f"{status} from there on, {_UNLOCATED[status]}"
     if status is Status.LOST and len(opened.log.gnss) and len(opened.log.motion):
-        text += f" (likely: {_CONTRADICTING})"
+        text += f" (likely: {_CONTRADICTING}{', or ways that the map lacks' if over_map else ''})"
     return (f"{text}; {count} readings: {reason} ({REASONS[reason]})" if count else text,)
 
 
