@@ -43,7 +43,7 @@ from mapfilter.viewing.trace import TraceRecorder
 from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
-from mapfilter.workflows.planned_cells import plan_antennas, planned_cells
+from mapfilter.workflows.planned_cells import cells_beside_log, plan_antennas
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
 from mapfilter.workflows.replay_lacks import early_end_note, fixes_note, lack_of
 from mapfilter.workflows.replay_logs import ReplayLogs
@@ -119,7 +119,7 @@ def run_replay(
     def sites(crs: str) -> CellPlan:
         if database is not None:
             return database.plan
-        return planned_cells(config, crs) if config.cells.plan else CellPlan(crs, ())
+        return cells_beside_log(config, crs)
 
     @cache
     def over(crs: str, fitted: FilterOptions, *, cells: bool) -> Filter[Any]:

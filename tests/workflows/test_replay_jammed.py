@@ -152,3 +152,14 @@ def test_a_track_that_is_lost_by_exchanged_degrees_names_them(drive, replay):
     tables = apart(drive)
     tables["positions"] = tables["positions"].rename(columns=names)
     assert "latitude and longitude are swapped)" in replay(tables).err
+
+
+def test_a_log_with_exchanged_degrees_is_named_beside_the_cell_plan(drive, replay, tmp_path):
+    names = {"latitude": "longitude", "longitude": "latitude"}
+    places = apart(drive)["positions"].rename(columns=names)
+    phone = places.assign(mcc=1, mnc=1, lac=1, ci=1, rsrp=-80)
+    head = "cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz"
+    (tmp_path / "cells.csv").write_text(f"{head}\nA,A,60.0,25.0,30,0,55,1800\n")
+    plan = "cells.plan=" + json.dumps(str(tmp_path / "cells.csv"))
+    done = replay({"phone": phone}, "--set", plan)
+    assert_refused(done, "swapped, or so in the log, by whose positions the CRS is EPSG:")
