@@ -249,7 +249,7 @@ def replay(
             )
         figures = replay_figures(result)
         print_result(figures if as_json else replay_text(figures), as_json)
-        for note in figures["notes"]:
+        for note in dict.fromkeys(figures["notes"]):
             print_message(note, "note: ")
         for warning in result.warnings:
             print_message(warning)

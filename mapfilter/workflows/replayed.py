@@ -16,7 +16,7 @@ from mapfilter._words import number_of
 from mapfilter.evaluation.accuracy import Accuracy
 from mapfilter.evaluation.outcome import Outcome
 from mapfilter.evaluation.success import SuccessSummary, summarise
-from mapfilter.filters.contract import Reason
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.replay_baseline import SingleReports, together
 
@@ -151,6 +151,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
         **scores,
         "switched": sum(outcome.switched for outcome in outcomes),
         "final_statuses": _sum({o.final_status: 1} for o in outcomes if o.final_status),
+        "seconds_by_status": _seconds_by_status(outcomes),
         "unused": _sum(outcome.unused for outcome in outcomes),
         "unknown_cells": _most_frequent(outcome.unknown_cells for outcome in outcomes),
         "logs_with_unknown_cells": [log.name for log in result.logs if log.outcome.unknown_cells],
@@ -183,6 +184,12 @@ def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
     for count in counts:
         total.update(count)
     return dict(sorted(total.items()))
+
+
+def _seconds_by_status(outcomes: Sequence[Outcome]) -> dict[str, float]:
+    lasted = [outcome.seconds_by_status for outcome in outcomes]
+    names = [str(status) for status in Status if any(str(status) in one for one in lasted)]
+    return {name: sum(one.get(name, 0.0) for one in lasted) for name in names}
 
 
 def _most_frequent(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:

@@ -237,6 +237,9 @@ def test_several_logs_are_summed_up_without_truth(own_world, replay, tmp_path):
     assert found["switched"] == sum(figures["switched"] for figures in each)
     assert sum(found["final_statuses"].values()) == found["logs"] == 2
     assert "success" not in found
+    assert sum(found["seconds_by_status"].values()) == pytest.approx(
+        sum(sum(figures["seconds_by_status"].values()) for figures in each)
+    )
     for reason, count in found["unused"].items():
         assert count == sum(figures["unused"].get(reason, 0) for figures in each)
     readings = sum(figures["unknown_cells"].get("X", 0) for figures in each)
