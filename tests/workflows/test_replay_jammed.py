@@ -132,10 +132,12 @@ def test_a_track_that_is_lost_long_before_its_end_says_so(drive, replay):
     )
 
 
-def test_motion_alone_has_nothing_to_start_from(drive, replay):
+def test_motion_alone_has_nothing_to_start_from(drive, replay, tmp_path):
     done = replay({"odometry": apart(drive)["odometry"]})
     assert done.code == 3
-    assert "nothing is located in odometry: no positions and no radio to start from" in done.err
+    assert "nothing is located in odometry: no positions and no radio to start from\n" in done.err
+    scored = replay(apart(drive), "--truth", tmp_path / "positions.csv")
+    assert "to start from (those of the truth serve for scores only)" in scored.err
 
 
 def test_exchanged_degrees_of_the_truth_are_refused(drive, replay, tmp_path):
