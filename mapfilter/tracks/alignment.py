@@ -12,7 +12,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
-from mapfilter.tracks.misplaced import FAR_M
+from mapfilter.tracks.misplaced import FAR_APART, FAR_M
 from mapfilter.tracks.readers.recording import Recording
 
 _QUARTER_S = 900.0
@@ -127,8 +127,8 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
     if clock.kind == "local":
         return _zone(recording, first, one, other)
     if same and _common(recording, first) >= _COMMON_SHARE:
-        note = _disagreement(first.path.name, one, other)
-        return 0.0, note if " km from those" in note else ""
+        far = one is not None and other is not None and _apart_m(one, other, 0.0, 0.1) > FAR_M
+        return 0.0, _disagreement(first.path.name, one, other) if far else ""
     if one is not None and other is not None:
         low, high = one[0][0] - other[0][-1], one[0][-1] - other[0][0]
         step_s = max(1.0, (high - low) / _MOST_SHIFTS)
@@ -199,8 +199,8 @@ def _disagreement(first: str, one: _Track | None, other: _Track | None) -> str:
     shift_s, apart_m = _best_shift(one, other, shifts)
     if now_m > FAR_M and apart_m > FAR_M:
         return (
-            f"positions lie {now_m / 1000:.1f} km from those of the same times in {first} (median) "
-            "(likely: another journey, another day's times, or positions that were spoofed)"
+            f"positions lie {now_m / 1000:.1f} {FAR_APART} in {first} (median) (likely: another "
+            "journey, another day's times, or positions that were spoofed)"
         )
     if abs(shift_s) < _REMARKABLE_S or apart_m > 0.8 * now_m:
         return f"positions agree within {now_m:.1f} m (median)"

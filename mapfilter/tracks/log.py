@@ -34,6 +34,7 @@ from mapfilter.tracks.log_checks import (
     truth_far_off,
 )
 from mapfilter.tracks.log_times import seconds_of_tables
+from mapfilter.tracks.misplaced import FAR_APART
 from mapfilter.tracks.motion_faults import compared_places, motion_faults
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
@@ -230,7 +231,7 @@ def make_log(
         check_clocks(tables, called, faults)
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
-        if not faults.found and not any(" km from those" in note for note in every_note):
+        if not faults.found and not any(FAR_APART in note for note in every_note):
             every_note += truth_far_off(str(crs), tables)
         # Of values that are refused nothing is told besides.
         if not faults.found:

@@ -15,6 +15,8 @@ AWAY_M = 5000.0
 """Positions all of which lie farther outside of an area are those of another one."""
 FAR_M = 2000.0
 """Positions of one journey that lie farther apart are wrong: of degrees, of clocks, or spoofed."""
+FAR_APART = "km from those of the same times"
+"""Words by which notes on such positions are known."""
 UNDONE = {
     "latitude and longitude swapped": ("lat_deg", "lon_deg", 1, 1),
     "a lost sign of longitude": ("lon_deg", "lat_deg", -1, 1),

@@ -140,9 +140,10 @@ def test_speeds_in_rows_without_positions_are_named(tmp_path):
     assert not any("without a position" in note for note in named.notes)
 
 
-def test_a_header_states_that_times_are_utc(tmp_path):
+@pytest.mark.parametrize("header", ["Time (UTC)", "timestamp_utc", "UTC time", "utc"])
+def test_a_header_states_that_times_are_utc(tmp_path, header):
     times = pd.Timestamp("2026-05-01 08:00:00") + pd.to_timedelta(TIME_S, unit="s")
-    found = read(tmp_path, {"Time (UTC)": times, **PLACES})
+    found = read(tmp_path, {header: times, **PLACES})
     assert found.clock.kind == "utc"
     assert found.tables["positions"]["time_s"].iloc[0] == pytest.approx(1777622400.0)
 

@@ -10,7 +10,7 @@ from mapfilter.tracks.readers.csv_fields import meant
 
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
-        *("time", "timestamp", "date time", "utc time", "local time", "unix time", "epoch time"),
+        *("time", "timestamp", "date time", "local time", "unix time", "epoch time"),
         *("elapsed time", "time elapsed", "seconds elapsed", "device time", "gps time", "date"),
     ),
     "lat_deg": ("latitude", "lat", "gps latitude", "gps lat"),
@@ -140,9 +140,9 @@ def _fits(field: str, unit: str) -> bool:
 
 def _fields_of(text: str) -> dict[str, int]:
     """Return the fields whose quantity is written in a text, and by which of its words."""
-    words = _WORD.findall(text)
-    if text.count("(") and words[-1:] == ["utc"] and len(words) > 1:
-        words = words[:-1]
+    every = _WORD.findall(text)
+    # A zone is no quantity.
+    words = [word for word in every if word != "utc"] or every
     found = {}
     for field, some in QUANTITIES.items():
         for rank, quantity in enumerate(some):
