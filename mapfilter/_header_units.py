@@ -54,29 +54,33 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 """Units by quantity, as multiples of the first of each."""
 
 _OTHER_NAMES = {
-    **dict.fromkeys(("mps", "ms-1", "m/sec"), "m/s"),
-    **dict.fromkeys(("kmh", "kph", "kmph", "km/hr", "km/hour", "kmh-1"), "km/h"),
-    **dict.fromkeys(("mi/h", "miles/h", "mile/h", "milesperhour"), "mph"),
+    **dict.fromkeys(("mps", "m_s", "ms-1"), "m/s"),
+    **dict.fromkeys(("kmh", "kph", "kmph", "km_h", "kmh-1"), "km/h"),
+    **dict.fromkeys(("mi/h", "milesperhour"), "mph"),
     **dict.fromkeys(("kn", "kt", "kts", "knot"), "knots"),
-    **dict.fromkeys(("fps", "feet/s", "ft/sec"), "ft/s"),
-    **dict.fromkeys(("radps", "rads-1", "rad/sec", "radian/s", "radians/s", "rad_s"), "rad/s"),
-    **dict.fromkeys(
-        ("degps", "dps", "degs-1", "deg/sec", "degree/s", "degrees/s", "deg_s"), "deg/s"
-    ),
-    **dict.fromkeys(("degh-1", "deg/hr", "degrees/h"), "deg/h"),
+    **dict.fromkeys(("fps",), "ft/s"),
+    **dict.fromkeys(("radps", "rads-1", "rad_s"), "rad/s"),
+    **dict.fromkeys(("degps", "dps", "degs-1", "deg_s"), "deg/s"),
+    **dict.fromkeys(("degh-1",), "deg/h"),
     **dict.fromkeys(("mdps",), "mdeg/s"),
     **dict.fromkeys(("rev/min", "1/min"), "rpm"),
+    **dict.fromkeys(("m/s/s", "ms-2", "mps2"), "m/s2"),
+    **dict.fromkeys(("microtesla",), "ut"),
+}
+_WORDS = {
     **dict.fromkeys(("radian", "radians"), "rad"),
     **dict.fromkeys(("degree", "degrees"), "deg"),
     **dict.fromkeys(("metre", "metres", "meter", "meters"), "m"),
+    **dict.fromkeys(("kilometre", "kilometres", "kilometer", "kilometers"), "km"),
     **dict.fromkeys(("feet", "foot"), "ft"),
     **dict.fromkeys(("mile", "miles"), "mi"),
-    **dict.fromkeys(("m/s/s", "ms-2", "mps2", "m/sec2"), "m/s2"),
-    **dict.fromkeys(("microtesla",), "ut"),
     **dict.fromkeys(("sec", "second", "seconds"), "s"),
+    **dict.fromkeys(("sec2",), "s2"),
+    **dict.fromkeys(("hr", "hour", "hours"), "h"),
     **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
     **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
 }
+"""Words for units and their parts."""
 _SUFFIXES = {
     "_radps": ("rate of turning", "rad/s"),
     "_degps": ("rate of turning", "deg/s"),
@@ -96,7 +100,8 @@ _BEGINNINGS = {
 }
 _BRACKETS = re.compile(r"\[([^\[\]]*)\]\s*$|\(([^()]*)\)\s*$")
 _ENDINGS = re.compile(
-    r"[_ ](kmh|kph|mph|mps|knots|radps|degps|dps|rad_s|deg_s|rad|deg|km|cm|mm|ft|ms|us|ns)$"
+    r"[_ ](km[_/]?h|kph|mph|mps|m[_/]s|knots|kn|radps|degps|dps|rad[_/]s|deg[_/]s|rad|deg|"
+    r"km|cm|mm|m|ft|ms|us|ns|s|dbm|hpa)$"
 )
 _NO_UNIT = ("", "-", "1", "#")
 
@@ -166,6 +171,34 @@ def header_unit(field: str, column: str) -> HeaderUnit | None:
     return HeaderUnit("", float("nan"), written, quantity)
 
 
+def parted_unit(column: str) -> tuple[str, str]:
+    """Return a column's name without the unit at its end, and that unit as in :data:`UNITS`.
+
+    Both are in small letters; the unit is "" where the name states none that is known.
+
+    Examples
+    --------
+    >>> parted_unit("Speed (OBD)(km/h)"), parted_unit("yaw_rate_deg_s"), parted_unit("velocity")
+    (('speed (obd)', 'km/h'), ('yaw_rate', 'deg/s'), ('velocity', ''))
+    """
+    text = column.lower().rstrip()
+    bracket = _BRACKETS.search(text)
+    ending = bracket or _ENDINGS.search(text)
+    if ending is None:
+        return text, ""
+    written = next(part for part in ending.groups() if part is not None)
+    name = _normal(written)
+    if not any(name in units for units in UNITS.values()):
+        return text, ""
+    return text[: ending.start()].rstrip(" _"), name
+
+
+def quantity_of(field: str) -> str:
+    """Return the quantity of a field with a unit, as in :data:`UNITS`; "" of others."""
+    of = _unit_of_field(field)
+    return "" if of is None else of[0]
+
+
 def _unit_of_field(field: str) -> tuple[str, str] | None:
     for end, unit in _SUFFIXES.items():
         if field.endswith(end):
@@ -178,4 +211,5 @@ def _normal(text: str) -> str:
     plain = text.strip().lower().replace("°", "deg").replace("µ", "u").replace("μ", "u")
     plain = plain.replace("²", "2").replace("⁻¹", "-1").replace("⁻²", "-2").replace("⁻2", "-2")
     plain = re.sub(r"[\s^*·.]", "", plain.replace(" per ", "/"))
+    plain = "/".join(_WORDS.get(part, part) for part in plain.split("/"))
     return _OTHER_NAMES.get(plain, plain)

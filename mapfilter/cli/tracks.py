@@ -207,6 +207,7 @@ def replay(
     with nullcontext() if undrawn(config, settings or ()) else drawer_process() as drawers:
         from mapfilter.config.load import load_config
         from mapfilter.workflows.replay import run_replay, unnamed_database
+        from mapfilter.workflows.replay_text import replay_text
         from mapfilter.workflows.replayed import replay_figures
 
         given = seeded(settings, seed, "journeys.seed")
@@ -246,8 +247,11 @@ def replay(
             result = run_replay(
                 loaded, folder, html=html, beside=True, drawers=drawers, progress=progress
             )
-        print_result(replay_figures(result), as_json)
-        for warning in (*result.losses, *result.warnings):
+        figures = replay_figures(result)
+        print_result(figures if as_json else replay_text(figures), as_json)
+        for note in dict.fromkeys(figures["notes"]):
+            print_message(note, "note: ")
+        for warning in result.warnings:
             print_message(warning)
         if result.partial:
             raise typer.Exit(PARTIAL)

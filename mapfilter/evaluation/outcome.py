@@ -33,6 +33,12 @@ class Outcome:
         The last position, WGS 84; NaN where there is none.
     last_time_s : float
         When that was.
+    radius_95_median_m : float
+        Radius that holds 95 % of the belief, the median over located epochs; NaN without any.
+    radius_95_last_m : float
+        That of the last position.
+    seconds_by_status : dict
+        How long each status lasted that occurs, from its epochs to the next ones.
     unused : dict
         How many readings were not used, by reason.
     unknown_cells : dict
@@ -47,6 +53,9 @@ class Outcome:
     last_lon_deg: float
     last_lat_deg: float
     last_time_s: float
+    radius_95_median_m: float
+    radius_95_last_m: float
+    seconds_by_status: dict[str, float]
     unused: dict[str, int]
     unknown_cells: dict[str, int]
 
@@ -57,6 +66,9 @@ def outcome(estimate: TrackEstimate) -> Outcome:
     statuses = Counter(estimate.status)
     located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))[-1:]
     lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
+    followed = np.array([status.is_followed for status in estimate.status], dtype=bool)
+    radius_m = estimate.radii_m[followed, -1] if len(estimate) else np.zeros(0)
+    radius_m = radius_m[np.isfinite(radius_m)]
     unused: Counter[str] = Counter()
     unknown: Counter[str] = Counter()
     for reading in estimate.unused:
@@ -72,6 +84,19 @@ def outcome(estimate: TrackEstimate) -> Outcome:
         float(lon[0]) if located.size else nan,
         float(lat[0]) if located.size else nan,
         float(estimate.time_s[located[0]]) if located.size else nan,
+        float(np.median(radius_m)) if radius_m.size else nan,
+        float(estimate.radii_m[located[0], -1]) if located.size else nan,
+        _seconds_by_status(estimate),
         dict(sorted(unused.items())),
         dict(sorted(unknown.items(), key=lambda one: (-one[1], one[0]))),
     )
+
+
+def _seconds_by_status(estimate: TrackEstimate) -> dict[str, float]:
+    lasted_s = np.diff(estimate.time_s, append=estimate.time_s[-1:])
+    statuses = np.array([str(status) for status in estimate.status])
+    return {
+        str(status): float(lasted_s[statuses == str(status)].sum())
+        for status in Status
+        if status in estimate.status
+    }

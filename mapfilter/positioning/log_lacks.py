@@ -35,6 +35,9 @@ def lack_of_log(
     if estimate.converged_at is not None:
         return ""
     if isinstance(options, KalmanFilter):
+        if log.gnss.empty and log.radio.empty and log.tdoa.empty:
+            scored = " (those of the truth serve for scores only)" if len(log.truth) else ""
+            return f"no positions and no radio to start from{scored}{_unused_ranges(log)}"
         return f"too little was measured{_unused_ranges(log)}"
     has_cells = database is None or bool(database.cell_ids)
     if database is not None and by_streets_alone(options, log, database):

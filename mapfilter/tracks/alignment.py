@@ -12,6 +12,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
+from mapfilter.tracks.misplaced import FAR_APART, FAR_M
 from mapfilter.tracks.readers.recording import Recording
 
 _QUARTER_S = 900.0
@@ -122,11 +123,12 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
     clock = recording.clock
     same = clock.kind == first.clock.kind and clock.kind != "utc"
     if clock.absolute or (same and clock.kind == "local"):
-        return 0.0, _disagreement(one, other)
+        return 0.0, _disagreement(first.path.name, one, other)
     if clock.kind == "local":
         return _zone(recording, first, one, other)
     if same and _common(recording, first) >= _COMMON_SHARE:
-        return 0.0, ""
+        far = one is not None and other is not None and _apart_m(one, other, 0.0, 0.1) > FAR_M
+        return 0.0, _disagreement(first.path.name, one, other) if far else ""
     if one is not None and other is not None:
         low, high = one[0][0] - other[0][-1], one[0][-1] - other[0][0]
         step_s = max(1.0, (high - low) / _MOST_SHIFTS)
@@ -138,7 +140,10 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
         return shift, f"{shift:+.1f} s, by speeds (correlation {correlation:.2f})"
     expected = f"positions or speeds in common with {first.path.name}"
     got = f"times in {clock}, and none"
-    hint = f"give --offset {recording.path.name}=SECONDS"
+    hint = (
+        f"mapfilter convert --offset {recording.path.name}=SECONDS, the seconds to add to its times"
+    )
+    hint += " (Unix time of its time 0)" if first.clock.absolute else ""
     raise fail(InputError, str(recording.path), expected, got, hint)
 
 
@@ -161,11 +166,12 @@ def _zone(
     shifts = np.arange(-_MOST_ZONE_S, _MOST_ZONE_S + 1, _QUARTER_S)
     if one is not None and other is not None:
         apart = np.array([_apart_m(one, other, shift, 0.1) for shift in shifts])
-        if np.isfinite(apart).any():
+        # Positions of two places do not tell a zone.
+        if (apart <= FAR_M).any():
             shift_s = float(shifts[np.nanargmin(apart)])
             near = float(np.nanmin(apart))
             note = f"local time is UTC{_clock(-shift_s)} (by positions, median {near:.1f} m apart)"
-            fine = _disagreement(one, (other[0] + shift_s, *other[1:]))
+            fine = _disagreement(first.path.name, one, (other[0] + shift_s, *other[1:]))
             return shift_s, f"{note}; {fine}" if fine else note
     common = np.array([_common(recording, first, shift) for shift in shifts])
     if common.max() <= 0:
@@ -182,7 +188,7 @@ def _clock(shift_s: float) -> str:
     return f"{sign}{int(abs(shift_s)) // 3600:02d}:{int(abs(shift_s)) % 3600 // 60:02d}"
 
 
-def _disagreement(one: _Track | None, other: _Track | None) -> str:
+def _disagreement(first: str, one: _Track | None, other: _Track | None) -> str:
     """Return a note where positions of two clocks agree better some seconds apart."""
     if one is None or other is None or not (_moved(one) and _moved(other)):
         return ""
@@ -191,6 +197,11 @@ def _disagreement(one: _Track | None, other: _Track | None) -> str:
         return ""
     shifts = np.arange(-_SEARCH_S, _SEARCH_S + 0.5, 0.5)
     shift_s, apart_m = _best_shift(one, other, shifts)
+    if now_m > FAR_M and apart_m > FAR_M:
+        return (
+            f"positions lie {now_m / 1000:.1f} {FAR_APART} in {first} (median) (likely: another "
+            "journey, another day's times, or positions that were spoofed)"
+        )
     if abs(shift_s) < _REMARKABLE_S or apart_m > 0.8 * now_m:
         return f"positions agree within {now_m:.1f} m (median)"
     return (

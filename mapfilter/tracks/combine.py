@@ -15,6 +15,7 @@ from mapfilter.geodesy import (
     heading_from_azimuth_rad,
 )
 from mapfilter.tracks.alignment import Alignment, align
+from mapfilter.tracks.far_apart import check_far_apart
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.journey_motion import journey_motion, measured_positions
 from mapfilter.tracks.log import TrackLog, make_log
@@ -81,7 +82,8 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     Raises
     ------
     InputError
-        Clocks cannot be aligned, frames do not fit together, or the tables make no sense.
+        Clocks cannot be aligned, frames do not fit together, positions lie far apart by a mistake
+        of their degrees, or the tables make no sense.
     """
     options = options or CombineOptions()
     journey = [r for r in recordings if set(r.tables) - _NO_JOURNEY]
@@ -92,6 +94,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         got = "only orbits of satellites" if orbits else "only a list of cells"
         hint = "name them together with a recording of pseudoranges" if orbits else _CELLS_HINT
         raise fail(InputError, names, expected, got, hint)
+    check_far_apart(journey)
     alignment = align(journey, options.offsets_s)
     shifted = [
         _shifted(recording, offset)

@@ -16,6 +16,7 @@ from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import (
+    UNDIRECTED,
     by_compass,
     course_errors,
     motion_from_course,
@@ -131,6 +132,10 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
             notes += [fault] if fault else []
         moved = motion_from_poses(rows) if poses else by_compass(rows, frame.convergence_rad)
         moved = moved.assign(heading_rad=wrap_rad(moved["heading_rad"]))
+        # The first row turns by nothing.
+        if moved["heading_rad"].isna().all() and moved["turn_rad"].iloc[1:].isna().all():
+            lacking = "no headings and no turns (a column compass_deg, heading_rad or turn_rad)"
+            notes.append(f"motion: {lacking}: {UNDIRECTED}")
         return Moved(moved, source=source, compass=compass)
     return None
 

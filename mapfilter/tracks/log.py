@@ -26,8 +26,15 @@ from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.tracks.clock_steps import with_clocks_gone_on
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.log_checks import check_clocks, check_start, check_steps, early_ends
+from mapfilter.tracks.log_checks import (
+    check_clocks,
+    check_start,
+    check_steps,
+    early_ends,
+    truth_far_off,
+)
 from mapfilter.tracks.log_times import seconds_of_tables
+from mapfilter.tracks.misplaced import FAR_APART
 from mapfilter.tracks.motion_faults import compared_places, motion_faults
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
@@ -224,6 +231,8 @@ def make_log(
         check_clocks(tables, called, faults)
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
+        if not faults.found and not any(FAR_APART in note for note in every_note):
+            every_note += truth_far_off(str(crs), tables)
         # Of values that are refused nothing is told besides.
         if not faults.found:
             places = compared_places(tables["truth"], tables["gnss"])

@@ -10,6 +10,8 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
+from mapfilter.geodesy import Lattice
+from mapfilter.tracks.misplaced import FAR_M, misplaced_by
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0
@@ -29,6 +31,7 @@ _SOMEWHERE_M = 100.0
 # Between these, positions lie apart by the kilometres of the steps, or a part of them.
 _KILO = (100.0, 1200.0)
 _FASTEST_KMPS = 0.1
+_AREA_M = 100.0
 _EXPECTED = "metres moved in each interval"
 
 
@@ -64,6 +67,35 @@ def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
     if last_s - first_s <= max(_EARLY_S, _EARLY_SHARE * (last_s - begin_s)):
         return ()
     return (f"{first}: ends {last_s - first_s:.0f} s before {last}, as if cut off",)
+
+
+def truth_far_off(crs: str, tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
+    """Return a note where fixes lie kilometres from the truth of the same times; none else.
+
+    Parameters
+    ----------
+    crs : str
+        That of the positions.
+    """
+    truth, fixes = (tables[name].drop_duplicates("time_s") for name in ("truth", "gnss"))
+    inside = fixes[fixes["time_s"].between(truth["time_s"].min(), truth["time_s"].max())]
+    if len(truth) < _FEW_ROWS or len(inside) < _FEW_ROWS:
+        return ()
+    east_m, north_m = (inside[name].to_numpy() for name in ("east_m", "north_m"))
+    true_east_m, true_north_m = (
+        np.interp(inside["time_s"], truth["time_s"], truth[name]) for name in ("east_m", "north_m")
+    )
+    off_m = float(np.median(np.hypot(east_m - true_east_m, north_m - true_north_m)))
+    if not off_m > FAR_M:
+        return ()
+    low, high = (truth[["east_m", "north_m"]].agg(of) for of in ("min", "max"))
+    bounds_m = (*low.tolist(), *high.tolist())
+    area = Lattice.covering(crs, bounds_m, _AREA_M)
+    mistake = misplaced_by(east_m, north_m, area)
+    likely = (
+        f"{mistake} in one of them" if mistake else "another journey, or fixes that were spoofed"
+    )
+    return (f"gnss lies {off_m / 1000:.1f} km from the truth (median) (likely: {likely})",)
 
 
 def check_start(

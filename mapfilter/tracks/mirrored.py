@@ -11,19 +11,13 @@ from mapfilter._types import Floats
 from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.headings import headings_and_courses
 from mapfilter.tracks.journey_motion import Moved
+from mapfilter.tracks.misplaced import UNDONE
 from mapfilter.tracks.readers.recording import Recording
 
 _FEWEST = 20
 _AGREED = 0.85
 _LEAST_GAIN = 0.3
 _METRES_PER_DEGREE = 111_195.0
-_UNDONE = {
-    "latitude and longitude swapped": ("lat_deg", "lon_deg", 1, 1),
-    "a lost sign of longitude": ("lon_deg", "lat_deg", -1, 1),
-    "a lost sign of latitude": ("lon_deg", "lat_deg", 1, -1),
-    "latitude and longitude swapped, with a lost sign": ("lat_deg", "lon_deg", -1, -1),
-}
-"""Columns and signs of the true longitude and latitude, by the mistake."""
 
 
 def mirrored_notes(recordings: Sequence[Recording], moved: Moved) -> list[str]:
@@ -74,7 +68,7 @@ def mirrored_by(motion: pd.DataFrame, places: pd.DataFrame) -> str:
     agreed = abs(_mean_turn(heading, course))
     if agreed > 1 - _LEAST_GAIN:
         return ""
-    for cause, (lon, lat, lon_sign, lat_sign) in _UNDONE.items():
+    for cause, (lon, lat, lon_sign, lat_sign) in UNDONE.items():
         undone = places.assign(lon_deg=lon_sign * places[lon], lat_deg=lat_sign * places[lat])
         if (undone["lat_deg"].abs() > 90).any():
             continue

@@ -13,6 +13,17 @@ from mapfilter.geodesy import Lattice, project, unproject
 
 AWAY_M = 5000.0
 """Positions all of which lie farther outside of an area are those of another one."""
+FAR_M = 2000.0
+"""Positions of one journey that lie farther apart are wrong: of degrees, of clocks, or spoofed."""
+FAR_APART = "km from those of the same times"
+"""Words by which notes on such positions are known."""
+UNDONE = {
+    "latitude and longitude swapped": ("lat_deg", "lon_deg", 1, 1),
+    "a lost sign of longitude": ("lon_deg", "lat_deg", -1, 1),
+    "a lost sign of latitude": ("lon_deg", "lat_deg", 1, -1),
+    "latitude and longitude swapped, with a lost sign": ("lat_deg", "lon_deg", -1, -1),
+}
+"""Columns and signs of the true longitude and latitude, by the mistake."""
 
 _MOST_TRIED = 200
 _TIMES = 10.0

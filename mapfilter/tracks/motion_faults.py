@@ -171,7 +171,8 @@ def turn_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
     >>> motion = pd.DataFrame({"time_s": np.arange(400.0), "step_m": 10.0, "turn_rad": -turn})
     >>> truth = pd.DataFrame({"time_s": np.arange(400.0), "east_m": east, "north_m": north})
     >>> turn_fault(motion, truth)
-    'turns run clockwise by the course of the positions; expected radians counter-clockwise'
+    'turns run clockwise by the course of the positions; expected radians counter-clockwise, \
+or latitude and longitude of the positions are swapped'
     >>> turn_fault(motion.assign(turn_rad=turn), truth)
     ''
     """
@@ -208,7 +209,10 @@ def turn_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
     words = [f"are {' or '.join(alike)}"] if unit else []
     words += ["run clockwise"] if sign < 0 else []
     by = "by the course of the positions; expected radians counter-clockwise"
-    return f"turns {' and '.join(words)} {by}"
+    mirrored = (
+        "" if unit or sign > 0 else ", or latitude and longitude of the positions are swapped"
+    )
+    return f"turns {' and '.join(words)} {by}{mirrored}"
 
 
 def _column(motion: pd.DataFrame, name: str) -> Floats:

@@ -15,6 +15,7 @@ from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.geodesy import Lattice
 from mapfilter.positioning.fingerprints.located import LocatedReports, figures_of
 from mapfilter.positioning.fingerprints.locating import (
     ReportLocator,
@@ -26,12 +27,15 @@ from mapfilter.positioning.fingerprints.options import AUTO, Centroid, method_na
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.report.canvas import BLUE, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
+from mapfilter.tracks.misplaced import check_near
+from mapfilter.tracks.placeless import is_local_frame
 from mapfilter.workflows.fingerprints import read_database, read_reports
 from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.results import FIGURES, POSITIONS, check_figures_of_reports
 
 PICTURE = "errors.png"
 _SHARE = 0.95
+_AREA_M = 100.0
 
 
 @dataclass(frozen=True)
@@ -150,9 +154,28 @@ def _inputs(
         query = read_reports(log, known.crs if known is not None else crs, plan, columns)
     except MapfilterError as error:
         faults.found.extend(error.faults)
-    if known is None or query is None:
+    if known is not None and query is not None:
+        _check_near(log, query[0], known, faults)
+    if known is None or query is None or faults.found:
         raise InputError(tuple(faults.found))
     return known, query
+
+
+def _check_near(log: Path, reports: Reports, known: Reports, faults: Faults) -> None:
+    """Note positions of reports that all lie far from those of the database."""
+    there = np.isfinite(known.east_m) & np.isfinite(known.north_m)
+    given = np.isfinite(reports.east_m) & np.isfinite(reports.north_m)
+    if is_local_frame(known.crs) or not (there.any() and given.any()):
+        return
+    west_m, most_east_m = _extent(known.east_m[there])
+    south_m, most_north_m = _extent(known.north_m[there])
+    bounds_m = (west_m, south_m, most_east_m, most_north_m)
+    area = Lattice.covering(known.crs, bounds_m, _AREA_M)
+    check_near(str(log), reports.east_m[given], reports.north_m[given], area, faults)
+
+
+def _extent(values: Floats) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
 
 
 def _centroid_errors_m(fitted: ReportLocator, reports: Reports) -> Floats:

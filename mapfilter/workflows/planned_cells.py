@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from mapfilter.config.inputs import Cells
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.geodesy import Lattice, short_crs
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.msi import read_antennas
@@ -47,6 +49,30 @@ def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> Cell
         defaults={name: getattr(cells, name) for name in _DEFAULTS if not own or name in stated},
         bounds_m=bounds_m,
     )
+
+
+def cells_beside_log(config: Config, crs: str) -> CellPlan:
+    """Read the cell plan of a configuration in the CRS of a log; an empty one where none is given.
+
+    Raises
+    ------
+    InputError
+        It is wrong; or its cells lie where the CRS is not used, for which positions of the log may
+        be the cause.
+    """
+    if config.cells.plan is None:
+        return CellPlan(crs, ())
+    try:
+        return planned_cells(config, crs)
+    except InputError as error:
+        if config.area.crs is not None:
+            raise
+        cause = f"or so in the log, by whose positions the CRS is {short_crs(crs)}"
+        faults = (
+            replace(one, hint=f"{one.hint}, {cause}") if one.hint.endswith("swapped") else one
+            for one in error.faults
+        )
+        raise InputError(tuple(faults)) from error
 
 
 def plan_antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:

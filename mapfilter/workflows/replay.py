@@ -43,9 +43,9 @@ from mapfilter.viewing.trace import TraceRecorder
 from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
-from mapfilter.workflows.planned_cells import plan_antennas, planned_cells
+from mapfilter.workflows.planned_cells import cells_beside_log, plan_antennas
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
-from mapfilter.workflows.replay_lacks import fixes_note, lack_of
+from mapfilter.workflows.replay_lacks import early_end_note, fixes_note, lack_of
 from mapfilter.workflows.replay_logs import ReplayLogs
 from mapfilter.workflows.replayed import (
     ReplayedLog,
@@ -119,7 +119,7 @@ def run_replay(
     def sites(crs: str) -> CellPlan:
         if database is not None:
             return database.plan
-        return planned_cells(config, crs) if config.cells.plan else CellPlan(crs, ())
+        return cells_beside_log(config, crs)
 
     @cache
     def over(crs: str, fitted: FilterOptions, *, cells: bool) -> Filter[Any]:
@@ -189,15 +189,15 @@ def run_replay(
         if truth is not None:
             log = replace(log, notes=(*log.notes, *truth_notes(track.estimate, truth)))
         fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
-        log = replace(log, notes=(*log.notes, *fixes))
+        ends = early_end_note(opened, track.estimate, over_map=database is not None)
+        log = replace(log, notes=(*log.notes, *fixes, *ends))
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)
         if recorder is not None:
             written = _with_view(written, log, track, recorder, database, into)
         files = tuple(out / file.relative_to(new) for file in written.outputs)
-        losses = tuple(loss for recording in opened.recordings for loss in recording.losses)
         foreign = foreign_cells(written.outcome.unknown_cells, sites(crs))
-        return replace(written, outputs=files, losses=losses, foreign=foreign)
+        return replace(written, outputs=files, foreign=foreign)
 
     place: AbstractContextManager[Executor] = nullcontext(drawers or SerialExecutor())
     if drawers is None and beside and wanted != "none":

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, listed
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import Lattice, same_crs, short_crs
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.log_lacks import NO_MOTION, lack_of_log
@@ -17,10 +19,23 @@ from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers import plain_csv
 from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
+from mapfilter.viewing.words import REASONS
 
 _MOTION_COLUMNS = (
     "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps "
     "or wheel_speed_kmh"
+)
+
+_EARLY_S, _EARLY_SHARE = 30.0, 0.1
+_UNLOCATED = {
+    Status.SEARCHING: "as several places are possible",
+    Status.LOST: "as the readings contradict the position",
+    Status.OUTSIDE: "as nothing on the map explains the readings",
+}
+
+_CONTRADICTING = (
+    "steps in another unit, turns the other way round, another journey, or positions whose "
+    "latitude and longitude are swapped"
 )
 
 
@@ -83,7 +98,8 @@ def columns_of_motion(opened: OpenedLog) -> str:
     for one in tables:
         found = [field for field in MOTION_FIELDS if field in one.fields]
         text += f"; {one.path.name} has {', '.join(found) or 'none of them'}"
-        text += f", columns not used: {listed(one.unread)} (--column)" if one.unread else ""
+        unread = [name for name in one.unread if name not in found]
+        text += f", columns not used: {listed(unread)} (--column)" if unread else ""
     return text
 
 
@@ -116,6 +132,42 @@ def fixes_note(
     text = f"gnss: {len(log.gnss) - unused} of {len(log.gnss)} positions of {names} used as GNSS "
     text += "fixes; --without gnss leaves them out"
     return (text if len(log.truth) else f"{text}, --truth {placed[0].path.name} scores by them",)
+
+
+def early_end_note(
+    opened: OpenedLog, estimate: TrackEstimate, *, over_map: bool
+) -> tuple[str, ...]:
+    """Return a note where a track is located until long before its rows end, and why; else none.
+
+    Parameters
+    ----------
+    opened : OpenedLog
+        The log as it was opened, with its sensors.
+    over_map : bool
+        Whether a map may lack the way that was gone.
+    """
+    followed = [status.is_followed for status in estimate.status]
+    if not any(followed):
+        return ()
+    last = max(at for at, located in enumerate(followed) if located)
+    last_s, status = float(estimate.time_s[last]), estimate.status[-1]
+    begin_s, end_s = float(estimate.time_s[0]), float(estimate.time_s[-1])
+    if status.is_followed:
+        ends_s = [float(rows["time_s"].iloc[-1]) for rows in opened.sensors.values() if len(rows)]
+        end_s = max([end_s, *ends_s])
+    if end_s - last_s <= max(_EARLY_S, _EARLY_SHARE * (end_s - begin_s)):
+        return ()
+    text = f"located until {last_s:.0f} s, rows go on until {end_s:.0f} s: "
+    if status.is_followed:
+        return (f"{text}neither motion nor measurements from there on, but sensors alone",)
+    unused: Counter[Reason] = Counter()
+    for one in estimate.unused:
+        unused[one.reason] += one.readings if one.time_s > last_s else 0
+    reason, count = unused.most_common(1)[0] if unused else (Reason.USED, 0)
+    text += f"{status} from there on, {_UNLOCATED[status]}"
+    if status is Status.LOST and len(opened.log.gnss) and len(opened.log.motion):
+        text += f" (likely: {_CONTRADICTING}{', or ways that the map lacks' if over_map else ''})"
+    return (f"{text}; {count} readings: {reason} ({REASONS[reason]})" if count else text,)
 
 
 def receiver_motion(opened: OpenedLog) -> str:

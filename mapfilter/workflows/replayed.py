@@ -16,7 +16,7 @@ from mapfilter._words import number_of
 from mapfilter.evaluation.accuracy import Accuracy
 from mapfilter.evaluation.outcome import Outcome
 from mapfilter.evaluation.success import SuccessSummary, summarise
-from mapfilter.filters.contract import Reason
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.replay_baseline import SingleReports, together
 
@@ -59,8 +59,6 @@ class ReplayedLog:
         Equal for logs with the same true path; empty without a truth.
     baseline : SingleReports or None
         Errors of the reports, each located by itself; None without truth, reports or cells.
-    losses : tuple of str
-        Rows and values of its recordings that are not used; they are among the notes, too.
     foreign : str
         Why the database may lack all of its unknown cells, or an empty text.
     """
@@ -74,7 +72,6 @@ class ReplayedLog:
     outputs: tuple[Path, ...]
     route: str = ""
     baseline: SingleReports | None = None
-    losses: tuple[str, ...] = ()
     foreign: str = ""
 
     @property
@@ -128,11 +125,6 @@ class ReplayResult:
             found.append(f"nothing is located in {_named(names)}: {lack}")
         return tuple(found)
 
-    @property
-    def losses(self) -> tuple[str, ...]:
-        """Rows and values of recordings that are not used."""
-        return tuple(dict.fromkeys(loss for log in self.logs for loss in log.losses))
-
 
 def route_of(log: TrackLog) -> str:
     """Return what is equal for logs with the same true path; an empty text without a truth."""
@@ -159,6 +151,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
         **scores,
         "switched": sum(outcome.switched for outcome in outcomes),
         "final_statuses": _sum({o.final_status: 1} for o in outcomes if o.final_status),
+        "seconds_by_status": _seconds_by_status(outcomes),
         "unused": _sum(outcome.unused for outcome in outcomes),
         "unknown_cells": _most_frequent(outcome.unknown_cells for outcome in outcomes),
         "logs_with_unknown_cells": [log.name for log in result.logs if log.outcome.unknown_cells],
@@ -191,6 +184,12 @@ def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
     for count in counts:
         total.update(count)
     return dict(sorted(total.items()))
+
+
+def _seconds_by_status(outcomes: Sequence[Outcome]) -> dict[str, float]:
+    lasted = [outcome.seconds_by_status for outcome in outcomes]
+    names = [str(status) for status in Status if any(str(status) in one for one in lasted)]
+    return {name: sum(one.get(name, 0.0) for one in lasted) for name in names}
 
 
 def _most_frequent(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:

@@ -51,6 +51,19 @@ def test_a_track_that_is_found_and_lost():
     assert found.last_time_s == 2.0
     assert found.unused == {"no_step": 1, "not_used_by_filter": 20_038, "unknown_cell": 3}
     assert found.unknown_cells == {"X": 2, "Y": 1}
+    assert found.seconds_by_status == {
+        "SEARCHING": 1.0, "CONVERGED": 1.0, "TRACKING": 1.0, "LOST": 0.0,
+    }  # fmt: skip
+
+
+def test_radii_are_those_of_located_epochs_and_of_the_last_position():
+    statuses = (Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN, Status.LOST)
+    track = estimate(*((status, 0.0, 0.0) for status in statuses))
+    track.radii_m[:, -1] = [900.0, 30.0, 20.0, 400.0, 500.0]
+    found = outcome(track)
+    assert (found.radius_95_median_m, found.radius_95_last_m) == (30.0, 500.0)
+    track.radii_m[:, -1] = nan
+    assert np.isnan(outcome(track).radius_95_median_m)
 
 
 @pytest.mark.parametrize("epochs", [(), ((Status.SEARCHING, nan, nan),)])
@@ -59,4 +72,6 @@ def test_a_track_that_is_nowhere(epochs):
     assert found.final_status == ("SEARCHING" if epochs else "")
     assert not found.switched
     assert np.isnan([found.switch_time_s, found.last_lon_deg, found.last_lat_deg]).all()
+    assert np.isnan([found.radius_95_median_m, found.radius_95_last_m]).all()
+    assert found.seconds_by_status == ({"SEARCHING": 0.0} if epochs else {})
     assert astuple(found)[-2:] == ({}, {})

@@ -89,7 +89,7 @@ def test_decibels_are_no_level(tmp_path):
         ("gyr_z", "gyro z [deg s⁻¹]", "deg/s"),
         ("mag_x", "mag x [µT]", "ut"),
         ("level_dbm", "RSRP [dBm]", "dbm"),
-        ("level_dbm", "rsrp_dbm", None),
+        ("level_dbm", "rsrp_dbm", "dbm"),
         ("wheel_speed_mps", "Speed (m/min)", ""),
         ("wheel_speed_mps", "Speed [-]", None),
         ("ci", "Cell [eci]", None),

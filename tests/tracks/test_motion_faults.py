@@ -103,7 +103,9 @@ def test_turns_the_other_way_round_or_in_another_unit(seed, speed_mps, sd_m, clo
     turn = sign * motion["turn_rad"]
     by = "by the course of the positions; expected radians counter-clockwise"
     if clockwise:
-        assert turn_fault(motion.assign(turn_rad=turn), places) == f"turns run clockwise {by}"
+        assert turn_fault(motion.assign(turn_rad=turn), places) == (
+            f"turns run clockwise {by}, or latitude and longitude of the positions are swapped"
+        )
     more = f" and {words}" if words else ""
     degrees = motion.assign(turn_rad=np.degrees(turn))
     assert turn_fault(degrees, places) == f"turns are degrees{more} {by}"

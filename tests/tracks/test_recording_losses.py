@@ -104,10 +104,14 @@ def test_positions_in_another_unit_are_named(factor, hint, walk, read):
 
 
 def test_names_of_columns_that_resemble_a_field_are_told(walk, tmp_path):
-    names = {"steps": "stepcount", "compass_deg": "compas", "latitude": "compass_rad"}
+    names = {"steps": "stps", "compass_deg": "compas", "latitude": "compass_rad"}
     walk.rename(columns=names).to_csv(tmp_path / "phone.csv", index=False)
     recording = read_recording(tmp_path / "phone.csv")
-    assert recording.unread == ("stepcount (steps?)", "compas (compass_deg?)", "compass_rad")
+    assert recording.unread == (
+        "stps (steps?)",
+        "compas (compass_deg?)",
+        "compass_rad (compass_deg?)",
+    )
     assert "steps" not in recording.fields
     assert "level_dbm" in recording.fields
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import time
 from dataclasses import replace
@@ -27,6 +28,7 @@ from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.filter import locate
 from mapfilter.tracks.store import read_log, write_log
+from mapfilter.viewing.words import REASONS
 from mapfilter.workflows import replay as workflow
 from mapfilter.workflows.replay import run_replay
 
@@ -130,8 +132,7 @@ def test_neighbours_that_name_neither_cell_nor_carrier_are_no_unknown_cells(log,
     table.loc[neighbour, ["cell", "arfcn", "bsic"]] = None
     table.to_csv(log / "radio.csv", index=False)
     outcome = replay(log, "--json", "--filter", "bayes")
-    assert (outcome.code, outcome.err) == (0, "")
-    assert outcome.json["unknown_cells"] == {}
+    assert assert_done(outcome).json["unknown_cells"] == {}
     assert 0 < outcome.json["unused"]["no_cell"] <= neighbour.sum()
 
 
@@ -161,8 +162,15 @@ def test_a_log_without_truth_is_located_and_told(log, replay, tmp_path):
     lon, lat = unproject(estimate.crs, estimate.east_m[-1:], estimate.north_m[-1:])
     assert (found["last_lon_deg"], found["last_lat_deg"]) == (lon[0], lat[0])
     assert with_truth["scored_epochs"] <= found["epochs"]
+    assert found["radius_95_median_m"] is None
+    assert sum(found["seconds_by_status"].values()) == pytest.approx(np.ptp(estimate.time_s))
     text = assert_done(replay(log)).out
     assert "final_status: TRACKING\nswitched: True\n" in text
+    assert "radius_95_median_m: -\n" in text
+    assert re.search(r"\n  TRACKING: \d+ \(\d+ %\)\n", text)
+    assert found["unused"]
+    for reason, count in found["unused"].items():
+        assert f"\n  {reason}: {count} ({REASONS[Reason(reason)]})\n" in text
     assert "unknown_cells" not in text
 
 
@@ -192,7 +200,11 @@ def test_notes_of_a_log_are_told(log, replay):
         f"{log / 'motion.csv'}: out of order in 1 place, sorted by time",
     ]
     assert assert_done(replay(log, "--json")).json["notes"] == told
-    assert f"notes:\n  {told[0]}\n  {told[1]}\n" in replay(log).out
+    done = replay(log)
+    assert "notes:" not in done.out
+    # Each of them once, with --json as without.
+    for one in (done, replay(log, "--json")):
+        assert one.err.splitlines() == [f"mapfilter: note: {note}" for note in told]
 
 
 def test_a_ground_truth_that_begins_after_the_switch_tells_nothing_of_it(log, replay, tmp_path):
@@ -225,6 +237,9 @@ def test_several_logs_are_summed_up_without_truth(own_world, replay, tmp_path):
     assert found["switched"] == sum(figures["switched"] for figures in each)
     assert sum(found["final_statuses"].values()) == found["logs"] == 2
     assert "success" not in found
+    assert sum(found["seconds_by_status"].values()) == pytest.approx(
+        sum(sum(figures["seconds_by_status"].values()) for figures in each)
+    )
     for reason, count in found["unused"].items():
         assert count == sum(figures["unused"].get(reason, 0) for figures in each)
     readings = sum(figures["unknown_cells"].get("X", 0) for figures in each)

@@ -89,11 +89,11 @@ def test_a_drive_that_is_too_short_is_said_to_be(roads):
     assert (outcome.code, "too short a way" in outcome.err) == (3, True)
 
 
-def test_a_filter_without_a_map_over_roads_alone_measures_too_little(roads):
+def test_a_filter_without_a_map_over_roads_alone_has_no_start(roads):
     built = mapfilter("build", "-c", roads, "--json").json["database"]
     drive, out = write_drive(roads.parent), roads.parent / "ekf"
     done = mapfilter("replay", "--db", built, "--log", drive, "--filter", "ekf", "--out", out)
-    assert (done.code, "too little was measured" in done.err) == (3, True)
+    assert (done.code, "no positions and no radio to start from" in done.err) == (3, True)
 
 
 def test_steps_without_turns_are_said_to_be(roads):

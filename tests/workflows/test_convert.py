@@ -341,7 +341,8 @@ def test_a_speed_and_a_yaw_rate_are_odometry(speed, rate, tmp_path):
     (tmp_path / "drive.csv").write_text(f"time,{speed},{rate},lat,lon\n{rows}")
     result = run_convert([tmp_path / "drive.csv"], tmp_path / "log")
     assert read_log(tmp_path / "log").motion.empty
-    unused = "speed and yaw rate not used beside positions; name the column wheel_speed_mps"
+    unused = "speed and yaw rate not used beside positions; where wheels measured it: --column "
+    unused += f"wheel_{speed}={speed}"
     assert unused in result.files[0].notes
     rows = "".join(f"{k},{told},{turned},{9 * k},0\n" for k in range(11))
     (tmp_path / "drive.csv").write_text(f"time,{speed},{rate},east_m,north_m\n{rows}")

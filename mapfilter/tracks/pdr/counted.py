@@ -32,8 +32,9 @@ _CARRIED_SD_DEG = 15.0
 _CORRELATION_S = 6.0
 _OWN_COUNTS = "counted in each row"
 _NO_COURSE = (
-    "steps are counted, but no compass and no turns are beside them (compass_deg, turn_rad, "
-    "yaw_rate_radps, or a gyroscope): no motion"
+    "steps are counted, but no compass and no turns are beside them (a column compass_deg, "
+    "turn_rad or yaw_rate_radps, or a gyroscope): which way they went is unknown, so there is no "
+    "motion; between positions the track stands still"
 )
 
 
@@ -168,7 +169,10 @@ def _by_turns(time_s: Floats, sensors: Mapping[str, pd.DataFrame]) -> tuple[_Cou
             "2 s apart: no motion"
         )
     nothing, whole = np.full(len(time_s), np.nan), np.ones(len(time_s))
-    notes = ("no compass: turns only, the heading at the start is unknown",)
+    notes = (
+        "no compass (a column compass_deg): turns only, the heading at the start is unknown until "
+        "positions or a map tell it",
+    )
     source, walk_rad = f"with {turning.source}", turning.walk_rad_per_sqrt_s
     return _Course(nothing, turn, whole, walk_rad, source, "no turn known in", notes), ""
 

@@ -11,7 +11,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import motion_from_odometry, odometry_gaps
+from mapfilter.tracks.moved import UNDIRECTED, motion_from_odometry, odometry_gaps
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S, Compass, YawOffset, yaw_offset
 from mapfilter.tracks.pdr.odometry_rows import usable_rows
@@ -177,7 +177,10 @@ def _bias(time_s: Floats, rate: Floats, standing: Bools, course_offset: Floats |
 def _notes(found: YawOffset, stood: int, *, has_rate: bool) -> tuple[str, ...]:
     """Return what was learnt of the gyroscope's bias."""
     if not has_rate:
-        return ("odometry: no yaw rate, steps only",)
+        return (
+            "odometry: no yaw rates (a column such as Yaw rate [deg/s] or yaw_rate_radps): "
+            f"{UNDIRECTED}",
+        )
     bias = f"{np.degrees(found.rate_radps):+.3f} ± {np.degrees(found.rate_sd_radps):.3f} deg/s"
     if not stood:
         return ("yaw rate: the vehicle never stands, so that the bias could not be learnt",)

@@ -68,7 +68,10 @@ def walk_notes(
         if share > 0.1:
             words.append(f"compass disturbed for {share:.0%} of the steps, gyroscope used there")
     else:
-        words.append("no compass: turns only, the heading at the start is unknown")
+        words.append(
+            "no compass (magnetometer): turns only, the heading at the start is unknown until "
+            "positions or a map tell it"
+        )
     if gaps:
         words.append(f"{gaps} gaps of the sensors: motion unknown there")
     for climb in found:

@@ -26,6 +26,7 @@ from mapfilter.tracks.readers.times import (
 SEPARATORS = ",;\t|"
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
+_FIRST_ROWS = 1000
 _LEAST_UNIX_S = 1e8
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
@@ -146,6 +147,20 @@ class Columns:
         changed = pc.replace_substring_regex(column, pattern, by)
         return replace(self, _columns={**self._columns, self.names.index(name): changed})
 
+    def first_text(self, name: str) -> str:
+        """Return the first text of a column that is not blank; "" where there is none."""
+        column = self._raw(name)
+        texts = () if column is None else pc.utf8_trim_whitespace(column[:_FIRST_ROWS]).to_pylist()
+        return next((text for text in texts if text), "")
+
+    def joined(self, before: str, name: str) -> Columns:
+        """Return columns in which the texts of one follow those of another, after a blank."""
+        first, second = self._raw(before), self._raw(name)
+        if first is None or second is None:
+            return self
+        both = pc.binary_join_element_wise(*map(pc.utf8_trim_whitespace, (first, second)), " ")
+        return replace(self, _columns={**self._columns, self.names.index(name): both})
+
     def number(self, *names: str) -> Floats:
         """Return the first of these columns that is there as numbers, NaN where missing.
 
@@ -195,7 +210,9 @@ class Columns:
         self.reading.tallies.add_texts(name, part, pc.sum(good).as_py() + count, count, examples)
         if bad:
             some = number_of(bad, "value is no number", "values are no numbers")
-            self.reading.ignore(f"{name}: {some}, taken as missing")
+            at = pc.index(wrong, value=True).as_py()
+            first = f"first {column[at].as_py()[:40]!r} in line {self.line[at]}"
+            self.reading.ignore(f"{name}: {some}, taken as missing ({first})")
         column = pc.replace_substring_regex(column, r"^\+", "")
         return pc.cast(pc.if_else(good, column, None), kind)
 

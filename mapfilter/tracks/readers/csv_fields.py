@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 
@@ -71,6 +72,12 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
 """Fields that a column map may name, and the names of columns that are known without one."""
 
 
+def usual_fields(names: Collection[str]) -> dict[str, str]:
+    """Return the columns that have usual names of fields, by field."""
+    found = ((field, next((n for n in some if n in names), "")) for field, some in FIELDS.items())
+    return {field: name for field, name in found if name}
+
+
 MOTION_FIELDS = (
     *("step_m", "steps", "compass_deg", "heading_rad", "turn_rad", "turn_deg", "yaw_rate_radps"),
     *("yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh"),
@@ -100,10 +107,22 @@ def meant(column: str, taken: Collection[str] = ()) -> str:
     return ""
 
 
+def column_option(field: str, column: str) -> str:
+    """Return the option that names the column of a field, as a shell takes it.
+
+    Examples
+    --------
+    >>> column_option("time", "Zeit"), column_option("speed_mps", "v [m/s]")
+    ('--column time=Zeit', "--column 'speed_mps=v [m/s]'")
+    """
+    return f"--column {shlex.quote(f'{field}={column}')}"
+
+
 def check_fields(columns: Mapping[str, str], faults: Faults) -> None:
     """Note each field of a column map that does not exist, with the most similar one."""
     for field in columns:
         if field not in FIELDS:
-            near = get_close_matches(field, FIELDS, 1)
-            expected = f"one of {', '.join(FIELDS)}"
+            near = get_close_matches(field, FIELDS, 3)
+            # The list of all would hide the likely ones.
+            expected = f"a field such as {', '.join(near or FIELDS)}"
             faults.add(f"--column {field}", expected, field, near[0] if near else "")

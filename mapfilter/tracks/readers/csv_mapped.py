@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,9 +13,13 @@ from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.tracks.readers.columns import Columns, only
 from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields
+from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.identities import available
 from mapfilter.tracks.readers.recording import Reading
+
+_DATE = "date"
+_OF_DAY = re.compile(r"\d{1,2}:\d\d")
 
 
 @dataclass(frozen=True)
@@ -26,14 +31,22 @@ class Mapped:
     rows : Columns
     own : mapping of str to str
         Columns of fields by a user's map; other fields have columns of their usual names.
+    stated : mapping of str to str
+        Columns of other fields, whose headers state quantity and unit.
+    beside : tuple of str
+        Columns that are used with those of fields.
     """
 
     rows: Columns
     own: Mapping[str, str]
+    stated: Mapping[str, str]
+    beside: tuple[str, ...] = ()
 
     def names(self, field: str) -> tuple[str, ...]:
         """Return the names of columns that may hold a field."""
-        return (self.own[field].lower(),) if field in self.own else FIELDS[field]
+        if field in self.own:
+            return (self.own[field].lower(),)
+        return (self.stated[field],) if field in self.stated else FIELDS[field]
 
     def has(self, *fields: str) -> bool:
         """Return whether there are columns of all these fields."""
@@ -42,15 +55,19 @@ class Mapped:
     def number(self, field: str) -> Floats:
         """Return a field's numbers, NaN where missing; by the unit in the column's name."""
         values = self.rows.number(*self.names(field))
-        unit = self.unit(field)
-        if unit is None or unit.factor == 1.0:
+        unit, column = self.unit(field), self.rows.find(*self.names(field))
+        factor = 1.0 if unit is None else unit.factor
+        if factor == 1.0 and field not in self.stated:
             return values
-        column = self.rows.find(*self.names(field))
-        note = f"{field}: {unit.unit} by the name of its column ({column}), converted"
+        if unit is None:
+            self.rows.reading.note(f"{field}: column {column}")
+            return values
+        note = f"{field}: {unit.unit} by the name of its column ({column})"
+        note += ", converted" if factor != 1.0 else ""
         if field == "heading_rad":
             note += "; counter-clockwise from grid east (a compass is compass_deg)"
         self.rows.reading.note(note)
-        return values * unit.factor
+        return values * factor
 
     def unit(self, field: str) -> HeaderUnit | None:
         """Return the unit that the name of a field's column states."""
@@ -99,7 +116,7 @@ def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Map
         if options.shared and field in FIELDS and column.lower() not in rows.names
     }
     own = {field: name for field, name in options.columns.items() if field not in elsewhere}
-    mapped, faults = Mapped(rows, own), Faults()
+    mapped, faults = Mapped(rows, own, _stated(rows, own)), Faults()
     where, present = f"{reading.path} header", f"{', '.join(rows.names)[:300]}"
     check_fields(own, faults)
     for field, column in own.items():
@@ -115,8 +132,24 @@ def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Map
             hint = "another quantity, or a name to be written without brackets"
             got = f"{unit.written} in {rows.find(*mapped.names(field))}"
             faults.add(where, f"{unit.known} for {field}", got, hint)
-    if "time" not in own and rows.find(*FIELDS["time"]) is None:
+    if not mapped.has("time") and "time" not in own:
         hint = "--column time=COLUMN"
         faults.add(where, "a column of times", present, hint)
     faults.raise_if_any(InputError)
     return mapped
+
+
+def with_dates(mapped: Mapped) -> Mapped:
+    """Return columns with times of day after the dates of the column ``date``, if there is one."""
+    rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
+    if name in (None, _DATE) or not rows.has(_DATE) or not _OF_DAY.match(rows.first_text(name)):
+        return mapped
+    rows.reading.note(f"time: columns {_DATE} and {name}")
+    return replace(mapped, rows=rows.joined(_DATE, name), beside=(_DATE,))
+
+
+def _stated(rows: Columns, own: Mapping[str, str]) -> dict[str, str]:
+    """Return columns whose headers state quantity and unit, of fields without another column."""
+    usual = {field: name for field, some in FIELDS.items() if (name := rows.find(*some))}
+    columns = [*usual.values(), *(name.lower() for name in own.values())]
+    return stated_fields(rows.names, {*usual, *own}, columns)

@@ -6,6 +6,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
+from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.recording import Reading
 from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
@@ -13,33 +14,79 @@ from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
 _KMH = 1 / 3.6
 _NEAR_S = 1.0
 _SPEEDS = ("speed_mps", "speed_kmh")
+_OF_PHONES = ("steps", "step_m", "level_dbm", "bars", "cell", "ci", "cgi", "acc_x")
+_FEWEST_ALONE, _ALONE_SHARE = 10, 0.1
+
+
+def has_odometry(mapped: Mapped) -> bool:
+    """Return whether a file has the speed of a vehicle.
+
+    It is that of the wheels; else any speed, where there are no positions whose receiver measured
+    it, and besides a yaw rate nothing of a walk or a phone.
+    """
+    if mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh"):
+        return True
+    if not any(map(mapped.has, _SPEEDS)) or _is_placed(mapped):
+        return False
+    return _is_turned(mapped) or not any(map(mapped.has, _OF_PHONES))
+
+
+def has_unused_odometry(mapped: Mapped) -> bool:
+    """Return whether a speed and a yaw rate are not used: there are positions beside them.
+
+    Beside counted steps the yaw rate is the walker's.
+    """
+    speeds = any(map(mapped.has, _SPEEDS)) and not has_odometry(mapped)
+    return speeds and _is_placed(mapped) and _is_turned(mapped) and not mapped.has("steps")
 
 
 def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     """Add the rows with a vehicle's speed or yaw rate, and yaw rates of rows beside them."""
+    if not has_odometry(mapped):
+        if _is_placed(mapped) and any(map(mapped.has, _SPEEDS)):
+            _note_speeds(mapped, reading)
+        return
     wheels = mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh")
-    turned = mapped.has("yaw_rate_radps") or mapped.has("yaw_rate_degps")
     if not wheels:
-        if not turned or not any(map(mapped.has, _SPEEDS)):
-            return
-        # Beside positions a speed is that of their receiver.
-        if mapped.has("lat_deg", "lon_deg") or mapped.has("east_m", "north_m"):
-            # Beside counted steps the yaw rate is the walker's.
-            if not mapped.has("steps"):
-                reading.note(
-                    "speed and yaw rate not used beside positions; name the column wheel_speed_mps"
-                )
-            return
-    name = "wheel_speed" if wheels else "speed"
-    speed = mapped.number(f"{name}_mps")
-    if mapped.has(f"{name}_kmh"):
-        speed = _KMH * mapped.number(f"{name}_kmh")
+        reading.note("speed: taken for a vehicle's, as there are no positions beside it")
+    speed = speeds_of(mapped, "wheel_speed" if wheels else "speed")
     yaw = _at_speeds(reading, time_s, speed, mapped.radians("yaw_rate", "ps"))
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
     if not np.isfinite(speed).any():
         return
     turns = np.isfinite(yaw) & (np.isfinite(speed) | (np.abs(yaw) <= FASTEST_TURN_RADPS))
     add_rows(reading, "odometry", columns, mapped.rows, np.isfinite(speed) | turns)
+
+
+def speeds_of(mapped: Mapped, name: str) -> Floats:
+    """Return a speed in m/s, of a field for m/s or one for km/h; NaN where missing."""
+    if mapped.has(f"{name}_kmh"):
+        return _KMH * mapped.number(f"{name}_kmh")
+    return mapped.number(f"{name}_mps")
+
+
+def _is_placed(mapped: Mapped) -> bool:
+    return mapped.has("lat_deg", "lon_deg") or mapped.has("east_m", "north_m")
+
+
+def _is_turned(mapped: Mapped) -> bool:
+    return mapped.has("yaw_rate_radps") or mapped.has("yaw_rate_degps")
+
+
+def _note_speeds(mapped: Mapped, reading: Reading) -> None:
+    """Note speeds taken for those of a receiver that a vehicle may have measured."""
+    field = next(filter(mapped.has, reversed(_SPEEDS)))
+    column = mapped.rows.find(*mapped.names(field))
+    option = f"where wheels measured it: {column_option(f'wheel_{field}', column or '')}"
+    if has_unused_odometry(mapped):
+        reading.note(f"speed and yaw rate not used beside positions; {option}")
+        return
+    speed = mapped.number(field)
+    place = mapped.number("lat_deg" if mapped.has("lat_deg") else "east_m")
+    measured, alone = np.isfinite(speed), np.isfinite(speed) & ~np.isfinite(place)
+    if (count := int(alone.sum())) >= max(_FEWEST_ALONE, _ALONE_SHARE * measured.sum()):
+        some = f"{count} of {number_of(int(measured.sum()), 'speed')}"
+        reading.ignore(f"{column}: {some} without a position in the row, not used; {option}")
 
 
 def _at_speeds(reading: Reading, time_s: Floats, speed: Floats, yaw: Floats) -> Floats:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
+from mapfilter.errors import ConfigError, InputError, MapfilterError, fail, listed
 from mapfilter.tracks.readers import (
     antennas,
     cell_csv,
@@ -27,7 +28,8 @@ from mapfilter.tracks.readers import (
     tems,
 )
 from mapfilter.tracks.readers.columns import header_names, likely_separator
-from mapfilter.tracks.readers.csv_fields import FIELDS
+from mapfilter.tracks.readers.csv_fields import usual_fields
+from mapfilter.tracks.readers.csv_headers import likely_fields, stated_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading, Recording
 from mapfilter.tracks.readers.text import Text, parts_of, read_text
@@ -57,6 +59,7 @@ FORMATS: tuple[Format, ...] = (
 """All formats, in the order in which a file is compared with them."""
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+_LIST = "docs/howto/recordings.rst lists them"
 _PEEKED_BYTES = 1 << 18
 _NOT_READ = {
     ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
@@ -65,7 +68,11 @@ _NOT_READ = {
     ".kml": "KML; export GPX, or a table as CSV",
     ".kmz": "KML; export GPX, or a table as CSV",
     ".geojson": "GeoJSON; export GPX, or a table as CSV",
+    ".json": "JSON; export GPX, or a table as CSV",
     ".fit": "a FIT file; export GPX",
+    ".xlsx": "a spreadsheet; export it as CSV",
+    ".xls": "a spreadsheet; export it as CSV",
+    ".ods": "a spreadsheet; export it as CSV",
 }
 """Suffixes of formats that are not read, and what to do."""
 
@@ -173,18 +180,30 @@ def _other_separators(path: Path, text: Text) -> str:
 
 def _unknown(path: Path, text: Text) -> MapfilterError:
     """Return the error for a file of no known format."""
-    names = set(header_names(text.first_line, likely_separator(text.first_line)))
-    fields = {name for some in FIELDS.values() for name in some}
-    hint = _NOT_READ.get(path.suffix.lower(), "")
-    if not hint and len(names) > 1 and names & fields:
-        hint = (
-            "a CSV with other names of columns: --column FIELD=COLUMN (track.columns in a "
-            "configuration), such as acc_x=AX or wheel_speed_mps=SPEED"
-        )
-        if not names & set(FIELDS["time"]):
-            hint = f"a CSV without a column of times; {hint}, and time=COLUMN"
-    if not hint:
-        hint = _other_separators(path, text)
-    expected = f"a recording in a known format ({', '.join(f.name for f in FORMATS)})"
+    separator = likely_separator(text.first_line)
+    names = header_names(text.first_line, separator)
+    is_table = len(names) > 1 and not text.first_line.lstrip().startswith(("{", "[", "<"))
+    hint = _NOT_READ.get(path.suffix.lower(), "") or _other_separators(path, text)
+    if is_table and not hint:
+        hint = _other_names(names)
     got = f"none of them; it begins with {text.first_line[:60]!r}"
-    return fail(InputError, str(path), expected, got, hint)
+    if is_table:
+        got = f"none of them, but a table with the columns {listed([n for n in names if n])}"
+    return fail(InputError, str(path), f"a recording in a known format ({_LIST})", got, hint)
+
+
+def _other_names(names: Sequence[str]) -> str:
+    """Return the hint for a table whose columns are not known, with the fields they resemble."""
+    usual, stated = usual_fields(names), stated_fields(names, (), ())
+    found = {*usual, *stated}
+    others = [name for name in names if name and name not in (*usual.values(), *stated.values())]
+    likely = {name: fields for name in others if (fields := likely_fields(name, found))}
+    such = [f"{fields[0]}={name}" for name, fields in likely.items()] or ["wheel_speed_mps=SPEED"]
+    times = ""
+    if "time" not in found:
+        times = "a CSV without a column of times; "
+        such += [] if any("time" in fields for fields in likely.values()) else ["time=COLUMN"]
+    option = (
+        f"--column FIELD=COLUMN (track.columns in a configuration), such as {' and '.join(such)}"
+    )
+    return f"{times}a CSV with other names of columns: {option}"

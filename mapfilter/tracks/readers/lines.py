@@ -6,6 +6,7 @@ Quotes are taken away line by line, so one that is never closed ends with its li
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -19,6 +20,8 @@ from mapfilter._arrow import arrow_bytes
 from mapfilter._types import Bools, Ints
 from mapfilter.tracks.readers.recording import Reading
 
+_DECIMAL = re.compile(r"\s*[-+]?\d+,\d+\s*")
+_THOUSANDS = re.compile(r"\s*[-+]?[1-9]\d{0,2}(,\d{3})+\s*")
 LONGEST_LINE = 1 << 16
 """Characters of a line; a longer one is refused."""
 
@@ -140,6 +143,8 @@ def _mended(
             fields = next(csv.reader([words], delimiter=separator), [])
         except csv.Error:
             fields = []
+        if separator == ",":
+            fields = [_with_point(value) for value in fields]
         # A separator within quotes would separate again.
         other = "_" if separator == " " else " "
         fields = [value.replace(separator, other).replace("\n", " ") for value in fields]
@@ -150,9 +155,17 @@ def _mended(
     if len(fields) == count:
         return separator.join(fields).replace('"', "").encode()
     few = len(fields) < count
-    hint = "cut off, or another separator" if few else "a separator within a field"
+    hint = "cut off, or another separator"
+    if not few:
+        hint = "a separator within a field" + (", as decimal commas" if separator == "," else "")
     reading.refuse(line, f"{'fewer' if few else 'more'} fields than {count} (likely: {hint})")
     return None
+
+
+def _with_point(value: str) -> str:
+    """Return a number with a decimal comma with a point; others, and thousands, as they are."""
+    is_decimal = _DECIMAL.fullmatch(value) is not None and _THOUSANDS.fullmatch(value) is None
+    return value.replace(",", ".") if is_decimal else value
 
 
 def parsed(block: bytes, count: int, separator: str) -> pa.Table:

@@ -7,29 +7,30 @@ import re
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.errors import InputError, fail, listed
+from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.columns import (
     header_columns,
     header_names,
     likely_separator,
 )
 from mapfilter.tracks.readers.csv_cells import add_cells
-from mapfilter.tracks.readers.csv_fields import FIELDS, meant
-from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows, mapped_columns
-from mapfilter.tracks.readers.csv_odometry import add_odometry
+from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
+from mapfilter.tracks.readers.csv_headers import stated_fields
+from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows, mapped_columns, with_dates
+from mapfilter.tracks.readers.csv_odometry import add_odometry, speeds_of
+from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 
 _UNIX_S = 1e8
 
-_KMH = 1 / 3.6
 _SPEEDS = ("speed_mps", "speed_kmh")
 _CONTENT = (
     *(("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("bars",)),
     *(("acc_x",), ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",)),
     *(("wheel_speed_kmh",), ("steps",)),
-    *((speed, rate) for speed in _SPEEDS for rate in ("yaw_rate_radps", "yaw_rate_degps")),
+    *((speed,) for speed in _SPEEDS),
 )
 _VITAL = (
     *("step_m", "heading_rad", "turn_rad", "turn_deg", "compass_deg", "steps", "level_dbm", "bars"),
@@ -40,31 +41,29 @@ _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 
 
 def _matches(text: Text) -> bool:
-    names = set(header_names(text.first_line, likely_separator(text.first_line)))
-
-    def has(field: str) -> bool:
-        return bool(names & set(FIELDS[field]))
-
-    return has("time") and any(all(map(has, fields)) for fields in _CONTENT)
+    names = header_names(text.first_line, likely_separator(text.first_line))
+    found = {*usual_fields(names), *stated_fields(names, (), ())}
+    return "time" in found and any(found.issuperset(fields) for fields in _CONTENT)
 
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "CSV"
     rows = header_columns(text.data, reading, text.line)
-    mapped = mapped_columns(rows, reading, options)
+    mapped = with_dates(mapped_columns(rows, reading, options))
+    rows = mapped.rows
     reading.named = tuple(mapped.own)
     reading.tallies.columns |= {
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
     }
     time_s = _times(mapped, reading, options)
+    reading.columns |= mapped.stated
+    reading.columns |= {field: name.lower() for field, name in mapped.own.items()}
+    reading.last_s = max([reading.last_s, *time_s[np.isfinite(time_s)][-1:].tolist()])
     if mapped.has("lat_deg", "lon_deg"):
-        speed = mapped.number("speed_mps")
-        if mapped.has("speed_kmh"):
-            speed = _KMH * mapped.number("speed_kmh")
         names = ("lat_deg", "lon_deg", "altitude_m", "accuracy_m", "course_deg")
         columns = {name: mapped.number(name) for name in names}
         there = np.isfinite(columns["lat_deg"]) | np.isfinite(columns["lon_deg"])
-        columns |= {"time_s": time_s, "speed_mps": speed}
+        columns |= {"time_s": time_s, "speed_mps": speeds_of(mapped, "speed")}
         add_rows(reading, "positions", columns, rows, there)
     if mapped.has("east_m", "north_m"):
         columns = {name: mapped.number(name) for name in ("east_m", "north_m", "heading_rad")}
@@ -79,15 +78,10 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     add_odometry(mapped, reading, time_s)
     _add_sensors(mapped, reading, time_s)
     add_cells(mapped, reading, time_s)
-    taken = {name for field in FIELDS for name in mapped.names(field)}
-    found = [field for field in FIELDS if mapped.has(field)]
-    reading.fields = tuple(found)
-    unread = (name for name in rows.names if name and name not in taken)
-    reading.unread = tuple(
-        f"{name} ({near}?)" if (near := meant(name, found)) else name for name in unread
-    )
+    reading.fields = tuple(field for field in FIELDS if mapped.has(field))
+    reading.unread = unused_columns(mapped)
     if reading.unread:
-        reading.note(f"columns not used: {listed(reading.unread)}; see --column")
+        reading.ignore(unused_note(reading.unread))
 
 
 def _times(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
@@ -97,9 +91,13 @@ def _times(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     if known.size >= 0.5 * len(number) and known.size and abs(float(np.median(known))) < _UNIX_S:
         reading.clock = Clock("monotonic")
         return number
-    reading.notes[:] = [note for note in reading.notes if not note.endswith("taken as missing")]
-    time_s, zoned = mapped.rows.times(*mapped.names("time"), zone=options.zone)
-    reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
+    reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
+    names = mapped.names("time")
+    # A zone that is given is that of the local times of all files.
+    rows, name = mapped.rows, mapped.rows.find(*names) or ""
+    zone = "UTC" if "utc" in name else options.zone
+    time_s, zoned = rows.times(*names, zone=zone)
+    reading.clock = Clock("utc") if zoned else Clock("local", zone)
     if len(time_s) and not np.isfinite(time_s).any():
         texts = mapped.texts("time").tolist()
         at = next((row for row, text in enumerate(texts) if text), 0)

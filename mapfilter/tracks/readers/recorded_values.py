@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from mapfilter._types import Bools, Ints
 from mapfilter.tracks.readers.tables import Field
 
 _MANY_ROWS = 10_000
+_LATE_S, _LATE_SHARE, _DAY_S = 30.0, 0.1, 86_400.0
 
 
 def joined_parts(parts: list[pd.DataFrame]) -> pd.DataFrame:
@@ -91,3 +93,26 @@ def _texts(given: Any) -> pd.Categorical:
 
 def _categories(codes: Any, words: list[str]) -> pd.Categorical:
     return pd.Categorical.from_codes(codes, pd.Index(words, dtype=object))
+
+
+def late_rows(tables: Iterable[Sequence[pd.DataFrame]], last_s: float, *, read: bool) -> str:
+    """Return a note on rows that go on long after the last one of a table; "" for none.
+
+    Parameters
+    ----------
+    tables : iterable of sequence of pandas.DataFrame
+        Parts of each table.
+    last_s : float
+        Time of the last row, used or not.
+    read : bool
+        Whether all columns were read.
+    """
+    times = [part["time_s"] for parts in tables for part in parts if "time_s" in part]
+    if not times:
+        return ""
+    beyond_s = last_s - max(float(time.max()) for time in times)
+    lasted_s = last_s - min(float(time.min()) for time in times)
+    if not max(_LATE_S, _LATE_SHARE * lasted_s) < beyond_s < _DAY_S:
+        return ""
+    held = "they are empty" if read else "of their columns none is used"
+    return f"rows go on for {beyond_s:.0f} s after the last one with a value that is used: {held}"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,16 +14,18 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.errors import listed
 from mapfilter.tracks.cut_times import cut_times
 from mapfilter.tracks.readers.recorded_values import (
     checked_values,
     duplicates,
     joined_parts,
+    late_rows,
     reordered,
 )
 from mapfilter.tracks.readers.tables import RECORDED, Field
 from mapfilter.tracks.readers.tallies import Tallies
+from mapfilter.tracks.readers.unusable import Unusable, nothing_usable
 from mapfilter.tracks.schema import NEIGHBOUR
 
 ClockKind = Literal["utc", "gps", "local", "monotonic"]
@@ -61,21 +64,6 @@ class Clock:
         if self.kind == "local":
             return f"local time ({self.zone or 'zone unknown'})"
         return {"utc": "UTC", "gps": "GPS time"}.get(self.kind, "seconds from an unknown start")
-
-
-@dataclass(frozen=True)
-class Unusable:
-    """Rows of a file that cannot be used, for one reason; ``lines`` are the first of them."""
-
-    reason: str
-    count: int
-    lines: tuple[int, ...]
-
-    def __str__(self) -> str:
-        more = ", …" if self.count > len(self.lines) else ""
-        lines = "line" if self.count == 1 else "lines"
-        where = f"{lines} {', '.join(map(str, self.lines))}{more}"
-        return f"{number_of(self.count, 'row')}: {self.reason} ({where})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +134,8 @@ class Recording:
 class Reading:
     """Collects the tables, bad rows and notes of one file while it is read.
 
-    ``absolute`` tells whether times are seconds of UTC (or of local time as if it were UTC), so
-    that they can be checked against the calendar.
+    ``last_s`` is the last time of the file's rows, used or not; ``columns`` are the names in the
+    file of columns without a usual name, by field.
     """
 
     path: Path
@@ -162,12 +150,17 @@ class Reading:
     unread: tuple[str, ...] = ()
     named: tuple[str, ...] = ()
     tallies: Tallies = field(default_factory=Tallies)
+    last_s: float = -inf
+    columns: dict[str, str] = field(default_factory=dict)
+    _firsts: dict[str, str] = field(default_factory=dict)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
 
-    def refuse(self, lines: ArrayLike, reason: str) -> None:
-        """Count lines with bad rows, each once for a reason."""
+    def refuse(self, lines: ArrayLike, reason: str, first: float | None = None) -> None:
+        """Count lines with bad rows, each once for a reason; ``first`` is the first bad value."""
         found = np.atleast_1d(np.asarray(lines, dtype=np.int64))
         if found.size:
+            if first is not None:
+                self._firsts.setdefault(reason, f"{first:.10g}")
             self._refused.setdefault(reason, []).append(found)
 
     def note(self, text: str) -> None:
@@ -235,9 +228,12 @@ class Reading:
                 self.tallies.add_values(table, known, values, given, good & outside, line)
         label = f"{table}, {known.name}"
         if known.required:
-            self.refuse(line[good & missing], f"{known.name}: missing, or no {known.kind}")
+            column = self.columns.get(known.name, "")
+            named = f"{known.name} ({column})" if column else known.name
+            self.refuse(line[good & missing], f"{named}: missing, or no {known.kind}")
             for hint, of in known.mistakes(values, good & outside):
-                self.refuse(line[of], f"{known.name}: not {known.expected}{hint}")
+                reason = f"{named}: not {known.expected}{hint}"
+                self.refuse(line[of], reason, float(values[of][0]))
             return ~missing & ~outside
         if (ignored := good & outside).any():
             first = line[ignored][0]
@@ -288,12 +284,22 @@ class Reading:
         """
         found = {reason: np.unique(np.concatenate(some)) for reason, some in self._refused.items()}
         refused = tuple(
-            Unusable(reason, len(lines), tuple(lines[:_LINES_KEPT].tolist()))
+            Unusable(
+                reason,
+                len(lines),
+                tuple(lines[:_LINES_KEPT].tolist()),
+                self._firsts.get(reason, ""),
+            )
             for reason, lines in sorted(found.items(), key=lambda one: -len(one[1]))
         )
         if not self.tables:
-            raise nothing_usable(self.path, name, self.rows, refused, rows_word)
+            reasons = [*map(str, refused), *self.ignored]
+            if not reasons and (empty := self.tallies.empty):
+                reasons.append(f"no numbers in {listed(empty)}")
+            raise nothing_usable(self.path, name, self.rows, reasons, rows_word)
         self.tallies.check(self.path, RECORDED)
+        if late := late_rows(self.tables.values(), self.last_s, read=not self.unread):
+            self.ignore(late)
         radio = self.tables.get("radio", ())
         by_cell = any((part["role"] == NEIGHBOUR).any() for part in radio)
         kept = {
@@ -337,12 +343,3 @@ class Reading:
             if table not in _SEVERAL and (cut := cut_times(np.asarray(counted))):
                 self.ignore(f"{table}: {cut}")
         return rows
-
-
-def nothing_usable(
-    path: Path, name: str, rows: int, refused: Iterable[Unusable], rows_word: str = "row"
-) -> MapfilterError:
-    """Return the error for a file of which no row can be used, with the main reasons."""
-    reasons = "; ".join(str(found) for found in list(refused)[:3])
-    got = f"none in {number_of(rows, 'row')}" + (f": {reasons}" if reasons else "")
-    return fail(InputError, str(path), f"a usable {rows_word} of {name}", got)

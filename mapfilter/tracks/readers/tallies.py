@@ -105,6 +105,14 @@ class Tallies:
         """
         self._texts[column, part] = _Texts(given, bad, tuple(examples))
 
+    @property
+    def empty(self) -> tuple[str, ...]:
+        """Columns without any number."""
+        given: dict[str, int] = {}
+        for (column, _), texts in self._texts.items():
+            given[column] = given.get(column, 0) + texts.given
+        return tuple(column for column, count in given.items() if not count)
+
     def check(self, path: Path, known: Mapping[str, tuple[Field, ...]]) -> None:
         """Raise InputError for every column that is mostly out of range, or mostly no numbers."""
         faults = Faults()

@@ -24,6 +24,12 @@ _FAR_QUARTERS = 6e7
 """Quarters of an hour, 1700 years from 1970; datetime ends soon after."""
 _DOTTED = re.compile(r"^\s*(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)(?!\d)", re.ASCII)
 """Day, month and year with dots, which no one writes in another order."""
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_NAMED = re.compile(
+    rf"^\s*(\d\d?)[- ]({'|'.join(_MONTHS)})[a-z]*\.?[- ]((?:19|20)\d\d)(?!\d)",
+    re.ASCII | re.IGNORECASE,
+)
+"""Day, month in English, and year."""
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
 _OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?", re.ASCII)
@@ -77,7 +83,7 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
         Zone of times that state none.
     layout : str
         Format as of ``strptime``, or "ISO8601"; numbers are Unix times then, and days with dots
-        (31.12.2026) are read, too.
+        (31.12.2026) or names of months (31-Dec-2026) are read, too.
 
     Returns
     -------
@@ -107,6 +113,8 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
             plain = plain.str.replace(
                 _DOTTED, lambda m: f"{m[3]}-{int(m[2]):02d}-{int(m[1]):02d}", regex=True
             )
+        if plain.str.match(_NAMED).any():
+            plain = plain.str.replace(_NAMED, _with_month_number, regex=True)
     plain = plain.where(plain.str.match(r"\s*(?:19|20)\d\d"), "")
     moments = pd.to_datetime(plain, format=layout, utc=True, errors="coerce")
     seconds = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy(dtype=np.float64)
@@ -117,6 +125,11 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
     understood = np.isfinite(seconds)
     zoned = bool(zone) or bool(aware[understood].all() if understood.any() else False)
     return time_s, zoned
+
+
+def _with_month_number(found: re.Match[str]) -> str:
+    month = _MONTHS.index(found[2].lower()) + 1
+    return f"{found[3]}-{month:02d}-{int(found[1]):02d}"
 
 
 def utc_from_local_s(local_s: ArrayLike, zone: str) -> Floats:

@@ -1,0 +1,65 @@
+"""Columns of a plain CSV that are not used, and the fields that they may be."""
+
+from __future__ import annotations
+
+from mapfilter.errors import listed
+from mapfilter.tracks.readers.csv_fields import FIELDS, column_option
+from mapfilter.tracks.readers.csv_headers import likely_fields
+from mapfilter.tracks.readers.csv_mapped import Mapped
+from mapfilter.tracks.readers.csv_odometry import has_odometry, has_unused_odometry
+
+_OF_PLACES = ("altitude_m", "accuracy_m", "course_deg", "speed_mps", "speed_kmh")
+_OF_ODOMETRY = ("speed_mps", "speed_kmh", "yaw_rate_radps", "yaw_rate_degps")
+_OF_WHEELS = {"speed_mps": "wheel_speed_mps", "speed_kmh": "wheel_speed_kmh"}
+_OF_STEPS = ("compass_deg", "turn_rad", "turn_deg")
+_OF_COUNTED_STEPS = (*_OF_STEPS, "yaw_rate_radps", "yaw_rate_degps")
+_MEASURED = {*_OF_PLACES, *_OF_ODOMETRY, *_OF_STEPS, "heading_rad"}
+"""Fields that are of use beside others only."""
+
+
+def unused_columns(mapped: Mapped) -> tuple[str, ...]:
+    """Return the columns that are not used, each with the fields that its name resembles."""
+    found = [field for field in FIELDS if mapped.has(field)]
+    useless = _MEASURED.intersection(found) - _useful(mapped)
+    columns = {mapped.rows.find(*mapped.names(field)): field for field in useless}
+    taken = {name for field in FIELDS for name in mapped.names(field)} - set(columns)
+    taken.update(mapped.beside)
+    texts = []
+    for name in mapped.rows.names:
+        if not name or name in taken:
+            continue
+        likely = (
+            [_OF_WHEELS.get(columns[name], "")] if name in columns else likely_fields(name, found)
+        )
+        texts.append(_with_fields(name, [field for field in likely if field]))
+    return tuple(texts)
+
+
+def unused_note(unread: tuple[str, ...]) -> str:
+    """Return a note on columns that are not used, with an option that names one of them."""
+    guessed = next((one for one in unread if one.endswith("?)")), "")
+    if not guessed:
+        return f"columns not used: {listed(unread)}; see --column"
+    name, _, fields = guessed[:-2].rpartition(" (")
+    option = column_option(fields.split(" or ")[0], name)
+    return f"columns not used: {listed(unread)} (likely: {option})"
+
+
+def _with_fields(name: str, fields: list[str]) -> str:
+    return f"{name} ({' or '.join(fields)}?)" if fields else name
+
+
+def _useful(mapped: Mapped) -> set[str]:
+    """Return the fields that are of use beside the others that there are."""
+    useful: set[str] = set()
+    if mapped.has("lat_deg", "lon_deg"):
+        useful.update(_OF_PLACES)
+    if mapped.has("east_m", "north_m"):
+        useful.add("heading_rad")
+    elif mapped.has("step_m"):
+        useful.update(("heading_rad", *_OF_STEPS))
+    if has_odometry(mapped) or has_unused_odometry(mapped):
+        useful.update(_OF_ODOMETRY)
+    if mapped.has("steps") and not mapped.has("step_m"):
+        useful.update(_OF_COUNTED_STEPS)
+    return useful

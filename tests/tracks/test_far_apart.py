@@ -1,0 +1,84 @@
+"""Positions of one journey that lie kilometres apart: degrees exchanged or mirrored."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.log import make_log
+from mapfilter.tracks.open_log import OpenOptions, open_log
+
+TIME_S = np.arange(60.0)
+LAT, LON = 60.0 + 1e-4 * TIME_S, 25.0 + 2e-4 * TIME_S
+
+
+def written(tmp_path, name, lat, lon, begin_s=1.78e9):
+    path = tmp_path / f"{name}.csv"
+    table = pd.DataFrame({"time": begin_s + TIME_S, "latitude": lat, "longitude": lon})
+    table.to_csv(path, index=False)
+    return path
+
+
+@pytest.mark.parametrize("begin_s", [1.78e9, 0.0])
+@pytest.mark.parametrize("is_truth", [True, False])
+@pytest.mark.parametrize(
+    ("lat", "lon", "cause"),
+    [
+        (LON, LAT, "latitude and longitude swapped in one of the two"),
+        (LAT, -LON, "a lost sign of longitude in one of the two"),
+        (-LAT, LON, "a lost sign of latitude in one of the two"),
+    ],
+)
+def test_exchanged_degrees_of_one_recording_are_refused(
+    tmp_path, begin_s, is_truth, lat, lon, cause
+):
+    one = written(tmp_path, "one", LAT, LON, begin_s)
+    other = written(tmp_path, "other", lat, lon, begin_s)
+    options = OpenOptions(combine=CombineOptions(truth=[other] if is_truth else []))
+    paths = [one] if is_truth else [one, other]
+    with pytest.raises(InputError) as error:
+        open_log(paths, options=options)
+    (fault,) = error.value.faults
+    assert fault.where == f"{other}, latitude and longitude"
+    assert "near 60.00295, 25.00590 (one.csv)" in fault.expected
+    assert "km off" in fault.got
+    assert fault.hint == cause
+
+
+@pytest.mark.parametrize("begin_s", [1.78e9, 0.0])
+def test_recordings_kilometres_apart_are_noted(tmp_path, begin_s):
+    one = written(tmp_path, "one", LAT, LON, begin_s)
+    other = written(tmp_path, "other", LAT + 0.1, LON, begin_s)
+    notes = open_log([one, other]).log.notes
+    (told,) = [note for note in notes if "km from those" in note]
+    assert told.startswith("other.csv: positions lie 11.1 km from those of the same times in one")
+    assert not any("agree within" in note for note in notes)
+    near = written(tmp_path, "near", LAT + 0.01, LON, begin_s)
+    assert not any("km from" in note for note in open_log([one, near]).log.notes)
+
+
+def test_places_elsewhere_do_not_tell_a_zone(tmp_path):
+    one = written(tmp_path, "one", LAT, LON)
+    local = pd.to_datetime(1.78e9 + 3600 + TIME_S, unit="s").strftime("%Y-%m-%dT%H:%M:%S")
+    rows = pd.DataFrame({"time": local, "latitude": LAT + 1.0, "longitude": LON})
+    rows.to_csv(tmp_path / "other.csv", index=False)
+    notes = open_log([one, tmp_path / "other.csv"]).log.notes
+    assert any("(by the overlap of times)" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("moved", "cause"),
+    [
+        (lambda rows: rows.rename(columns={"east_m": "north_m", "north_m": "east_m"}), "east and"),
+        (lambda rows: rows.assign(east_m=rows["east_m"] + 30_000), "another journey, or fixes"),
+    ],
+)
+def test_fixes_far_from_the_truth_of_a_log_are_noted(moved, cause):
+    places = pd.DataFrame(
+        {"time_s": TIME_S, "east_m": 385_000 + 5 * TIME_S, "north_m": 6_672_000 + 3 * TIME_S}
+    )
+    (note,) = make_log("EPSG:32635", gnss=places, truth=moved(places)).notes
+    assert note.startswith("gnss lies ")
+    assert f"km from the truth (median) (likely: {cause}" in note
+    assert not make_log("EPSG:32635", gnss=places, truth=places.assign(east_m=386_000.0)).notes

@@ -1,0 +1,79 @@
+"""Tables of which nothing is read: columns, the first offending value and the likely cause."""
+
+import pandas as pd
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.formats import read_recording
+
+
+def refused(tmp_path, text, name="table.csv", **columns):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError) as error:
+        read_recording(path, options=ReadOptions(columns=columns))
+    (fault,) = error.value.faults
+    return fault
+
+
+def test_an_unknown_table_names_its_columns_and_options_for_them(tmp_path):
+    fault = refused(tmp_path, "time,speed,heading,rpm\n1,2,3,4\n")
+    assert len(fault.expected) < 80
+    assert fault.got == "none of them, but a table with the columns time, speed, heading, rpm"
+    assert fault.hint.endswith("such as speed_mps=speed and compass_deg=heading")
+    fault = refused(tmp_path, "zeit,v\n1,2\n")
+    assert fault.hint.startswith("a CSV without a column of times; a CSV with other names of ")
+    assert fault.hint.endswith("such as wheel_speed_mps=SPEED and time=COLUMN")
+
+
+@pytest.mark.parametrize("name", ["track.json", "track.xlsx"])
+def test_other_files_are_named_by_their_suffix(tmp_path, name):
+    fault = refused(tmp_path, '{"type": 1, "time": 2}\n', name)
+    assert "begins with" in fault.got
+    assert "CSV" in fault.hint
+
+
+@pytest.mark.parametrize(
+    ("text", "got"),
+    [
+        (
+            "time,lat,lon\n1,60.1 N,24.9 E\n",
+            "none in 1 row: lat: 1 value is no number, taken as missing (first '60.1 N' in line 2)",
+        ),
+        ("time,lat,lon\n1,,\n2,,\n", "none in 2 rows: no numbers in lat, lon"),
+        ("time,lat,lon\n", "no rows"),
+        (
+            "time,lat,lon\n1,139.7,35.6\n2,139.8,35.6\n",
+            "none in 2 rows: 2 rows: lat_deg: not degrees in -90..90 (likely: latitude and "
+            "longitude swapped) (lines 2, 3; first 139.7)",
+        ),
+        (
+            "time,wheel_speed_kmh\n1,fast\n2,slow\n",
+            "none in 2 rows: wheel_speed_kmh: 2 values are no numbers, taken as missing (first "
+            "'fast' in line 2)",
+        ),
+        (
+            "time,lat,lon\n1,60,17,24,9\n",
+            "none in 1 row: 1 row: more fields than 3 (likely: a separator within a field, as "
+            "decimal commas) (line 2)",
+        ),
+    ],
+)
+def test_a_table_without_a_usable_row_names_columns_and_values(tmp_path, text, got):
+    assert refused(tmp_path, text).got.startswith(got)
+
+
+def test_a_named_column_is_named_beside_its_field(tmp_path):
+    fault = refused(tmp_path, "time,Breite,lon\n1,139.7,35.6\n", lat_deg="Breite")
+    assert "lat_deg (breite): not degrees" in fault.got
+
+
+def test_decimal_commas_within_quotes_are_read(tmp_path):
+    path = tmp_path / "phone.csv"
+    path.write_text('time,lat,lon,altitude\n1,"60,1712","24,9412","1,500"\n2,"60,2","25","7"\n')
+    places = read_recording(path).tables["positions"]
+    assert places["lat_deg"].tolist() == [60.1712, 60.2]
+    assert places["lon_deg"].tolist() == [24.9412, 25.0]
+    # Which comma parts thousands is not known.
+    assert pd.isna(places["altitude_m"].iloc[0])
