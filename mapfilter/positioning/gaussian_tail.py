@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, erfc, exp, inf, isfinite, log, nan, pi, sin, sqrt
 
 import numpy as np
@@ -63,7 +64,7 @@ class GaussianTail:
         usable = usable_risk(risk, self.p_none)
         return float(_mixture_radius(usable, *self._parts)) if usable > 0 else inf
 
-    @property
+    @cached_property
     def _parts(self) -> tuple[Floats, Floats, Floats]:
         """Weights, and means and deviations along the parts' own axes, the longer one first."""
         values, axes = np.linalg.eigh(self.covariances_m2)

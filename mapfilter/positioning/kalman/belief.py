@@ -147,7 +147,8 @@ class SumBelief:
         size, at = covariances[:, own, own], means[:, own]
         volume = np.linalg.slogdet(size)[1]
         off = at - at[:, None]
-        apart = np.einsum("hci,hij,hcj->hc", off, np.linalg.inv(size), off, optimize=True)
+        # einsum would search anew for the order of the products.
+        apart = (off @ np.linalg.inv(size) * off).sum(axis=2)
         near, differing = (_NEAR_OF_MANY, _ALIKE_OF_MANY) if many else (_NEAR, _ALIKE)
         alike = (apart < near) & (np.abs(volume - volume[:, None]) < differing)
         left = np.ones(order.size, dtype=np.bool_)
