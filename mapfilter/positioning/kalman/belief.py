@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -71,7 +72,7 @@ class SumBelief:
         covariances = np.tile(covariance, (count, 1, 1))
         return cls(np.full(count, 1 / count), means, covariances, np.arange(count))
 
-    @property
+    @cached_property
     def moments(self) -> Gaussian:
         """Mean and covariance of the whole."""
         mean = self.weights @ self.means
