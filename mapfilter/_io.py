@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from mapfilter._inputs import is_unicode, json_value, open_input, read_input
-from mapfilter._partial import is_left, new_partial, nothing_left, partials
+from mapfilter._partial import is_in_new, is_left, new_partial, nothing_left, partials
 from mapfilter._replace import ASIDE, NEW, discard, exchange, note_old
 from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fail
 
@@ -53,17 +53,20 @@ def atomic_file(path: Path) -> Iterator[Path]:
     """Give a temporary path beside ``path``; rename it into place when the block succeeds.
 
     The temporary path keeps the suffix of ``path``, because drivers choose formats by it. Where
-    ``path`` is a link, its target is replaced. Raises OutputError where a file or its folder cannot
-    be written, as on a full disk.
+    ``path`` is a link, its target is replaced. What lies in a new folder of :func:`atomic_dir` or
+    :func:`replaced_files` is flushed to the disk with this. Raises OutputError where a file or its
+    folder cannot be written, as on a full disk.
     """
     with nothing_left(path.parent):
         target, partial = _partial_folder(path)
         temporary = partial / path.name
+        flushed = not is_in_new(target)
         try:
             with _writing(temporary, path):
                 yield temporary
-                _sync(temporary)
-            with _into_place(path, target):
+                if flushed:
+                    _sync(temporary)
+            with _into_place(path, target, flushed=flushed):
                 temporary.replace(target)
         finally:
             shutil.rmtree(partial, ignore_errors=True)
@@ -87,10 +90,7 @@ def atomic_dir(path: Path) -> Iterator[Path]:
                 new.mkdir()
                 note_old(partial, target)
                 yield new
-                # Most of the time of each is waiting for the disk, which takes many at once.
-                with ThreadPoolExecutor(_SYNCED_AT_ONCE) as pool:
-                    for _ in pool.map(_sync, sorted(new.rglob("*"))):
-                        pass
+                _sync_all(sorted(new.rglob("*")))
                 _sync(new)
             with _into_place(path, target):
                 if target.exists():
@@ -120,15 +120,13 @@ def replaced_files(folder: Path, older: Callable[[], Iterable[Path]]) -> Iterato
             with _into_place(folder, folder):
                 stale = set(older())
                 files = sorted(path for path in new.rglob("*") if not path.is_dir())
-                for file in files:
-                    _sync(file)
+                _sync_all(files)
                 for file in files:
                     target = folder / file.relative_to(new)
                     target.parent.mkdir(parents=True, exist_ok=True)
                     file.replace(target)
                     stale.discard(target)
-                for within in {(folder / file.relative_to(new)).parent for file in files}:
-                    _sync(within)
+                _sync_all({(folder / file.relative_to(new)).parent for file in files})
                 for path in sorted(stale):
                     path.unlink(missing_ok=True)
                     if path.parent != folder and not any(path.parent.iterdir()):
@@ -283,10 +281,11 @@ def _writing(temporary: Path, path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _into_place(path: Path, target: Path) -> Iterator[None]:
+def _into_place(path: Path, target: Path, *, flushed: bool = True) -> Iterator[None]:
     try:
         yield
-        _sync(target.parent)
+        if flushed:
+            _sync(target.parent)
     except OSError as error:
         raise _not_writable(path, error) from error
 
@@ -305,6 +304,14 @@ def _partial_folder(path: Path) -> tuple[Path, Path]:
         return path, new_partial(path)
     except OSError as error:
         raise _not_writable(path, error) from error
+
+
+def _sync_all(paths: Iterable[Path]) -> None:
+    """Do what :func:`_sync` does for files and folders, side by side."""
+    # Most of the time of each is waiting for the disk, which takes many at once.
+    with ThreadPoolExecutor(_SYNCED_AT_ONCE) as pool:
+        for _ in pool.map(_sync, paths):
+            pass
 
 
 def _sync(path: Path) -> None:

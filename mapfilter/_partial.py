@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from mapfilter._replace import ASIDE
+from mapfilter._replace import ASIDE, NEW
 
 ABANDONED_S = 7 * 86400.0
 """So long after its last change, the folder of a process of another host is taken for left."""
@@ -99,6 +99,11 @@ def is_left(partial: Path) -> bool:
     if found["host"] in (None, _host()):
         return not _is_alive(found["pid"])
     return time.time() - _changed_s(partial) > ABANDONED_S
+
+
+def is_in_new(path: Path) -> bool:
+    """Return whether a path lies in a half-written result that is a folder."""
+    return any(one.name == NEW and ".partial-" in one.parent.name for one in path.parents)
 
 
 def remove_left(folder: Path, wait_s: float) -> None:

@@ -83,21 +83,19 @@ def fill_field(
     on_way = np.zeros(size, dtype=np.bool_)
     on_way[pixels] = True
     away_px, (row, col) = distance_transform_edt(~on_way, return_indices=True)
-    ways, distance = np.zeros(size, dtype=np.int64), np.zeros(size)
-    half_width = np.zeros(size, dtype=np.float32)
-    ways[pixels], distance[pixels], half_width[pixels] = way_id, distance_m, half_width_m
-    level = np.empty((*size, len(received)), dtype=np.float32)
+    point_at = np.zeros(size, dtype=np.int64)
+    point_at[pixels] = np.arange(way_id.size)
+    level_of = np.full((way_id.size, len(received)), np.nan, dtype=np.float32)
     for i, (_, cell_row, cell_col, level_dbm) in enumerate(received):
-        layer = np.full(size, np.nan, dtype=np.float32)
-        layer[cell_row, cell_col] = level_dbm
-        level[..., i] = layer[row, col]
+        level_of[point_at[cell_row, cell_col], i] = level_dbm
+    nearest = point_at[row, col]
     return RadioField(
         window,
         tuple(cell_id for cell_id, *_ in received),
-        level,
-        (away_px * window.resolution_m + distance[row, col]).astype(np.float32),
-        half_width[row, col],
-        ways[row, col],
+        level_of[nearest],
+        (away_px * window.resolution_m + distance_m[nearest]).astype(np.float32),
+        half_width_m[nearest],
+        way_id[nearest],
         on_way,
     )
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, erfc, exp, inf, isfinite, log, pi, sin, sqrt
+from functools import cached_property
+from math import cos, erfc, exp, inf, isfinite, log, nan, pi, sin, sqrt
 
 import numpy as np
 from numba import njit
@@ -14,7 +15,13 @@ from mapfilter.positioning.integrity import usable_risk
 _STEPS = 36
 _FAR = 9.0
 """Deviations beyond which a Gaussian has 1e-19."""
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
+_RULE = np.array(np.polynomial.legendre.leggauss(40))
+_COARSE_RULE = np.array(np.polynomial.legendre.leggauss(6))
+"""Nodes and weights of the integral, and of its first estimates."""
+_COARSE, _CLOSE, _SURE = 1e-2, 1e-5, 1e-6
+"""Change of logarithms at the last step of a search with either rule; distance from the radius so
+found, relative to it, beyond which it decides."""
+_MOST_STEPS, _LEAST = 12, 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +53,7 @@ class GaussianTail:
 
     def outside(self, radius_m: float) -> float:
         """Return the share of the mixture beyond a radius."""
-        return float(_mixture_outside(radius_m, *self._parts))
+        return float(_mixture_outside(radius_m, *self._parts, _RULE))
 
     def radius_m(self, share: float) -> float:
         """Return the radius that holds a share of the mixture."""
@@ -57,7 +64,7 @@ class GaussianTail:
         usable = usable_risk(risk, self.p_none)
         return float(_mixture_radius(usable, *self._parts)) if usable > 0 else inf
 
-    @property
+    @cached_property
     def _parts(self) -> tuple[Floats, Floats, Floats]:
         """Weights, and means and deviations along the parts' own axes, the longer one first."""
         values, axes = np.linalg.eigh(self.covariances_m2)
@@ -75,8 +82,23 @@ def _upper(z: float) -> float:
 
 
 @njit(error_model="numpy", cache=True)
-def _outside(radius: float, along: float, across: float, long: float, short: float) -> float:
-    """Return the share of a Gaussian beyond a radius, its mean and deviations on its axes."""
+def _both_sides(up: float, across: float, short: float) -> float:
+    """Return the share of a normal above ``up`` and below ``-up``, of a mean that is above 0."""
+    near, far = (up - across) / short, (up + across) / short
+    if far > 10.0 and far * far - max(near, 0.0) ** 2 > 90.0:
+        # What lies beyond the far side does not change the sum's last bit.
+        return _upper(near) if near > -10.0 else 1.0
+    return _upper(near) + _upper(far)
+
+
+@njit(error_model="numpy", cache=True)
+def _outside(
+    radius: float, along: float, across: float, long: float, short: float, rule: Floats
+) -> float:
+    """Return the share of a Gaussian beyond a radius, its mean and deviations on its axes.
+
+    ``rule`` (2, k) are nodes and weights of each of three panels.
+    """
     away = sqrt(along * along + across * across)
     if away + _FAR * long <= radius:
         return 0.0
@@ -93,24 +115,25 @@ def _outside(radius: float, along: float, across: float, long: float, short: flo
             continue
         from_, to = np.arcsin(low / radius), np.arcsin(high / radius)
         half, middle = 0.5 * (to - from_), 0.5 * (to + from_)
-        for k in range(_NODES.size):
-            angle = middle + half * _NODES[k]
+        for k in range(rule.shape[1]):
+            angle = middle + half * rule[0, k]
             away, up = radius * sin(angle), radius * cos(angle)
             z = (away - along) / long
             density = exp(-0.5 * z * z) / (long * sqrt(2.0 * pi)) * up
-            tail = _upper((up - across) / short) + _upper((up + across) / short)
-            beyond += half * _WEIGHTS[k] * density * tail
+            beyond += half * rule[1, k] * density * _both_sides(up, across, short)
     return beyond
 
 
 @njit(error_model="numpy", cache=True)
-def _mixture_outside(radius: float, weight: Floats, mean: Floats, deviation: Floats) -> float:
+def _mixture_outside(
+    radius: float, weight: Floats, mean: Floats, deviation: Floats, rule: Floats
+) -> float:
     if radius <= 0:
         return 1.0
     beyond = 0.0
     for c in range(weight.size):
         place = mean[c, 0], mean[c, 1], deviation[c, 0], deviation[c, 1]
-        beyond += weight[c] * _outside(radius, *place)
+        beyond += weight[c] * _outside(radius, *place, rule)
     return beyond
 
 
@@ -122,7 +145,7 @@ def _is_within(
     beyond, left = 0.0, weight.sum()
     for c in range(weight.size):
         place = mean[c, 0], mean[c, 1], deviation[c, 0], deviation[c, 1]
-        beyond += weight[c] * _outside(radius, *place)
+        beyond += weight[c] * _outside(radius, *place, _RULE)
         left -= weight[c]
         if beyond > share:
             return False
@@ -133,17 +156,59 @@ def _is_within(
 
 
 @njit(error_model="numpy", cache=True)
+def _searched(
+    square: float,
+    slope: float,
+    share: float,
+    parts: tuple[Floats, Floats, Floats],
+    rule: Floats,
+    close: float,
+) -> tuple[float, float]:
+    """Return the squared radius beyond which there is a share, NaN if not found, and a slope.
+
+    That is by secants of the logarithm of what lies beyond, which is nearly a line.
+    """
+    last = last_beyond = 0.0
+    for count in range(_MOST_STEPS):
+        beyond = log(max(_mixture_outside(sqrt(square), *parts, rule), _LEAST))
+        if count > 0:
+            slope = (beyond - last_beyond) / (square - last)
+        lacking = log(share) - beyond
+        step = lacking / slope
+        last, last_beyond = square, beyond
+        square = min(max(square + step, 0.25 * square), 4.0 * square)
+        if abs(step) < close * square and abs(lacking) < close:
+            return square, slope
+    return nan, slope
+
+
+@njit(error_model="numpy", cache=True)
 def _mixture_radius(share: float, weight: Floats, mean: Floats, deviation: Floats) -> float:
-    """Return the radius beyond which the mixture has a share."""
+    """Return the radius beyond which the mixture has a share.
+
+    By bisection, whose radii are compared with that of a search; those next to it are looked at.
+    """
     if not isfinite(weight.sum() + mean.sum() + deviation.sum()):
         return np.nan
+    parts = weight, mean, deviation
     reach = sqrt(2.0 * log(2.0 * weight.size / share)) + 1.0
-    low = high = 0.0
+    low = high = moment = 0.0
     for c in range(weight.size):
-        high = max(high, sqrt(mean[c, 0] ** 2 + mean[c, 1] ** 2) + reach * deviation[c, 0])
+        away2 = mean[c, 0] ** 2 + mean[c, 1] ** 2
+        high = max(high, sqrt(away2) + reach * deviation[c, 0])
+        moment += weight[c] * (away2 + deviation[c, 0] ** 2 + deviation[c, 1] ** 2)
+    # As if it were round.
+    square, slope = -log(share) * moment, -1.0 / moment
+    square, slope = _searched(square, slope, share, parts, _COARSE_RULE, _COARSE)
+    square, _ = _searched(square, slope, share, parts, _RULE, _CLOSE)
+    found = sqrt(square)
     for _ in range(_STEPS):
         middle = 0.5 * (low + high)
-        if _is_within(middle, share, weight, mean, deviation):
+        if abs(middle - found) > _SURE * found:
+            is_within = middle > found
+        else:
+            is_within = _is_within(middle, share, *parts)
+        if is_within:
             high = middle
         else:
             low = middle

@@ -57,25 +57,32 @@ def name_by_plan(log: TrackLog, plan: CellPlan) -> TrackLog:
     cells = radio["cell"]
     if radio.empty or bool(cells.isin(plan.ids).all()):
         return log
-    keys = radio[["role", "cell"]].copy()
-    for name in _KEYS:
-        keys[name] = radio.get(name)
-    keys = keys.astype(object).where(keys.notna(), None)
-    numbers = pd.MultiIndex.from_frame(keys.fillna("")).factorize()[0]
-    _, first = np.unique(numbers, return_index=True)
+    columns = [_values(radio, name) for name in ("role", "cell", *_KEYS)]
+    number_of_key: dict[tuple[Any, ...], int] = {}
+    numbers = [
+        number_of_key.setdefault(values, len(number_of_key))
+        for values in zip(*columns, strict=True)
+    ]
     table = PlanNames(plan)
     named: list[str | None] = []
     found = _Counts()
-    for at, count in zip(first.tolist(), np.bincount(numbers).tolist(), strict=True):
-        values = {k: _plain(v) for k, v in keys.iloc[at].items()}
-        reported = ReportedCell(**values)
+    for values, count in zip(number_of_key, np.bincount(numbers).tolist(), strict=True):
+        reported = ReportedCell(*map(_plain, values))
         named.append(table.name(reported))
         found.add(reported, named[-1], plan, count)
     if not any(found.named.values()) and not found.hidden:
         return log
     # Without the dtype pandas 3 makes these strings, and None becomes NaN.
-    new = pd.Series([named[i] for i in numbers.tolist()], index=radio.index, dtype=object)
+    new = pd.Series([named[i] for i in numbers], index=radio.index, dtype=object)
     return replace(log, radio=radio.assign(cell=new), notes=(*log.notes, *found.notes()))
+
+
+def _values(table: pd.DataFrame, name: str) -> list[Any]:
+    """Return the values of a column, None where there are none."""
+    if name not in table:
+        return [None] * len(table)
+    values: list[Any] = table[name].to_numpy(dtype=object, na_value=None).tolist()
+    return values
 
 
 def _plain(value: Any) -> Any:

@@ -11,7 +11,14 @@ from pathlib import Path
 import pytest
 
 from mapfilter import _io, _replace
-from mapfilter._io import atomic_dir, atomic_file, check_replaceable, check_version, sealed
+from mapfilter._io import (
+    atomic_dir,
+    atomic_file,
+    check_replaceable,
+    check_version,
+    replaced_files,
+    sealed,
+)
 from mapfilter.errors import OutputError, StoreError
 
 
@@ -138,6 +145,27 @@ def test_files_and_folders_are_on_the_disk_before_and_after_the_rename(tmp_path,
     with atomic_file(tmp_path / "file") as temporary:
         temporary.write_text("")
     assert synced == ["file", tmp_path.name]
+
+
+def test_files_of_a_new_folder_are_flushed_once(tmp_path, monkeypatch):
+    synced = []
+    fsync = os.fsync
+
+    def noted(handle):
+        synced.append(Path(f"/proc/self/fd/{handle}").readlink().name)
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    with replaced_files(tmp_path / "results", lambda: ()) as new:
+        for path in (new / "a", new / "deep" / "b"):
+            with atomic_file(path) as temporary:
+                temporary.write_text("text")
+    assert sorted(synced) == sorted(["a", "b", "deep", "results", tmp_path.name])
+    synced.clear()
+    with atomic_dir(tmp_path / "folder") as new, atomic_file(new / "deep" / "part") as temporary:
+        temporary.write_text("text")
+    assert sorted(synced) == sorted(["deep", "new", "part", tmp_path.name])
+    assert read_folder(tmp_path / "folder") == {"deep/part": "text"}
 
 
 def test_folders_that_cannot_be_synced_are_let_go(tmp_path, monkeypatch):

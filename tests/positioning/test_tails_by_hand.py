@@ -231,3 +231,29 @@ def test_the_sides_of_a_long_part_are_alike(angle_rad, across_m):
     away_m = np.hypot(*drawn.T)
     for radius_m in (25.0, 35.0, 50.0):
         assert tail.outside(radius_m) == pytest.approx(np.mean(away_m > radius_m), abs=5e-3)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.05, 0.01, 1e-3, 1e-6])
+@pytest.mark.parametrize("thin", [1.0, 0.3, 0.01])
+@pytest.mark.parametrize(
+    "weights",
+    [
+        (1.0, 0.0, 0.0),
+        (0.6, 0.3, 0.1),
+        # What lies beyond hardly changes between two parts that are far from each other.
+        (0.94, 0.0497, 0.0103),
+        (0.989, 0.0099, 0.0011),
+    ],
+)
+def test_radius_of_a_mixture_is_where_its_share_lies_beyond(weights, thin, share):
+    """As by plain bisection, whatever search narrows it."""
+    means_m = np.array([[0.0, 0.0], [300.0, 40.0], [-2000.0, 900.0]])
+    spread_m2 = np.diag([400.0, 400.0 * thin**2])[np.newaxis].repeat(3, axis=0)
+    tail = GaussianTail(np.array(weights), means_m, spread_m2)
+    low_m, high_m = 0.0, 1e4
+    while high_m - low_m > 1e-7 * high_m:
+        middle_m = 0.5 * (low_m + high_m)
+        is_within = tail.outside(middle_m) <= share
+        low_m, high_m = (low_m, middle_m) if is_within else (middle_m, high_m)
+    # The radius is taken too large by 1e-5 of it at most.
+    assert high_m * (1 - 1e-6) <= tail.radius_m(1 - share) <= high_m * (1 + 1.2e-5)

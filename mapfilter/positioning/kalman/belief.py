@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -71,7 +72,7 @@ class SumBelief:
         covariances = np.tile(covariance, (count, 1, 1))
         return cls(np.full(count, 1 / count), means, covariances, np.arange(count))
 
-    @property
+    @cached_property
     def moments(self) -> Gaussian:
         """Mean and covariance of the whole."""
         mean = self.weights @ self.means
@@ -147,7 +148,8 @@ class SumBelief:
         size, at = covariances[:, own, own], means[:, own]
         volume = np.linalg.slogdet(size)[1]
         off = at - at[:, None]
-        apart = np.einsum("hci,hij,hcj->hc", off, np.linalg.inv(size), off, optimize=True)
+        # einsum would search anew for the order of the products.
+        apart = (off @ np.linalg.inv(size) * off).sum(axis=2)
         near, differing = (_NEAR_OF_MANY, _ALIKE_OF_MANY) if many else (_NEAR, _ALIKE)
         alike = (apart < near) & (np.abs(volume - volume[:, None]) < differing)
         left = np.ones(order.size, dtype=np.bool_)
