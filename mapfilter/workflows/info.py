@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,9 @@ from rasterio.errors import RasterioError
 from mapfilter._gdal import open_raster
 from mapfilter._inputs import open_input
 from mapfilter._ogr import VectorSource, sealed_gdal, vector_source
-from mapfilter.config.load import load_config
-from mapfilter.database.export import BANDS, CELLS_TAG
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.evaluation.map_bound import BANDS as BOUND_BANDS
 from mapfilter.geodesy import short_crs
 from mapfilter.radio.cell_layouts import ATOLL, COLUMNS
 from mapfilter.radio.tables import read_table
@@ -114,6 +112,9 @@ def _file_info(path: Path) -> dict[str, Any]:
         use = "fingerprints: mapfilter evaluate single-reports reads those that its page names"
         return {"kind": "MATLAB file", "bytes": path.stat().st_size, "use": use}
     if suffix == ".toml":
+        # Of what has another kind no filter is imported, which takes longer than to describe it.
+        from mapfilter.config.load import load_config
+
         load_config(path, [])
         return {"kind": "configuration", "use": f"mapfilter check -c {path.name}"}
     if format_of(path) is not None:
@@ -184,8 +185,11 @@ def _table_info(path: Path) -> dict[str, Any]:
 
 def _tiff_info(path: Path) -> dict[str, Any]:
     """Describe a GeoTIFF: levels or losses, what mapfilter wrote, or any other."""
-    names, tagged = _described(path)
-    if names == tuple(dict(BANDS)) and tagged:
+    from mapfilter.database.export import BANDS, CELLS_TAG
+    from mapfilter.evaluation.map_bound import BANDS as BOUND_BANDS
+
+    names, tags = _described(path)
+    if names == tuple(dict(BANDS)) and CELLS_TAG in tags:
         use = "written by mapfilter export; QGIS and rasterio open it"
         return {"kind": "best servers", **_geotiff_info(path), "use": use}
     if names == tuple(dict(BOUND_BANDS)):
@@ -200,14 +204,14 @@ def _tiff_info(path: Path) -> dict[str, Any]:
     return {"kind": "classes", **found, **more, "use": use}
 
 
-def _described(path: Path) -> tuple[tuple[str | None, ...], bool]:
-    """Return the descriptions of a raster's bands, and whether a tag lists cells."""
+def _described(path: Path) -> tuple[tuple[str | None, ...], Collection[str]]:
+    """Return the descriptions of a raster's bands, and the names of its tags."""
     try:
         # A file that is cut off may have lost its place; its own reader reports that.
         with open_raster(path) as source:
-            return source.descriptions, CELLS_TAG in source.tags()
+            return source.descriptions, source.tags().keys()
     except RasterioError:
-        return (), False
+        return (), ()
 
 
 def _is_classes(path: Path) -> bool:

@@ -2,6 +2,8 @@
 
 import gzip
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import geopandas
@@ -266,3 +268,13 @@ def test_figures_of_another_program_are_no_results(tmp_path):
     (tmp_path / "summary.json").write_text("[1, 2]")
     (tmp_path / "figures.json").write_text("no JSON")
     assert info(tmp_path)["kind"] == "recordings"
+
+
+def test_no_filter_is_imported_to_describe_anything():
+    """It takes as long as all else; asked of a process of its own."""
+    code = (
+        "import sys, mapfilter.workflows.info as _\n"
+        "print(*{'numba', 'mapfilter.config.sections', 'mapfilter.positioning'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
