@@ -75,7 +75,7 @@ def motion_from_odometry(rows: pd.DataFrame) -> pd.DataFrame:
     turn = _integrated(time, rows["yaw_rate_radps"].to_numpy(dtype=np.float64))
     gap = odometry_gaps(time, speed)
     # Whoever stands does not turn: one reading of a gyroscope would be that of the whole gap.
-    turn[_long_gaps(time) & ~gap] = 0.0
+    turn[long_gaps(time) & ~gap] = 0.0
     return pd.DataFrame(
         {
             "time_s": time,
@@ -102,14 +102,14 @@ def odometry_gaps(time_s: Floats, speed_mps: Floats) -> Bools:
     >>> odometry_gaps(time_s, np.zeros(5)).any()
     np.False_
     """
-    gap = _long_gaps(time_s)
+    gap = long_gaps(time_s)
     moves = ~(np.abs(speed_mps) <= _STANDING_MPS)
     gap[1:] &= moves[1:] | moves[:-1]
     return gap
 
 
-def _long_gaps(time_s: Floats) -> Bools:
-    """Return which rows come long after the ones before."""
+def long_gaps(time_s: Floats) -> Bools:
+    """Return which rows come long after the ones before, at rest, too."""
     gap = np.zeros(time_s.size, dtype=np.bool_)
     if time_s.size > 2:
         lasted_s = np.diff(time_s)

@@ -101,14 +101,6 @@ def test_whoever_rests_before_and_after_a_pause_has_rested():
     assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, STEP, 100.0, rested=True) == 399.0
 
 
-def test_without_reports_nothing_shows_a_drive_from_one_stop_to_another():
-    rest, never = Going(0.0, True, False), RowTimes(100.0)
-    assert unrecorded_s(ALWAYS, never, 500.0, rest, 100.0, rested=True) == 399.0
-    # A logger that writes what changes has a row a minute at rest.
-    assert unrecorded_s(ALWAYS, never, 160.0, rest, 100.0, rested=True) == 0.0
-    assert unrecorded_s(ALWAYS, never, 161.0, rest, 100.0, rested=True) == 60.0
-
-
 def test_a_pedometer_pauses_only_where_reports_do():
     """It has no rows at rest, but a modem goes on."""
     heard = EVERY_2_S._replace(epoch_s=158.0)

@@ -167,27 +167,6 @@ def test_two_motions_are_one():
     )
 
 
-@pytest.mark.parametrize(
-    ("paused_s", "status"), [(59.0, Status.TRACKING), (400.0, Status.UNCERTAIN)]
-)
-def test_a_drive_from_stop_to_stop_may_lie_in_a_pause(paused_s, status):
-    """3 km off it was TRACKING within 20 m: the rows before and after it were those of a rest."""
-    rng = np.random.default_rng(4)
-    steps = [MotionStep(0.0 if k >= 100 else 8.0, 0.3) for k in range(140)]
-    way = np.cumsum([step.step_m * np.exp(0.3j) for step in steps])
-    fixes = [at(place, 5.0, rng) if k < 90 else None for k, place in enumerate(way)]
-    later_s = [k + (paused_s if k >= 120 else 0.0) for k in range(140)]
-    made = [Epoch(later_s[k], (step,), fix=fixes[k]) for k, step in enumerate(steps)]
-    _, radii_m, statuses, why, _ = followed(made)
-    assert radii_m[119] < 20.0
-    assert statuses[-1] is status
-    if paused_s > 60.0:
-        assert why[120] == {Reason.MOTION_MISSING}
-        assert radii_m[-1] > 8.0 * 100
-    else:
-        assert radii_m[-1] < 25.0
-
-
 @pytest.mark.parametrize("dead", [False, True])
 def test_an_odometer_of_zeros_with_a_corner_is_dead(dead):
     """30 s around a corner at 8 m/s; or a rest of 30 s, which is one."""

@@ -8,8 +8,9 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.positioning.epochs import ReportRow
+from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.sensors.rest import Rest, _added, _carried, _left, levels_of
+from mapfilter.positioning.sensors.watch import SensorWatch, watched
 
 
 def row(cell, level_dbm, role="neighbour", censored=0, **more):
@@ -209,7 +210,7 @@ def turning(rest, turns_rad, *, period_s=1.0, heading_rad=nan):
 
 def test_a_vehicle_that_takes_a_corner_does_not_stand():
     """Turns of the last seconds count: those of 10 s before with 1/e."""
-    car = Rest(0.0, pace_mps=9.0)
+    car = Rest(0.0, pace_mps=9.0, braked_mps2=9.0)
     assert turning(car, [0.2] * 4).turned_rad == pytest.approx(
         0.2 * sum(exp(-k / 10) for k in range(4))
     )
@@ -222,21 +223,35 @@ def test_a_vehicle_that_takes_a_corner_does_not_stand():
 
 
 @pytest.mark.parametrize(
-    ("pace_mps", "turns_rad", "heading_rad"),
+    ("pace_mps", "braked_mps2", "turns_rad", "heading_rad"),
     [
         # A walker turns at rest, courses of a receiver do, and the bias of a gyroscope adds up.
-        (1.4, [0.5] * 9, nan),
-        (9.0, [0.5] * 9, 1.0),
-        (9.0, [0.05] * 900, nan),
-        (9.0, [nan] * 9, nan),
-        (9.0, [0.6, -0.6] * 9, nan),
+        (1.4, 9.0, [0.5] * 9, nan),
+        (9.0, 9.0, [0.5] * 9, 1.0),
+        (9.0, 9.0, [0.05] * 900, nan),
+        (9.0, 9.0, [nan] * 9, nan),
+        (9.0, 9.0, [0.6, -0.6] * 9, nan),
+        # Wheel sensors read zero while a car rolls out into a parking lot.
+        (9.0, 4.9, [0.5] * 9, nan),
     ],
 )
-def test_turns_that_are_no_corner(pace_mps, turns_rad, heading_rad):
-    assert not turning(Rest(0.0, pace_mps=pace_mps), turns_rad, heading_rad=heading_rad).is_carried
+def test_turns_that_are_no_corner(pace_mps, braked_mps2, turns_rad, heading_rad):
+    rest = Rest(0.0, pace_mps=pace_mps, braked_mps2=braked_mps2)
+    assert not turning(rest, turns_rad, heading_rad=heading_rad).is_carried
+
+
+@pytest.mark.parametrize(
+    ("speeds_mps", "braked_mps2"),
+    [([8.0, 8.0, 8.0], 8.0), ([8.0, 6.0, 3.0], 3.0), ([8.0, 5.0, 2.4], 0.0), ([1.4] * 3, 0.0)],
+)
+def test_how_a_rest_began(speeds_mps, braked_mps2):
+    watch = SensorWatch()
+    for k, step_m in enumerate([speeds_mps[0]] * 40 + speeds_mps + [0.0]):
+        watch, _, _ = watched(watch, Epoch(float(k), (MotionStep(step_m, nan, 0.0),)))
+    assert watch.rest.braked_mps2 == pytest.approx(braked_mps2)
 
 
 def test_turns_are_kept_while_reports_come():
-    rest = turning(Rest(0.0, pace_mps=9.0), [0.2] * 3)
+    rest = turning(Rest(0.0, pace_mps=9.0, braked_mps2=9.0), [0.2] * 3)
     heard = rest.heard(3.0, (row("A", -70.0),))
     assert (heard.turned_rad, heard.turned_s) == (rest.turned_rad, 2.0)

@@ -6,8 +6,8 @@ from math import degrees, nan, radians
 import numpy as np
 import pytest
 
-from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.filters.gaussian import EKF, UKF, Gaussian
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.gaussian import EKF, UKF
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
@@ -65,7 +65,7 @@ def test_a_phone_that_is_turned_is_followed(method, jump_deg):
         steps, way, rng = walked(seed, jump_deg)
         fixes = [fix_at(p, 5.0, rng) if k < 300 and k % 5 == 0 else None for k, p in enumerate(way)]
         places, radii_m, jumps, error_deg = followed(steps, fixes, method=method)
-        assert jumps
+        assert len(jumps) == 1
         assert 200 < jumps[0] <= 270
         off_m = np.abs(places - way)
         assert np.median(off_m[275:300]) < 6.0
@@ -78,7 +78,7 @@ def test_how_a_compass_is_mounted_is_found_by_late_fixes(askew_deg):
     steps, way, rng = walked(21, askew_deg, count=800, at=0)
     fixes = [fix_at(p, 5.0, rng) if 300 <= k < 500 else None for k, p in enumerate(way)]
     places, radii_m, jumps, error_deg = followed(steps, fixes, heard_first=True)
-    assert jumps
+    assert len(jumps) == 1
     assert jumps[0] < 340
     off_m = np.abs(places - way)[400:]
     assert off_m.max() < 30.0
@@ -118,7 +118,7 @@ def test_stretches_are_least_squares():
     way = np.cumsum(rng.normal(5, 3, (12, 2)), axis=0)
     turned = 1.1 * np.exp(0.8j) * (way[:, 0] + 1j * way[:, 1])
     fixes = np.stack([turned.real, turned.imag], 1) + rng.normal(0, 2, (12, 2)) + [EAST, NORTH]
-    rows = np.column_stack([way, fixes, np.full(12, 60.0), np.zeros((12, 2))])
+    rows = np.column_stack([np.arange(12.0), way, fixes, np.full(12, 60.0), np.zeros((12, 2))])
     found = _Stretches.of(rows)
     for first in range(7):
         x, y = way[first:].T
@@ -139,39 +139,121 @@ def test_stretches_are_least_squares():
         at = np.array([1.0, 0.0, way[-1, 0], -way[-1, 1]])
         assert turn.sd_m == pytest.approx(np.sqrt(at @ covariance @ at), rel=1e-6)
         assert turn.turned_rad == pytest.approx(np.angle(complex(a, b)))
+        assert found.residual_m2[first] == pytest.approx(left[0], rel=1e-6)
+        if turn.sd_rad > radians(3.5):
+            continue
+        # By the angle alone: that of a and b across them.
+        across = np.array([0.0, 0.0, -b, a]) / size**2
+        shared = [
+            at @ covariance @ across,
+            np.array([0, 1.0, *way[-1, ::-1]]) @ covariance @ across,
+        ]
+        assert turn.shared_m_rad == pytest.approx(shared, rel=1e-6)
     assert not found.fits[7:].any()
 
 
+@pytest.mark.parametrize("off_deg", [10.0, 60.0, 180.0])
+def test_the_ratio_is_that_of_sums_of_squares(off_deg):
+    """Of exact fixes, with the angle of the belief known: what another angle leaves of them."""
+    rng = np.random.default_rng(3)
+    way = np.cumsum(rng.normal(5, 3, (10, 2)), axis=0) @ [1, 1j]
+    fixes = np.exp(0.3j) * way
+    columns = [np.arange(10.0), way.real, way.imag, fixes.real, fixes.imag, np.full(10, 49.0)]
+    found = _Stretches.of(np.column_stack([*columns, np.zeros((10, 2))]))
+    nats = found.nats(np.full(10, radians(off_deg)), np.zeros(10))
+    for first in range(5):
+        other = np.exp(1j * (0.3 + radians(off_deg))) * way[first:]
+        off = fixes[first:] - other
+        left = np.abs(off - off.mean()) ** 2
+        assert nats[first] == pytest.approx(left.sum() / (2 * 49.0), rel=1e-6)
+
+
 def test_a_way_is_broken_off_where_its_direction_or_length_is_not_known():
-    way, _ = RecentWay().at_fix(EAST, NORTH, 5.0, 0.0, 0.1)
-    gone = way.moved(MotionStep(6.0, 0.0))
+    fix, known, white = (EAST, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0)
+    way, _ = RecentWay().at_fix(0.0, fix, known, white)
+    gone = way.moved(MotionStep(6.0, 0.0), 0.0)
     assert (gone.east_m, gone.north_m, len(gone.rows)) == (6.0, 0.0, 1)
     for step in (MotionStep(2.0, nan), MotionStep(nan, 0.1), MotionStep(2.0, nan, nan, 3.0)):
-        assert gone.moved(step) == RecentWay()
-    assert gone.moved(MotionStep(0.0, nan)) is gone
-    assert RecentWay().moved(MotionStep(6.0, 0.0)) == RecentWay()
+        assert gone.moved(step, 0.0) == RecentWay()
+    assert gone.moved(MotionStep(0.0, nan), 0.0) is gone
+    assert RecentWay().moved(MotionStep(6.0, 0.0), 0.0) == RecentWay()
     # Fixes close to the one before add nothing.
-    again, _ = gone.moved(MotionStep(-2.0, 0.0)).at_fix(EAST, NORTH, 5.0, 0.0, 0.1)
-    assert len(again.rows) == 1
-    again, _ = gone.at_fix(EAST, NORTH, 5.0, 0.0, 0.1)
+    near, _ = gone.moved(MotionStep(-2.0, 0.0), 0.0).at_fix(4.0, fix, known, white)
+    assert len(near.rows) == 1
+    again, _ = gone.at_fix(4.0, fix, known, white)
     assert len(again.rows) == 2
 
 
-def test_a_jump_is_a_motion_of_all_that_it_has_led_astray():
-    belief = Gaussian(np.arange(9.0), np.eye(9))
-    turn = Turn(1.5, 0.1, 100.0, 200.0, 4.0)
+def test_what_a_rate_adds_is_in_the_way_and_not_in_the_error():
+    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.1, 0.01), (0.0, 30.0))
+    way = way.moved(MotionStep(0.0, nan), 0.2).moved(MotionStep(6.0, 0.3), 0.1)
+    assert complex(way.east_m, way.north_m) == pytest.approx(6.0 * np.exp(0.6j))
+    way, _ = way.at_fix(5.0, (EAST + 6.0, NORTH, 25.0), (0.5, 0.02), (0.0, 30.0))
+    assert way.rows[-1].turned_rad == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("variance_m2", "lasting", "after_s", "expected_m2"),
+    [(25.0, (0.0, 30.0), 5.0, 7.5**2), (400.0, (0.0, 30.0), 5.0, 400.0),
+     (100.0, (6.0, 30.0), 5.0, 100.0 + 2 * 36 * 30 / 5.0), (25.0, (0.0, 30.0), 0.5, 7.5**2)],
+)  # fmt: skip
+def test_errors_that_last_count_once_and_fixes_may_be_late(
+    variance_m2, lasting, after_s, expected_m2
+):
+    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, variance_m2), (0.0, 0.01), lasting)
+    assert way.rows[0].variance_m2 == max(variance_m2, 7.5**2)
+    gone = way.moved(MotionStep(6.0, 0.0), 0.0)
+    way, _ = gone.at_fix(after_s, (EAST + 6.0, NORTH, variance_m2), (0.0, 0.01), lasting)
+    late_m2 = (2 * 6.0 / after_s) ** 2
+    assert way.rows[1].variance_m2 == pytest.approx(expected_m2 + late_m2)
+
+
+@pytest.mark.parametrize("rate_deg_per_s", [0.3, 1.0])
+def test_a_rate_of_turns_that_was_found_is_no_jump(rate_deg_per_s):
+    """Its sum over the stretches that are compared is 20 to 100 degrees."""
+    steps, way, rng = walked(5, count=600)
+    heading = np.angle(np.diff(way, prepend=way[0] - 1.4))
+    turns = wrap_rad(np.diff(heading, prepend=0.0)) + radians(rate_deg_per_s)
+    steps = [MotionStep(one.step_m, nan, turn) for one, turn in zip(steps, turns, strict=True)]
+    fixes = [fix_at(p, 5.0, rng) if k % 5 == 0 and k < 450 else None for k, p in enumerate(way)]
+    options = KalmanOptions(turn_rate_sd_deg_per_s=rate_deg_per_s)
+    places, radii_m, jumps, _ = followed(steps, fixes, options=options)
+    assert jumps == []
+    assert (np.abs(places - way) <= radii_m)[450:].mean() > 0.95
+
+
+def test_a_jump_forgets_the_place_and_the_error_before_it():
+    turn = Turn(1.5, 0.1, 100.0, 200.0, 4.0, (0.2, -0.1))
     layout = replace(extended_layout(RECKONED), size=9)
-    transition, noise, shift = jump_to(turn, belief, layout, lasts=True)
-    np.testing.assert_array_equal(transition, np.eye(9))
-    np.testing.assert_array_equal(shift, [100, 199, -0.5, 0, 0, 100, 199, 0, 0])
+    transition, noise, shift = jump_to(turn, layout, lasts=True)
+    np.testing.assert_array_equal(np.diag(transition), [0, 0, 0, 1, 1, 0, 0, 1, 1])
+    np.testing.assert_array_equal(transition, np.diag(np.diag(transition)))
+    np.testing.assert_array_equal(shift, [100, 200, 1.5, 0, 0, 100, 200, 0, 0])
     expected = np.zeros((9, 9))
     for one in ((0, 0), (0, 5), (5, 5), (5, 0)):
         expected[one], expected[one[0] + 1, one[1] + 1] = 16.0, 16.0
     expected[2, 2] = 0.01
+    for east in (0, 5):
+        expected[2, [east, east + 1]] = expected[[east, east + 1], 2] = 0.2, -0.1
     np.testing.assert_allclose(noise, expected)
-    _, own, moved = jump_to(turn, belief, StateLayout(9, 0, 1), lasts=False)
-    assert not own[5:, 5:].any()
+    _, own, moved = jump_to(turn, StateLayout(9, 0, 1), lasts=False)
+    assert not own[5:].any()
     assert not moved[5:].any()
+
+
+def test_a_jump_is_no_loss():
+    """What fixes said against the wrong heading is no reason to call the position lost."""
+    steps, way, rng = walked(12, 180.0, count=320)
+    fixes = [fix_at(p, 3.0, rng) if k % 4 == 0 else None for k, p in enumerate(way)]
+    tracker = KalmanTracker(SiteModels(PLAN, KalmanOptions()), EKF)
+    state, found = tracker.begin(("motion", "gnss")), []
+    for k, (step, fix) in enumerate(zip(steps, fixes, strict=True)):
+        state, out = tracker.step(state, Epoch(float(k), (step,), fix=fix), rng)
+        turned = any(one.reason is Reason.PHONE_TURNED for one in out.unused)
+        found.append((turned, out.fix.status, len(state.recent_nis)))
+    (at,) = [k for k, (turned, _, _) in enumerate(found) if turned]
+    assert found[at][1:] == (Status.TRACKING, 0)
+    assert Status.LOST not in {status for _, status, _ in found[at:]}
 
 
 def test_what_was_before_a_jump_is_smoothed_without_it():

@@ -155,3 +155,36 @@ def test_a_bus_without_any_speed_turns_nevertheless():
     motion, _, _ = reckon_odometry(rows)
     assert motion["step_m"].iloc[1:].isna().all()
     assert motion["turn_rad"].sum() == pytest.approx(np.trapezoid(RATE_RADPS, TIME_S), abs=1e-9)
+
+
+def test_the_bias_of_a_gyroscope_does_not_turn_who_stands_without_rows():
+    """With the ignition off for 20 minutes: 0.12 deg/s were -142°."""
+    time_s = np.r_[np.arange(0.0, 60.0, 0.1), np.arange(1260.0, 1320.0, 0.1)]
+    speed = np.where((time_s > 50.0) & (time_s < 1270.0), 0.0, 8.0)
+    rows = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": np.radians(0.12)}
+    motion, _, notes = reckon_odometry(pd.DataFrame(rows))
+    assert motion["turn_rad"].to_numpy()[600] == 0.0
+    assert motion["step_m"].to_numpy()[600] == 0.0
+    assert motion["turn_rad"].sum() == pytest.approx(0.0, abs=0.01)
+    assert any("1 pause (longest 1200.1 s) between rests, taken as rests" in one for one in notes)
+
+
+@pytest.mark.parametrize("corner", [False, True])
+def test_a_bus_that_lacks_speeds_between_rests_has_moved_if_it_turned(corner):
+    lost = (TIME_S > 20.0) & (TIME_S < 50.0)
+    speed = np.where((TIME_S > 15.0) & (TIME_S < 52.0), 0.0, SPEED_MPS)
+    rate = np.where((TIME_S > 30.0) & (TIME_S < 38.0), 0.2 * corner, 0.0)
+    rows = {"time_s": TIME_S, "speed_mps": np.where(lost, np.nan, speed), "yaw_rate_radps": rate}
+    motion, _, notes = reckon_odometry(pd.DataFrame(rows))
+    assert motion["step_m"].isna().any() == corner
+    assert motion["turn_rad"].sum() == pytest.approx(1.58 * corner, abs=0.02)
+    assert any("turns alone are known" in one for one in notes) == corner
+
+
+def test_turns_after_the_last_speed_are_known():
+    speed = np.where(TIME_S < 30.0, SPEED_MPS, np.nan)
+    rows = {"time_s": TIME_S, "speed_mps": speed, "yaw_rate_radps": RATE_RADPS}
+    motion, _, _ = reckon_odometry(pd.DataFrame(rows))
+    assert len(motion) == TIME_S.size
+    assert motion["step_m"].isna().to_numpy()[300:].all()
+    assert motion["turn_rad"].sum() == pytest.approx(np.trapezoid(RATE_RADPS, TIME_S), abs=1e-6)

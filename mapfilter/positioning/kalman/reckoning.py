@@ -16,7 +16,7 @@ alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, hypot, inf, isfinite, nan, radians, sin, sqrt
+from math import cos, inf, isfinite, nan, radians, sin, sqrt
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from mapfilter.positioning.kalman.alignment import Alignment, Direction
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
-from mapfilter.positioning.kalman.turned import FIX_S, RecentWay, Turn
+from mapfilter.positioning.kalman.turned import RecentWay, Turn
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.positioning.sensors.unmeasured import headless_step, missed_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
@@ -41,6 +41,9 @@ the rate of turns in rad/s."""
 ERRORS = slice(2, 5)
 """Components that are errors of dead reckoning."""
 _TURNED, _SCALE, _RATE, _LEAST = 2, 3, 4, 1e-6
+_TURNS_SD_RAD = radians(2.0)
+"""White error of headings that turns add up to, at most: what wheels slip and cameras shake. Those
+of a compass are read one by one."""
 
 
 def at_rest(layout: StateLayout) -> Motion:
@@ -161,16 +164,16 @@ class Reckoning:
         transition, noise, shift = at_rest(RECKONED)
         turned_s = time_s if isfinite(step.turn_rad) else self.turned_s
         # Who stands without any turn has none: nothing was read of a gyroscope.
-        by_rate = isfinite(self.turned_s) and not isfinite(step.heading_rad)
-        by_rate = by_rate and (step.step_m != 0 or step.turn_rad != 0)
+        by_turns = not isfinite(step.heading_rad)
+        by_rate = by_turns and (step.step_m != 0 or step.turn_rad != 0)
         alignment, step = self.alignment.headed(step)
-        recent = self.recent.moved(step)
+        if by_rate and isfinite(self.turned_s) and alignment.known:
+            transition[_TURNED, _RATE] = turned_s - self.turned_s
+        recent = self.recent.moved(step, float(transition[_TURNED, _RATE] * errors[2]))
         after = replace(self, alignment=alignment, turned_s=turned_s, recent=recent)
         if not isfinite(step.step_m):
             return after, (transition, noise, shift), Reason.NO_STEP
         noise[_TURNED, _TURNED] = radians(options.drift_deg_per_sqrt_m) ** 2 * abs(step.step_m)
-        if by_rate and alignment.known:
-            transition[_TURNED, _RATE] = turned_s - self.turned_s
         if not isfinite(step.heading_rad):
             why = Reason.USED
             if not isfinite(step.spread_m):
@@ -187,7 +190,8 @@ class Reckoning:
         transition[:2, 2:] = np.outer(length_m * across, transition[_TURNED, 2:])
         transition[:2, _SCALE] = step.step_m * along
         shift[:2] = length_m * along - transition[:2, 2:] @ errors
-        cross_m = step.step_m * radians(options.heading_sd_deg)
+        white_rad = radians(options.heading_sd_deg)
+        cross_m = step.step_m * (min(white_rad, _TURNS_SD_RAD) if by_turns else white_rad)
         noise[:2, :2] = options.step_sd_m**2 * np.outer(along, along)
         noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
         noise[:2, :2] += cross_m**2 * np.outer(across, across)
@@ -206,14 +210,15 @@ class Reckoning:
 
         It is the direction of turns, or the jump of headings by which the belief is off.
         """
-        sd_m = float(np.sqrt(np.trace(covariance_m2) / 2))
-        place = fix.east_m, fix.north_m
-        alignment, found = self.alignment.at_fix(*place, sd_m)
-        turned_rad, variance = belief.mean[_TURNED], belief.covariance[_TURNED, _TURNED]
-        # Errors that last, and are alike at several fixes, count once in that time.
-        alike = 1 + 2 * options.fix_lasting_s / FIX_S
-        way_sd_m = hypot(sd_m, options.fix_lasting_m * sqrt(alike))
-        recent, jump = self.recent.at_fix(*place, way_sd_m, float(turned_rad), sqrt(variance))
+        variance_m2 = float(np.trace(covariance_m2)) / 2
+        alignment, found = self.alignment.at_fix(fix.east_m, fix.north_m, sqrt(variance_m2))
+        turned = float(belief.mean[_TURNED]), float(belief.covariance[_TURNED, _TURNED])
+        recent, jump = self.recent.at_fix(
+            time_s,
+            (fix.east_m, fix.north_m, variance_m2),
+            turned,
+            (options.fix_lasting_m, options.fix_lasting_s),
+        )
         after = replace(
             self,
             watch=self.watch.positioned(time_s),
@@ -225,29 +230,31 @@ class Reckoning:
         return after, found or jump
 
 
-def jump_to(turn: Turn, belief: Gaussian, layout: StateLayout, *, lasts: bool) -> Motion:
+def jump_to(turn: Turn, layout: StateLayout, *, lasts: bool) -> Motion:
     """Return the motion of a jump of headings: to their error, and to where it has led.
+
+    What the belief had of both is forgotten. Both are as the fixes tell them, and their errors are
+    of one cause.
 
     Parameters
     ----------
-    belief : Gaussian
-        Before it.
+    layout : StateLayout
+        Of the belief.
     lasts : bool
         Whether the place that fixes are of is a part of the state, too.
     """
-    transition, noise, shift = at_rest(layout)
-    target, variances = [turn.east_m, turn.north_m], turn.sd_m**2 * np.eye(2)
+    transition, _, shift = at_rest(layout)
     own = [layout.east, layout.north]
-    shift[own] = target - belief.mean[own]
-    noise[np.ix_(own, own)] = variances
-    if lasts:
-        seen = [RECKONED.size, RECKONED.size + 1]
-        shift[seen] = shift[own]
-        for one, other in ((seen, seen), (own, seen), (seen, own)):
-            noise[np.ix_(one, other)] = variances
-    shift[_TURNED] = turn.turned_rad - belief.mean[_TURNED]
-    noise[_TURNED, _TURNED] = turn.sd_rad**2
-    return transition, noise, shift
+    # East and north, once or twice, and the heading error by the two of the place and the angle.
+    cause = np.zeros((layout.size, 3))
+    for place in [own, [RECKONED.size, RECKONED.size + 1]] if lasts else [own]:
+        transition[place, place] = 0.0
+        shift[place] = turn.east_m, turn.north_m
+        cause[place, [0, 1]] = 1.0
+    transition[_TURNED, _TURNED], shift[_TURNED], cause[_TURNED, 2] = 0.0, turn.turned_rad, 1.0
+    known = np.diag([turn.sd_m**2, turn.sd_m**2, turn.sd_rad**2])
+    known[:2, 2] = known[2, :2] = turn.shared_m_rad
+    return transition, cause @ known @ cause.T, shift
 
 
 def turned_to(belief: SumBelief, direction: Direction) -> SumBelief:

@@ -252,8 +252,9 @@ class KalmanStep:
             moments = self.belief.moments
             self.reckoning, found = self.reckoning.fixed(time_s, fix, noise, moments, self.options)
             if isinstance(found, Turn):
-                self._jump(jump_to(found, moments, layout, lasts=self.lasts))
-                self.unused.append(UnusedReading(time_s, "motion", "", Reason.PHONE_TURNED))
+                self._jump(jump_to(found, layout, lasts=self.lasts))
+                if found.is_new:
+                    self.unused.append(UnusedReading(time_s, "motion", "", Reason.PHONE_TURNED))
                 return True
         if self.lasts:
             layout = fix_layout(layout, self.own.size)

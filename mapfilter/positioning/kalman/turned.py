@@ -7,9 +7,11 @@ compared with where its steps have led, q: turned by δ and drawn out by κ, as 
     z = p + a q + e,    a = (1 + κ) exp(iδ),
 
 whose least squares are a linear regression. Over each of the last stretches δ is compared with the
-error that the belief had at its beginning. Where it is another one, beyond what both may be off,
-fixes lie on the way so turned, and the belief has not followed, it is the heading error from there
-on: a test of a generalised likelihood ratio over the time of the jump (Willsky & Jones 1976).
+error that the belief had at its beginning; q has what the belief knows of a rate of turns. Where δ
+is another one, beyond what both may be off, fixes lie on the way so turned, and the belief has not
+followed, it is the heading error from there on: a test of a generalised likelihood ratio over the
+time of the jump (Willsky & Jones 1976). Errors of steps and of headings, one by one, are small
+beside those of fixes, and left out.
 """
 
 from __future__ import annotations
@@ -26,27 +28,50 @@ from mapfilter.geodesy import wrap_rad
 
 _MOST_ROWS, _LEAST_ROWS, _APART_M = 30, 6, 5.0
 """Fixes that are kept, those of a stretch at least, and the way between two of them."""
-FIX_S = 5.0
-"""Time in which a walker goes so far."""
-_LEAST_FIX_SD_M = 7.5
-"""Fixes between houses are off to one side for a while, beyond what they state."""
+_LEAST_FIX_SD_M, _LATE_S = 7.5, 2.0
+"""Fixes between houses are off to one side for a while, beyond what they state; and by the way of
+the time by which a receiver may be late, which a corner would turn."""
 _LEAST_TURN_RAD, _FOLLOWED_RAD, _LEAST_NATS = radians(20.0), radians(10.0), 12.0
 """Smallest jump, the difference below which the belief has followed it, and the log-likelihood
 ratio at which it is one."""
 _SHORTEST, _LONGEST, _MOST_MISFIT = 0.7, 1.4, 2.0
 """Lengths of the way by fixes to that by steps between which they are the same way; largest mean
 square of what is left of fixes, in their variances."""
-_LEAST_SD_RAD = radians(3.0)
+_LEAST_SD_RAD, _FOUND_RAD = radians(3.0), radians(6.0)
+"""Least deviation of an angle, and that from which on it is left to the filter."""
 
 
 class Turn(NamedTuple):
-    """The heading error since a jump, and where that leads: deviations are of one axis."""
+    """The heading error since a jump, and where that leads; ``sd_m`` is of one axis.
+
+    ``shared_m_rad`` is the covariance of east and of north with the angle. It is new where it is
+    not a better one of the same jump.
+    """
 
     turned_rad: float
     sd_rad: float
     east_m: float
     north_m: float
     sd_m: float
+    shared_m_rad: tuple[float, float] = (0.0, 0.0)
+    is_new: bool = True
+
+
+class _Row(NamedTuple):
+    """A fix, where steps have led at its time, and what the belief had.
+
+    ``variance_m2`` is that of the fix along one axis, ``turned_rad`` the belief's heading error
+    less what a rate of turns has added since the first fix, and ``turned_rad2`` its variance.
+    """
+
+    time_s: float
+    way_east_m: float
+    way_north_m: float
+    east_m: float
+    north_m: float
+    variance_m2: float
+    turned_rad: float
+    turned_rad2: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,58 +82,98 @@ class RecentWay:
     ----------
     east_m, north_m : float
         Where they have led, from anywhere.
-    rows : tuple of tuple of float
-        The same at fixes, with east and north of each and its variance along one axis, and the
-        heading error that the belief had there and its variance.
+    by_rate_rad : float
+        What a lasting error of the rate of turns, as the belief has it, has added to headings.
+    rows : tuple of _Row
+        The fixes.
+    is_turning : bool
+        Whether a jump was found whose angle is not known well yet.
     """
 
     east_m: float = 0.0
     north_m: float = 0.0
-    rows: tuple[tuple[float, ...], ...] = ()
+    by_rate_rad: float = 0.0
+    rows: tuple[_Row, ...] = ()
+    is_turning: bool = False
 
-    def moved(self, step: MotionStep) -> RecentWay:
-        """Add a step; one without a length or heading breaks the way off."""
-        if not self.rows or step.step_m == 0:
+    def moved(self, step: MotionStep, by_rate_rad: float) -> RecentWay:
+        """Add a step, and what a rate of turns adds to headings over its time.
+
+        A step without a length or heading breaks the way off.
+        """
+        if not self.rows or (step.step_m == 0 and by_rate_rad == 0):
             return self
-        if not (isfinite(step.step_m) and isfinite(step.heading_rad)):
+        if step.step_m != 0 and not (isfinite(step.step_m) and isfinite(step.heading_rad)):
             return RecentWay()
-        east_m = self.east_m + step.step_m * cos(step.heading_rad)
-        north_m = self.north_m + step.step_m * sin(step.heading_rad)
-        return replace(self, east_m=east_m, north_m=north_m)
+        by_rate_rad += self.by_rate_rad
+        east_m, north_m = self.east_m, self.north_m
+        if step.step_m != 0:
+            east_m += step.step_m * cos(step.heading_rad + by_rate_rad)
+            north_m += step.step_m * sin(step.heading_rad + by_rate_rad)
+        return RecentWay(east_m, north_m, by_rate_rad, self.rows, self.is_turning)
 
     def at_fix(
-        self, east_m: float, north_m: float, sd_m: float, turned_rad: float, turned_sd_rad: float
+        self,
+        time_s: float,
+        place: tuple[float, float, float],
+        turned: tuple[float, float],
+        lasting: tuple[float, float],
     ) -> tuple[RecentWay, Turn | None]:
         """Return it after a fix, and the turn of a jump that the fix has shown.
 
         Parameters
         ----------
-        east_m, north_m, sd_m : float
-            Of the fix; its deviation along one axis.
-        turned_rad, turned_sd_rad : float
-            The heading error that the belief has, and its deviation.
+        time_s : float
+        place : (float, float, float)
+            East and north of the fix in m, and its variance along one axis.
+        turned : (float, float)
+            The heading error that the belief has, and its variance.
+        lasting : (float, float)
+            Deviation and time of the part of its error that lasts: what several fixes share in that
+            time counts once.
         """
-        here = self.east_m, self.north_m
-        if self.rows and hypot(here[0] - self.rows[-1][0], here[1] - self.rows[-1][1]) < _APART_M:
-            return self, None
-        variance_m2 = max(sd_m, _LEAST_FIX_SD_M) ** 2
-        row = (*here, east_m, north_m, variance_m2, turned_rad, turned_sd_rad**2)
+        east_m, north_m, variance_m2 = place
+        gone_m = mps = 0.0
+        if self.rows:
+            last = self.rows[-1]
+            gone_m = hypot(self.east_m - last.way_east_m, self.north_m - last.way_north_m)
+            if gone_m < _APART_M:
+                return self, None
+            since_s = max(time_s - last.time_s, 1e-3)
+            mps = gone_m / since_s
+            variance_m2 += 2 * lasting[0] ** 2 * lasting[1] / since_s
+        variance_m2 = max(variance_m2, _LEAST_FIX_SD_M**2) + (_LATE_S * mps) ** 2
+        now_rad = turned[0] - self.by_rate_rad
+        row = _Row(
+            *(time_s, self.east_m, self.north_m, east_m, north_m, variance_m2),
+            *(now_rad, turned[1]),
+        )
         rows = (*self.rows, row)[-_MOST_ROWS:]
         after = replace(self, rows=rows)
         if len(rows) < _LEAST_ROWS:
             return after, None
         given = np.array(rows)
         found = _Stretches.of(given)
-        turned = np.angle(found.factor)
-        off = wrap_rad(turned - given[:, 5])
-        nats = off**2 / (2 * (found.sd_rad**2 + given[:, 6]))
+        turns = np.angle(found.factor)
+        off = wrap_rad(turns - [one.turned_rad for one in rows])
+        nats = found.nats(off, np.array([one.turned_rad2 for one in rows]))
         shown = (np.abs(off) >= _LEAST_TURN_RAD) & (nats >= _LEAST_NATS) & found.fits
-        shown &= np.abs(wrap_rad(turned - turned_rad)) >= _FOLLOWED_RAD
+        if not self.is_turning:
+            shown &= np.abs(wrap_rad(turns - now_rad)) >= _FOLLOWED_RAD
         if not shown.any():
             return after, None
-        best = int(np.argmax(np.where(shown, nats, -1.0)))
-        size = given.shape[0] - best
-        return replace(after, rows=rows[best:]), found.turn(best, complex(*here), size)
+        # A stretch that has shown it may have begun before the jump.
+        left_m2 = np.where(found.fits, found.residual_m2 + _followed_m2(given), np.inf)
+        best = int(np.argmin(left_m2))
+        turn = found.turn(best, complex(self.east_m, self.north_m), len(rows) - best)
+        is_found = turn.sd_rad <= _FOUND_RAD
+        if is_found:
+            # What the belief had before is no longer compared with.
+            told = {"turned_rad": turn.turned_rad, "turned_rad2": turn.sd_rad**2}
+            rows = tuple(one._replace(**told) for one in rows[best:])
+        turned_rad = float(wrap_rad(turn.turned_rad + self.by_rate_rad))
+        turn = turn._replace(turned_rad=turned_rad, is_new=not self.is_turning)
+        return replace(after, rows=rows, is_turning=not is_found), turn
 
 
 class _Stretches(NamedTuple):
@@ -123,6 +188,8 @@ class _Stretches(NamedTuple):
         Sum of squares of the way about its mean.
     variance_m2 : (N,) array
         Mean variance of fixes.
+    residual_m2 : (N,) array
+        Sum of squares of what is left of the fixes.
     fits : (N,) bool array
         Whether the fixes lie on the way.
     """
@@ -132,27 +199,27 @@ class _Stretches(NamedTuple):
     mean_fix: np.ndarray
     spread_m2: Floats
     variance_m2: Floats
+    residual_m2: Floats
     fits: np.ndarray
 
     @classmethod
     def of(cls, rows: Floats) -> _Stretches:
-        # About the last fix: sums of squares of coordinates of a country lose digits.
-        about = rows[:, :4] - rows[-1, :4]
-        way, fix = about[:, 0] + 1j * about[:, 1], about[:, 2] + 1j * about[:, 3]
+        """Return the regressions of rows whose columns are those of :class:`_Row`."""
+        # From the last fix: sums of squares of coordinates of a country lose digits.
+        last = rows[-1, 1] + 1j * rows[-1, 2], rows[-1, 3] + 1j * rows[-1, 4]
+        way, fix = rows[:, 1] + 1j * rows[:, 2] - last[0], rows[:, 3] + 1j * rows[:, 4] - last[1]
         count = np.arange(len(rows), 0, -1.0)
         mean_way, mean_fix = _sums(way) / count, _sums(fix) / count
         spread = _sums(np.abs(way) ** 2) - count * np.abs(mean_way) ** 2
         spread = np.maximum(spread, 1e-6)
-        both = _sums(np.conj(way) * fix) - count * np.conj(mean_way) * mean_fix
-        left = _sums(np.abs(fix) ** 2) - count * np.abs(mean_fix) ** 2 - np.abs(both) ** 2 / spread
-        variance = _sums(rows[:, 4]) / count
-        factor = both / spread
-        fits = (left <= _MOST_MISFIT * variance * np.maximum(2 * count - 4, 1.0)) & (
-            count >= _LEAST_ROWS
-        )
+        cross = _sums(np.conj(way) * fix) - count * np.conj(mean_way) * mean_fix
+        variance, factor = _sums(rows[:, 5]) / count, cross / spread
+        residual = _sums(np.abs(fix) ** 2) - count * np.abs(mean_fix) ** 2
+        residual -= np.abs(cross) ** 2 / spread
+        fits = residual <= _MOST_MISFIT * variance * np.maximum(2 * count - 4, 1.0)
         fits &= (np.abs(factor) >= _SHORTEST) & (np.abs(factor) <= _LONGEST)
-        last = complex(*rows[-1, :2]), complex(*rows[-1, 2:4])
-        return cls(factor, mean_way + last[0], mean_fix + last[1], spread, variance, fits)
+        fits &= count >= _LEAST_ROWS
+        return cls(factor, mean_way + last[0], mean_fix + last[1], spread, variance, residual, fits)
 
     @property
     def sd_rad(self) -> Floats:
@@ -160,18 +227,40 @@ class _Stretches(NamedTuple):
         size = np.maximum(np.abs(self.factor), _SHORTEST)
         return np.asarray(np.sqrt(self.variance_m2 / self.spread_m2) / size)
 
+    def nats(self, off_rad: Floats, others_rad2: Floats) -> Floats:
+        """Return the log-likelihood ratios of directions to others, which have variances.
+
+        That of a fixed direction is ``|a| Σ|q - q̄|² (1 - cos off) / σ²``: large angles count by
+        their chord.
+        """
+        size = np.maximum(np.abs(self.factor), _SHORTEST)
+        variance = self.variance_m2 / (self.spread_m2 * size)
+        return np.asarray(2 * np.sin(off_rad / 2) ** 2 / (variance + others_rad2))
+
     def turn(self, index: int, here: complex, count: int) -> Turn:
         """Return the turn by one of them, and where it leads."""
         off = here - self.mean_way[index]
         place = self.mean_fix[index] + self.factor[index] * off
         share = 1 / count + abs(off) ** 2 / self.spread_m2[index]
+        # By the angle alone, a place off the middle moves across the way to it.
+        shared = 1j * self.factor[index] * off * self.sd_rad[index] ** 2
         return Turn(
             float(np.angle(self.factor[index])),
             hypot(float(self.sd_rad[index]), _LEAST_SD_RAD),
             float(place.real),
             float(place.imag),
             sqrt(float(self.variance_m2[index] * share)),
+            (float(shared.real), float(shared.imag)),
         )
+
+
+def _followed_m2(rows: Floats) -> Floats:
+    """Return what is left of the fixes before each, as the belief had headings at the first."""
+    off = rows[:, 3] + 1j * rows[:, 4] - (rows[0, 3] + 1j * rows[0, 4])
+    off -= np.exp(1j * rows[0, 6]) * (rows[:, 1] + 1j * rows[:, 2] - complex(*rows[0, 1:3]))
+    sums, squares = np.cumsum(off), np.cumsum(np.abs(off) ** 2)
+    left = squares - np.abs(sums) ** 2 / np.arange(1.0, len(rows) + 1)
+    return np.concatenate([[0.0], left[:-1]])
 
 
 def _sums(values: np.ndarray) -> np.ndarray:

@@ -67,6 +67,8 @@ class Pace:
         Mean speed while it moves, and that of the last seconds.
     fastest_mps : float
         Largest speed of a row.
+    last_mps : float
+        Speed of the last row.
     """
 
     motion_s: float = nan
@@ -78,6 +80,7 @@ class Pace:
     speed_mps: float = _WALK_MPS
     recent_mps: float = _WALK_MPS
     fastest_mps: float = 0.0
+    last_mps: float = 0.0
 
     @property
     def reports_always(self) -> bool:
@@ -128,6 +131,7 @@ class Pace:
                 # By time: of two rows at almost the same one, the speed would be any.
                 lasted_s = max(lasted_s, covered_s) if covered_s > row_s else lasted_s
                 speed_mps += (gone_m - speed_mps * lasted_s) / (_SPEED_S * max(interval_s, 1.0))
+        row_mps = self._row_mps(gone_m, since_s, covered_s)
         pace = Pace(
             time_s,
             time_s if goes else self.stepped_s,
@@ -137,9 +141,15 @@ class Pace:
             self.rests or (measured and not goes),
             speed_mps,
             recent_mps,
-            max(self.fastest_mps, self._row_mps(gone_m, since_s, covered_s)),
+            max(self.fastest_mps, row_mps),
+            row_mps,
         )
         return pace, Going(gone_m, measured, moves)
+
+    def braked_mps2(self, time_s: float) -> float:
+        """Return how a vehicle has braked that rests at a time; 0 from a walker's speed."""
+        lasted_s = max(time_s - self.motion_s, self.interval_s)
+        return self.last_mps / lasted_s if self.last_mps > WALKERS_MPS and lasted_s > 0 else 0.0
 
     def slowed(self, strolled_mps: float) -> Pace:
         """Return the pace after a way that was shown to be slow, at a speed."""

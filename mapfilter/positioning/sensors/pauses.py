@@ -17,8 +17,6 @@ GAP_S = 5.0
 _SILENT_S, _KNOWN_REPORTS = 10.0, 10
 """After so long without a row of any kind a recording has paused; reports by which it is known how
 often they come."""
-_AT_REST_S = 60.0
-"""Usual time between rows of a logger at rest that else writes what changes."""
 _RECENT_REPORTS = 20
 
 
@@ -84,11 +82,10 @@ def unrecorded_s(
     """
     silent_s = times.silent_s(time_s)
     if pace.reports_always:
-        since_s = time_s - pace.motion_s
-        if rested and not going.moves and (times.reports > 0 or since_s <= _AT_REST_S):
-            # Whoever stands before and after has stood. Reports would show a drive from one stop
-            # to another; without any a long pause may be one.
+        if rested and not going.moves:
+            # Whoever stands before and after a pause has stood, as with the ignition off.
             return 0.0
+        since_s = time_s - pace.motion_s
         if going.measured and since_s > longest_s(pace):
             silent_s = since_s
     if silent_s == 0:

@@ -9,7 +9,9 @@ rest itself has to be shown, too: where levels could have shown it, and did not,
 doubt from 45 m on, at the pace before, beyond what is measured. How levels change then depends on
 the distance.
 
-A vehicle does not turn where it stands: an odometer of zeros with the turn of a corner is dead.
+A vehicle does not turn where it stands: an odometer whose zeros began at once, beyond usual
+braking, and have the turn of a corner, is dead. Wheel sensors also read zero while one creeps into
+a parking lot.
 """
 
 from __future__ import annotations
@@ -46,8 +48,10 @@ _STROLL_SHARE = 0.5
 """Share of that variance which a way as measured explains, where it is compared with being
 elsewhere: with all of it, the two could hardly be told apart after 30 m."""
 _LEFT_M, _SHOWABLE_NATS = 45.0, -2.5
+_BRAKES_MPS2 = 5.0
+"""Beyond usual braking."""
 _CORNER_RAD, _CORNER_S = radians(45.0), 10.0
-"""Turn within some seconds that no bias of a gyroscope adds up to, nor a vehicle that creeps."""
+"""Turn within some seconds that no bias of a gyroscope adds up to."""
 _SHOWN_NATS, _SHOWN_AGAIN_NATS = -1.0, -5.0
 """Way from which on a position is in doubt, and sum of levels that do not change at all above which
 levels could not show a rest; the sum at or below which they do, and do again after a doubt."""
@@ -83,6 +87,8 @@ class Rest:
         Whether levels could have shown the rest by now, and did not.
     measured_m : float
         Way in m that was measured since then: 0 at rest.
+    braked_mps2 : float
+        How a vehicle has braked to it.
     turned_rad, turned_s : float
         Sum of recent turns that were measured without a way or a heading, and the time of the last.
     """
@@ -100,15 +106,17 @@ class Rest:
     still_nats: float = 0.0
     is_doubtful: bool = False
     measured_m: float = 0.0
+    braked_mps2: float = 0.0
     turned_rad: float = 0.0
     turned_s: float = -inf
 
     def turned(self, time_s: float, steps: tuple[MotionStep, ...]) -> Rest:
         """Add turns without a way: a vehicle that takes a corner is carried on.
 
-        Headings beside them may be courses of a receiver, which turn at rest.
+        Headings beside turns may be courses of a receiver, which turn at rest.
         """
-        if self.is_carried or self.pace_mps <= WALKERS_MPS:
+        is_driven = self.braked_mps2 > _BRAKES_MPS2 and self.pace_mps > WALKERS_MPS
+        if not is_driven or self.is_carried:
             return self
         turns = [s.turn_rad for s in steps if isfinite(s.turn_rad) and not isfinite(s.heading_rad)]
         if not turns:
@@ -162,6 +170,7 @@ class Rest:
             still_nats,
             self._in_doubt(time_s, left_nats, still_nats, measured_m) and nats < _CARRIED_NATS,
             measured_m,
+            self.braked_mps2,
             self.turned_rad,
             self.turned_s,
         )

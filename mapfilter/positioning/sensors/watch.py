@@ -156,7 +156,11 @@ def _followed(
         if not steps:
             return watch, epoch, Reason.USED
         watch = watch._moving(time_s)
-    rest = watch.rest or Rest(watch.known_s, pace_mps=step_unit_m * pace.speed_mps)
+    rest = watch.rest or Rest(
+        watch.known_s,
+        pace_mps=step_unit_m * pace.speed_mps,
+        braked_mps2=known.braked_mps2(time_s) if going.measured else 0.0,
+    )
     was_carried = rest.is_carried
     rest = rest.heard(time_s, epoch.radio, step_unit_m * going.gone_m).turned(time_s, steps)
     why = Reason.USED

@@ -14,6 +14,8 @@ _JUMP_MPS, _JUMP_MPS2 = 15.0, 30.0
 _FULL_SCALE_MPS = 55.0
 """Marks are the ends of scales (255 km/h, 65 m/s): other speeds between zeros are good ones."""
 _NEAR_S = 1.0
+_CORNER_RAD = np.pi / 4
+"""Turn of a vehicle between two rests that has moved in between."""
 
 
 def usable_rows(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -22,7 +24,7 @@ def usable_rows(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
     A speed that stays the same to the last digit, far above those before and after it, is no
     motion, and missing. A missing yaw rate between rows that have one, each at most a second away,
     is theirs in proportion to time. Rows without a speed are dropped but for those with a yaw rate
-    where speeds are missing for long: there they tell how it turned.
+    where speeds are missing for long while it moves: there they tell how it turned.
 
     Parameters
     ----------
@@ -67,15 +69,22 @@ def usable_rows(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
 
 
 def _telling(time_s: Floats, speed: Floats, rate: Floats) -> Bools:
-    """Return the rows with speeds, and between them, over gaps of these, those with yaw rates."""
+    """Return the rows with speeds, and over gaps of these, also the last one, those with yaw rates.
+
+    Between two rests there is a gap where the yaw rates of the time take a corner.
+    """
     kept = np.isfinite(speed)
     if not kept.any():
         return ~kept
     known, others = np.flatnonzero(kept), np.flatnonzero(~kept & np.isfinite(rate))
     after = np.searchsorted(known, others)
-    between = (after > 0) & (after < known.size)
-    gaps = odometry_gaps(time_s[known], speed[known])
-    kept[others[between][gaps[after[between]]]] = True
+    ends_s = np.append(time_s[known], time_s[-1])
+    turned = np.zeros(ends_s.size)
+    np.add.at(turned, after, np.diff(time_s, prepend=time_s[0])[others] * rate[others])
+    moves = np.append(np.where(np.abs(turned[:-1]) >= _CORNER_RAD, np.nan, speed[known]), np.nan)
+    gaps = odometry_gaps(ends_s, moves)
+    gaps[0] = False
+    kept[others[gaps[after]]] = True
     return kept
 
 

@@ -11,7 +11,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import UNDIRECTED, motion_from_odometry, odometry_gaps
+from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry, odometry_gaps
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S, Compass, YawOffset, yaw_offset
 from mapfilter.tracks.pdr.odometry_rows import usable_rows
@@ -57,7 +57,10 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     standing = _settled(time_s, np.abs(speed) < _STANDING_MPS)
     found = _bias(time_s, rate, standing, None)
     correction = np.interp(time_s, found.time_s, found.offset_rad)
-    turn = motion["turn_rad"].to_numpy() + np.diff(correction, prepend=correction[0])
+    # Over a rest without rows nothing was read of the gyroscope.
+    rested = long_gaps(time_s) & (motion["turn_rad"].to_numpy() == 0)
+    biased = np.where(rested, 0.0, np.diff(correction, prepend=correction[0]))
+    turn = motion["turn_rad"].to_numpy() + biased
     has_rate = bool(np.isfinite(rate).any())
     notes = unusable + _notes(found, int(np.sum(standing & np.isfinite(rate))), has_rate=has_rate)
     # Which way it went meanwhile is as little known as over a gap.
@@ -69,6 +72,10 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
     imu = _noise(time_s, found, float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS)
     notes += _gap_notes(time_s, speed, turn)
+    if rested.any():
+        longest_s = float(np.diff(time_s, prepend=time_s[0])[rested].max())
+        words = number_of(int(rested.sum()), "pause")
+        notes += (f"odometry: {words} (longest {longest_s:.1f} s) between rests, taken as rests",)
     return motion.assign(turn_rad=turn), imu, notes
 
 
@@ -128,7 +135,10 @@ def reckon_velocity(
 def _gap_notes(time_s: Floats, speed: Floats, turn: Floats) -> tuple[str, ...]:
     """Return what is said of gaps, by whether turns are known over them."""
     known = np.flatnonzero(np.isfinite(speed))
-    gaps = np.flatnonzero(odometry_gaps(time_s[known], speed[known]))
+    # Rows without a speed are those of a gap.
+    gaps = odometry_gaps(time_s[known], speed[known])
+    gaps[1:] |= np.diff(known) > 1
+    gaps = np.flatnonzero(gaps)
     if not gaps.size:
         return ()
     first, last = known[gaps - 1], known[gaps]
