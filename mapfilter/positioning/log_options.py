@@ -20,7 +20,7 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_faults import fault_notes
 from mapfilter.tracks.speeds import FASTEST_MPS, speed_fault
 
-STREETS_ALONE = "no cells and no positions in the log: located by the streets alone"
+STREETS_ALONE = "no cells in the log: located by streets, and by positions where it has some"
 
 OptionsT = TypeVar("OptionsT")
 
@@ -148,14 +148,14 @@ def _changed(options: OptionsT, changes: dict[str, Any]) -> OptionsT:
 
 
 def by_streets_alone(options: object, log: TrackLog, database: RadioRouteDatabase) -> bool:
-    """Return whether a log has nothing but motion, so that the streets have to start the filter.
+    """Return whether a log has motion and no cells, so that cells of a database tell nothing.
 
-    The Bayes map filter starts so in a database without cells
-    (:meth:`mapfilter.database.radioroutes.RadioRouteDatabase.without_cells`).
+    The Bayes map filter starts by the streets, or by positions, and takes their rules in a database
+    without cells (:meth:`mapfilter.database.radioroutes.RadioRouteDatabase.without_cells`).
     """
     if not isinstance(options, BayesFilter) or isinstance(options, GridFilter):
         return False
-    measured = (log.radio, log.gnss, log.pseudoranges, log.tdoa)
+    measured = (log.radio, log.tdoa)
     moved = log.motion["step_m"].notna().any()
     return bool(database.cell_ids and moved) and all(table.empty for table in measured)
 

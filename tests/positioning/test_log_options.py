@@ -346,7 +346,9 @@ def test_streets_alone_start_the_filter_where_a_log_of_a_radio_map_has_but_motio
     assert by_streets_alone(BayesFilter(), given, database) is alone
     assert not by_streets_alone(GridFilter(), given, database)
     fix = pd.DataFrame({"time_s": [1.0], "east_m": [0.0], "north_m": [0.0]})
-    assert not by_streets_alone(BayesFilter(), replace(given, gnss=fix), database)
+    # Positions tell as much over roads alone; cells and their times need the map's.
+    assert by_streets_alone(BayesFilter(), replace(given, gnss=fix), database) is alone
+    assert not by_streets_alone(BayesFilter(), replace(given, radio=log().radio), database)
 
 
 def headed_rows(step_m):

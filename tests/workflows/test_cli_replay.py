@@ -296,7 +296,7 @@ def test_a_log_of_motion_alone_is_located_by_the_streets(log, replay, world):
         (log / f"{table}.csv").unlink(missing_ok=True)
     outcome = assert_done(replay(log, "--json", "--filter", "bayes", "--set=output.pictures=all"))
     assert (
-        "no cells and no positions in the log: located by the streets alone"
+        "no cells in the log: located by streets, and by positions where it has some"
         in (outcome.json["notes"])
     )
     database = mf.open_database(world.database)
