@@ -136,9 +136,9 @@ def _gap_notes(time_s: Floats, speed: Floats, turn: Floats) -> tuple[str, ...]:
     """Return what is said of gaps, by whether turns are known over them."""
     known = np.flatnonzero(np.isfinite(speed))
     # Rows without a speed are those of a gap.
-    gaps = odometry_gaps(time_s[known], speed[known])
-    gaps[1:] |= np.diff(known) > 1
-    gaps = np.flatnonzero(gaps)
+    is_gap = odometry_gaps(time_s[known], speed[known])
+    is_gap[1:] |= np.diff(known) > 1
+    gaps = np.flatnonzero(is_gap)
     if not gaps.size:
         return ()
     first, last = known[gaps - 1], known[gaps]
