@@ -20,8 +20,8 @@ from mapfilter._arrow import arrow_bytes
 from mapfilter._types import Bools, Ints
 from mapfilter.tracks.readers.recording import Reading
 
-_DECIMAL = re.compile(r"\s*[-+]?\d+,\d+\s*")
-_THOUSANDS = re.compile(r"\s*[-+]?[1-9]\d{0,2}(,\d{3})+\s*")
+_DECIMAL = re.compile(r"\A\s*[-+]?\d+,\d+\s*")
+_THOUSANDS = re.compile(r"\A\s*[-+]?[1-9]\d{0,2}(,\d{3})+\s*")
 LONGEST_LINE = 1 << 16
 """Characters of a line; a longer one is refused."""
 
