@@ -17,6 +17,12 @@ def database_argument(value: object) -> Argument:
     return Argument("database", value, RadioRouteDatabase | PATH, expected)
 
 
+def optional_database(value: object) -> Argument:
+    """Return the argument ``database`` to be checked, where some filters need none."""
+    expected = "a database of open_database or build, or its path, or None"
+    return Argument("database", value, RadioRouteDatabase | PATH | None, expected)
+
+
 def log_argument(value: object) -> Argument:
     """Return the argument ``log`` to be checked."""
     return Argument("log", value, TrackLog | PATH, "a log of read_log or make_log, or its path")

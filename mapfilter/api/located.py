@@ -11,13 +11,15 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._arguments import Argument, Setting, check_arguments, generator
-from mapfilter.api.given import database_argument, log_argument, opened, read
+from mapfilter.api.given import log_argument, opened, optional_database, read
+from mapfilter.api.mapless import no_sites, over_sites, own_sites
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
 from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.integrity import DEFAULT_RISK
 from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.positioning.log_lacks import NO_MOTION, advice_of, lack_of_log
@@ -47,13 +49,15 @@ class Track:
     positioned : PositionedTrack
         The filter's result: an estimate, snapshots of its hypotheses, and the processor time of
         this process in seconds, without reading the database.
+    database : RadioRouteDatabase or None
+        None where the filter needed no map.
     trace : TraceRecorder or None
         The beliefs and explanations that :meth:`view` shows, where ``record`` asked for them.
     """
 
     positioned: PositionedTrack
     log: TrackLog
-    database: RadioRouteDatabase
+    database: RadioRouteDatabase | None
     trace: TraceRecorder | None = None
 
     @property
@@ -100,12 +104,13 @@ class Track:
         return self.estimate.to_dataframe()
 
     def to_geodataframe(self) -> gpd.GeoDataFrame:
-        """Return the same with points in the CRS of the database, without unlocated epochs."""
+        """Return the same with points in the CRS of the log, without unlocated epochs."""
         return self.estimate.to_geodataframe()
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the track and the ground truth over the streets of the database.
+        """Draw the track and the ground truth over the streets of the database, if there is one.
 
+        Where there is none, the ground is plain.
         A script saves the picture with ``mf.save_picture(axes, "track.png")``.
 
         Parameters
@@ -116,13 +121,16 @@ class Track:
         from mapfilter.report.track import plot_track
         from mapfilter.workflows.served import served_points, street_map
 
-        base = street_map(self.database, served_points(self.database))
-        return plot_track(self.estimate, Truth.of_table(self.log.truth), base, ax=ax)
+        base = None
+        if self.database is not None:
+            base = street_map(self.database, served_points(self.database))
+        truth, fixes_m = Truth.of_table(self.log.truth), self.log.fixes_m
+        return plot_track(self.estimate, truth, base, ax=ax, fixes_m=fixes_m)
 
 
 def locate(
     log: TrackLog | Path | str,
-    database: RadioRouteDatabase | Path | str,
+    database: RadioRouteDatabase | Path | str | None = None,
     filter: Any = DEFAULT,  # noqa: A002
     *,
     seed: int | np.random.Generator = 0,
@@ -138,8 +146,11 @@ def locate(
     log : TrackLog or path
         In the CRS of the database; a path is read as by :func:`mapfilter.read_log` in that CRS.
         Cells that it names by identity (mcc, mnc, lac, ci) get the ids of the database.
-    database : RadioRouteDatabase or path
-        A path is opened by each call; open it once for many logs.
+    database : RadioRouteDatabase, path or None
+        A path is opened by each call; open it once for many logs. Kalman-type filters need none:
+        ``locate(log, filter="ekf")`` is by GNSS fixes and dead reckoning. For levels and timing
+        advances they need sites: ``KalmanFilter().over_sites(plan)``. Without a database a path is
+        read in the UTM zone of its positions, or the CRS of its sites.
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out. What the log states
@@ -165,13 +176,14 @@ def locate(
     StoreError
         A path holds no database, or one that is damaged.
     ConfigError
-        Log or database is neither, the seed is none, the filter is none, a custom filter fails,
+        Log or database is neither, the filter needs a database and there is none, or sites for the
+        radio of the log, the seed is none, the filter is none, a custom filter fails,
         the risk does not lie between 0 and 1, or another argument is of another type.
     """
     check_arguments(
         "locate",
         log_argument(log),
-        database_argument(database),
+        optional_database(database),
         keywords=[
             Setting("ways", ways, bool),
             Setting("snapshots", snapshots, bool),
@@ -180,30 +192,36 @@ def locate(
         ],
     )
     rng = generator("locate", seed)
-    database = opened(database)
-    log = read(log, database.lattice.crs)
-    log = name_by_plan(in_frame(log, database.lattice.crs), database.plan)
-    log = with_range_notes(log, database.plan)
-    options, notes = fitted_to_log(
-        filter_options(filter) if isinstance(filter, str) else filter, log
-    )
-    alone = by_streets_alone(options, log, database)
+    given_filter = filter_options(filter) if isinstance(filter, str) else filter
+    database = None if database is None else opened(database)
+    plan = own_sites(given_filter) if database is None else database.plan
+    log = read(log, plan.crs if plan is not None else "")
+    if plan is None:
+        plan = no_sites(log)
+    else:
+        log = in_frame(log, plan.crs)
+    log = with_range_notes(name_by_plan(log, plan), plan)
+    options, notes = fitted_to_log(given_filter, log)
+    alone = database is not None and by_streets_alone(options, log, database)
     notes = (*notes, STREETS_ALONE) if alone else notes
     given, undirected = with_joined_steps(log, options)
     notes = (*notes, *undirected)
-    bound = as_filter(options, database.without_cells() if alone else database, ways=ways)
+    if database is None:
+        bound: Filter[Any] = over_sites(options, plan)
+    else:
+        bound = as_filter(options, database.without_cells() if alone else database, ways=ways)
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     trace = TraceRecorder(bound) if record else None
     found = loop.locate(given, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)
     notes = _not_located(log, options, found.estimate, database)
-    if alone or not database.cell_ids:
+    if database is not None and (alone or not database.cell_ids):
         notes += advice_of(log, options, found.estimate)
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     return Track(found, log, database, trace)
 
 
 def _not_located(
-    log: TrackLog, options: Any, estimate: TrackEstimate, database: RadioRouteDatabase
+    log: TrackLog, options: Any, estimate: TrackEstimate, database: RadioRouteDatabase | None
 ) -> tuple[str, ...]:
     """Return a note on what a log lacks that was not located, with a remedy."""
     lack = lack_of_log(log, options, estimate, database)

@@ -7,7 +7,7 @@ from typing import Any
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.kalman.filter import KalmanFilter, KalmanTracker
 from mapfilter.positioning.log_options import by_streets_alone
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import PLACE, SERVING
@@ -28,13 +28,13 @@ def lack_of_log(
     log : TrackLog
         What the filter was given.
     options
-        Of the filter.
+        Of the filter, or the filter itself.
     database : RadioRouteDatabase or None
         None where the filter only takes sites.
     """
     if estimate.converged_at is not None:
         return ""
-    if isinstance(options, KalmanFilter):
+    if isinstance(options, KalmanFilter | KalmanTracker):
         if log.gnss.empty and log.radio.empty and log.tdoa.empty:
             scored = " (those of the truth serve for scores only)" if len(log.truth) else ""
             return f"no positions and no radio to start from{scored}{_unused_ranges(log)}"

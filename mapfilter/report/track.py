@@ -21,6 +21,7 @@ from mapfilter.report.canvas import (
     BLACK,
     BLUE,
     GREEN,
+    GREY,
     ORANGE,
     SKY,
     VERMILLION,
@@ -35,6 +36,8 @@ from mapfilter.report.canvas import (
 _MAP_IN = 8.0
 _MARGIN_SHARE = 0.08
 _LEAST_MARGIN_M = 40.0
+_NOWHERE_M = (0.0, 0.0, 2 * _LEAST_MARGIN_M, 2 * _LEAST_MARGIN_M)
+"""Extent without a map and without a position."""
 _TRUTH = "#868686"
 _CLAIMED = (Status.CONVERGED, Status.TRACKING)
 _GONE = (Status.LOST, Status.OUTSIDE)
@@ -44,9 +47,10 @@ _GONE = (Status.LOST, Status.OUTSIDE)
 def plot_track(
     estimate: TrackEstimate,
     truth: Truth | None,
-    base: BaseMap,
+    base: BaseMap | None,
     ax: Axes | None = None,
     *,
+    fixes_m: Floats | None = None,
     title: str = "",
     zoom: bool = True,
 ) -> Axes:
@@ -55,13 +59,18 @@ def plot_track(
     Tracked estimates more than 50 m off are drawn in another colour and shape; those while the
     filter searched, was uncertain or lost are no claims, and small and pale whatever their error.
     Epochs without a position are not drawn; crosses mark the true positions (without truth, the
-    estimates) at which the filter got lost. Without a title it is the filter's name and the outcome
-    of the track; ``zoom`` shows only the surroundings of truth and estimate, not the whole area.
+    estimates) at which the filter got lost. Positions that the log itself holds, such as GNSS
+    fixes, are ``fixes_m``, (k, 2) as east and north. Without a title it is the filter's name and
+    the outcome of the track; ``zoom`` shows only the surroundings of truth and estimate, or without
+    either of the fixes, not the whole area. Without a map (None) the ground is plain.
     """
     if truth is not None and not truth.time_s.size:
         truth = None
-    bounds_m = _surroundings(estimate, truth) if zoom else None
-    shown = base if bounds_m is None else base.zoomed(bounds_m)
+    bounds_m = _surroundings(estimate, truth, fixes_m) if zoom or base is None else None
+    if base is None:
+        shown = BaseMap(bounds_m or _NOWHERE_M)
+    else:
+        shown = base if bounds_m is None else base.zoomed(bounds_m)
     axes = ax
     if axes is None:
         axes = new_figure(_MAP_IN + 0.8, map_height_in(shown, _MAP_IN) + 1.2).subplots()
@@ -73,10 +82,13 @@ def plot_track(
         x, y = frame(truth.east_m, truth.north_m)
         path = Look(linewidth=6.5, solid_capstyle="round", solid_joinstyle="round")
         axes.plot(x, y, color=_TRUTH, zorder=4, label="truth", **path)
-        name = axes.annotate("start", (x[0], y[0]), (0, -14), textcoords="offset points")
-        name.set(ha="center", fontsize=9, path_effects=HALO, zorder=3.5)
-        axes.scatter(x[:1], y[:1], s=50, color="white", edgecolors=BLACK, zorder=11)
+        _name_ends(axes, x, y)
         off = position_errors_m(estimate, truth) > SUCCESS_RADIUS_M
+    elif located.any():
+        _name_ends(axes, *frame(estimate.east_m[located], estimate.north_m[located]))
+    if fixes_m is not None and len(fixes_m):
+        plus = Look(marker="+", color=BLACK, s=45.0, linewidths=0.7, zorder=4.5)
+        axes.scatter(*frame(*fixes_m.T), label="positions of the log", **plus)
     claimed = np.array([status in _CLAIMED for status in estimate.status], dtype=bool)
     tracked = located & claimed
     groups = (
@@ -110,6 +122,14 @@ def plot_track(
     attribute(axes, shown)
     legend(axes, ax, 3)
     return axes
+
+
+def _name_ends(axes: Axes, x: Floats, y: Floats) -> None:
+    """Mark where a path starts and ends; in a round trip one name is below, the other above."""
+    for at, word, offset_pt, colour in ((0, "start", -14, "white"), (-1, "end", 8, GREY)):
+        name = axes.annotate(word, (x[at], y[at]), (0, offset_pt), textcoords="offset points")
+        name.set(ha="center", fontsize=9, path_effects=HALO, zorder=11)
+        axes.scatter(x[at], y[at], s=50, color=colour, edgecolors=BLACK, zorder=9.8)
 
 
 def _lost_m(estimate: TrackEstimate, truth: Truth | None) -> Floats:
@@ -148,13 +168,20 @@ def _outcome(estimate: TrackEstimate, truth: Truth | None) -> str:
     return f"{words}; {last.lower()} at the end" if last in _GONE else words
 
 
-def _surroundings(estimate: TrackEstimate, truth: Truth | None) -> Bounds | None:
-    """Return the extent of all positions with a margin; None when there are none."""
+def _surroundings(
+    estimate: TrackEstimate, truth: Truth | None, fixes_m: Floats | None
+) -> Bounds | None:
+    """Return the extent of all positions with a margin; None when there are none.
+
+    Fixes may be far off, so that they count only where there is nothing else.
+    """
     parts = [np.column_stack([estimate.east_m, estimate.north_m])]
     if truth is not None:
         parts.append(np.column_stack([truth.east_m, truth.north_m]))
     positions = np.concatenate(parts)
     positions = positions[np.isfinite(positions).all(axis=1)]
+    if not len(positions) and fixes_m is not None:
+        positions = fixes_m
     if not len(positions):
         return None
     low, high = positions.min(axis=0), positions.max(axis=0)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._arguments import Argument, Entries, Setting, check_arguments, items
 from mapfilter._html import html_table, shortened
+from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
@@ -120,6 +121,12 @@ class TrackLog:
         """Seconds from the first to the last row of any table; 0 for an empty log."""
         times = np.concatenate([getattr(self, name)["time_s"].to_numpy() for name in TABLES])
         return float(np.ptp(times)) if len(times) else 0.0
+
+    @property
+    def fixes_m(self) -> Floats:
+        """East and north of the GNSS fixes, (k, 2)."""
+        fixes_m: Floats = self.gnss[["east_m", "north_m"]].to_numpy(dtype=np.float64)
+        return fixes_m
 
     @property
     def truth_length_m(self) -> float:

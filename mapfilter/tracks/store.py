@@ -246,7 +246,8 @@ def _no_log(path: Path, expected: str) -> MapfilterError:
     if tables:
         got = f"{tables[0].name} without a {HEAD} beside it"
         expected = f'{HEAD} with the CRS, such as {{"crs": "EPSG:32635"}}'
-        return fail(InputError, str(path), expected, got, "left out when the log was made by hand")
+        hint = "left out when the log was made by hand, or recordings: name the files with --log"
+        return fail(InputError, str(path), expected, got, hint)
     if path.is_file():
         hint = "name the folder that it lies in"
         if path.stem not in TABLES and path.name != HEAD:

@@ -177,7 +177,7 @@ def run_replay(
             on_snapshots=draw_belief,
         )
         into = new if count == 1 else new / name
-        shown = TrackPictures(track.estimate, truth, base) if drawn else None
+        shown = TrackPictures.of_log(track.estimate, log, base) if drawn else None
         if shown is not None:
             pictures = begin_pictures(shown, drawing, pictures)
         baseline = baselines.of(log)

@@ -22,6 +22,7 @@ from mapfilter.evaluation.accuracy import Truth
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.ground import MAX_PANELS, BaseMap
+from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.drawer import DRAWING_LIBRARY, drawer_process
 from mapfilter.workflows.results import PICTURES
 
@@ -63,21 +64,35 @@ class TrackPictures:
     truth : Truth or None
         Its true positions, where the log has them.
     base : BaseMap or None
-        The map below; without any, errors alone are drawn.
+        The map below; without any, the ground is plain, and evidence is not drawn.
+    fixes_m : (k, 2) array or None
+        East and north of the positions that the log itself holds, such as GNSS fixes.
     """
 
     estimate: TrackEstimate
     truth: Truth | None
     base: BaseMap | None
+    fixes_m: Floats | None = None
+
+    @classmethod
+    def of_log(cls, estimate: TrackEstimate, log: TrackLog, base: BaseMap | None) -> TrackPictures:
+        """Return what the pictures of a log show that was located as ``estimate``."""
+        return cls(estimate, Truth.of_table(log.truth), base, log.fixes_m)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the pictures that there are, besides that of the belief."""
         error = (_ERROR,) if self.truth is not None else ()
         if self.base is None:
-            return error
+            return (_TRACK, *error) if self._is_anywhere else error
         has_evidence = self.estimate.evidence is not None and len(self.estimate) > 0
         return (_TRACK, *error, *((_EVIDENCE,) if has_evidence else ()))
+
+    @property
+    def _is_anywhere(self) -> bool:
+        has_fixes = self.fixes_m is not None and len(self.fixes_m) > 0
+        located = bool(np.isfinite(self.estimate.east_m).any())
+        return located or has_fixes or self.truth is not None
 
 
 def begin_belief(
@@ -161,8 +176,7 @@ def _drawn(shown: TrackPictures, name: str, single_reports_m: Floats | None) -> 
     if name == _ERROR:
         assert truth is not None
         return plot_error_over_distance(estimate, truth, single_reports_m=single_reports_m)
-    assert base is not None
-    return plot_track(estimate, truth, base)
+    return plot_track(estimate, truth, base, fixes_m=shown.fixes_m)
 
 
 def _candidates(snapshot: Snapshot) -> float:

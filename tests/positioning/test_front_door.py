@@ -77,6 +77,32 @@ def test_a_picture_is_saved_as_the_commands_save_theirs(track, tmp_path):
         mf.save_picture(figure, tmp_path / "track.bmp")
 
 
+@pytest.mark.parametrize("filter_", ["ekf", mf.KalmanFilter(), mf.KalmanFilter], ids=str)
+def test_a_filter_without_a_map_needs_no_database(filter_, tmp_path):
+    walk = walk_log()
+    fixes = walk.truth[["time_s", "east_m", "north_m"]]
+    log = mf.make_log(walk.crs, motion=walk.motion, gnss=fixes, truth=walk.truth)
+    found = mf.locate(log, None, filter_)
+    assert found.database is None
+    assert mf.score(found, log.truth).error_mean_m < 20
+    assert any(one.get_text() == "end" for one in found.plot().texts)
+    assert found.view() is not None
+    mf.write_log(log, tmp_path / "log")
+    by_path = mf.locate(tmp_path / "log", filter=filter_)
+    pd.testing.assert_frame_equal(by_path.to_dataframe(), found.to_dataframe())
+
+
+def test_a_filter_without_a_map_may_have_sites_of_its_own(database):
+    over_sites = mf.KalmanFilter().over_sites(database.plan)
+    found = mf.locate(walk_log(), filter=over_sites).to_dataframe()
+    by_database = mf.locate(walk_log(), database, over_sites).to_dataframe()
+    pd.testing.assert_frame_equal(found, by_database)
+    still = mf.make_log(walk_log().crs, motion=walk_log().motion)
+    for filter_ in ("ekf", over_sites):
+        (note,) = mf.locate(still, filter=filter_).log.notes
+        assert note == "nothing is located: no positions and no radio to start from"
+
+
 @pytest.mark.parametrize("filter_", [mf.CandidateFilter(), "candidate"], ids=str)
 def test_a_filter_is_given_by_options_or_name(filter_, database, track):
     found = mf.locate(walk_log(), database, filter_)

@@ -43,6 +43,11 @@ def world(folder, database_path):
     }
 
 
+def own(database):
+    """A custom filter, which is given a database."""
+    raise AssertionError(database)
+
+
 def refused(call, *expected):
     with pytest.raises(mf.MapfilterError) as caught:
         call()
@@ -117,6 +122,12 @@ def test_exchanged_arguments_are_named_with_their_order(world, order, call):
     [
         ("locate, log: expected a log of read_log", lambda w: mf.locate(None, w["database"])),
         ("locate, database: expected a database of", lambda w: mf.locate(w["log"], 3)),
+        ("for the filter bayes, found None (likely: left out; ekf,", lambda w: mf.locate(w["log"])),
+        ("for the filter own, found None", lambda w: mf.locate(w["log"], filter=own)),
+        (
+            "for the radio of the log, found None (likely: KalmanFilter().over_sites(plan)",
+            lambda w: mf.locate(w["log"], None, mf.KalmanFilter()),
+        ),
         ("locate_reports, log: expected", lambda w: mf.locate_reports(3, w["database"])),
         ("locate_reports, database[0]", lambda w: mf.locate_reports(w["log"], [3])),
         ("score, truth: expected a table such as log.truth", lambda w: mf.score(w["track"], None)),

@@ -394,6 +394,27 @@ def test_a_track_shows_where_it_got_lost(area, with_truth):
     assert all(one.get_label() != "got lost here" for one in axes.collections)
 
 
+@pytest.mark.parametrize("switch_s", [0.0, None])
+def test_a_track_without_a_map_shows_its_ends_and_the_fixes(area, switch_s):
+    """Where nothing was located, the fixes give the extent."""
+    fixes_m = np.array([[WEST_M + 20.0, NORTH_M - 300.0], [WEST_M + 90.0, NORTH_M - 280.0]])
+    axes = plot_track(estimate(area, switch_s), None, None, fixes_m=fixes_m)
+    (drawn,) = (one for one in axes.collections if one.get_label() == "positions of the log")
+    (x, y) = np.asarray(drawn.get_offsets()).T
+    assert (np.ptp(x), np.ptp(y)) == pytest.approx((70.0, 20.0))
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    assert switch_s == 0.0 or (left < x.min() < x.max() < right and low < y.min() < y.max() < high)
+    ends = {"start", "end"} if switch_s == 0.0 else set()
+    assert {"start", "end"} & {one.get_text() for one in axes.texts} == ends
+    assert axes.get_xlabel() == "east of local origin / m"
+
+
+def test_a_track_without_a_map_or_a_position_is_an_empty_square(area, tmp_path):
+    axes = plot_track(estimate(area, None), None, None)
+    save(axes, tmp_path / "t.png")
+    assert axes.get_title() == "candidate filter: did not converge"
+
+
 def test_local_frame_and_scale_bar(area):
     axes = Figure().subplots()
     frame = draw_base(axes, area.base)

@@ -99,6 +99,7 @@ def test_tables_without_a_head(folder):
         told = refusal_of(read, path)
         assert f"{folder}: expected log.json with the CRS" in told
         assert "found motion.csv without a log.json beside it" in told
+        assert "or recordings: name the files with --log" in told
 
 
 def test_a_table_in_place_of_its_folder(folder):

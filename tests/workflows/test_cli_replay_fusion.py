@@ -190,11 +190,21 @@ def test_replay_needs_a_plan_and_no_map(tmp_path):
     assert told["error_mean_m"] < 14
     estimate = read_estimate(tmp_path / "out" / "estimate.parquet")
     assert np.hypot(estimate.east_m - truth[:, 0], estimate.north_m - truth[:, 1])[-1] < 20
-    assert (tmp_path / "out" / "error.png").is_file()
+    assert {"track.png", "error.png"} == {file.name for file in (tmp_path / "out").glob("*.png")}
     done = CliRunner().invoke(app, [*words, *plan, "--smooth"], catch_exceptions=False)
     assert json.loads(done.stdout.splitlines()[-1])["error_mean_m"] < told["error_mean_m"]
     with pytest.raises(ConfigError, match=r"cells\.plan"):
         CliRunner().invoke(app, words, catch_exceptions=False)
+
+
+@pytest.mark.parametrize("table", ["gnss", "motion"])
+def test_a_replay_without_map_and_truth_draws_the_track_where_it_has_a_position(tmp_path, table):
+    log, _ = walk(motion=True, gnss=True, steps=20)
+    write_log(make_log(CRS, **{table: getattr(log, table)}), tmp_path / "walk")
+    words = ["replay", "--filter", "ekf", "--log", str(tmp_path / "walk")]
+    CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out")], catch_exceptions=False)
+    drawn = [file.name for file in (tmp_path / "out").glob("*.png")]
+    assert drawn == (["track.png"] if table == "gnss" else [])
 
 
 def test_replay_takes_antennas_from_their_files(tmp_path):

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -54,6 +55,14 @@ def test_another_process_draws_the_same_bytes(monkeypatch):
     beside, started = _pngs()
     assert started == 1
     assert beside == here
+
+
+def test_without_a_map_there_is_a_track_where_there_is_a_position():
+    shown = replace(_shown(), base=None)
+    assert shown.names == ("track.png", "error.png")
+    nowhere = replace(shown, truth=None, fixes_m=np.empty((0, 2)))
+    assert nowhere.names == ()
+    assert replace(nowhere, fixes_m=np.ones((1, 2))).names == ("track.png",)
 
 
 def _killed(parent):
