@@ -284,20 +284,34 @@ def test_a_belief_without_positions_is_moved_as_it_reads_headings_with_draws_of_
     assert rng.bit_generator.state == other.bit_generator.state
 
 
-def test_a_measured_position_leaves_no_doubt_of_a_jump():
-    plain, other = turned_phone(Hold()), turned_phone()
-    for readings in ({"fix": FIX}, {"ranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)}):
-        assert move(walking(held=(plain, other)), **readings)[0].held == ()
-        # Where a turned phone has taken over, the one as measured may come back.
+FIXED = {"fix": FIX}
+RANGED = {"ranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)}
+
+
+def test_pseudoranges_leave_no_doubt_of_a_jump_and_fixes_weigh_other_beliefs():
+    """Pseudoranges weigh the main belief alone."""
+    plain, other = turned_phone(Hold(), 4), turned_phone()
+    assert move(walking(held=(plain, other)), **RANGED)[0].held == ()
+    assert move(walking(held=(plain, other)), **FIXED)[0].held == (plain, other)
+    nothing = {"ranges": (Pseudorange("G", nan, 1.0, (0, 0, 0)),)}
+    assert len(move(walking(held=(plain, other)), **nothing)[0].held) == 2
+    # A heading may jump where there is a fix.
+    raw = MotionStep(2.0, 2.0, 1.6)
+    assert len(move(walking(), raw, **FIXED)[0].held) == 3
+    assert move(walking(), raw, **RANGED)[0].held == ()
+
+
+def test_once_a_turned_phone_has_taken_over_positions_begin_the_one_as_measured():
+    plain, other = turned_phone(Hold(), 4), turned_phone()
+    for readings, left in ((RANGED, ()), (FIXED, (other,))):
         state = walking(held=(plain, other), hold=Hold(1.0, 3.0))
-        assert move(state, **readings)[0].held == (plain,)
-        (back,) = move(replace(state, held=(other,)), **readings)[0].held
+        assert set(move(state, **readings)[0].held) == {plain, *left}
+        *rest, back = move(replace(state, held=(other,)), **readings)[0].held
+        assert tuple(rest) == left
         assert (back.hold, back.log_prior) == (Hold(), pytest.approx(np.log(1 / 3)))
         assert move(replace(state, held=(), status=Status.LOST), **readings)[0].held == ()
         searching = replace(state, held=(), belief=belief(SEARCHING))
         assert move(searching, **readings)[0].held == ()
-    nothing = {"ranges": (Pseudorange("G", nan, 1.0, (0, 0, 0)),)}
-    assert len(move(walking(held=(plain, other)), **nothing)[0].held) == 2
 
 
 @pytest.mark.parametrize(

@@ -125,15 +125,22 @@ def with_a_fix(epoch, log):
     return replace(epoch, fix=GnssFix(*place, 25.0, 25.0))
 
 
-def test_measured_positions_leave_no_doubt():
-    log, rng = log_of(1, reversed_), np.random.default_rng(1)
+@pytest.mark.parametrize("change", [None, reversed_, lambda heading: heading + np.pi / 2])
+def test_fixes_tell_whether_the_phone_was_turned(change):
+    """Those right after a jump agree with both explanations of it."""
+    log, rng = log_of(1, change), np.random.default_rng(1)
     state = WATCHED.begin_at(log.truth["east_m"][0], log.truth["north_m"][0], 5.0, rng)
-    since = 0
+    off_m, claimed = [], []
     for epoch in epochs(log):
-        since += bool(since or state.held)
-        state, _ = WATCHED.step(state, with_a_fix(epoch, log) if since else epoch, rng)
-        assert not (since and state.held)
-    assert since > 100
+        measured = with_a_fix(epoch, log)
+        state, output = WATCHED.step(state, measured, rng)
+        truth, fix = measured.fix, output.fix
+        off_m.append(np.hypot(fix.east_m - truth.east_m, fix.north_m - truth.north_m))
+        claimed.append(fix.status is Status.TRACKING)
+    assert state.hold.is_usual is (change is None)
+    assert np.median(off_m[-100:]) < 10
+    assert not np.any(np.array(claimed) & (np.array(off_m) > 50))
+    assert np.mean(claimed) > 0.8
 
 
 @pytest.mark.parametrize("mistaken", [True, False])

@@ -99,21 +99,24 @@ def moved(
     reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
     twin = state.twin
     hold, walking_rad, rules = state.hold, state.walking_rad, beliefs.holds
-    positioned = epoch.fix is not None or any(isfinite(one.range_m) for one in epoch.ranges)
     held = state.held
-    if positioned:
-        # Positions leave no doubt of a jump, and tell whether headings are still read rightly.
-        plain = (one for one in held if one.hold.is_as_measured)
-        held = () if hold.is_as_measured else tuple(plain)
+    ranged = any(isfinite(one.range_m) for one in epoch.ranges)
+    positioned = epoch.fix is not None or ranged
+    if ranged:
+        # Pseudoranges are compared with the main belief alone, so there is no doubt of a jump.
+        as_is = (one for one in held if one.hold.is_as_measured)
+        held = () if hold.is_as_measured else tuple(as_is)
     if not epoch.time_s - state.watch.pace.stepped_s <= rules.longest_pause_s:
         # Who stood may have turned there.
         walking_rad = nan
     own = _OwnDraws(epoch.time_s)
-    otherwise = positioned and not held and not hold.is_as_measured
-    if otherwise and isinstance(belief, ParticleBelief):
+    # Positions tell whether headings are still read rightly.
+    plain = hold.is_as_measured or any(one.hold.is_as_measured for one in held)
+    if positioned and not plain and isinstance(belief, ParticleBelief):
         gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
         if state.status is belief.status is Status.TRACKING:
-            held = (as_measured(rules, belief, state.null, hold, gone_m, white_rad, own.forking),)
+            plainly = as_measured(rules, belief, state.null, hold, gone_m, white_rad, own.forking)
+            held = (*held, plainly)
     unaided = state.unaided
     if positioned and isinstance(belief, ParticleBelief) and beliefs.positions_lead(state):
         gone_m, pulls = reckoning.travelled_m, beliefs.pulls
@@ -147,8 +150,8 @@ def moved(
                 unaided = ()
             predict = beliefs.moving_filter(state, compass=compass).predict
             tracked = state.status is Status.TRACKING and belief.status is Status.TRACKING
-            jumped = compass and not positioned and jumps(walking_rad, raw, rules)
-            if jumped and belief.status is Status.SEARCHING:
+            jumped = compass and not ranged and jumps(walking_rad, raw, rules)
+            if jumped and not positioned and belief.status is Status.SEARCHING:
                 changed_rad = raw.heading_rad - walking_rad
                 belief = beliefs.turned(belief, hold.sign * changed_rad, own.forking)
             if tracked and jumped and isinstance(belief, ParticleBelief):
