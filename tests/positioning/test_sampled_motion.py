@@ -133,7 +133,7 @@ def test_kalman_filters_add_it_to_steps_and_not_to_rests():
     for step, expected in ((STEP, ROUGH**2), (replace(STEP, step_m=0.0), 0.0)):
         fine = replace(step, sampling_sd_m=0.0)
         rough_m2, fine_m2 = (
-            Reckoning().moved(one, KalmanFilter(), np.zeros(2))[1][1][:2, :2]
+            Reckoning().moved(one, 0.0, KalmanFilter(), np.zeros(3))[1][1][:2, :2]
             for one in (step, fine)
         )
         np.testing.assert_allclose(rough_m2 - fine_m2, expected * np.eye(2), atol=1e-9)

@@ -11,11 +11,14 @@ from mapfilter.filters.gaussian import EKF, UKF
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.kalman.alignment import Alignment
 from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanTracker
 from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
-from mapfilter.positioning.kalman.reckoning import RECKONED, jump_to
+from mapfilter.positioning.kalman.reckoning import RECKONED, Reckoning, jump_to
 from mapfilter.positioning.kalman.turned import RecentWay, Turn, _Stretches
+from mapfilter.positioning.sensors.pace import Pace
+from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.radio.cells import Cell, CellPlan
 
 EAST, NORTH = 500_000.0, 4_600_000.0
@@ -254,6 +257,19 @@ def test_a_jump_is_no_loss():
     (at,) = [k for k, (turned, _, _) in enumerate(found) if turned]
     assert found[at][1:] == (Status.TRACKING, 0)
     assert Status.LOST not in {status for _, status, _ in found[at:]}
+
+
+@pytest.mark.parametrize(("speed_mps", "kept"), [(1.4, 2), (9.0, 0)])
+def test_the_gyroscope_of_a_vehicle_is_not_turned_in_the_hand(speed_mps, kept):
+    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0))
+    way, _ = way.moved(MotionStep(9.0, 0.0), 0.0).at_fix(
+        5.0, (EAST + 9.0, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0)
+    )
+    watch = SensorWatch(Pace(speed_mps=speed_mps))
+    made = Reckoning(watch, alignment=Alignment(0.1, known=True), turned_s=4.0, recent=way)
+    for step, rows in ((MotionStep(9.0, nan, 0.1), kept), (MotionStep(9.0, 0.2), 2)):
+        after, _, _ = made.moved(step, 6.0, KalmanOptions(), np.zeros(3))
+        assert len(after.recent.rows) == rows
 
 
 def test_what_was_before_a_jump_is_smoothed_without_it():

@@ -169,7 +169,10 @@ class Reckoning:
         alignment, step = self.alignment.headed(step)
         if by_rate and isfinite(self.turned_s) and alignment.known:
             transition[_TURNED, _RATE] = turned_s - self.turned_s
-        recent = self.recent.moved(step, float(transition[_TURNED, _RATE] * errors[2]))
+        # Nobody turns the gyroscope of a vehicle in the hand: what contradicts it is no jump.
+        driven = by_turns and self.watch.pace.speed_mps > WALKERS_MPS
+        by_rate_rad = float(transition[_TURNED, _RATE] * errors[2])
+        recent = RecentWay() if driven else self.recent.moved(step, by_rate_rad)
         after = replace(self, alignment=alignment, turned_s=turned_s, recent=recent)
         if not isfinite(step.step_m):
             return after, (transition, noise, shift), Reason.NO_STEP
