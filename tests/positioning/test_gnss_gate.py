@@ -117,6 +117,22 @@ def test_a_fix_that_no_hypothesis_explains_is_rejected_for_a_while(status, limit
     assert ended.unused == ()
 
 
+def test_a_rejected_fix_weighs_rivals_that_explain_it():
+    """By no more than the gate; those that it contradicts, too, lose nothing."""
+    fix = fix_at(100.0, 0.0)
+    found = compared(belief_at(sd_m=0.0), fix=fix)
+    (term,) = found.rival_terms
+    at_fix, near, far = (
+        belief_at((PLACE_M[0] + x, PLACE_M[1]), 0.0, count=1).state for x in (100.0, 88.0, -100.0)
+    )
+    assert term.log_likelihood(at_fix) == pytest.approx(9.0)
+    assert term.log_likelihood(near) == pytest.approx(7.0)
+    assert term.log_likelihood(far) == 0.0
+    # One that is used weighs all beliefs alike, one on probation none.
+    assert compared(belief_at(), fix=fix_at()).rival_terms == ()
+    assert compared(belief_at(), found.state, time_s=12.0, fix=fix).rival_terms == ()
+
+
 def test_a_fix_at_the_gate_is_used():
     """6 m off with a variance of 2 m² it is 9 nats less than at its place."""
     fix = replace(fix_at(6.0), var_east_m2=2.0, var_north_m2=2.0)

@@ -125,15 +125,16 @@ def with_a_fix(epoch, log):
     return replace(epoch, fix=GnssFix(*place, 25.0, 25.0))
 
 
+@pytest.mark.parametrize("every", [1, 3])
 @pytest.mark.parametrize("change", [None, reversed_, lambda heading: heading + np.pi / 2])
-def test_fixes_tell_whether_the_phone_was_turned(change):
-    """Those right after a jump agree with both explanations of it."""
+def test_fixes_tell_whether_the_phone_was_turned(change, every):
+    """Right after a jump they agree with both explanations, 15 m on the belief rejects them."""
     log, rng = log_of(1, change), np.random.default_rng(1)
     state = WATCHED.begin_at(log.truth["east_m"][0], log.truth["north_m"][0], 5.0, rng)
     off_m, claimed = [], []
-    for epoch in epochs(log):
+    for k, epoch in enumerate(epochs(log)):
         measured = with_a_fix(epoch, log)
-        state, output = WATCHED.step(state, measured, rng)
+        state, output = WATCHED.step(state, epoch if k % every else measured, rng)
         truth, fix = measured.fix, output.fix
         off_m.append(np.hypot(fix.east_m - truth.east_m, fix.north_m - truth.north_m))
         claimed.append(fix.status is Status.TRACKING)

@@ -187,7 +187,8 @@ class EvidenceUpdate(NamedTuple):
     null hypothesis, that of the alternative in ``alternative_under_null`` if it differs. ``belief``
     and ``alternative`` replace those of the filter unless None. ``disputed`` asks for an
     alternative. ``radio`` and ``reason`` (whether the serving cell is used) come from the radio
-    reports only. ``path`` is the way that a belief starts with, where the map alone is the
+    reports only. Beliefs in which the phone was turned are weighed by ``rival_terms``, too.
+    ``path`` is the way that a belief starts with, where the map alone is the
     evidence.
     """
 
@@ -203,6 +204,7 @@ class EvidenceUpdate(NamedTuple):
     reason: Reason | None = None
     path: RecentPath | None = None
     alternative_under_null: float | None = None
+    rival_terms: tuple[Term, ...] = ()
 
 
 class EvidenceSource(ABC):

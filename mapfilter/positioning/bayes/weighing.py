@@ -217,7 +217,9 @@ class Weighing:
         )
         if lanes is not None or state.twin is not None:
             after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
-        after = self._rivals.turned(after, evidence, epoch.time_s, measured=measured)
+        more = tuple(term for one in updates for term in one.rival_terms)
+        shared = replace(evidence, terms=(*evidence.terms, *more)) if more else evidence
+        after = self._rivals.turned(after, shared, epoch.time_s, measured=measured)
         after = self._rivals.unaided(after, updates, epoch.time_s, measured=measured)
         if beliefs.asks_for_proof(after):
             after = self._asked_for_proof(after, epoch)

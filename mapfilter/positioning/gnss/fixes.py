@@ -48,6 +48,21 @@ class FixTerm:
         return np.asarray(-0.5 * np.minimum(square, _FIX_CLIP**2), dtype=np.float64)
 
 
+@dataclass(frozen=True)
+class RejectedFixTerm:
+    """Log-likelihood of a fix that the belief has rejected, for its rivals: beyond its gate.
+
+    Hypotheses that the fix contradicts as well gain nothing by it, and lose nothing.
+    """
+
+    term: FixTerm
+    gate: float
+
+    def log_likelihood(self, state: Floats32) -> Floats:
+        """Return the log-likelihood of each hypothesis, over that of the belief at its gate."""
+        return np.maximum(self.term.log_likelihood(state) + self.gate, 0.0)
+
+
 def refutation(fix: GnssFix, total: float, area_m2: float) -> float:
     """Return the log-likelihood of a fix under the null hypothesis, less that of a belief.
 

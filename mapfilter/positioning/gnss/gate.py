@@ -22,7 +22,13 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.evidence import FixedTerm, Term
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.gnss.fixes import FixTerm, agrees_with, refutation, widened
+from mapfilter.positioning.gnss.fixes import (
+    FixTerm,
+    RejectedFixTerm,
+    agrees_with,
+    refutation,
+    widened,
+)
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
@@ -118,7 +124,8 @@ class GnssComparison(NamedTuple):
 
     ``belief`` carries clock and height in its hypotheses; ``under_null`` is the log-likelihood
     under the null hypothesis, relative to that under the belief. ``compared`` is whether there was
-    anything to compare; ``unused`` holds kind, name and reason of readings left out.
+    anything to compare; ``unused`` holds kind, name and reason of readings left out. Rivals are
+    weighed by ``rival_terms``, too.
     """
 
     belief: MapBelief
@@ -127,6 +134,7 @@ class GnssComparison(NamedTuple):
     under_null: float = 0.0
     compared: bool = False
     unused: tuple[Unused, ...] = ()
+    rival_terms: tuple[Term, ...] = ()
 
     def without(
         self, kind: str, names: Iterable[str], why: Reason, **changes: Any
@@ -223,6 +231,8 @@ class GnssGate:
             # Whether it is trusted again stays as it was.
             state = self.rejected(found.state, time_s)
             why = Reason.REJECTED_BY_EVIDENCE
+            rival = RejectedFixTerm(term, 1.0 + self._gate(belief))
+            found = found._replace(rival_terms=(rival,))
             return found.without("gnss", [""], why, state=state, compared=True)
         state = replace(state, fix_used_at_m=travelled_m, rejected_since_s=nan)
         # The likelihood of the whole belief is judged here, so it does not count in the CUSUM.

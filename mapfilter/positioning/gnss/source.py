@@ -168,6 +168,7 @@ class GnssSource(EvidenceSource):
             unused=[UnusedReading(epoch.time_s, *one) for one in main.unused],
             belief=main.belief,
             alternative=alternative,
+            rival_terms=main.rival_terms,
             disputed=main.state.contradicting and rejected_s >= self.options.dispute_s,
         )
 
