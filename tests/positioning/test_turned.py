@@ -187,6 +187,24 @@ def test_a_way_is_broken_off_where_its_direction_or_length_is_not_known():
     assert len(again.rows) == 2
 
 
+def test_a_jump_is_done_with_once_all_fixes_lie_on_one_way():
+    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0))
+    way = replace(way, is_turning=True)
+    for k in range(1, 8):
+        off_m = 300.0 if k == 6 else 0.0
+        way = way.moved(MotionStep(6.0, 0.0), 0.0)
+        fix = (EAST + 6.0 * k, NORTH + off_m, 25.0)
+        way, turn = way.at_fix(5.0 * k, fix, (0.0, 0.01), (0.0, 30.0))
+        assert turn is None
+        # Too few fixes tell nothing, and of one far off it is not known yet what it tells.
+        assert way.is_turning is (k < 5)
+    far = replace(way, is_turning=True, rows=way.rows[:7])
+    far, _ = far.moved(MotionStep(6.0, 0.0), 0.0).at_fix(
+        50.0, (EAST + 48.0, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0)
+    )
+    assert far.is_turning
+
+
 def test_what_a_rate_adds_is_in_the_way_and_not_in_the_error():
     way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.1, 0.01), (0.0, 30.0))
     way = way.moved(MotionStep(0.0, nan), 0.2).moved(MotionStep(6.0, 0.3), 0.1)

@@ -161,7 +161,8 @@ class RecentWay:
         if not self.is_turning:
             shown &= np.abs(wrap_rad(turns - now_rad)) >= _FOLLOWED_RAD
         if not shown.any():
-            return after, None
+            # Fixes that all lie on one way as the belief has it leave nothing to be found.
+            return replace(after, is_turning=self.is_turning and not found.fits[0]), None
         # A stretch that has shown it may have begun before the jump.
         left_m2 = np.where(found.fits, found.residual_m2 + _followed_m2(given), np.inf)
         best = int(np.argmin(left_m2))
