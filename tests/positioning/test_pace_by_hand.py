@@ -112,10 +112,10 @@ def test_of_rows_more_often_than_once_a_second_each_counts_a_twentieth_of_its_wa
     assert after(stepped, 10.0, 0.8).speed_mps == pytest.approx(1.0 + (0.8 - 1.0) / 20)
 
 
-def test_rows_at_one_time_say_nothing_of_intervals_and_speeds():
+def test_rows_at_one_time_say_nothing_of_intervals_and_usual_speeds():
     pace = Pace(10.0, 10.0, rows=50, interval_s=0.5, irregular_s=0.1, fastest_mps=2.0)
     found = after(pace, 10.0, 0.7)
-    assert found == replace(pace, rows=51)
+    assert found == replace(pace, rows=51, last_mps=0.7 / 0.5)
 
 
 def test_means_of_intervals_are_those_of_all_rows_up_to_twenty():
