@@ -128,15 +128,20 @@ def test_output_through_a_link_replaces_what_it_leads_to(tmp_path, dangling):
     assert names(here) == ["file", "folder"]
 
 
-def test_files_and_folders_are_on_the_disk_before_and_after_the_rename(tmp_path, monkeypatch):
-    synced = []
-    fsync = os.fsync
+@pytest.fixture
+def synced(monkeypatch):
+    """Names of files and folders in the order in which they are flushed to the disk."""
+    names_, fsync = [], os.fsync
 
     def noted(handle):
-        synced.append(Path(f"/proc/self/fd/{handle}").readlink().name)
+        names_.append(Path(f"/proc/self/fd/{handle}").readlink().name)
         fsync(handle)
 
     monkeypatch.setattr(os, "fsync", noted)
+    return names_
+
+
+def test_files_and_folders_are_on_the_disk_before_and_after_the_rename(tmp_path, synced):
     write_folder(tmp_path / "folder", "text")
     # What lies in the folder is synced side by side, in any order.
     assert sorted(synced[:-2]) == ["deep", "part"]
@@ -147,15 +152,7 @@ def test_files_and_folders_are_on_the_disk_before_and_after_the_rename(tmp_path,
     assert synced == ["file", tmp_path.name]
 
 
-def test_files_of_a_new_folder_are_flushed_once(tmp_path, monkeypatch):
-    synced = []
-    fsync = os.fsync
-
-    def noted(handle):
-        synced.append(Path(f"/proc/self/fd/{handle}").readlink().name)
-        fsync(handle)
-
-    monkeypatch.setattr(os, "fsync", noted)
+def test_files_of_a_new_folder_are_flushed_once(tmp_path, synced):
     with replaced_files(tmp_path / "results", lambda: ()) as new:
         for path in (new / "a", new / "deep" / "b"):
             with atomic_file(path) as temporary:

@@ -212,6 +212,16 @@ class Reckoning:
         """Return it after a fix with a covariance, and what that has found of headings.
 
         It is the direction of turns, or the jump of headings by which the belief is off.
+
+        Parameters
+        ----------
+        time_s : float
+        fix : GnssFix
+        covariance_m2 : (2, 2) array
+            Of the fix.
+        belief : Gaussian
+            Moments of the belief before it, in the layout :data:`RECKONED` and what is behind it.
+        options : KalmanOptions
         """
         variance_m2 = float(np.trace(covariance_m2)) / 2
         alignment, found = self.alignment.at_fix(fix.east_m, fix.north_m, sqrt(variance_m2))
