@@ -41,9 +41,10 @@ PLAN = CellPlan(CRS, (
     cell("A", 0.0, arfcn=600, bsic=1), cell("B", 2000.0, arfcn=601, bsic=2),
     cell("C", 3000.0, antenna="sector", azimuth_deg=90.0, arfcn=601, bsic=3),
 ))  # fmt: skip
-SITES = SiteModels(PLAN, KalmanOptions())
+SITES = SiteModels(PLAN, KalmanOptions(fix_lasting_share=0.0))
 MAY_BE_0 = (
     "fix_lasting_m",
+    "fix_lasting_share",
     "bias_sd_deg",
     "drift_deg_per_sqrt_m",
     "turn_rate_sd_deg_per_s",
@@ -74,9 +75,9 @@ def test_the_usual_options():
         "level_offset_memory_m": 3000.0, "level_noise_db": 8.0, "level_noise_memory_m": 40.0,
         "timing_step_m": pytest.approx(553.46, abs=0.01),
         "timing_sd_m": 200.0, "timing_memory_m": 500.0,
-        "fix_sd_m": 10.0, "fix_lasting_m": 0.0, "fix_lasting_s": 30.0,
+        "fix_sd_m": 10.0, "fix_lasting_share": 0.7, "fix_lasting_m": 0.0, "fix_lasting_s": 30.0,
         "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0, "step_sd_m": 0.3,
-        "heading_sd_deg": 11.459155902616464, "bias_sd_deg": 10.0, "drift_deg_per_sqrt_m": 0.3,
+        "heading_sd_deg": 11.459155902616464, "bias_sd_deg": 10.0, "drift_deg_per_sqrt_m": 0.6,
         "turn_rate_sd_deg_per_s": 0.05,
         "scale": 0.03, "drift_m_per_sqrt_s": 0.3, "start_sd_m": 1500.0,
         "start_parts": 21, "start_spacing_m": 600.0, "reach_m": 35_000.0,
@@ -88,7 +89,10 @@ def test_the_usual_options():
                 continue
             with pytest.raises(ConfigError, match=f"KalmanOptions, {name}: expected a .*r (>|in)"):
                 KalmanOptions(**{name: value})
-        assert getattr(KalmanOptions(**{name: 7}), name) == 7
+        if name != "fix_lasting_share":
+            assert getattr(KalmanOptions(**{name: 7}), name) == 7
+    with pytest.raises(ConfigError, match=r"fix_lasting_share: expected a number .*0\.7"):
+        KalmanOptions(fix_lasting_share=0.71)
     with pytest.raises(ConfigError, match=r"start_parts: expected a whole number in 1\.\.100"):
         KalmanOptions(start_parts=101)
     # To the last digit what it was in radians.
@@ -120,12 +124,14 @@ def test_steps_shift_and_spread():
     expected += way_spread_m2(3.0) / 2 * np.eye(2)
     assert way_spread_m2(3.0) == pytest.approx(9.0, rel=0.02)
     np.testing.assert_allclose(shift, [*way, 0.0, 0.0, 0.0])
-    drift = radians(0.3) ** 2
-    # The error of headings drifts: the last step has the drift of the 5 m before it.
-    expected += drift * 5.0 * 1.0**2 * np.outer(left[:, 1], left[:, 1])
+    # The error of headings drifts: the last step has the drift of the 5 m before it, of which 3 m
+    # are without a compass.
+    before = radians(0.6) ** 2 * 2.0 + radians(0.3) ** 2 * 3.0
+    expected += before * 1.0**2 * np.outer(left[:, 1], left[:, 1])
     np.testing.assert_allclose(noise[:2, :2], expected)
-    np.testing.assert_allclose(noise[2, :2], drift * 5.0 * left[:, 1])
-    np.testing.assert_allclose(noise[2:, 2:], np.diag([drift * 6.0, 0.0, 0.0]))
+    np.testing.assert_allclose(noise[2, :2], before * left[:, 1])
+    drifted = before + radians(0.6) ** 2 * 1.0
+    np.testing.assert_allclose(noise[2:, 2:], np.diag([drifted, 0.0, 0.0]))
     assert made.moved_m == 13.0
     np.testing.assert_allclose(made.belief.means[0], [*(5.0 + way), 0.0, 0.0, 0.0])
     np.testing.assert_allclose(made.belief.covariances[0, :2, :2], 9.0 * np.eye(2) + expected)

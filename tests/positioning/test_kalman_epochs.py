@@ -20,7 +20,7 @@ from mapfilter.radio.cells import Cell, CellPlan
 
 CRS, EAST, NORTH = "EPSG:32629", 500_000.0, 4_600_000.0
 PLAN = CellPlan(CRS, (Cell("A", "A", EAST, NORTH, 30.0, None, 50.0, 1800.0, "omni"),))
-OPTIONS = KalmanOptions(timing_step_m=100.0, timing_sd_m=1.0)
+OPTIONS = KalmanOptions(timing_step_m=100.0, timing_sd_m=1.0, fix_lasting_share=0.0)
 
 
 def begun(options=OPTIONS, *, sd_m=50.0, east_m=2000.0, layout=RECKONED, **more):

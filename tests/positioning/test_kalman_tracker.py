@@ -15,7 +15,7 @@ from mapfilter.radio.cells import CellPlan
 
 CRS, EAST_M, NORTH_M = "EPSG:32629", 500_000.0, 4_600_000.0
 PLAN = CellPlan(CRS, ())
-OPTIONS = KalmanFilter(start_sd_m=30.0, drift_m_per_sqrt_s=4.0, smooth=True)
+OPTIONS = KalmanFilter(start_sd_m=30.0, drift_m_per_sqrt_s=4.0, fix_lasting_share=0.0, smooth=True)
 RNG = np.random.default_rng(0)
 
 
@@ -27,7 +27,12 @@ RNG = np.random.default_rng(0)
 def test_a_velocity_stands_in_for_dead_reckoning(kinds, lasting_m, size, north):
     """Else errors of headings and steps, and where errors of fixes last, the place that they are
     of, are parts of the state."""
-    layout = KalmanFilter(fix_lasting_m=lasting_m).over_sites(PLAN).begin(kinds).layout
+    layout = (
+        KalmanFilter(fix_lasting_m=lasting_m, fix_lasting_share=0.0)
+        .over_sites(PLAN)
+        .begin(kinds)
+        .layout
+    )
     assert (layout.size, layout.east, layout.north) == (size, 0, north)
 
 

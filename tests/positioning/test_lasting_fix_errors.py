@@ -75,17 +75,18 @@ def _share_held(options, walks):
 def test_radii_hold_where_errors_of_fixes_last(smooth):
     rng = np.random.default_rng(3)
     walks = [_walk(rng) for _ in range(20)]
-    white = _share_held(KalmanFilter(smooth=smooth), walks)
+    independent = KalmanFilter(smooth=smooth, fix_lasting_share=0.0)
     lasting = KalmanFilter(smooth=smooth, fix_lasting_m=LASTING_M, fix_lasting_s=MEMORY_S)
-    assert white < 0.7
+    assert _share_held(independent, walks) < 0.7
     assert _share_held(lasting, walks) > 0.9
+    assert _share_held(KalmanFilter(smooth=smooth), walks) > 0.95
 
 
 def test_radii_hold_without_dead_reckoning():
     rng = np.random.default_rng(4)
     walks = [_walk(rng, reckoned=False) for _ in range(20)]
     lasting = KalmanFilter(fix_lasting_m=LASTING_M, fix_lasting_s=MEMORY_S)
-    assert _share_held(KalmanFilter(), walks) < 0.88
+    assert _share_held(KalmanFilter(fix_lasting_share=0.0), walks) < 0.88
     assert _share_held(lasting, walks) > 0.9
 
 

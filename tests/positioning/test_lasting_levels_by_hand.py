@@ -152,7 +152,7 @@ def walked(oracle, smoother, hears, epochs, *, level_sd_db=6.0, fixes=(0,), fix_
             oracle.move(2.0, steps)
         fix = None
         if k in fixes:
-            fix = GnssFix(EAST + rng.normal(0, 20), NORTH + rng.normal(0, 20), fix_m2, fix_m2, 0.0)
+            fix = GnssFix(EAST + rng.normal(0, 5), NORTH + rng.normal(0, 5), fix_m2, fix_m2, 0.0)
             if k == 0:
                 oracle.start(fix.east_m, fix.north_m)
             oracle.fix(fix.east_m, fix.north_m, fix_m2)
@@ -178,7 +178,7 @@ def walked(oracle, smoother, hears, epochs, *, level_sd_db=6.0, fixes=(0,), fix_
 @pytest.mark.parametrize("lasting_m", [0.0, 6.0])
 def test_walks_are_those_of_a_kalman_filter_with_an_error_for_every_cell(reckoned, lasting_m):
     """Cells come, go and come back; none gives way. Smoothed ones are the same, too."""
-    options = KalmanOptions(fix_lasting_m=lasting_m, start_sd_m=80.0)
+    options = KalmanOptions(fix_lasting_m=lasting_m, fix_lasting_share=0.0, start_sd_m=80.0)
     oracle, smoother = Oracle(plan_of(12), options, reckoned=reckoned), KalmanSmoother()
 
     def hears(k):

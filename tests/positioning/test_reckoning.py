@@ -68,7 +68,7 @@ def test_positions_find_how_a_compass_is_mounted(method, askew_deg, longer):
         off_m = np.abs(places - way)[330:]
         assert off_m.max() < 60.0
         assert (off_m <= radii_m[330:]).mean() > 0.95
-        assert radii_m[-1] < 120.0
+        assert radii_m[-1] < 220.0
         assert set(statuses[330:]) == {Status.TRACKING}
         turned_rad, scale = state.belief.moments.mean[2:4]
         assert degrees(turned_rad) == pytest.approx(-askew_deg, abs=10.0)
@@ -85,7 +85,7 @@ def test_without_positions_the_radius_grows_as_headings_may_be_off():
     along, across = np.array([np.cos(0.3), np.sin(0.3)]), np.array([-np.sin(0.3), np.cos(0.3)])
     assert along @ covariance @ along == pytest.approx(30.0**2 + 1000 * 0.09, rel=1e-3)
     white = 1000 * 0.2**2
-    drift = radians(0.3) ** 2 * 1000**3 / 3
+    drift = radians(0.6) ** 2 * 1000**3 / 3
     expected = (1000 * radians(10.0)) ** 2 + white + drift
     assert across @ covariance @ across == pytest.approx(expected, rel=3e-3)
 
@@ -278,9 +278,14 @@ def test_a_rest_in_doubt_is_told_and_its_way_is_missing_once_steps_are_counted()
 
 
 def test_the_heading_error_goes_on_over_a_way_that_was_not_measured():
-    for step in (MotionStep(80.0, 0.1), MotionStep(80.0, nan), MotionStep(80.0, nan, nan, 70.0)):
+    """As a compass wanders; without one as headings do that turns add up to."""
+    for step, deg in (
+        (MotionStep(80.0, 0.1), 0.6),
+        (MotionStep(80.0, nan), 0.3),
+        (MotionStep(80.0, nan, nan, 70.0), 0.3),
+    ):
         _, (_, noise, _), _ = Reckoning().moved(step, 1.0, OPTIONS, np.zeros(3))
-        assert noise[2, 2] == pytest.approx(80.0 * radians(0.3) ** 2)
+        assert noise[2, 2] == pytest.approx(80.0 * radians(deg) ** 2)
 
 
 def test_a_report_that_stands_still_while_one_walks_is_not_used():

@@ -93,7 +93,7 @@ class KalmanTracker(Filter[KalmanState]):
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> KalmanState:
         """Return the state before the first epoch."""
         layout = RECKONED if "motion" in kinds else MOVING
-        if self.sites.options.fix_lasting_m > 0:
+        if self.sites.options.has_lasting_fixes:
             layout = extended_layout(layout)
         heard = {"serving", "neighbour"}.intersection(kinds)
         slots = CellSlots.empty(min(MOST_CELLS, len(self.sites.cells)) if heard else 0)

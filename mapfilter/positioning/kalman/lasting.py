@@ -1,12 +1,15 @@
 """Errors of fixes that last: fixes of a place that stays beside the true position for a while.
 
-Positions from Wi-Fi scans, and those of satellites between walls, err to the same side again and
-again. Taken as independent, ten of them would count as one of a third of the error. Here the error
-is a first-order Gauss-Markov process b beside the white noise of each fix (Bar-Shalom, Li &
-Kirubarajan 2001, sect. 8.2). The state is extended by the place that fixes are of, ``q = p + b``,
-as fixes then measure two components of the state:
+Positions of satellites, and those from Wi-Fi scans, err to the same side again and again. Taken as
+independent, ten of them would count as one of a third of the error. Here the error is a first-order
+Gauss-Markov process b beside the white noise of each fix (Bar-Shalom, Li & Kirubarajan 2001, sect.
+8.2). The state is extended by the place that fixes are of, ``q = p + b``, as fixes then measure two
+components of the state:
 
     p' = Φ p + u + w,    q' = p' + a (q - p) + v,    a = exp(-Δt / T),    var v = (1 - a²) B².
+
+B follows what fixes state: where they are less precise than before an independent error is added to
+b, and where they are more precise b shrinks.
 """
 
 from __future__ import annotations
@@ -76,6 +79,26 @@ def extended_motion(
     spread = both @ noise @ both.T
     spread[n:, n:] += (1 - kept**2) * lasting_m**2 * np.eye(2)
     return wide, spread, both @ shift
+
+
+def rescaled(layout: StateLayout, size: int, before_m: float, now_m: float) -> Motion:
+    """Return motion of an extended layout by which the error that lasts has another deviation.
+
+    Parameters
+    ----------
+    layout : StateLayout
+        Without the extension.
+    size : int
+        Components of the state, whatever is behind the extension.
+    before_m, now_m : float
+        B.
+    """
+    transition, noise, n = np.eye(size), np.zeros((size, size)), layout.size
+    left = min(now_m / before_m, 1.0)
+    for axis, own in enumerate((layout.east, layout.north)):
+        transition[n + axis, [n + axis, own]] = left, 1 - left
+        noise[n + axis, n + axis] = max(now_m**2 - before_m**2, 0.0)
+    return transition, noise, np.zeros(size)
 
 
 def white_part(covariance_m2: Floats, lasting_m: float) -> Floats:

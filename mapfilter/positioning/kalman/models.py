@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from math import atan2, hypot
+from math import atan2, hypot, sqrt
 from typing import Annotated
 
 import numpy as np
@@ -20,6 +20,7 @@ from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import measure_kernel
 from mapfilter.options import NotNegative, Options, Positive
+from mapfilter.positioning.kalman.lasting import LEAST_WHITE
 from mapfilter.positioning.kalman.level_errors import LastingLevels
 from mapfilter.propagation.empirical import cost231_hata_db
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -57,9 +58,11 @@ class KalmanOptions(Options):
         Distance for which errors of timing advances last.
     fix_sd_m : float
         Assumed deviation of a GNSS fix without one.
+    fix_lasting_share : float
+        Assumed share of a fix's variance that lasts over later fixes, a Gauss-Markov process; 0:
+        fixes are independent of each other.
     fix_lasting_m : float
-        Assumed deviation along one axis of the part of a fix's error that lasts over later fixes, a
-        Gauss-Markov process; 0: fixes are independent of each other, as it is assumed of GNSS.
+        Assumed deviation of that part along one axis, whatever fixes state; 0: by their variances.
         :func:`mapfilter.positioning.fingerprints.lasting.lasting_error` finds that of Wi-Fi.
     fix_lasting_s : float
         Time after which the correlation of that part is 1/e.
@@ -70,7 +73,8 @@ class KalmanOptions(Options):
     bias_sd_deg : float
         Assumed deviation of a heading's error that lasts, at the start.
     drift_deg_per_sqrt_m : float
-        Assumed random walk of that error.
+        Assumed random walk of that error of a compass. Of headings that are sums of turns at most
+        0.3.
     turn_rate_sd_deg_per_s : float
         Assumed deviation of the lasting error of a rate of turns, where headings are their sums.
     scale : float
@@ -104,12 +108,13 @@ class KalmanOptions(Options):
     timing_sd_m: Positive = 200.0
     timing_memory_m: Positive = 500.0
     fix_sd_m: Positive = 10.0
+    fix_lasting_share: Annotated[float, Ge(0), Le(1 - LEAST_WHITE)] = 0.7
     fix_lasting_m: NotNegative = 0.0
     fix_lasting_s: Positive = 30.0
     step_sd_m: Positive = 0.3
     heading_sd_deg: Positive = 11.459155902616464
     bias_sd_deg: NotNegative = 10.0
-    drift_deg_per_sqrt_m: NotNegative = 0.3
+    drift_deg_per_sqrt_m: NotNegative = 0.6
     turn_rate_sd_deg_per_s: NotNegative = 0.05
     scale: NotNegative = 0.03
     drift_m_per_sqrt_s: Positive = 0.3
@@ -120,6 +125,15 @@ class KalmanOptions(Options):
     start_spacing_m: Positive = 600.0
     reach_m: Positive = 35_000.0
     converged_radius_m: Positive = 1000.0
+
+    @property
+    def has_lasting_fixes(self) -> bool:
+        """Whether errors of fixes last."""
+        return self.fix_lasting_m > 0 or self.fix_lasting_share > 0
+
+    def lasting_fix_m(self, variance_m2: float) -> float:
+        """Return the deviation of the lasting error of fixes with a variance along one axis."""
+        return self.fix_lasting_m or sqrt(self.fix_lasting_share * variance_m2)
 
     @property
     def lasting_levels(self) -> LastingLevels:

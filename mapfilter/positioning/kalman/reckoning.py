@@ -41,9 +41,9 @@ the rate of turns in rad/s."""
 ERRORS = slice(2, 5)
 """Components that are errors of dead reckoning."""
 _TURNED, _SCALE, _RATE, _LEAST = 2, 3, 4, 1e-6
-_TURNS_SD_RAD = radians(2.0)
-"""White error of headings that turns add up to, at most: what wheels slip and cameras shake. Those
-of a compass are read one by one."""
+_TURNS_SD_RAD, _TURNS_DRIFT_RAD = radians(2.0), radians(0.3)
+"""White error of headings that turns add up to, and their random walk over the root of a metre, at
+most: what wheels slip and cameras shake. A compass is read again and again, among iron."""
 
 
 def at_rest(layout: StateLayout) -> Motion:
@@ -137,6 +137,10 @@ class Reckoning:
             epoch = replace(epoch, motion=(missed_step(rested, time_s), *epoch.motion))
         return after, epoch, unused
 
+    def carried(self) -> Reckoning:
+        """Return it where positions have shown that one goes on though no step is counted."""
+        return replace(self, watch=self.watch.carried())
+
     def moved(
         self, step: MotionStep, time_s: float, options: KalmanOptions, errors: Floats
     ) -> tuple[Reckoning, Motion, Reason]:
@@ -176,7 +180,9 @@ class Reckoning:
         after = replace(self, alignment=alignment, turned_s=turned_s, recent=recent)
         if not isfinite(step.step_m):
             return after, (transition, noise, shift), Reason.NO_STEP
-        noise[_TURNED, _TURNED] = radians(options.drift_deg_per_sqrt_m) ** 2 * abs(step.step_m)
+        drift_rad = radians(options.drift_deg_per_sqrt_m)
+        drift_rad = min(drift_rad, _TURNS_DRIFT_RAD) if by_turns else drift_rad
+        noise[_TURNED, _TURNED] = drift_rad**2 * abs(step.step_m)
         if not isfinite(step.heading_rad):
             why = Reason.USED
             if not isfinite(step.spread_m):
@@ -243,7 +249,7 @@ class Reckoning:
         return after, found or jump
 
 
-def jump_to(turn: Turn, layout: StateLayout, *, lasts: bool) -> Motion:
+def jump_to(turn: Turn, layout: StateLayout, lasting_m: float | None) -> Motion:
     """Return the motion of a jump of headings: to their error, and to where it has led.
 
     What the belief had of both is forgotten. Both are as the fixes tell them, and their errors are
@@ -253,21 +259,25 @@ def jump_to(turn: Turn, layout: StateLayout, *, lasts: bool) -> Motion:
     ----------
     layout : StateLayout
         Of the belief.
-    lasts : bool
-        Whether the place that fixes are of is a part of the state, too.
+    lasting_m : float or None
+        Deviation of the error of fixes that lasts; None where it is no part of the state.
     """
     transition, _, shift = at_rest(layout)
     own = [layout.east, layout.north]
+    of = [RECKONED.size, RECKONED.size + 1]
     # East and north, once or twice, and the heading error by the two of the place and the angle.
     cause = np.zeros((layout.size, 3))
-    for place in [own, [RECKONED.size, RECKONED.size + 1]] if lasts else [own]:
+    for place in [own] if lasting_m is None else [own, of]:
         transition[place, place] = 0.0
         shift[place] = turn.east_m, turn.north_m
         cause[place, [0, 1]] = 1.0
     transition[_TURNED, _TURNED], shift[_TURNED], cause[_TURNED, 2] = 0.0, turn.turned_rad, 1.0
     known = np.diag([turn.sd_m**2, turn.sd_m**2, turn.sd_rad**2])
     known[:2, 2] = known[2, :2] = turn.shared_m_rad
-    return transition, cause @ known @ cause.T, shift
+    noise = cause @ known @ cause.T
+    if lasting_m is not None:
+        noise[of, of] += lasting_m**2
+    return transition, noise, shift
 
 
 def turned_to(belief: SumBelief, direction: Direction) -> SumBelief:

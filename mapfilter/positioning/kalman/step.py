@@ -12,7 +12,6 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import Method
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
-from mapfilter.models.ranging import position_fix
 from mapfilter.models.signal_strength import with_errors
 from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
@@ -20,13 +19,9 @@ from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.kalman.alignment import Direction
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.lasting import (
-    Motion,
-    extended_belief,
-    extended_motion,
-    fix_layout,
-    white_part,
-)
+from mapfilter.positioning.kalman.disputed import Ruling
+from mapfilter.positioning.kalman.fixing import FixErrors, FixWeighing
+from mapfilter.positioning.kalman.lasting import Motion, extended_belief, extended_motion
 from mapfilter.positioning.kalman.level_errors import (
     LEAST_MOVED_M,
     CellSlots,
@@ -76,6 +71,8 @@ class KalmanState:
         Transition, noise and shift that led to the last epoch.
     last_fix : GnssFix or None
         The last one with a position.
+    fixes : FixErrors
+        Errors of fixes.
     slots : CellSlots
         Cells whose errors of levels are in the state.
     reckoning : Reckoning
@@ -90,6 +87,7 @@ class KalmanState:
     recent_nis: tuple[float, ...] = ()
     motion: Motion | None = None
     last_fix: GnssFix | None = None
+    fixes: FixErrors = field(default_factory=FixErrors)
     slots: CellSlots = field(default_factory=lambda: CellSlots.empty(0))
     reckoning: Reckoning = field(default_factory=Reckoning)
 
@@ -100,7 +98,7 @@ class KalmanStep:
     def __init__(self, sites: SiteModels, method: Method, state: KalmanState) -> None:
         self.sites, self.options = sites, sites.options
         self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
-        self.lasts = self.options.fix_lasting_m > 0
+        self.lasts, self.fixes = self.options.has_lasting_fixes, state.fixes
         # With a rate behind each coordinate north is the third component.
         self.own = MOVING if state.layout.north == MOVING.north else RECKONED
         self.where = [self.layout.east, self.layout.north]
@@ -126,6 +124,7 @@ class KalmanStep:
             tuple(self.recent_nis),
             self.motion,
             self.last_fix,
+            self.fixes,
             self.slots,
             self.reckoning,
         )
@@ -142,7 +141,7 @@ class KalmanStep:
             # With a velocity in the state, nothing but what is weighed tells of motion.
             self.reckoning, epoch, unused = self.reckoning.watched(epoch)
             self.unused += unused if self.belief is not None else []
-        given = site_readings(self.sites, epoch)
+        given, self.fixes = site_readings(self.sites, epoch), self.fixes.at_time(epoch.time_s)
         self.motion = self._move(epoch, given.cells)
         reason = self._measure(epoch, given)
         if reason is Reason.NO_READING and heard and not epoch.radio:
@@ -157,7 +156,7 @@ class KalmanStep:
         self.moved_m += moved_m
         options = self.options
         if self.lasts:
-            lasting = options.fix_lasting_m, options.fix_lasting_s
+            lasting = self.fixes.lasting_m, options.fix_lasting_s
             motion = extended_motion(motion, self.own, *lasting, elapsed_s)
         if self.slots.size:
             self.slots, self.growth, renewed = self.slots.after_report(
@@ -213,7 +212,9 @@ class KalmanStep:
         if self.belief is None:
             self.belief = first_belief(self.sites, self.own, fix, given)
             if self.lasts:
-                self.belief = extended_belief(self.belief, self.own, self.options.fix_lasting_m)
+                lasting_m = self.options.lasting_fix_m(self.options.fix_sd_m**2)
+                self.belief = extended_belief(self.belief, self.own, lasting_m)
+                self.fixes = self.fixes._replace(lasting_m=lasting_m)
             if self.slots.size:
                 lasting = self.options.lasting_levels
                 self.belief = lasting.extended_belief(self.belief, self.slots)
@@ -252,17 +253,26 @@ class KalmanStep:
             moments = self.belief.moments
             self.reckoning, found = self.reckoning.fixed(time_s, fix, noise, moments, self.options)
             if isinstance(found, Turn):
-                self._jump(jump_to(found, layout, lasts=self.lasts))
+                self._jump(jump_to(found, layout, self.fixes.lasting_m if self.lasts else None))
                 if found.is_new:
                     self.unused.append(UnusedReading(time_s, "motion", "", Reason.PHONE_TURNED))
                 return True
-        if self.lasts:
-            layout = fix_layout(layout, self.own.size)
-            noise = white_part(noise, self.options.fix_lasting_m)
-        taken = self._update(position_fix(layout, noise), [fix.east_m, fix.north_m])
+        rest = self.reckoning.watch.rest
+        rests = self.own is RECKONED and rest is not None and not rest.is_carried
+        how = FixWeighing(self.options, self.own, layout, self.method, self.compared)
+        after = how.weighed(self.belief, self.fixes, fix, time_s, rests=rests)
+        self.belief, self.fixes = after.belief, after.errors
+        if self.motion is not None:
+            self.motion = after_each_other(self.motion, after.motion)
+        self.recent_nis = [] if after.ruling.begins else self._with_nis(after.nis)
+        if after.ruling is Ruling.CARRIED:
+            self.reckoning = self.reckoning.carried()
+        if after.ruling is Ruling.OUTLIER and not after.used:
+            why = Reason.REJECTED_BY_EVIDENCE
+            self.unused.append(UnusedReading(time_s, "gnss", "", why))
         if self.own is RECKONED and isinstance(found, Direction):
             self.belief = turned_to(self.belief, found)
-        return taken
+        return after.used
 
     def _jump(self, motion: Motion) -> None:
         """Move on by a jump of headings: what was measured before it said nothing of a loss."""
@@ -270,6 +280,11 @@ class KalmanStep:
             raise AssertionError("moved before it measures")
         self.belief = self.belief.predict(*motion)
         self.motion, self.recent_nis = after_each_other(self.motion, motion), []
+        self.fixes = self.fixes.after_a_jump()
+
+    def _with_nis(self, nis: float) -> list[float]:
+        """Return the last normalised innovations with one more, if it is known."""
+        return [*self.recent_nis, nis][-_WINDOW:] if isfinite(nis) else self.recent_nis
 
     def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
         """Update with a measurement; return whether that could be done."""
@@ -277,7 +292,7 @@ class KalmanStep:
             raise AssertionError("started before it measures")
         self.belief, info = self.belief.update(compiled(model), reading, self.method, self.compared)
         if info.used:
-            self.recent_nis = [*self.recent_nis, info.nis / len(reading)][-_WINDOW:]
+            self.recent_nis = self._with_nis(info.nis / len(reading))
         return info.used
 
     def _label(self, epoch: Epoch, steps: Sequence[MotionStep], reason: Reason) -> None:
@@ -301,7 +316,7 @@ class KalmanStep:
             if radius_m <= self.options.converged_radius_m:
                 self.status = Status.CONVERGED
         else:
-            lost = lost or self.reckoning.may_have_left
+            lost = lost or self.reckoning.may_have_left or self.fixes.record.is_lost
             near = radius_m <= self.options.converged_radius_m
             self.status = Status.TRACKING if near else Status.UNCERTAIN
             if lost:

@@ -183,6 +183,10 @@ class Rest:
         shown_nats = _SHOWN_AGAIN_NATS if self.is_doubtful else _SHOWN_NATS
         return far and still_nats <= _SHOWABLE_NATS and left_nats > shown_nats
 
+    def carried(self) -> Rest:
+        """Return the rest as one that is none."""
+        return replace(self, carried_nats=_CARRIED_NATS, is_doubtful=False)
+
     def missed_mps(self, gone_s: float) -> float:
         """Return the pace before less what was measured, over a time since it began."""
         return max(self.pace_mps - self.measured_m / gone_s, 0.0) if gone_s > 0 else 0.0

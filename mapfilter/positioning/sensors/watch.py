@@ -82,6 +82,10 @@ class SensorWatch(NamedTuple):
             return self
         return self._moving(time_s)
 
+    def carried(self) -> SensorWatch:
+        """Return the watch of what goes on though no step is counted, as positions have shown."""
+        return self if self.rest is None else self._replace(rest=self.rest.carried())
+
     def _moving(self, time_s: float) -> SensorWatch:
         """Return the watch after a measured way to a time."""
         return self._replace(moving_s=time_s, known_s=time_s, rest=None, unmeasured_s=0.0)

@@ -1,0 +1,177 @@
+"""Fixes that contradict the belief: a few of them are outliers, many that agree are right.
+
+A fix farther from the prediction than both may be off is an outlier, and not used where steps tell
+the way: so a burst of positions that walls reflect does not move what they tell. Without steps
+nothing else does, and its variance is raised until it is at the limit, as a heavy tail would have
+it (Huber 1964). Where fixes go on to contradict it, and lie on one line beside it, the belief is
+what is wrong, and begins anew with them. Of one that has just begun with a fix nobody knows which
+of the two is right, and it comes to cover both.
+
+Fixes that are off more often than their deviations say are less precise than they state. How often
+that is so is followed, and their variances are raised by it (innovation-based estimation; Mehra
+1970).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from math import hypot
+from typing import NamedTuple
+
+import numpy as np
+
+from mapfilter._types import Floats
+
+_LIMIT = 13.8
+"""Squared distance in deviations of the prediction that one in a thousand fixes exceeds."""
+_MEMORY, _SHOWN, _MOST = 20.0, 1.5, 9.0
+"""Fixes over which their precision is followed; times that squared distances are larger than stated
+from which on variances are raised, and the most by which they are."""
+_YOUNG = 3
+"""Fixes that agreed with it, below which a belief has just begun."""
+_LOST_FROM = 3
+"""Fixes in a row that contradict it, from which on a position is lost."""
+_FORGOTTEN_S = 60.0
+"""Time without a further fix after which those that contradicted it are taken for outliers."""
+_LEAST_ROWS = 5
+"""Fixes that show a belief to be wrong."""
+_MOVING_S, _MOVING_MPS = 5.0, 3.0
+"""Time in which fixes that go on while steps say rest show it, and their speed."""
+_LEAST_SD_M, _MOST_MISFIT = 7.5, 2.0
+"""Least deviation of a fix beside a line; largest mean square beside it, in their variances."""
+
+
+class Ruling(Enum):
+    """What a fix means to a belief.
+
+    ``AGREES``: it is as predicted. ``OUTLIER``: it is not. ``EITHER``: it or the belief, which has
+    just begun, is wrong. ``ANEW``: the belief is wrong. ``CARRIED``: so it is, as fixes go on while
+    steps say rest.
+    """
+
+    AGREES = "agrees"
+    OUTLIER = "outlier"
+    EITHER = "either"
+    ANEW = "anew"
+    CARRIED = "carried"
+
+    @property
+    def begins(self) -> bool:
+        """Whether the belief begins anew at the fix."""
+        return self in (Ruling.EITHER, Ruling.ANEW, Ruling.CARRIED)
+
+
+class Finding(NamedTuple):
+    """What a fix means.
+
+    Parameters
+    ----------
+    ruling : Ruling
+    squared : float
+        Its squared distance from the position predicted, in deviations and per component.
+    larger : float
+        Times that its variance is larger then.
+    """
+
+    ruling: Ruling
+    squared: float
+    larger: float = 1.0
+
+
+class _Row(NamedTuple):
+    time_s: float
+    off_east_m: float
+    off_north_m: float
+    variance_m2: float
+
+
+@dataclass(frozen=True, slots=True)
+class FixRecord:
+    """How well fixes have agreed with the belief.
+
+    Parameters
+    ----------
+    excess : float
+        Times that their squared distances have been larger than stated, of late.
+    agreed : int
+        Fixes that agreed since the belief began.
+    rows : tuple of _Row
+        The last ones in a row that did not: where they lay from the prediction.
+    """
+
+    excess: float = 1.0
+    agreed: int = 0
+    rows: tuple[_Row, ...] = ()
+
+    @property
+    def understated(self) -> float:
+        """Times that their variances are taken for larger than stated."""
+        return self.excess if self.excess >= _SHOWN else 1.0
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether fixes contradict the belief."""
+        return len(self.rows) >= _LOST_FROM
+
+    def at_time(self, time_s: float) -> FixRecord:
+        """Return it at a later time."""
+        if self.rows and time_s - self.rows[-1].time_s > _FORGOTTEN_S:
+            return replace(self, rows=())
+        return self
+
+    def at_fix(
+        self, fix: tuple[float, Floats, Floats, Floats], patience_s: float, *, rests: bool
+    ) -> tuple[FixRecord, Finding]:
+        """Return it after a fix, and what the fix means.
+
+        Parameters
+        ----------
+        fix : (float, (2,) array, (2, 2) array, (2, 2) array)
+            Its time, the fix less the position predicted, and the covariances of both,
+            of the fix as stated.
+        patience_s : float
+            Time after which fixes that contradict a belief show it to be wrong.
+        rests : bool
+            Whether steps say that one stands.
+        """
+        time_s, off_m, predicted_m2, stated_m2 = fix
+        noise_m2 = self.understated * stated_m2
+        squared = float(off_m @ np.linalg.solve(predicted_m2 + noise_m2, off_m))
+        if squared <= _LIMIT:
+            found = float(off_m @ np.linalg.solve(predicted_m2 + stated_m2, off_m)) / 2
+            excess = self.excess + (min(found, _MOST) - self.excess) / _MEMORY
+            return FixRecord(excess, self.agreed + 1), Finding(Ruling.AGREES, squared / 2)
+        if self.agreed < _YOUNG:
+            return replace(self, agreed=0, rows=()), Finding(Ruling.EITHER, squared / 2)
+        variance_m2 = max(float(np.trace(noise_m2)) / 2, _LEAST_SD_M**2)
+        rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2))
+        while time_s - rows[0].time_s > 2 * patience_s and len(rows) > _LEAST_ROWS:
+            rows = rows[1:]
+        ruling = _ruling(np.array(rows), patience_s, rests=rests)
+        if ruling.begins:
+            return replace(self, agreed=0, rows=()), Finding(ruling, squared / 2)
+        # So much larger that the fix is at the limit along the way to it.
+        along = off_m / hypot(*off_m)
+        own_m2 = float(along @ noise_m2 @ along)
+        most_m2 = float(off_m @ off_m) / _LIMIT - float(along @ predicted_m2 @ along)
+        larger = max(most_m2 / own_m2, 1.0)
+        return replace(self, rows=rows), Finding(ruling, squared / 2, larger)
+
+
+def _ruling(rows: Floats, patience_s: float, *, rests: bool) -> Ruling:
+    """Return what fixes in a row that contradict a belief mean."""
+    time_s, off_m = rows[:, 0] - rows[:, 0].mean(), rows[:, 1:3]
+    lasted_s = float(np.ptp(time_s))
+    if len(rows) < _LEAST_ROWS or lasted_s < (_MOVING_S if rests else patience_s):
+        return Ruling.OUTLIER
+    beside_m = off_m - off_m.mean(axis=0)
+    speed_mps = time_s @ beside_m / float(time_s @ time_s)
+    beside_m = beside_m - np.outer(time_s, speed_mps)
+    # Of both coordinates two are spent on the line.
+    misfit = float((beside_m**2).sum() / rows[:, 3].mean()) / (2 * len(rows) - 4)
+    if misfit > _MOST_MISFIT:
+        return Ruling.OUTLIER
+    if rests and float(np.hypot(*speed_mps)) >= _MOVING_MPS:
+        return Ruling.CARRIED
+    return Ruling.ANEW if lasted_s >= patience_s else Ruling.OUTLIER

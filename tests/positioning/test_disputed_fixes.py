@@ -1,0 +1,252 @@
+"""Fixes that contradict a Kalman-type filter: outliers, a belief that is wrong, dead odometers."""
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.models.state import MOVING
+from mapfilter.positioning.epochs import Epoch, GnssFix
+from mapfilter.positioning.kalman.disputed import FixRecord, Ruling
+from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.kalman.lasting import extended_layout, rescaled
+from mapfilter.positioning.kalman.reckoning import RECKONED
+from mapfilter.radio.cells import CellPlan
+
+EAST, NORTH = 500_000.0, 4_600_000.0
+
+
+def fix_at(place, stated_m=5.0):
+    return GnssFix(EAST + place.real, NORTH + place.imag, stated_m**2, stated_m**2, 0.0)
+
+
+def errors(rng, count, sd_m=4.0):
+    return rng.normal(0, sd_m, count) + 1j * rng.normal(0, sd_m, count)
+
+
+def straight(rng, count, speed_mps=1.4, heading_rad=0.4):
+    """Steps of a second by a compass, and where they lead."""
+    measured = heading_rad + rng.normal(0, 0.1, count)
+    way = speed_mps * np.arange(1, count + 1) * np.exp(1j * heading_rad)
+    return [MotionStep(speed_mps, float(one)) for one in measured], way
+
+
+def followed(fixes, steps=None, *, options=None):
+    """Positions, 95 % radii, statuses, reasons of unused motion and the last state."""
+    tracker = (options or KalmanFilter()).over_sites(CellPlan("EPSG:32629", ()))
+    kinds = {"gnss"} if steps is None else {"gnss", "motion"}
+    state, rng = tracker.begin(kinds), np.random.default_rng(0)
+    found = []
+    for k, fix in enumerate(fixes):
+        step = () if steps is None else (steps[k],)
+        state, out = tracker.step(state, Epoch(float(k), step, fix=fix), rng)
+        place = complex(out.fix.east_m - EAST, out.fix.north_m - NORTH)
+        reasons = {one.reason for one in out.unused if one.kind == "motion"}
+        found.append((place, out.fix.radii_m[2], out.fix.status, reasons))
+    places, radii_m, statuses, reasons = zip(*found, strict=True)
+    return np.array(places), np.array(radii_m), statuses, reasons, state
+
+
+@pytest.mark.parametrize("method", ["ekf", "ukf"])
+def test_a_burst_of_outliers_hardly_moves_what_steps_tell(method):
+    """They were followed by some 40 m, and the position stayed LOST after them."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        steps, way = straight(rng, 300)
+        seen = way + errors(rng, 300)
+        seen[100:112] += 60.0 * np.exp(1j * seed)
+        fixes = [fix_at(one) if k < 140 else None for k, one in enumerate(seen)]
+        places, radii_m, statuses, _, _ = followed(
+            fixes, steps, options=KalmanFilter(method=method)
+        )
+        off_m = np.abs(places - way)
+        assert off_m[90:140].max() < 10.0
+        assert Status.LOST in statuses[102:112]
+        assert set(statuses[113:]) == {Status.TRACKING}
+        assert (off_m <= radii_m)[113:].mean() > 0.9
+
+
+def test_a_burst_that_ends_the_fixes_is_forgotten():
+    rng = np.random.default_rng(5)
+    steps, way = straight(rng, 300)
+    seen = way + errors(rng, 300)
+    seen[100:] += 80.0
+    fixes = [fix_at(one) if k < 106 else None for k, one in enumerate(seen)]
+    places, radii_m, statuses, _, _ = followed(fixes, steps)
+    assert set(statuses[103:165]) == {Status.LOST}
+    assert set(statuses[166:]) == {Status.TRACKING}
+    assert (np.abs(places - way) <= radii_m)[166:].all()
+
+
+def test_fixes_that_go_on_elsewhere_are_right():
+    """As after a ride that no step counted: for half a minute it is LOST, then it begins anew."""
+    rng = np.random.default_rng(6)
+    steps, way = straight(rng, 300)
+    way[100:] += 400.0
+    places, _, statuses, _, _ = followed([fix_at(one) for one in way + errors(rng, 300)], steps)
+    off_m = np.abs(places - way)
+    assert set(statuses[102:130]) == {Status.LOST}
+    assert off_m[131:].max() < 15.0
+    assert set(statuses[131:]) == {Status.TRACKING}
+
+
+def test_fixes_that_scatter_are_no_place_to_begin_anew():
+    rng = np.random.default_rng(7)
+    steps, way = straight(rng, 300)
+    seen = way + errors(rng, 300)
+    seen[100:200] += 120.0 * np.exp(2j * np.pi * rng.random(100))
+    places, _, statuses, _, _ = followed([fix_at(one) for one in seen], steps)
+    assert np.abs(places - way).max() < 20.0
+    assert set(statuses[103:200]) == {Status.LOST}
+
+
+def test_a_first_fix_that_is_an_outlier_is_not_insisted_on():
+    """Until others agree the radius covers both places."""
+    rng = np.random.default_rng(8)
+    steps, way = straight(rng, 60)
+    seen = way + errors(rng, 60)
+    seen[0] += 150.0
+    places, radii_m, _, _, _ = followed([fix_at(one) for one in seen], steps)
+    off_m = np.abs(places - way)
+    assert (off_m <= radii_m)[1:].all()
+    assert radii_m[1] > 150.0
+    assert off_m[5:].max() < 15.0
+
+
+@pytest.mark.parametrize("speed_mps", [9.0, 15.0])
+def test_an_odometer_that_reads_zero_while_fixes_go_on_is_dead(speed_mps):
+    """On a straight road nothing turns."""
+    rng = np.random.default_rng(9)
+    way = speed_mps * np.arange(1, 301.0) + 0j
+    headings = rng.normal(0, 0.02, 300).tolist()
+    steps = [MotionStep(0.0 if 150 <= k < 200 else speed_mps, one) for k, one in enumerate(headings)]
+    seen = way + errors(rng, 300, 3.0)
+    places, _, statuses, reasons, _ = followed([fix_at(one) for one in seen], steps)
+    off_m = np.abs(places - way)
+    claimed = np.array([one is Status.TRACKING for one in statuses])
+    assert off_m[claimed & (np.arange(300) > 5)].max() < 50.0
+    assert any(Reason.MOTION_STUCK in one for one in reasons[155:200])
+    assert off_m[160:].max() < 25.0
+    assert not any(Reason.MOTION_STUCK in one for one in [*reasons[:150], *reasons[205:]])
+
+
+def test_fixes_that_wander_at_rest_are_no_motion():
+    rng = np.random.default_rng(10)
+    wander = np.zeros(400, dtype=complex)
+    for k in range(1, 400):
+        wander[k] = 0.98 * wander[k - 1] + complex(*rng.normal(0, 1.5, 2))
+    way = np.concatenate([8.0 * np.arange(1.0, 101.0), np.full(300, 800.0)]) + 0j
+    steps = [MotionStep(8.0 if k < 100 else 0.0, 0.0) for k in range(400)]
+    places, _, _, reasons, _ = followed([fix_at(one) for one in way + wander], steps)
+    assert not any(Reason.MOTION_STUCK in one for one in reasons)
+    assert np.abs(places - way).max() < np.abs(wander).max()
+
+
+def test_fixes_that_state_too_little_are_believed_less():
+    """White errors of 12 m, stated as 3 m."""
+    held, plain = [], []
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        steps, way = straight(rng, 300)
+        fixes = [fix_at(one, 3.0) for one in way + errors(rng, 300, 12.0)]
+        places, radii_m, _, _, state = followed(fixes, steps)
+        assert state.fixes.record.understated > 3.0
+        held.append((np.abs(places - way) <= radii_m)[60:].mean())
+        exact = [fix_at(one, 12.0) for one in way + errors(rng, 300, 12.0)]
+        plain.append(followed(exact, steps)[4].fixes.record.understated)
+    assert np.mean(held) > 0.9
+    assert plain == [1.0] * 5
+
+
+def test_without_dead_reckoning_outliers_do_not_throw_the_velocity():
+    rng = np.random.default_rng(11)
+    way = 15.0 * np.arange(1, 201.0) + 0j
+    seen = way + errors(rng, 200, 3.0)
+    seen[[80, 120, 121]] += 200.0j
+    places, _, statuses, _, _ = followed([fix_at(one) for one in seen])
+    assert np.abs(places - way)[5:].max() < 25.0
+    assert Status.LOST not in statuses[:120]
+    moved = way + np.where(np.arange(200) >= 100, 900.0j, 0.0)
+    places, _, statuses, _, _ = followed([fix_at(one) for one in moved + errors(rng, 200, 3.0)])
+    assert np.abs(places - moved)[110:].max() < 20.0
+    assert Status.LOST in statuses[100:106]
+
+
+def test_what_fixes_mean_by_hand():
+    one = np.eye(2)
+
+    def given(record, off_m, time_s=0.0, *, rests=False):
+        place = np.array([off_m, 0.0])
+        return record.at_fix((time_s, place, 4.0 * one, 12.0 * one), 30.0, rests=rests)
+
+    record, found = given(FixRecord(), 8.0)
+    assert (found.ruling, found.squared, found.larger) == (Ruling.AGREES, 2.0, 1.0)
+    assert (record.agreed, record.excess, record.understated) == (1, 1.05, 1.0)
+    assert given(FixRecord(agreed=2), 15.0)[1].ruling is Ruling.EITHER
+    record, found = given(FixRecord(agreed=3), 30.0)
+    assert found.ruling is Ruling.OUTLIER
+    # 900 / (4 + 12 f) = 13.8
+    assert found.larger == pytest.approx((900 / 13.8 - 4) / 12)
+    assert (len(record.rows), record.is_lost, record.agreed) == (1, False, 3)
+    for time_s in range(10, 30, 10):
+        record, found = given(record, 30.0, time_s)
+        assert found.ruling is Ruling.OUTLIER
+    assert record.is_lost
+    assert record.at_time(80.0).rows == record.rows
+    assert record.at_time(80.1).rows == ()
+    # As often as the rest of it: five that lasted for half a minute.
+    record, found = given(given(record, 30.0, 25.0)[0], 31.0, 31.0)
+    assert (found.ruling, record.agreed, record.rows) == (Ruling.ANEW, 0, ())
+    doubted = FixRecord(excess=4.0, agreed=3)
+    assert given(doubted, 26.0)[1].ruling is Ruling.AGREES
+    assert given(doubted, 27.0)[1].ruling is Ruling.OUTLIER
+
+
+def test_fixes_on_a_line_while_one_stands():
+    def ruled(speed_mps, *, rests, every_s=1.5, count=5):
+        record, found = FixRecord(agreed=9), None
+        for k in range(count):
+            off_m = np.array([40.0 + speed_mps * every_s * k, 0.0])
+            given = (every_s * k, off_m, np.eye(2), np.eye(2))
+            record, found = record.at_fix(given, 30.0, rests=rests)
+        return found.ruling
+
+    assert ruled(4.0, rests=True) is Ruling.CARRIED
+    assert ruled(4.0, rests=False) is Ruling.OUTLIER
+    assert ruled(2.0, rests=True) is Ruling.OUTLIER
+    assert ruled(4.0, rests=True, every_s=1.0) is Ruling.OUTLIER
+    assert ruled(4.0, rests=True, count=4, every_s=2.0) is Ruling.OUTLIER
+    assert ruled(0.0, rests=True, every_s=8.0) is Ruling.ANEW
+
+
+@pytest.mark.parametrize("layout", [RECKONED, MOVING])
+@pytest.mark.parametrize(("before_m", "now_m"), [(3.0, 5.0), (5.0, 3.0), (4.0, 4.0)])
+def test_what_lasts_follows_what_fixes_state(layout, before_m, now_m):
+    """Smaller errors shrink, larger ones have more that is new; the position stays as it is."""
+    size = extended_layout(layout).size
+    where, of = [layout.east, layout.north], [layout.size, layout.size + 1]
+    transition, noise, shift = rescaled(layout, size, before_m, now_m)
+    covariance = np.eye(size) * 7.0
+    for east, place in zip(where, of, strict=True):
+        covariance[east, place] = covariance[place, east] = 7.0
+        covariance[place, place] = 7.0 + before_m**2
+    after = transition @ covariance @ transition.T + noise
+    np.testing.assert_allclose(
+        after[: layout.size, : layout.size], covariance[: layout.size, : layout.size]
+    )
+    for east, place in zip(where, of, strict=True):
+        lasting_m2 = after[place, place] + after[east, east] - 2 * after[east, place]
+        assert lasting_m2 == pytest.approx(now_m**2)
+    assert not shift.any()
+
+
+def test_a_belief_begins_anew_at_a_fix_with_its_errors():
+    """The position is off by what lasts and by white noise, the place that fixes are of by this."""
+    options = KalmanFilter(fix_lasting_share=0.5)
+    steps = [MotionStep(1.0, 0.0)] * 40
+    far = [fix_at(complex(k + 1.0, 300.0 * (k >= 5))) for k in range(40)]
+    *_, state = followed(far[:36], steps[:36], options=options)
+    covariance = state.belief.moments.covariance
+    assert state.fixes.record.agreed == 0
+    assert covariance[0, 0] == pytest.approx(25.0)
+    assert covariance[0, 5] == covariance[5, 5] == pytest.approx(12.5)
+    assert state.belief.moments.mean[[0, 5]] == pytest.approx(EAST + 36.0)
