@@ -118,7 +118,9 @@ def test_an_odometer_that_reads_zero_while_fixes_go_on_is_dead(speed_mps):
     rng = np.random.default_rng(9)
     way = speed_mps * np.arange(1, 301.0) + 0j
     headings = rng.normal(0, 0.02, 300).tolist()
-    steps = [MotionStep(0.0 if 150 <= k < 200 else speed_mps, one) for k, one in enumerate(headings)]
+    steps = [
+        MotionStep(0.0 if 150 <= k < 200 else speed_mps, one) for k, one in enumerate(headings)
+    ]
     seen = way + errors(rng, 300, 3.0)
     places, _, statuses, reasons, _ = followed([fix_at(one) for one in seen], steps)
     off_m = np.abs(places - way)
@@ -250,3 +252,18 @@ def test_a_belief_begins_anew_at_a_fix_with_its_errors():
     assert covariance[0, 0] == pytest.approx(25.0)
     assert covariance[0, 5] == covariance[5, 5] == pytest.approx(12.5)
     assert state.belief.moments.mean[[0, 5]] == pytest.approx(EAST + 36.0)
+
+
+def test_an_outlier_is_told():
+    tracker = KalmanFilter().over_sites(CellPlan("EPSG:32629", ()))
+    rng, told = np.random.default_rng(0), []
+    steps, way = straight(rng, 30)
+    state = tracker.begin({"gnss", "motion"})
+    for k, step in enumerate(steps):
+        place = way[k] + (90.0 if k == 20 else 0.0)
+        state, out = tracker.step(state, Epoch(float(k), (step,), fix=fix_at(place)), rng)
+        told.append((out.fix.reason, [one.reason for one in out.unused if one.kind == "gnss"]))
+    rejected = Reason.REJECTED_BY_EVIDENCE
+    assert told[20] == (rejected, [rejected])
+    assert set(reason for reason, _ in told[:20] + told[21:]) == {Reason.USED}
+    assert not any(unused for _, unused in told[:20] + told[21:])

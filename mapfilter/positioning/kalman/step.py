@@ -218,13 +218,13 @@ class KalmanStep:
             if self.slots.size:
                 lasting = self.options.lasting_levels
                 self.belief = lasting.extended_belief(self.belief, self.slots)
-        taken = fix is not None and self._update_fix(fix, epoch.time_s)
+        why = Reason.UPDATE_FAILED if fix is None else self._update_fix(fix, epoch.time_s)
         if given.cells or given.timed:
             step_m = self.options.timing_step_m
             reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
             if self._update(self._radio_model(given), reading):
-                self.moved_m, taken = 0.0, True
-        return Reason.USED if taken else Reason.UPDATE_FAILED
+                self.moved_m, why = 0.0, Reason.USED
+        return why
 
     def _radio_model(self, given: SiteReadings) -> GaussianTerms:
         """Return the model of a report's levels and timing advances."""
@@ -245,7 +245,7 @@ class KalmanStep:
         growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, LEAST_MOVED_M)))
         return replace(model, noise=model.noise * np.outer(growth, growth))
 
-    def _update_fix(self, fix: GnssFix, time_s: float) -> bool:
+    def _update_fix(self, fix: GnssFix, time_s: float) -> Reason:
         if self.belief is None:
             raise AssertionError("started before it measures")
         noise, layout = fix_covariance_m2(fix, self.options.fix_sd_m), self.layout
@@ -256,7 +256,7 @@ class KalmanStep:
                 self._jump(jump_to(found, layout, self.fixes.lasting_m if self.lasts else None))
                 if found.is_new:
                     self.unused.append(UnusedReading(time_s, "motion", "", Reason.PHONE_TURNED))
-                return True
+                return Reason.USED
         rest = self.reckoning.watch.rest
         rests = self.own is RECKONED and rest is not None and not rest.is_carried
         how = FixWeighing(self.options, self.own, layout, self.method, self.compared)
@@ -267,12 +267,14 @@ class KalmanStep:
         self.recent_nis = [] if after.ruling.begins else self._with_nis(after.nis)
         if after.ruling is Ruling.CARRIED:
             self.reckoning = self.reckoning.carried()
-        if after.ruling is Ruling.OUTLIER and not after.used:
-            why = Reason.REJECTED_BY_EVIDENCE
-            self.unused.append(UnusedReading(time_s, "gnss", "", why))
         if self.own is RECKONED and isinstance(found, Direction):
             self.belief = turned_to(self.belief, found)
-        return after.used
+        if after.used:
+            return Reason.USED
+        if after.ruling is Ruling.OUTLIER:
+            self.unused.append(UnusedReading(time_s, "gnss", "", Reason.REJECTED_BY_EVIDENCE))
+            return Reason.REJECTED_BY_EVIDENCE
+        return Reason.UPDATE_FAILED
 
     def _jump(self, motion: Motion) -> None:
         """Move on by a jump of headings: what was measured before it said nothing of a loss."""
