@@ -20,6 +20,7 @@ from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.journey_motion import journey_motion, measured_positions
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.mirrored import mirrored_notes
+from mapfilter.tracks.motion_factors import scaled_motion
 from mapfilter.tracks.moved import places_of_poses
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
@@ -55,6 +56,9 @@ class CombineOptions:
         where nothing else gives them.
     walk : WalkOptions or None
         How steps are made of a phone's sensors where nothing else gives them; None for no steps.
+    factors : mapping of str to float
+        By which columns of motion (``step_m``, ``heading_rad``, ``turn_rad``) are multiplied, also
+        those of a track log.
     """
 
     crs: str = ""
@@ -64,6 +68,7 @@ class CombineOptions:
     offsets_s: Mapping[Path, float] = field(default_factory=dict)
     course_motion: bool = False
     walk: WalkOptions | None = field(default_factory=WalkOptions)
+    factors: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +126,10 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         walk=options.walk,
         true=[r for r in shifted if r.path in true_alone],
     )
+    names = ", ".join(r.path.name for r in measured)
+    rows, given_factors = scaled_motion(moved.rows, options.factors, names)
+    moved = replace(moved, rows=rows)
+    notes += given_factors
     mirrored = mirrored_notes(shifted, moved)
     notes += mirrored
     tables = {

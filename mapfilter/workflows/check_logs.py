@@ -14,7 +14,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import outside_m
-from mapfilter.tracks.motion_faults import fault_notes
+from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.range_units import range_notes

@@ -46,7 +46,11 @@ class Mapped:
         """Return the names of columns that may hold a field."""
         if field in self.own:
             return (self.own[field].lower(),)
-        return (self.stated[field],) if field in self.stated else FIELDS[field]
+        if field in self.stated:
+            return (self.stated[field],)
+        # A column that a user names for one field is no other one's.
+        taken = {column.lower() for column in self.own.values()}
+        return tuple(name for name in FIELDS[field] if name not in taken)
 
     def has(self, *fields: str) -> bool:
         """Return whether there are columns of all these fields."""
