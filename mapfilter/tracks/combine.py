@@ -11,9 +11,7 @@ import pandas as pd
 
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import (
-    heading_from_azimuth_rad,
-)
+from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.far_apart import check_far_apart
 from mapfilter.tracks.frame import Frame
@@ -25,6 +23,7 @@ from mapfilter.tracks.moved import places_of_poses
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.receiver_speeds import check_speeds
 from mapfilter.tracks.sensors import SENSOR_COLUMNS
 
 _RADIUS_68 = 1.515
@@ -107,6 +106,9 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     ]
     frame = Frame(shifted, options.crs, options.origin_deg)
     notes = [*alignment.notes, *frame.notes]
+    for one in shifted:
+        if (rows := one.tables.get("positions")) is not None and "speed_mps" in rows:
+            notes += check_speeds(one, *frame.east_north(rows, one.crs))
     for recording in recordings:
         if "cells" in recording.tables:
             count = len(recording.tables["cells"])

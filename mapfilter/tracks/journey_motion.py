@@ -12,6 +12,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.exchanged import check_columns
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -96,8 +97,8 @@ def journey_motion(
     Raises
     ------
     InputError
-        Odometry pauses for more than an hour, or there are no positions where motion is to come
-        from them.
+        Odometry pauses for more than an hour, columns of motion are exchanged or in another unit,
+        or there are no positions where motion is to come from them.
     """
     moved = _recorded(recordings, frame, notes)
     if moved is None and course_motion:
@@ -116,6 +117,7 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
             continue
         for other in having[1:]:
             notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
+        notes += check_columns(having[0])
         rows, source = having[0].tables[name], f"motion is that of {having[0].path.name}"
         if name == "odometry":
             _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))

@@ -1,4 +1,4 @@
-"""Motion whose turns or unit the positions of its log disprove is refused, and mended by a factor."""
+"""Motion that the positions of its log disprove is refused, and mended by a factor."""
 
 import numpy as np
 import pandas as pd

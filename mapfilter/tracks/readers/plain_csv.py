@@ -79,7 +79,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     _add_sensors(mapped, reading, time_s)
     add_cells(mapped, reading, time_s)
     reading.fields = tuple(field for field in FIELDS if mapped.has(field))
-    reading.unread = unused_columns(mapped)
+    reading.unread = unused_columns(mapped, time_s)
     if reading.unread:
         reading.ignore(unused_note(reading.unread))
 

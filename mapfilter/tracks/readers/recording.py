@@ -241,6 +241,12 @@ class Reading:
             # Elsewhere few bad values say nothing of their cause.
             hint = known.mistake(float(np.abs(values[ignored]).max())) if known.marks > 1 else ""
             where = f"first in line {first}" + (f"; likely: {hint}" if hint else "")
+            given = int(np.count_nonzero(good & ~missing))
+            if known.is_another(values[ignored], given):
+                # What is left of another quantity is none of this one either.
+                outside = ~missing
+                some = f"{int(ignored.sum())} of {number_of(given, 'value')} are"
+                where += "; the whole column"
             self.ignore(f"{label}: {some} not {known.expected}, ignored ({where})")
             checked[known.name] = np.where(outside, np.nan, values)
         return np.ones(len(line), dtype=bool)

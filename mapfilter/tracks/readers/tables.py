@@ -40,7 +40,8 @@ class Field:
         Up to so many different values out of range are marks of missing ones, and no reason to
         refuse a file.
     mostly : float
-        Share of other values out of range above which it is refused.
+        Share of other values out of range above which it is refused, or where the column is not
+        vital left out as another quantity, if it may have marks.
     """
 
     name: str
@@ -58,6 +59,20 @@ class Field:
     def mistake(self, largest: float) -> str:
         """Return the likely mistake behind values out of range, by the largest; "" for none."""
         return next((hint for low, high, hint in self.hints if low <= largest <= high), "")
+
+    def is_another(self, outside: Floats, given: int) -> bool:
+        """Return whether values out of range show that a column holds another quantity.
+
+        Parameters
+        ----------
+        outside : (N,) array
+            Values out of range.
+        given : int
+            Number of all values.
+        """
+        if self.vital or self.marks < 2 or len(outside) <= self.mostly * given:
+            return False
+        return len(np.unique(outside)) > self.marks
 
     @property
     def kind(self) -> str:
@@ -136,7 +151,12 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         _LONGITUDE,
         Field("altitude_m", -500, 20_000, "metres in -500..20000"),
         Field("accuracy_m", 0, 1e5, "metres >= 0"),
-        Field("speed_mps", 0, 350, "m/s in 0..350"),
+        Field(
+            *("speed_mps", 0, 350, "m/s in 0..350"),
+            hints=((0.0, np.inf, "a mark of missing values, or exchanged columns"),),
+            marks=3,
+            mostly=0.1,
+        ),
         Field("course_deg", 0, 360, "degrees in 0..360"),
         _text("provider"),
     ),

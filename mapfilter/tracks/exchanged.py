@@ -1,0 +1,104 @@
+"""Columns of motion that are no speeds or no turns: exchanged, or in another unit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.errors import Faults, InputError
+from mapfilter.tracks.readers.recording import Recording
+
+_COLUMNS = {"odometry": ("speed_mps", "yaw_rate_radps"), "motion": ("step_m", "turn_rad")}
+_FEWEST = 60
+_BOTH_WAYS, _ONE_WAY, _MOSTLY = 0.1, 0.01, 0.3
+"""Share of negative speeds of no vehicle that keeps turning to one side; of other turns; of
+turns."""
+_MIXED, _RESTLESS = 0.2, 0.05
+"""Share of negative speeds, and of rows that change their sign, of no vehicle at all."""
+_SIDEWAYS_MPS2, _OFTEN, _FEWEST_FAST, _MOVING_MPS = 20.0, 0.05, 20, 1.0
+"""Twice what tyres hold in a corner."""
+_FAST_MPS = 70.0
+
+
+def check_columns(recording: Recording) -> tuple[str, ...]:
+    """Return notes on columns of motion or odometry that may be of another quantity.
+
+    Speeds of both signs beside turns to one side alone are exchanged columns: a vehicle mostly
+    drives ahead, and turns to both sides. Speeds and yaw rates of odometry that together push it
+    sideways by more than 20 m/s² in 5 % of the rows are degrees for radians, or another unit.
+
+    Parameters
+    ----------
+    recording : Recording
+        With a table ``motion`` or ``odometry``.
+
+    Raises
+    ------
+    InputError
+        Columns are exchanged, or no tyre holds the vehicle.
+    """
+    faults, notes = Faults(), list[str]()
+    for table, names in _COLUMNS.items():
+        rows = recording.tables.get(table)
+        if rows is None or not set(names) <= set(rows):
+            continue
+        along, turn = (rows[name].to_numpy(dtype=np.float64) for name in names)
+        where = f"{recording.path}, {table}"
+        if _exchanged(along, turn):
+            share = float(np.mean(along[np.isfinite(along) & (along != 0)] < 0))
+            got = f"{share:.0%} of {names[0]} negative, and {names[1]} of one sign"
+            hint = f"the columns of {names[0]} and {names[1]} are exchanged"
+            faults.add(where, f"{names[0]} mostly positive, {names[1]} of both signs", got, hint)
+        elif table == "odometry" and (most := _sideways_mps2(along, turn)):
+            got = f"{most:.0f} m/s² sideways (speed times yaw rate) in 5 % of the rows or more"
+            hint = "degrees for radians: --column yaw_rate_degps=COLUMN; or another unit of speed"
+            faults.add(where, "m/s and rad/s of a vehicle that its tyres hold", got, hint)
+        elif table == "odometry" and (fast := _fast_mps(along)):
+            notes.append(
+                f"{recording.path.name}: odometry, speed_mps: {fast:.0f} m/s or more in 5 % of the "
+                "rows (likely: km/h for m/s, --column wheel_speed_kmh=COLUMN)"
+            )
+        elif share := _negative_share(along):
+            what = "another quantity, such as an acceleration or a rate of turning"
+            notes.append(
+                f"{recording.path.name}: {table}, {names[0]}: {share:.0%} negative, now and then "
+                f"(likely: {what})"
+            )
+    faults.raise_if_any(InputError)
+    return tuple(notes)
+
+
+def _exchanged(along: Floats, turn: Floats) -> bool:
+    """Return whether the one has both signs and the other only one, against their nature."""
+    moved, turned = (values[np.isfinite(values) & (values != 0)] for values in (along, turn))
+    known = np.isfinite(turn)
+    if moved.size < _FEWEST or turned.size < max(_FEWEST, _MOSTLY * known.sum()):
+        return False
+    back, left = float(np.mean(moved < 0)), float(np.mean(turned > 0))
+    return _BOTH_WAYS <= back <= 1 - _BOTH_WAYS and min(left, 1 - left) <= _ONE_WAY
+
+
+def _negative_share(along: Floats) -> float:
+    """Return the share of negative speeds that change their sign again and again; else 0."""
+    moved = along[np.isfinite(along) & (along != 0)]
+    if moved.size < _FEWEST:
+        return 0.0
+    back, changes = float(np.mean(moved < 0)), float(np.mean(np.diff(np.sign(moved)) != 0))
+    return back if _MIXED <= back <= 1 - _MIXED and changes >= _RESTLESS else 0.0
+
+
+def _fast_mps(speed_mps: Floats) -> float:
+    """Return the speed that is exceeded in 5 % of the rows; 0 where a vehicle may have it."""
+    known = np.abs(speed_mps[np.isfinite(speed_mps)])
+    fast = float(np.quantile(known, 1 - _OFTEN)) if known.size >= _FEWEST else 0.0
+    return fast if fast > _FAST_MPS else 0.0
+
+
+def _sideways_mps2(speed_mps: Floats, rate_radps: Floats) -> float:
+    """Return the acceleration that is exceeded in 5 % of the moving rows; 0 where tyres hold it."""
+    moving = np.isfinite(rate_radps) & (np.abs(speed_mps) > _MOVING_MPS)
+    sideways = np.abs(speed_mps * rate_radps)[moving]
+    if sideways.size < _FEWEST or np.sum(sideways > _SIDEWAYS_MPS2) < _FEWEST_FAST:
+        return 0.0
+    most = float(np.quantile(sideways, 1 - _OFTEN))
+    return most if most > _SIDEWAYS_MPS2 else 0.0
