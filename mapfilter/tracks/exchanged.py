@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
@@ -18,24 +19,26 @@ _MIXED, _RESTLESS = 0.2, 0.05
 _SIDEWAYS_MPS2, _OFTEN, _FEWEST_FAST, _MOVING_MPS = 20.0, 0.05, 20, 1.0
 """Twice what tyres hold in a corner."""
 _FAST_MPS = 70.0
+_FALLS, _STEPS_PER_S = 0.1, 5.0
 
 
 def check_columns(recording: Recording) -> tuple[str, ...]:
-    """Return notes on columns of motion or odometry that may be of another quantity.
+    """Return notes on columns of motion, odometry or steps that may be of another quantity.
 
     Speeds of both signs beside turns to one side alone are exchanged columns: a vehicle mostly
     drives ahead, and turns to both sides. Speeds and yaw rates of odometry that together push it
     sideways by more than 20 m/s² in 5 % of the rows are degrees for radians, or another unit.
+    Counted steps seldom fall, or are few in each row.
 
     Parameters
     ----------
     recording : Recording
-        With a table ``motion`` or ``odometry``.
+        Such as one with a table ``motion``, ``odometry`` or ``steps``.
 
     Raises
     ------
     InputError
-        Columns are exchanged, or no tyre holds the vehicle.
+        Columns are exchanged, no tyre holds the vehicle, or steps are none.
     """
     faults, notes = Faults(), list[str]()
     for table, names in _COLUMNS.items():
@@ -64,8 +67,27 @@ def check_columns(recording: Recording) -> tuple[str, ...]:
                 f"{recording.path.name}: {table}, {names[0]}: {share:.0%} negative, now and then "
                 f"(likely: {what})"
             )
+    if (steps := recording.tables.get("steps")) is not None:
+        _check_counts(recording, steps, faults)
     faults.raise_if_any(InputError)
     return tuple(notes)
+
+
+def _check_counts(recording: Recording, steps: pd.DataFrame, faults: Faults) -> None:
+    """Note counted steps that fall again and again."""
+    time_s, count = (steps[name].to_numpy(dtype=np.float64) for name in ("time_s", "count"))
+    if count.size < _FEWEST:
+        return
+    falls = float(np.mean(np.diff(count) < 0))
+    usual_s = max(float(np.median(np.diff(time_s))), 1.0)
+    if falls <= _FALLS or count.max() <= _STEPS_PER_S * usual_s:
+        return
+    got = f"{count.min():g} to {count.max():g}, falling in {falls:.0%} of the rows"
+    hint = "another quantity, such as an azimuth (compass_deg) or a length (step_m)"
+    if "compass" in recording.tables:
+        hint = "the columns of steps and compass_deg are exchanged"
+    expected = "a counter that grows, or the few steps of each row"
+    faults.add(f"{recording.path}, steps", expected, got, hint)
 
 
 def _exchanged(along: Floats, turn: Floats) -> bool:

@@ -100,6 +100,8 @@ def journey_motion(
         Odometry pauses for more than an hour, columns of motion are exchanged or in another unit,
         or there are no positions where motion is to come from them.
     """
+    for recording in recordings:
+        notes += check_columns(recording)
     moved = _recorded(recordings, frame, notes)
     if moved is None and course_motion:
         moved = _course([*recordings, *true], sensors, frame, notes)
@@ -117,7 +119,6 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
             continue
         for other in having[1:]:
             notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
-        notes += check_columns(having[0])
         rows, source = having[0].tables[name], f"motion is that of {having[0].path.name}"
         if name == "odometry":
             _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))

@@ -135,3 +135,40 @@ def test_a_unit_that_nothing_states_is_asked_for(tmp_path, speed, told):
     rows.to_csv(tmp_path / "drive.csv", index=False)
     (note,) = read_recording(tmp_path / "drive.csv").ignored
     assert told in note
+
+
+@pytest.fixture
+def walk():
+    rng = np.random.default_rng(4)
+    count = 15_000 + np.cumsum(rng.integers(1, 3, COUNT))
+    azimuth = (90 + 60 * np.sin(np.arange(COUNT) / 50) + rng.normal(0, 5, COUNT)) % 360
+    return {"steps": count, "compass_deg": azimuth}
+
+
+def test_steps_and_azimuths_that_are_exchanged_name_both_columns(walk, tmp_path):
+    path = tmp_path / "walk.csv"
+    rows = pd.DataFrame({"time": TIME_S, "step_count": walk["compass_deg"]})
+    rows.assign(azimuth_deg=walk["steps"]).to_csv(path, index=False)
+    with pytest.raises(InputError) as error:
+        read_recording(path)
+    (fault,) = error.value.faults
+    assert fault.where == f"{path}, column azimuth_deg (magnetic_deg)"
+    assert fault.hint == "a step counter: the columns of steps and it are exchanged"
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_azimuths_for_steps_are_refused(walk, read, whole):
+    read(**walk)
+    azimuth = walk["compass_deg"].round() if whole else walk["compass_deg"]
+    with pytest.raises(InputError) as error:
+        read(steps=azimuth, compass_deg=walk["steps"] % 350)
+    (fault,) = error.value.faults
+    assert "falling in" in fault.got
+    assert fault.hint == "the columns of steps and compass_deg are exchanged"
+    with pytest.raises(InputError, match=r"another quantity, such as an azimuth \(compass_deg\)"):
+        read(steps=azimuth, turn_rad=0.0)
+
+
+def test_steps_of_each_row_may_fall(walk, read):
+    log = read(**walk | {"steps": np.diff(walk["steps"], prepend=15_000)})
+    assert log.motion["step_m"].sum() > 500

@@ -139,6 +139,8 @@ def _add_sensors(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
 def _add_courses(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     """Add what gives counted steps a direction: a compass, turns, or a rate of turning."""
     magnetic = mapped.number("compass_deg")
+    if column := mapped.rows.find(*mapped.names("compass_deg")):
+        reading.tallies.columns["magnetic_deg"] = column
     columns = {"time_s": time_s, "magnetic_deg": magnetic}
     add_rows(reading, "compass", columns, mapped.rows, np.isfinite(magnetic))
     turn = mapped.radians("turn")

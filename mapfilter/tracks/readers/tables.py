@@ -264,7 +264,12 @@ RECORDED: dict[str, tuple[Field, ...]] = {
     "steps": (_TIME, Field("count", 0, 1e9, "steps >= 0", required=True)),
     "compass": (
         _TIME,
-        Field("magnetic_deg", -180, 360, "degrees in -180..360", required=True, vital=True),
+        Field(
+            *("magnetic_deg", -180, 360, "degrees in -180..360"),
+            required=True,
+            hints=((360.0, np.inf, "a step counter: the columns of steps and it are exchanged"),),
+            vital=True,
+        ),
     ),
     "turns": (
         _TIME,
