@@ -14,7 +14,7 @@ from mapfilter.tracks.motion_faults import step_fault
 from mapfilter.tracks.readers.recording import Recording
 
 _FEWEST = 20
-_AGREED, _APART = 0.8, 0.5
+_AGREED, _APART, _TURN_RAD = 0.8, 0.5, 6.2832
 
 
 def check_speeds(recording: Recording, east_m: Floats, north_m: Floats) -> tuple[str, ...]:
@@ -30,15 +30,19 @@ def check_speeds(recording: Recording, east_m: Floats, north_m: Floats) -> tuple
     Raises
     ------
     InputError
-        Speed and course are exchanged: the speeds, as degrees, are the course of the positions.
+        Speed and course are exchanged: the speeds, as degrees, are the course of the positions; or
+        courses are radians.
     """
     rows = recording.tables["positions"]
     places = pd.DataFrame({"time_s": rows["time_s"], "east_m": east_m, "north_m": north_m})
     known = rows.drop_duplicates("time_s").dropna(subset=["speed_mps"])
     if len(known) < _FEWEST:
         return ()
+    where, expected = f"{recording.path}, positions", "speed in m/s and course in degrees"
+    if _in_radians(known, places):
+        got, hint = "courses that are, as radians, that of the positions", "radians for degrees"
+        raise fail(InputError, where, expected, got, f"{hint}: call the column course [rad]")
     if _exchanged(known, places):
-        where, expected = f"{recording.path}, positions", "speed in m/s and course in degrees"
         got = "speeds that are, as degrees, the course of the positions"
         hint = "the columns of speed and course are exchanged"
         raise fail(InputError, where, expected, got, hint)
@@ -66,15 +70,30 @@ def speed_unit_fault(
     return step_fault(motion.assign(heading_rad=np.nan, turn_rad=np.nan), places)
 
 
+def _in_radians(known: pd.DataFrame, places: pd.DataFrame) -> bool:
+    """Return whether courses are radians, and as degrees none."""
+    if "course_deg" not in known or not known["course_deg"].max() <= _TURN_RAD:
+        return False
+    course = known["course_deg"]
+    return (
+        _agreement(known, np.degrees(course), places) >= _AGREED
+        and _agreement(known, course, places) <= _APART
+    )
+
+
 def _exchanged(known: pd.DataFrame, places: pd.DataFrame) -> bool:
     """Return whether speeds are courses, and courses are none."""
-
-    def agreement(azimuth_deg: pd.Series) -> float:
-        heading = heading_from_azimuth_rad(azimuth_deg.to_numpy(dtype=np.float64))
-        motion = pd.DataFrame({"time_s": known["time_s"], "step_m": 1.0, "heading_rad": heading})
-        heading, course = headings_and_courses(motion, places)
-        return float(np.mean(np.cos(course - heading))) if heading.size >= _FEWEST else 0.0
-
     if "course_deg" not in known:
         return False
-    return agreement(known["speed_mps"]) >= _AGREED and agreement(known["course_deg"]) <= _APART
+    return (
+        _agreement(known, known["speed_mps"], places) >= _AGREED
+        and _agreement(known, known["course_deg"], places) <= _APART
+    )
+
+
+def _agreement(known: pd.DataFrame, azimuth_deg: pd.Series, places: pd.DataFrame) -> float:
+    """Return the mean cosine between azimuths and the course of the positions; 0 for a few."""
+    heading = heading_from_azimuth_rad(azimuth_deg.to_numpy(dtype=np.float64))
+    motion = pd.DataFrame({"time_s": known["time_s"], "step_m": 1.0, "heading_rad": heading})
+    heading, course = headings_and_courses(motion, places)
+    return float(np.mean(np.cos(course - heading))) if heading.size >= _FEWEST else 0.0

@@ -106,7 +106,7 @@ def test_a_column_that_is_named_or_usual_goes_first(tmp_path):
         ("velocity", "velocity (speed_mps or speed_kmh?)"),
         ("Speed [%]", "speed [%]"),
         ("turn rate", "turn rate (yaw_rate_radps or yaw_rate_degps?)"),
-        ("heading", "heading (compass_deg?)"),
+        ("heading", "heading (course_deg?)"),
         ("engine speed [rpm]", "engine speed [rpm]"),
         ("level [dB]", "level [db]"),
     ],

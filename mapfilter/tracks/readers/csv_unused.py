@@ -42,6 +42,9 @@ def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
         likely = (
             [_OF_WHEELS.get(columns[name], "")] if name in columns else likely_fields(name, found)
         )
+        if likely == ["compass_deg"] and not _walks(mapped):
+            # Beside positions alone a compass is of no use, a course is.
+            likely = ["course_deg"]
         if len(likely) > 1 and likely[0].endswith("_mps"):
             unit = speed_unit(mapped, name, time_s)
             if unit not in _OF_SPEEDS:
@@ -60,6 +63,11 @@ def unused_note(unread: tuple[str, ...]) -> str:
     name, _, fields = guessed[:-2].rpartition(" (")
     option = column_options(fields.split(" or "), name)
     return f"columns not used: {listed(unread)} (likely: {option})"
+
+
+def _walks(mapped: Mapped) -> bool:
+    placed = mapped.has("lat_deg", "lon_deg") and not mapped.has("course_deg")
+    return not placed or mapped.has("steps") or mapped.has("step_m")
 
 
 def _with_fields(name: str, fields: list[str]) -> str:

@@ -16,6 +16,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import listed
 from mapfilter.tracks.cut_times import cut_times
+from mapfilter.tracks.readers.held_positions import own_positions
 from mapfilter.tracks.readers.recorded_values import (
     checked_values,
     duplicates,
@@ -348,4 +349,8 @@ class Reading:
             counted = time if table == "motion" and not by_cell else rows["time_s"]
             if table not in _SEVERAL and (cut := cut_times(np.asarray(counted))):
                 self.ignore(f"{table}: {cut}")
+        if table == "positions":
+            rows, notes = own_positions(rows)
+            for note in notes:
+                self.ignore(note)
         return rows

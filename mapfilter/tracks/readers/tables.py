@@ -114,7 +114,10 @@ _LATITUDE = Field(
 _LONGITUDE = Field(
     *("lon_deg", -180, 180, "degrees in -180..180"),
     required=True,
-    hints=_NO_DEGREES,
+    hints=(
+        (180.0, 360.0, "degrees east of 0 to 360; take 360 from those above 180"),
+        *_NO_DEGREES,
+    ),
 )
 _METRES = "metres"
 _EAST, _NORTH = (
