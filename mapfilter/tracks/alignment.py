@@ -15,6 +15,7 @@ from mapfilter.geodesy import unproject
 from mapfilter.tracks.clock_notes import apart_note, span_s, zoneless_note
 from mapfilter.tracks.misplaced import FAR_APART, FAR_M
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.speed_shift import shift_note, speeds_of_places
 
 _QUARTER_S = 900.0
 _MOST_ZONE_S = 14 * 3600.0
@@ -93,6 +94,8 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
     clock = recording.clock
     same = clock.kind == first.clock.kind and clock.kind != "utc"
     if clock.absolute or (same and clock.kind == "local"):
+        if one is None or other is None:
+            return 0.0, shift_note(first.path.name, _speed(first), _speed(recording))
         return 0.0, _disagreement(first.path.name, one, other)
     if clock.kind == "local":
         return _zone(recording, first, one, other)
@@ -245,7 +248,7 @@ def _speed(recording: Recording) -> tuple[Floats, Floats] | None:
     track = _track(recording)
     if track is None or len(track[0]) < 10:
         return None
-    return _rate(track[0], np.hypot(np.diff(track[1]), np.diff(track[2])))
+    return speeds_of_places(*track)
 
 
 def _rate(time_s: Floats, step_m: Floats) -> tuple[Floats, Floats]:

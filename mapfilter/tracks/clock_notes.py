@@ -9,6 +9,7 @@ from mapfilter.tracks.readers.recording import Recording
 
 _HOUR_S = 3600.0
 _APART_S = _HOUR_S
+_DAY_S, _WEEKS_S = 86_400.0, 1024 * 7 * 86_400
 
 
 def span_s(recording: Recording) -> tuple[float, float]:
@@ -44,11 +45,22 @@ def apart_note(recordings: Sequence[Recording], offsets_s: Sequence[float]) -> l
         before = max(before, span, key=lambda one: one[1])
     if not gaps_s:
         return []
-    hours = max(gaps_s) / 3600
-    return [
-        f"recordings lie up to {hours:.1f} h apart (likely: a wrong time zone; or several "
-        "journeys: convert each alone)"
-    ]
+    gap_s = max(gaps_s)
+    likely = "a wrong time zone; or several journeys: convert each alone"
+    likely = week_fault(gap_s) or likely
+    return [f"recordings lie up to {gap_s / 3600:.1f} h apart (likely: {likely})"]
+
+
+def week_fault(gap_s: float) -> str:
+    """Return the likely mistake of times that lie 1024 weeks, or a multiple, apart; "" for others.
+
+    Old receivers count weeks of GPS from 0 to 1023, and not how often.
+    """
+    anew = round(gap_s / _WEEKS_S)
+    if not anew or abs(gap_s - anew * _WEEKS_S) >= _DAY_S:
+        return ""
+    seconds = anew * _WEEKS_S
+    return f"the date of a receiver whose week number began anew: --offset FILE={seconds}"
 
 
 def _hours_off(one: tuple[float, float], other: tuple[float, float]) -> bool:

@@ -61,6 +61,11 @@ def check_columns(recording: Recording) -> tuple[str, ...]:
                 f"{recording.path.name}: odometry, speed_mps: {fast:.0f} m/s or more in 5 % of the "
                 "rows (likely: km/h for m/s, --column wheel_speed_kmh=COLUMN)"
             )
+        elif table == "odometry" and _unsigned(turn):
+            notes.append(
+                f"{recording.path.name}: odometry, yaw_rate_radps: all of one sign (likely: their "
+                "sign is lost, or turns to one side alone)"
+            )
         elif share := _negative_share(along):
             what = "another quantity, such as an acceleration or a rate of turning"
             notes.append(
@@ -98,6 +103,12 @@ def _exchanged(along: Floats, turn: Floats) -> bool:
         return False
     back, left = float(np.mean(moved < 0)), float(np.mean(turned > 0))
     return _BOTH_WAYS <= back <= 1 - _BOTH_WAYS and min(left, 1 - left) <= _ONE_WAY
+
+
+def _unsigned(turn: Floats) -> bool:
+    """Return whether yaw rates, noise and all, have one sign though there are many of them."""
+    turned = turn[np.isfinite(turn) & (turn != 0)]
+    return turned.size >= _FEWEST and bool((turned > 0).all() or (turned < 0).all())
 
 
 def _negative_share(along: Floats) -> float:

@@ -170,3 +170,58 @@ def test_seconds_of_gps_are_named_beside_unix_times(read):
 def test_degrees_of_a_whole_turn_are_named(read):
     with pytest.raises(InputError, match="degrees east of 0 to 360"):
         read(time=TIME_S, lat=LAT, lon=LON + 260)
+
+
+def test_positions_of_one_time_are_those_of_an_export(read):
+    found = read(time=np.full(COUNT, TIME_S[0]), lat=LAT, lon=LON)
+    assert any("all 300 rows have 1 time (likely: those of an export" in n for n in found.ignored)
+
+
+def test_positions_of_two_days_are_noted(read):
+    found = read(time=TIME_S + np.where(np.arange(COUNT) < 150, 0, 86_400), lat=LAT, lon=LON)
+    assert any(note.startswith("positions pause for 24.0 h") for note in found.ignored)
+
+
+@pytest.mark.parametrize("ci", [2**28 - 1, 2**36 - 1, 2**31 - 1])
+def test_identities_with_all_bits_set_are_of_no_cell(read, ci):
+    found = read(time=TIME_S, mcc=206, mnc=1, tac=7, ci=ci, rsrp=-90)
+    assert found.tables["radio"]["cell"].isna().all()
+
+
+def test_yaw_rates_without_their_sign_are_noted(read, tmp_path):
+    rate = np.random.default_rng(1).normal(0, 0.1, COUNT)
+    for values, told in ((rate, False), (np.abs(rate), True)):
+        read(time=TIME_S, wheel_speed_mps=10.0, yaw_rate_radps=values)
+        notes = mf.read_log(tmp_path / "a.csv").notes
+        assert any("all of one sign" in note for note in notes) == told
+
+
+def test_a_gyroscope_in_degrees_makes_no_motion(read, tmp_path):
+    time_s = TIME_S[0] + np.arange(3000) / 50
+    rng = np.random.default_rng(2)
+    rate = rng.normal(0, 0.6, (3000, 3))
+    swing = 9.8 + 2 * np.sin(2 * np.pi * 1.8 * time_s)
+    for factor, told in ((1.0, False), (180 / np.pi, True)):
+        columns = {f"gyr_{axis}": factor * rate[:, i] for i, axis in enumerate("xyz")}
+        read(time=time_s, acc_x=0.1, acc_y=0.1, acc_z=swing, **columns)
+        log = mf.read_log(tmp_path / "a.csv")
+        assert any("degrees for radians per second" in note for note in log.notes) == told
+        assert log.motion.empty == told
+
+
+def test_dead_reckoning_of_a_receiver_is_no_position(tmp_path):
+    def sentence(i, mode):
+        body = f"GNRMC,1000{i:02d}.00,A,6000.{i:03d}00,N,02500.00000,E,10.0,0.0,130526,,,{mode}"
+        total = 0
+        for letter in body:
+            total ^= ord(letter)
+        return f"${body}*{total:02X}"
+
+    modes = "AAAAADDDDDEEEEEEEEEE"
+    lines = [sentence(i, mode) for i, mode in enumerate(modes)]
+    (tmp_path / "a.nmea").write_text("\n".join(lines))
+    assert len(read_recording(tmp_path / "a.nmea").tables["positions"]) == 10
+    # Old receivers state no mode.
+    old = [line.rsplit(",,,", 1)[0] + ",,*00" for line in lines]
+    (tmp_path / "a.nmea").write_text("\n".join(line.replace("*00", "") for line in old))
+    assert len(read_recording(tmp_path / "a.nmea").tables["positions"]) == 20

@@ -14,6 +14,7 @@ _LONGEST_RUN_S, _ALIKE, _LONG = 5.0, 0.8, 3
 """Runs of equal positions of a slow receiver; longer ones are rests."""
 _JUMP_M, _JUMP_MPS, _SETTLED = 2000.0, 350.0, 10
 _FIRST_SHARE, _FIRST_ROWS = 0.02, 3
+_JOURNEY_S = 6 * 3600.0
 _DECIMALS, _EXACT_DEG = 3, 1e-9
 _RADIUS_68 = 1.515
 
@@ -35,6 +36,12 @@ def own_positions(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
     for part in (_without_first, _without_repeated, _with_rounding):
         rows, note = part(rows)
         notes += (note,) if note else ()
+    pause_s = float(rows["time_s"].diff().max()) if len(rows) > 1 else 0.0
+    if pause_s > _JOURNEY_S:
+        notes += (
+            f"positions pause for {pause_s / 3600:.1f} h (likely: several journeys: split the file "
+            "there, convert each alone)",
+        )
     return rows, notes
 
 
