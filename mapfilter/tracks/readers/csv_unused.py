@@ -42,7 +42,7 @@ def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
         likely = (
             [_OF_WHEELS.get(columns[name], "")] if name in columns else likely_fields(name, found)
         )
-        if likely == ["compass_deg"] and not _walks(mapped):
+        if likely == ["compass_deg"] and "heading" in name and not _walks(mapped):
             # Beside positions alone a compass is of no use, a course is.
             likely = ["course_deg"]
         if len(likely) > 1 and likely[0].endswith("_mps"):

@@ -55,9 +55,9 @@ def _without_first(rows: pd.DataFrame) -> tuple[pd.DataFrame, str]:
     if not jumps.size or jumps[-1] >= many:
         return rows, ""
     count = int(jumps[-1]) + 1
-    lie = "lies" if count == 1 else "lie"
+    first = "first row lies" if count == 1 else f"first {count} rows lie"
     note = (
-        f"positions: the first {number_of(count, 'row')} {lie} {step_m[jumps[-1]] / 1000:.1f} km "
+        f"positions: the {first} {step_m[jumps[-1]] / 1000:.1f} km "
         "from the next one, left out (likely: the last position of before)"
     )
     return rows.iloc[count:].reset_index(drop=True), note
