@@ -7,6 +7,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.readers.recording import Recording
 
 _COLUMNS = {"odometry": ("speed_mps", "yaw_rate_radps"), "motion": ("step_m", "turn_rad")}
@@ -19,6 +20,7 @@ _MIXED, _RESTLESS = 0.2, 0.05
 _SIDEWAYS_MPS2, _OFTEN, _FEWEST_FAST, _MOVING_MPS = 20.0, 0.05, 20, 1.0
 """Twice what tyres hold in a corner."""
 _FAST_MPS = 70.0
+_LARGE_RAD, _SLOW = 0.5, 0.2
 _FALLS, _STEPS_PER_S = 0.1, 5.0
 
 
@@ -52,6 +54,10 @@ def check_columns(recording: Recording) -> tuple[str, ...]:
             got = f"{share:.0%} of {names[0]} negative, and {names[1]} of one sign"
             hint = f"the columns of {names[0]} and {names[1]} are exchanged"
             faults.add(where, f"{names[0]} mostly positive, {names[1]} of both signs", got, hint)
+        elif table == "motion" and _is_heading(turn):
+            got = f"{np.nanmedian(np.abs(turn)):.1f} rad in the median, changing slowly"
+            hint = "headings (heading_rad, or compass_deg) for their changes"
+            faults.add(f"{where}, turn_rad", "changes of heading in each interval", got, hint)
         elif table == "odometry" and (most := _sideways_mps2(along, turn)):
             got = f"{most:.0f} m/s² sideways (speed times yaw rate) in 5 % of the rows or more"
             hint = "degrees for radians: --column yaw_rate_degps=COLUMN; or another unit of speed"
@@ -103,6 +109,14 @@ def _exchanged(along: Floats, turn: Floats) -> bool:
         return False
     back, left = float(np.mean(moved < 0)), float(np.mean(turned > 0))
     return _BOTH_WAYS <= back <= 1 - _BOTH_WAYS and min(left, 1 - left) <= _ONE_WAY
+
+
+def _is_heading(turn: Floats) -> bool:
+    """Return whether turns are large all the time and nearly the same from row to row."""
+    known = turn[np.isfinite(turn)]
+    if known.size < _FEWEST or np.median(np.abs(known)) < _LARGE_RAD:
+        return False
+    return bool(np.median(np.abs(wrap_rad(np.diff(known)))) < _SLOW * np.median(np.abs(known)))
 
 
 def _unsigned(turn: Floats) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -14,6 +15,7 @@ from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.times import (
     DAY_S,
+    parse_times,
     unix_seconds,
     utc_from_gps_s,
     utc_from_local_s,
@@ -24,12 +26,17 @@ _UNIX_S = 1e8
 _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 _DAYS, _EPOCH_DAYS, _NEAREST_S = (36_526.0, 73_050.0), 25_569.0, 1e-3
 """Days of the years 2000 to 2099 since 1900, those until 1970, and rows a thousand a second."""
+_NUMBER = re.compile(r"\d+(?:\.\d*)?")
 _RECENT_S, _LATEST_S = 1.6e9, 2.2e9
 """Unix times of 2020 and of 2039."""
 
 
 def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
-    """Return UTC seconds, or seconds from an unknown start where they are small numbers."""
+    """Return UTC seconds, or seconds from an unknown start where they are small numbers.
+
+    Of several columns of times one in UTC goes first, then one of local times.
+    """
+    mapped = _best_column(mapped)
     number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
     known = number[np.isfinite(number)]
     if known.size >= 0.5 * len(number) and known.size and abs(float(np.median(known))) < _UNIX_S:
@@ -54,6 +61,27 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             InputError, where, _TIMES, repr(texts[at][:40] or "nothing"), _of_time(texts[at])
         )
     return _over_midnight(mapped, reading, time_s)
+
+
+def _best_column(mapped: Mapped) -> Mapped:
+    """Return columns with the times of the one that says most."""
+    rows = mapped.rows
+    there = [name for name in mapped.names("time") if name in rows.names]
+    if len(there) < 2 or "time" in mapped.own:
+        return mapped
+    best = max(there, key=lambda name: _certainty(name, rows.first_text(name)))
+    if best == there[0]:
+        return mapped
+    return replace(mapped, stated={**mapped.stated, "time": best})
+
+
+def _certainty(name: str, text: str) -> int:
+    """Return 3 for times in UTC, 2 for local ones, 1 for other numbers, 0 for others."""
+    number = text.replace(",", ".")
+    if _NUMBER.fullmatch(number):
+        return 3 if float(number) > _UNIX_S else 1
+    time_s, zoned = parse_times(np.array([text], dtype=object), "UTC" if "utc" in name else "")
+    return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
 
 
 def _is_days(known: Floats) -> bool:

@@ -134,7 +134,13 @@ FASTEST_VEHICLE_MPS, FASTEST_TURN_RADPS = 120.0, 3.5
 """No road vehicle or usual train exceeds 432 km/h, none turns by 200 degrees in a second; the yaw
 rates of a vehicle's bus end at 3.92 rad/s (SAE J1939), above which they are marks."""
 _NO_VALUE = "what a bus sends where it has no value, such as"
-_TURN = Field("turn_rad", -6.3, 6.3, "radians in -2π..2π", hints=_DEGREES, vital=True)
+_TURN = Field(
+    *("turn_rad", -6.3, 6.3, "radians in -2π..2π"),
+    hints=_DEGREES,
+    vital=True,
+    marks=3,
+    mostly=0.05,
+)
 _LEVEL = Field(
     *("level_dbm", -200, 0, "dBm in -200..0"),
     hints=(
