@@ -15,6 +15,13 @@ _CORNER_RAD, _BACK_RAD = np.deg2rad(30.0), np.deg2rad(150.0)
 _AGREED_RAD = np.deg2rad(30.0)
 _FEWEST_CORNERS, _BOTH, _AGREED, _SELDOM = 5, 2 / 3, 0.85, 0.5
 _A_SECOND = 1.2
+_UNITS = {
+    "degrees": np.pi / 180,
+    "counted twice": 0.5,
+    "half as large as they should be": 2.0,
+    "revolutions per minute": 2 * np.pi / 60,
+}
+"""Factors that mend turns, by the mistake."""
 
 
 def turn_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None:
@@ -61,7 +68,7 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
         return None
     lasted_s = np.diff(time_s, prepend=time_s[:1])
     apart_s = float(np.median(lasted_s[1:]))
-    units: dict[str, Floats | float] = {"": 1.0, "degrees": np.pi / 180, "counted twice": 0.5}
+    units: dict[str, Floats | float] = {"": 1.0, **_UNITS}
     if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
         units[f"rates (rad/s) in rows {apart_s:.2g} s apart"] = lasted_s
         units[f"rates (degrees/s) in rows {apart_s:.2g} s apart"] = lasted_s * np.pi / 180
