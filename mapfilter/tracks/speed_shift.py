@@ -9,7 +9,7 @@ from mapfilter._types import Floats
 _WITHIN_S, _PERIOD_S = 60.0, 0.5
 _FEWEST_S, _LEAST, _TIMES, _GAIN, _PEAK_S = 180.0, 0.7, 3.0, 0.05, 8.0
 """What is left unexplained has to be three times as much without the shift."""
-_REMARKABLE_S, _HALF_S = 1.5, 2.5
+_REMARKABLE_S, _HALF_S, _LONGEST_S = 1.5, 2.5, 7200.0
 _LEAP_S = (17.0, 19.0)
 """GPS time is 18 s ahead of UTC since 2017."""
 
@@ -80,7 +80,7 @@ def speeds_of_places(time_s: Floats, east_m: Floats, north_m: Floats) -> Speeds:
 def _correlation(one: Speeds, other: Speeds, shift_s: float) -> float:
     """Return the correlation of speeds of which the second are shifted; NaN for a short time."""
     begin_s = max(one[0][0], other[0][0] + shift_s)
-    end_s = min(one[0][-1], other[0][-1] + shift_s)
+    end_s = min(one[0][-1], other[0][-1] + shift_s, begin_s + _LONGEST_S)
     if end_s - begin_s < _FEWEST_S:
         return float("nan")
     at_s = np.arange(begin_s, end_s, _PERIOD_S)

@@ -172,3 +172,18 @@ def test_azimuths_for_steps_are_refused(walk, read, whole):
 def test_steps_of_each_row_may_fall(walk, read):
     log = read(**walk | {"steps": np.diff(walk["steps"], prepend=15_000)})
     assert log.motion["step_m"].sum() > 500
+
+
+def test_usual_names_without_a_unit_say_what_they_are_taken_for(drive, tmp_path):
+    path = tmp_path / "drive.csv"
+    rows = pd.DataFrame({"time": TIME_S, "wheel_speed": drive["speed"], "yaw_rate": drive["rate"]})
+    rows.to_csv(path, index=False)
+    notes = read_recording(path).notes
+    assert notes == (
+        "wheel_speed: no unit in its name, taken for m/s; for km/h --column "
+        "wheel_speed_kmh=wheel_speed",
+        "yaw_rate: no unit in its name, taken for rad/s; for deg/s --column "
+        "yaw_rate_degps=yaw_rate",
+    )
+    pd.DataFrame({"time": TIME_S, **odometry(drive)}).to_csv(path, index=False)
+    assert read_recording(path).notes == ()
