@@ -71,11 +71,19 @@ def test_positions_that_a_receiver_holds_on_a_drive_are_left_out(read, speed_mps
         ({"time": np.arange(300), "t": "x", "utc": TIME_S}, TIME_S[0]),
         ({"time": "12:00:00", "timestamp": TIME_S}, TIME_S[0]),
         ({"time": TIME_S, "timestamp": np.arange(300)}, TIME_S[0]),
+        ({"time": TIME_S, "timestamp": 123_456_000_000_000 + np.arange(300)}, TIME_S[0]),
     ],
 )
 def test_of_several_columns_of_times_that_in_utc_is_read(read, columns, start):
     log = read(a=pd.DataFrame({**columns, "lat": LAT, "lon": LON}))
     assert log.start_utc_s == start
+    assert len(log.gnss) == COUNT
+
+
+def test_ticks_since_a_phone_was_started_are_no_utc(read):
+    ticks = 123_456_000_000_000 + np.arange(COUNT) * 10**9
+    log = read(a=table(np.arange(COUNT), timestamp=ticks, lat=LAT, lon=LON))
+    assert np.isnan(log.start_utc_s)
     assert len(log.gnss) == COUNT
 
 

@@ -90,6 +90,10 @@ def test_hemispheres_in_columns_of_their_own(read):
     assert len(found.unread) == 1
     found = read(time=TIME_S, latitude=LAT, ns="N", longitude=LON, ew="E")
     np.testing.assert_allclose(places(found)["lon_deg"], LON)
+    found = read(time=TIME_S, latitude=LAT, longitude=LON, lon_dir="W")
+    assert (places(found)["lon_deg"] < 0).all()
+    found = read(time=TIME_S, latitude=LAT, longitude=LON, state="S")
+    np.testing.assert_allclose(places(found)["lat_deg"], LAT)
     # A sign that is there already stays.
     found = read(time=TIME_S, latitude=-LAT, ns="S", longitude=-LON, ew="W")
     np.testing.assert_allclose(places(found)["lat_deg"], -LAT)

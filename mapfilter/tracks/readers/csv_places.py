@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from mapfilter._types import Floats
@@ -12,6 +14,7 @@ from mapfilter.tracks.readers.csv_odometry import speeds_of
 from mapfilter.tracks.readers.recording import Reading
 
 _HEMISPHERES = {"lat_deg": ("N", "S"), "lon_deg": ("E", "W")}
+_NAMED = re.compile(r"lat|lon|lng|hemi|^n[ /_]?s$|^e[ /_]?w$")
 _FEWEST_WEST = 3
 """So many different negative courses are no mark of missing ones."""
 
@@ -19,7 +22,7 @@ _FEWEST_WEST = 3
 def hemisphere_columns(rows: Columns, taken: frozenset[str] = frozenset()) -> dict[str, str]:
     """Return the columns that hold the hemisphere of a latitude or longitude, by field.
 
-    All their texts are N and S, or E and W.
+    All their texts are N and S, or E and W; there is one for both, or its name says what it is.
 
     Parameters
     ----------
@@ -37,7 +40,10 @@ def hemisphere_columns(rows: Columns, taken: frozenset[str] = frozenset()) -> di
                 texts = {str(text).upper() for text in np.unique(rows.texts(name))}
                 if texts <= {*letters, ""}:
                     found[field] = name
-    return found
+    if len(found) == len(_HEMISPHERES):
+        return found
+    # A letter alone may be a mark of anything.
+    return {field: name for field, name in found.items() if _NAMED.search(name)}
 
 
 def add_places(

@@ -27,8 +27,8 @@ _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 _DAYS, _EPOCH_DAYS, _NEAREST_S = (36_526.0, 73_050.0), 25_569.0, 1e-3
 """Days of the years 2000 to 2099 since 1900, those until 1970, and rows a thousand a second."""
 _NUMBER = re.compile(r"\d+(?:\.\d*)?")
-_RECENT_S, _LATEST_S = 1.6e9, 2.2e9
-"""Unix times of 2020 and of 2039."""
+_EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
+"""Unix times of 1998, 2020 and 2039."""
 
 
 def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
@@ -79,7 +79,8 @@ def _certainty(name: str, text: str) -> int:
     """Return 3 for times in UTC, 2 for local ones, 1 for other numbers, 0 for others."""
     number = text.replace(",", ".")
     if _NUMBER.fullmatch(number):
-        return 3 if float(number) > _UNIX_S else 1
+        # Ticks since a phone was started are large, too.
+        return 3 if _EARLY_S < unix_seconds([float(number)])[0] < _LATEST_S else 1
     time_s, zoned = parse_times(np.array([text], dtype=object), "UTC" if "utc" in name else "")
     return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
 
