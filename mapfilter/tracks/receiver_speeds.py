@@ -14,7 +14,7 @@ from mapfilter.tracks.motion_faults import step_fault
 from mapfilter.tracks.readers.recording import Recording
 
 _FEWEST = 20
-_AGREED, _APART, _TURN_RAD = 0.8, 0.5, 6.2832
+_AGREED, _APART, _VARIED, _TURN_RAD = 0.8, 0.5, 0.9, 6.2832
 
 
 def check_speeds(recording: Recording, east_m: Floats, north_m: Floats) -> tuple[str, ...]:
@@ -74,19 +74,27 @@ def _in_radians(known: pd.DataFrame, places: pd.DataFrame) -> bool:
     """Return whether courses are radians, and as degrees none."""
     if "course_deg" not in known or not known["course_deg"].max() <= _TURN_RAD:
         return False
-    course = known["course_deg"]
-    return (
-        _agreement(known, np.degrees(course), places) >= _AGREED
-        and _agreement(known, course, places) <= _APART
-    )
+    return _fits_better(known, np.degrees(known["course_deg"]), places)
 
 
 def _exchanged(known: pd.DataFrame, places: pd.DataFrame) -> bool:
     """Return whether speeds are courses, and courses are none."""
-    if "course_deg" not in known:
+    return "course_deg" in known and _fits_better(known, known["speed_mps"], places)
+
+
+def _fits_better(known: pd.DataFrame, azimuth_deg: pd.Series, places: pd.DataFrame) -> bool:
+    """Return whether azimuths are the course of the positions, and those that are given are not.
+
+    A straight way has one course only, which small numbers fit by chance.
+    """
+    given = known["course_deg"].notna() & azimuth_deg.notna()
+    known, azimuth_deg = known[given], azimuth_deg[given]
+    if len(known) < _FEWEST:
         return False
+    varied = abs(np.mean(np.exp(1j * np.radians(azimuth_deg)))) < _VARIED
     return (
-        _agreement(known, known["speed_mps"], places) >= _AGREED
+        bool(varied)
+        and _agreement(known, azimuth_deg, places) >= _AGREED
         and _agreement(known, known["course_deg"], places) <= _APART
     )
 

@@ -88,6 +88,13 @@ def test_speed_and_course_of_a_receiver_that_are_exchanged_are_refused(drive, re
         read(**places, speed_mps=drive["azimuth"], course_deg=drive["speed"])
 
 
+@pytest.mark.parametrize("course", [None, 90.0])
+def test_a_walk_straight_to_the_north_is_no_exchange(read, course):
+    """Its speeds, taken for degrees, are nearly its course."""
+    places = {"latitude": 60 + np.arange(COUNT) * 1e-5, "longitude": 25.0}
+    read(**places, speed_mps=1.1, course_deg=course)
+
+
 def test_speeds_of_a_receiver_that_are_another_quantity_are_left_out(drive, read, tmp_path):
     places = {name: drive[name] for name in ("latitude", "longitude")}
     read(**places, speed_mps=drive["rate"])
