@@ -229,3 +229,13 @@ def test_dead_reckoning_of_a_receiver_is_no_position(tmp_path):
     old = [line.rsplit(",,,", 1)[0] + ",,*00" for line in lines]
     (tmp_path / "a.nmea").write_text("\n".join(line.replace("*00", "") for line in old))
     assert len(read_recording(tmp_path / "a.nmea").tables["positions"]) == 20
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_ticks_since_a_phone_was_started_need_their_unit(read, unit, scale):
+    ticks = ((123_456 + np.arange(COUNT)) * scale).astype("int64")
+    with pytest.raises(InputError, match="ticks since a phone was started"):
+        read(timestamp=ticks, lat=LAT, lon=LON)
+    found = read(**{f"timestamp_{unit}": ticks, "lat": LAT, "lon": LON})
+    assert found.clock.kind == "monotonic"
+    np.testing.assert_allclose(places(found)["time_s"], 123_456 + np.arange(COUNT))

@@ -33,6 +33,7 @@ ClockKind = Literal["utc", "gps", "local", "monotonic"]
 
 _LINES_KEPT = 3
 _EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
+_TICKS = "likely: ticks since a phone was started; their unit in the header, as time_ms, reads them"
 _JUMP_S = 86_400.0
 _STRAY_SHARE = 0.1
 _SEVERAL = ("radio", "satellites", "ephemerides")
@@ -268,7 +269,11 @@ class Reading:
         kept = np.ones(len(line), dtype=bool)
         if self.clock.kind != "monotonic":
             kept = (time_s >= _EARLIEST_UTC_S) & (time_s <= _LATEST_UTC_S)
-            self.refuse(line[good & ~kept], "time: not between 1980 and 2100")
+            outside = good & ~kept
+            # Milliseconds or nanoseconds of a phone that runs for days look like Unix times.
+            early = outside.any() and bool((time_s[good] < _EARLIEST_UTC_S).all())
+            hint = f" ({_TICKS})" if early else ""
+            self.refuse(line[outside], f"time: not between 1980 and 2100{hint}")
         index = np.flatnonzero(good & kept)
         if index.size < 3:
             return kept
