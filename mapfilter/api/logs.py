@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from numbers import Real
 from pathlib import Path
 
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments, shown
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.motion_factors import check_factors
 from mapfilter.tracks.open_log import OpenOptions, open_log
 from mapfilter.tracks.pdr.options import WalkOptions
 
@@ -26,6 +28,7 @@ def read_log(
     columns: Mapping[str, str] | None = None,
     course_motion: bool = False,
     walk: WalkOptions | None = _WALK,
+    factors: Mapping[str, float] | None = None,
 ) -> TrackLog:
     """Read a track log, or recordings of one journey by other programs.
 
@@ -49,6 +52,9 @@ def read_log(
     walk : WalkOptions or None
         How steps and headings are made of the raw sensors of a phone where nothing else gives
         motion; None for no steps.
+    factors : mapping of str to float, optional
+        By which columns of motion (``step_m``, ``heading_rad``, ``turn_rad``) are multiplied: -1
+        for turns that run clockwise, 0.3048 for lengths in feet.
 
     Raises
     ------
@@ -70,12 +76,18 @@ def read_log(
             Entries("columns", columns, str, "a column's name", "the column of each field"),
             Setting("course_motion", course_motion, bool),
             Argument("walk", walk, WalkOptions | None, "WalkOptions"),
+            Entries("factors", factors, Real, "a number", "the factor of each column of motion"),
         ],
     )
+    faults = Faults()
+    check_factors(factors or {}, faults)
+    faults.raise_if_any(ConfigError)
     given, true = _several("paths", paths), _several("truth", truth)
     if not given:
         raise fail(ConfigError, "read_log, paths", _FILES, "none", "a pattern that no file matches")
-    combine = CombineOptions(truth=true, course_motion=course_motion, walk=walk)
+    combine = CombineOptions(
+        truth=true, course_motion=course_motion, walk=walk, factors=factors or {}
+    )
     options = OpenOptions(zone=zone, columns=columns or {}, combine=combine)
     return open_log(given, crs=crs, options=options).log
 

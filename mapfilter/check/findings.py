@@ -60,7 +60,8 @@ REMEDIES = {
     "log-cells-unknown": "Take the plan of the network that was received, with mcc, mnc, lac and "
     "ci, or name the cells in the log by the plan's ids.",
     "log-headings": "Give headings in radians counter-clockwise from grid east: pi/2 minus a "
-    "compass azimuth in radians; mapfilter convert reads a column of degrees as compass_deg.",
+    "compass azimuth in radians; mapfilter convert reads a column of degrees as compass_deg. "
+    "track.factors.heading_rad = 1 takes them as they are.",
     "log-invalid": "Correct the log or recording, or its settings in [track].",
     "log-outside-area": "Take a log of this area, or the area of this log.",
     "log-ranges": "Give differences in metres, how much farther the cell is than the other one, "
@@ -68,9 +69,11 @@ REMEDIES = {
     "log-rows-unused": "Look at the lines named; mapfilter convert lists all reasons.",
     "log-speeds": "Give lengths in metres; if a vehicle moved, set filter.bayes.vehicle = true.",
     "log-steps": "Give the metres moved in each interval: lengths in metres, not speeds and not in "
-    "feet; a recording with a column speed_kmh or speed_mps is read as such by mapfilter convert.",
+    "feet; a recording with a column speed_kmh or speed_mps is read as such by mapfilter convert. "
+    "track.factors.step_m multiplies them; 1 takes them as they are.",
     "log-turns": "Give the change of heading in each interval, in radians, counter-clockwise "
-    "positive; mapfilter convert reads columns turn_deg, yaw_rate_radps and yaw_rate_degps.",
+    "positive; mapfilter convert reads columns turn_deg, yaw_rate_radps and yaw_rate_degps. "
+    "track.factors.turn_rad multiplies them: -1 turns them round, 1 takes them as they are.",
     "log-without-motion": "Add a recording of steps, odometry or a fused track (track.recordings), "
     "or set track.course_motion; without motion only GNSS locates.",
     "lon-lat-swapped": "Exchange longitude and latitude.",

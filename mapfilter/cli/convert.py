@@ -11,10 +11,12 @@ import typer
 from mapfilter.cli.options import (
     ColumnOption,
     DeclinationOption,
+    FactorOption,
     JsonOption,
     StepLengthOption,
     column_map,
     given_path,
+    motion_factors,
     numbers,
     refuse,
     walk_changes,
@@ -63,6 +65,7 @@ def convert(
             "--offset", metavar="FILE=S", help="Seconds to add to the times of a file; repeatable."
         ),
     ] = None,
+    factor: FactorOption = None,
     course_motion: Annotated[
         bool,
         typer.Option(
@@ -108,6 +111,7 @@ def convert(
             offsets_s=_offsets(parse_pairs(offset or (), "--offset"), [*given, *true]),
             course_motion=course_motion,
             walk=None if no_steps else _walk(pose, declination, step_length),
+            factors=motion_factors(factor),
         ),
     )
     result = run_convert(given, out, options)

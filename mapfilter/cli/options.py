@@ -81,6 +81,14 @@ ColumnOption = Annotated[
     list[str] | None,
     typer.Option("--column", metavar="FIELD=COLUMN", help="Column of a plain CSV; repeatable."),
 ]
+FactorOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--factor",
+        metavar="COLUMN=NUMBER",
+        help="Multiply step_m, heading_rad or turn_rad of motion (-1 turns it round); repeatable.",
+    ),
+]
 BoxOption = Annotated[
     str | None,
     typer.Option("--bbox", metavar="W,S,E,N", help="Part of the map, in degrees; else all of it."),
@@ -152,6 +160,28 @@ def column_map(texts: list[str] | None) -> dict[str, str]:
     check_fields(columns, faults)
     faults.raise_if_any(ConfigError)
     return columns
+
+
+def motion_factors(texts: list[str] | None) -> dict[str, float]:
+    """Read ``--factor``: the number by which each column of motion is multiplied.
+
+    Raises
+    ------
+    ConfigError
+        A text is no ``COLUMN=NUMBER``, a column is none of motion, or a number is 0.
+    """
+    if not texts:
+        return {}
+    from mapfilter.tracks.motion_factors import check_factors
+    from mapfilter.workflows.convert import parse_pairs
+
+    pairs, faults = parse_pairs(texts, "--factor"), Faults()
+    found = {
+        name: (numbers(text, 1, f"--factor {name}") or [0.0])[0] for name, text in pairs.items()
+    }
+    check_factors(found, faults)
+    faults.raise_if_any(ConfigError)
+    return found
 
 
 def walk_changes(declination_deg: float | None, step_m: float | None) -> dict[str, Any]:

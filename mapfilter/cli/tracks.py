@@ -13,6 +13,7 @@ from mapfilter.cli.options import (
     ColumnOption,
     ConfigOption,
     DeclinationOption,
+    FactorOption,
     FilterOption,
     JsonOption,
     OutOption,
@@ -22,6 +23,7 @@ from mapfilter.cli.options import (
     check_custom_filter,
     column_map,
     given_path,
+    motion_factors,
     named_defaults,
     named_options,
     refuse,
@@ -159,6 +161,7 @@ def replay(
         str | None, typer.Option("--zone", help="Zone of local times in recordings.")
     ] = None,
     column: ColumnOption = None,
+    factor: FactorOption = None,
     course_motion: Annotated[
         bool,
         typer.Option(
@@ -220,6 +223,8 @@ def replay(
                 given.append(f"{key}={toml([str(file) for file in files])}")
         columns = column_map(column)
         given += [f"track.columns.{field}={toml(name)}" for field, name in columns.items()]
+        for column_name, number in motion_factors(factor).items():
+            given.append(f"track.factors.{column_name}={number!r}")
         if course_motion:
             given.append("track.course_motion=true")
         walk = walk_changes(declination, step_length)

@@ -120,11 +120,11 @@ class Section(BaseModel):
 
 
 class Columns(Section):
-    """A section that names columns of a table."""
+    """A section of columns of a table, each with a value or none, such as its name."""
 
     @property
-    def given(self) -> dict[str, str]:
-        """The columns that are named."""
+    def given(self) -> dict[str, Any]:
+        """The values of the columns that have one."""
         return {name: column for name, column in self if column is not None}
 
 

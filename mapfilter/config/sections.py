@@ -57,6 +57,13 @@ def _format_name(value: str) -> str:
     return value
 
 
+def _no_zero(value: float) -> float:
+    if value == 0:
+        raise ValueError("a number other than 0")
+    return value
+
+
+Factor = Annotated[float, AfterValidator(_no_zero)]
 _T = TypeVar("_T")
 Axis = Annotated[
     tuple[_T, ...],
@@ -188,6 +195,27 @@ class TrackColumns(Columns):
     """
 
 
+class TrackFactors(Columns):
+    """``[track.factors]``: numbers by which columns of motion are multiplied.
+
+    For turns that run clockwise (-1) or lengths in another unit (0.3048 for feet). 1 takes a column
+    as it is, although the positions of the log contradict it. They count for track logs, too.
+
+    Parameters
+    ----------
+    step_m : float, optional
+        Factor of the lengths of steps.
+    heading_rad : float, optional
+        Factor of headings.
+    turn_rad : float, optional
+        Factor of turns, or of those made of yaw rates.
+    """
+
+    step_m: Factor | None = None
+    heading_rad: Factor | None = None
+    turn_rad: Factor | None = None
+
+
 @with_options(WalkOptions)
 class TrackWalk(Section):
     """``[track.walk]``: steps and headings made of the raw sensors of a walker's phone."""
@@ -196,7 +224,7 @@ class TrackWalk(Section):
 class Track(Section):
     """``[track]``: a log, a folder of logs, or recordings of other programs.
 
-    All keys but ``path`` and ``without`` are for recordings.
+    All keys but ``path``, ``without`` and ``factors`` are for recordings.
 
     Parameters
     ----------
@@ -233,6 +261,7 @@ class Track(Section):
     steps: bool = True
     walk: TrackWalk = TrackWalk()
     columns: TrackColumns = TrackColumns()
+    factors: TrackFactors = TrackFactors()
 
 
 @with_options(CandidateFilter)

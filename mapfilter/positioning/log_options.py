@@ -17,7 +17,7 @@ from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.motion_faults import fault_notes
+from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.speeds import FASTEST_MPS, speed_fault
 
 STREETS_ALONE = "no cells in the log: located by streets, and by positions where it has some"

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mapfilter._types import Floats
+from mapfilter._words import number_of
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, accuracy, position_errors_m
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
@@ -21,7 +22,6 @@ from mapfilter.report.canvas import (
     BLACK,
     BLUE,
     GREEN,
-    GREY,
     ORANGE,
     SKY,
     VERMILLION,
@@ -32,11 +32,10 @@ from mapfilter.report.canvas import (
     styled,
     wrapped_title,
 )
+from mapfilter.report.track_marks import LEAST_MARGIN_M, lost_places, name_ends, surroundings
 
 _MAP_IN = 8.0
-_MARGIN_SHARE = 0.08
-_LEAST_MARGIN_M = 40.0
-_NOWHERE_M = (0.0, 0.0, 2 * _LEAST_MARGIN_M, 2 * _LEAST_MARGIN_M)
+_NOWHERE_M = (0.0, 0.0, 2 * LEAST_MARGIN_M, 2 * LEAST_MARGIN_M)
 """Extent without a map and without a position."""
 _TRUTH = "#868686"
 _CLAIMED = (Status.CONVERGED, Status.TRACKING)
@@ -58,15 +57,16 @@ def plot_track(
 
     Tracked estimates more than 50 m off are drawn in another colour and shape; those while the
     filter searched, was uncertain or lost are no claims, and small and pale whatever their error.
-    Epochs without a position are not drawn; crosses mark the true positions (without truth, the
-    estimates) at which the filter got lost. Positions that the log itself holds, such as GNSS
+    Epochs without a position are not drawn; crosses mark the estimates (before any, the truth) at
+    which the filter got lost. Positions that the log itself holds, such as GNSS
     fixes, are ``fixes_m``, (k, 2) as east and north. Without a title it is the filter's name and
     the outcome of the track; ``zoom`` shows only the surroundings of truth and estimate, or without
-    either of the fixes, not the whole area. Without a map (None) the ground is plain.
+    either of the fixes, not the whole area; how many estimates lie outside is written down. Without
+    a map (None) the ground is plain.
     """
     if truth is not None and not truth.time_s.size:
         truth = None
-    bounds_m = _surroundings(estimate, truth, fixes_m) if zoom or base is None else None
+    bounds_m = surroundings(estimate, truth, fixes_m) if zoom or base is None else None
     if base is None:
         shown = BaseMap(bounds_m or _NOWHERE_M)
     else:
@@ -76,16 +76,17 @@ def plot_track(
         axes = new_figure(_MAP_IN + 0.8, map_height_in(shown, _MAP_IN) + 1.2).subplots()
     frame = draw_base(axes, shown)
     located = np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m)
+    found_m = estimate.east_m[located], estimate.north_m[located]
     off = np.zeros(len(estimate), dtype=bool)
     if truth is not None:
         # Wider than the marks of the estimate: neither hides the other.
         x, y = frame(truth.east_m, truth.north_m)
         path = Look(linewidth=6.5, solid_capstyle="round", solid_joinstyle="round")
         axes.plot(x, y, color=_TRUTH, zorder=4, label="truth", **path)
-        _name_ends(axes, x, y)
+        name_ends(axes, x, y, np.column_stack(frame(*found_m)))
         off = position_errors_m(estimate, truth) > SUCCESS_RADIUS_M
     elif located.any():
-        _name_ends(axes, *frame(estimate.east_m[located], estimate.north_m[located]))
+        name_ends(axes, *frame(*found_m), np.empty((0, 2)))
     if fixes_m is not None and len(fixes_m):
         plus = Look(marker="+", color=BLACK, s=45.0, linewidths=0.7, zorder=4.5)
         axes.scatter(*frame(*fixes_m.T), label="positions of the log", **plus)
@@ -102,7 +103,7 @@ def plot_track(
             axes.scatter(*at, linewidths=0, **look)
             # Marks as small as on the map would not show their colour in the legend.
             axes.add_line(mark(label, look["marker"], 2 * look["s"] ** 0.5, color=look["color"]))
-    lost_m = _lost_m(estimate, truth)
+    lost_m = lost_places(estimate, truth)
     if len(lost_m):
         cross = Look(s=140, marker="X", color=BLACK, edgecolors="white", linewidths=1.0)
         axes.scatter(*frame(*lost_m.T), zorder=10.5, label="got lost here", **cross)
@@ -117,6 +118,7 @@ def plot_track(
             axes.plot(*ends, color=VERMILLION, linewidth=1.4, zorder=9)
             rim = Look(facecolors="white", edgecolors=GREEN, linewidths=2.0, zorder=9.5)
             axes.scatter(true_x, true_y, s=70, marker="D", label="truth at the switch", **rim)
+    _note_outside(axes, np.column_stack(found_m), shown.bounds_m)
     words = title or f"{estimate.filter} filter: {_outcome(estimate, truth)}"
     axes.set_title(wrapped_title(axes, words))
     attribute(axes, shown)
@@ -124,24 +126,14 @@ def plot_track(
     return axes
 
 
-def _name_ends(axes: Axes, x: Floats, y: Floats) -> None:
-    """Mark where a path starts and ends; in a round trip one name is below, the other above."""
-    for at, word, offset_pt, colour in ((0, "start", -14, "white"), (-1, "end", 8, GREY)):
-        name = axes.annotate(word, (x[at], y[at]), (0, offset_pt), textcoords="offset points")
-        name.set(ha="center", fontsize=9, path_effects=HALO, zorder=11)
-        axes.scatter(x[at], y[at], s=50, color=colour, edgecolors=BLACK, zorder=9.8)
-
-
-def _lost_m(estimate: TrackEstimate, truth: Truth | None) -> Floats:
-    """Return where the filter got lost, (k, 2) as east and north; of moments with a position."""
-    lost = np.array([status is Status.LOST for status in estimate.status], dtype=bool)
-    begins = lost & ~np.concatenate([[False], lost[:-1]])
-    at = estimate.east_m, estimate.north_m
-    if truth is not None:
-        at = truth.at(estimate.time_s)
-    places: Floats = np.column_stack(at)[begins]
-    known: Floats = places[np.isfinite(places).all(axis=1)]
-    return known
+def _note_outside(axes: Axes, found_m: Floats, bounds_m: Bounds) -> None:
+    """Write how many estimates lie outside of the picture, if any do."""
+    west, south, east, north = bounds_m
+    inside = (found_m >= (west, south)).all(axis=1) & (found_m <= (east, north)).all(axis=1)
+    if count := int(np.sum(~inside)):
+        words = f"{number_of(count, 'estimate')} outside of the picture"
+        text = axes.text(0.008, 0.99, words, transform=axes.transAxes, zorder=20)
+        text.set(ha="left", va="top", fontsize=8.5, path_effects=HALO)
 
 
 def _unclaimed(estimate: TrackEstimate) -> str:
@@ -166,30 +158,3 @@ def _outcome(estimate: TrackEstimate, truth: Truth | None) -> str:
                 words += f"; mean error then {score.error_mean_m:.1f} m"
     last = estimate.status[-1] if len(estimate) else Status.SEARCHING
     return f"{words}; {last.lower()} at the end" if last in _GONE else words
-
-
-def _surroundings(
-    estimate: TrackEstimate, truth: Truth | None, fixes_m: Floats | None
-) -> Bounds | None:
-    """Return the extent of all positions with a margin; None when there are none.
-
-    Fixes may be far off, so that they count only where there is nothing else.
-    """
-    parts = [np.column_stack([estimate.east_m, estimate.north_m])]
-    if truth is not None:
-        parts.append(np.column_stack([truth.east_m, truth.north_m]))
-    positions = np.concatenate(parts)
-    positions = positions[np.isfinite(positions).all(axis=1)]
-    if not len(positions) and fixes_m is not None:
-        positions = fixes_m
-    if not len(positions):
-        return None
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    margin_m = max(_LEAST_MARGIN_M, _MARGIN_SHARE * float((high - low).max()))
-    # No side is shorter than half the other one: a straight track still shows its surroundings.
-    half = np.maximum((high - low) / 2, 0.25 * float((high - low).max())) + margin_m
-    middle = (low + high) / 2
-    west, south = (middle - half).tolist()
-    south -= 0.05 * 2 * float(half[1])  # room for the scale bar
-    east, north = (middle + half).tolist()
-    return west, south, east, north

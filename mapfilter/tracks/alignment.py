@@ -12,8 +12,10 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
+from mapfilter.tracks.clock_notes import apart_note, span_s, zoneless_note
 from mapfilter.tracks.misplaced import FAR_APART, FAR_M
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.speed_shift import shift_note, speeds_of_places
 
 _QUARTER_S = 900.0
 _MOST_ZONE_S = 14 * 3600.0
@@ -28,9 +30,6 @@ _RATE_HZ = 5.0
 _LEAST_CORRELATION = 0.5
 _METRES_PER_DEGREE = 111_195.0
 _REMARKABLE_S = 1.5
-
-_HOUR_S = 3600.0
-_APART_S = _HOUR_S
 
 _Track = tuple[Floats, Floats, Floats]
 
@@ -71,38 +70,10 @@ def align(recordings: Sequence[Recording], given_s: Mapping[Path, float]) -> Ali
         offsets.append(offset_s + given_s.get(first.path, 0.0))
         if note:
             notes.append(f"{recording.path.name}: {note}")
-    notes += _apart(recordings, offsets)
+    if not first.clock.absolute:
+        notes += zoneless_note([one for one in recordings if one.path not in given_s])
+    notes += apart_note(recordings, offsets)
     return Alignment(tuple(offsets), first.clock.absolute, tuple(notes))
-
-
-def _apart(recordings: Sequence[Recording], offsets_s: Sequence[float]) -> list[str]:
-    """Return a note where recordings lie hours apart, as those of several journeys do."""
-    spans = [
-        (begin + offset, end + offset)
-        for (begin, end), offset in zip(map(_span, recordings), offsets_s, strict=True)
-    ]
-    gaps_s = []
-    before, *others = sorted(spans)
-    for span in others:
-        gap_s = span[0] - before[1]
-        if gap_s > _APART_S or (gap_s > 0 and _hours_off(before, span)):
-            gaps_s.append(gap_s)
-        before = max(before, span, key=lambda one: one[1])
-    if not gaps_s:
-        return []
-    hours = max(gaps_s) / 3600
-    return [
-        f"recordings lie up to {hours:.1f} h apart (likely: a wrong time zone; or several "
-        "journeys: convert each alone)"
-    ]
-
-
-def _hours_off(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Return whether most of the shorter of two spans lies in the other one some hours earlier."""
-    apart_s = other[0] - one[0]
-    hours = round(apart_s / _HOUR_S)
-    shorter_s = min(end - begin for begin, end in (one, other))
-    return hours > 0 and abs(apart_s - hours * _HOUR_S) < 0.5 * shorter_s
 
 
 def _reference(recordings: Sequence[Recording]) -> int:
@@ -123,6 +94,8 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
     clock = recording.clock
     same = clock.kind == first.clock.kind and clock.kind != "utc"
     if clock.absolute or (same and clock.kind == "local"):
+        if one is None or other is None:
+            return 0.0, shift_note(first.path.name, _speed(first), _speed(recording))
         return 0.0, _disagreement(first.path.name, one, other)
     if clock.kind == "local":
         return _zone(recording, first, one, other)
@@ -147,14 +120,9 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
     raise fail(InputError, str(recording.path), expected, got, hint)
 
 
-def _span(recording: Recording) -> tuple[float, float]:
-    times = [rows["time_s"] for rows in recording.tables.values() if "time_s" in rows]
-    return min(float(t.iloc[0]) for t in times), max(float(t.iloc[-1]) for t in times)
-
-
 def _common(recording: Recording, first: Recording, shift_s: float = 0.0) -> float:
     """Return the share of the shorter recording that lies within the other one."""
-    (a, b), (c, d) = _span(first), _span(recording)
+    (a, b), (c, d) = span_s(first), span_s(recording)
     overlap = min(b, d + shift_s) - max(a, c + shift_s)
     return overlap / max(min(b - a, d - c), 1e-9)
 
@@ -280,7 +248,7 @@ def _speed(recording: Recording) -> tuple[Floats, Floats] | None:
     track = _track(recording)
     if track is None or len(track[0]) < 10:
         return None
-    return _rate(track[0], np.hypot(np.diff(track[1]), np.diff(track[2])))
+    return speeds_of_places(*track)
 
 
 def _rate(time_s: Floats, step_m: Floats) -> tuple[Floats, Floats]:

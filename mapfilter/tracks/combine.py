@@ -11,23 +11,21 @@ import pandas as pd
 
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import (
-    heading_from_azimuth_rad,
-)
+from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.far_apart import check_far_apart
 from mapfilter.tracks.frame import Frame
-from mapfilter.tracks.journey_motion import journey_motion, measured_positions
+from mapfilter.tracks.journey_motion import OF_RECEIVER, journey_motion
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.mirrored import mirrored_notes
+from mapfilter.tracks.motion_factors import scaled_motion
 from mapfilter.tracks.moved import places_of_poses
 from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.position_sources import fixes_of, measured_positions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.receiver_speeds import check_speeds
 from mapfilter.tracks.sensors import SENSOR_COLUMNS
-
-_RADIUS_68 = 1.515
-"""Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
 
 _NO_JOURNEY = {"cells", "ephemerides", "ionosphere"}
 _CELLS_HINT = "give it as [cells] plan"
@@ -55,6 +53,9 @@ class CombineOptions:
         where nothing else gives them.
     walk : WalkOptions or None
         How steps are made of a phone's sensors where nothing else gives them; None for no steps.
+    factors : mapping of str to float
+        By which columns of motion (``step_m``, ``heading_rad``, ``turn_rad``) are multiplied, also
+        those of a track log.
     """
 
     crs: str = ""
@@ -64,6 +65,7 @@ class CombineOptions:
     offsets_s: Mapping[Path, float] = field(default_factory=dict)
     course_motion: bool = False
     walk: WalkOptions | None = field(default_factory=WalkOptions)
+    factors: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +104,9 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     ]
     frame = Frame(shifted, options.crs, options.origin_deg)
     notes = [*alignment.notes, *frame.notes]
+    for one in shifted:
+        if (rows := one.tables.get("positions")) is not None and "speed_mps" in rows:
+            notes += check_speeds(one, *frame.east_north(rows, one.crs))
     for recording in recordings:
         if "cells" in recording.tables:
             count = len(recording.tables["cells"])
@@ -121,12 +126,18 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         walk=options.walk,
         true=[r for r in shifted if r.path in true_alone],
     )
+    names = ", ".join(r.path.name for r in measured)
+    rows, given_factors = scaled_motion(moved.rows, options.factors, names)
+    moved = replace(moved, rows=rows)
+    notes += given_factors
     mirrored = mirrored_notes(shifted, moved)
     notes += mirrored
+    by_receiver = moved.source == OF_RECEIVER
+    others = [one for one in shifted if one.path not in options.truth]
     tables = {
         "motion": moved.rows,
         "radio": _joined(shifted, "radio"),
-        "gnss": _fixes(shifted, frame, options, notes),
+        "gnss": fixes_of(others, frame, None if by_receiver else moved.rows, notes),
         "truth": _truth(shifted, frame, options),
         "pseudoranges": _satellites(recordings, shifted, notes),
     }
@@ -193,27 +204,6 @@ def _radio(rows: pd.DataFrame) -> pd.DataFrame:
     rows = rows.assign(**{name: rows[name].round().astype("Int64") for name in whole})
     empty = [name for name in _CELL_COLUMNS if rows[name].isna().all()]
     return rows.drop(columns=empty)
-
-
-def _fixes(
-    recordings: Sequence[Recording], frame: Frame, options: CombineOptions, notes: list[str]
-) -> pd.DataFrame | None:
-    parts = []
-    for recording in recordings:
-        rows, note = measured_positions(recording)
-        if rows is None or recording.path in options.truth:
-            continue
-        if note:
-            notes.append(note)
-        east, north = frame.east_north(rows, recording.crs)
-        variance = np.full(len(rows), np.nan)
-        if "accuracy_m" in rows:
-            radius = rows["accuracy_m"].to_numpy()
-            variance = np.where(radius > 0, (radius / _RADIUS_68) ** 2, np.nan)
-        columns = {"time_s": rows["time_s"], "east_m": east, "north_m": north}
-        columns |= {"var_east_m2": variance, "var_north_m2": variance}
-        parts.append(pd.DataFrame({**columns, "cov_east_north_m2": 0.0 * variance}))
-    return pd.concat(parts, ignore_index=True).sort_values("time_s") if parts else None
 
 
 def _truth(

@@ -7,8 +7,10 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.stretches import known_places
 
+_EXPECTED, _COMPASS = "counter-clockwise from east", "--column compass_deg=COLUMN"
 _LEAST_M = 2.0
 _FEWEST = 20
 _CONSTANT = 0.9
@@ -20,8 +22,8 @@ _ROUNDED = 0.005
 _LASTING = 0.25
 
 
-def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
-    """Return what is wrong with a log's headings, by its positions; an empty text for nothing.
+def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None:
+    """Return what is wrong with a log's headings, by its positions; None for nothing.
 
     The course of the positions minus the heading is 0 where headings are as they should be. Where
     headings run clockwise, it is the sum of both that stays the same: π/2 if they count from north.
@@ -41,27 +43,31 @@ def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
     >>> truth = pd.DataFrame({"time_s": time_s, "east_m": east, "north_m": north})
     >>> wrong = np.pi / 2 - course
     >>> steps = pd.DataFrame({"time_s": time_s[1:], "step_m": 3.0, "heading_rad": wrong})
-    >>> heading_fault(steps, truth)
-    'headings run clockwise from north (compass degrees?); expected counter-clockwise from east'
-    >>> heading_fault(steps.assign(heading_rad=course), truth)
-    ''
+    >>> print(heading_fault(steps, truth))
+    headings run clockwise from north (compass degrees?); expected counter-clockwise from east \
+(--column compass_deg=COLUMN mends it)
+    >>> heading_fault(steps.assign(heading_rad=course), truth) is None
+    True
     """
     heading, course = headings_and_courses(motion, places)
     if heading.size < _FEWEST:
-        return ""
+        return None
     same, other = (np.mean(np.exp(1j * (course + sign * heading))) for sign in (-1, 1))
     if abs(other) >= _CONSTANT and abs(other) - abs(same) >= _LEAST_GAIN:
         reference_deg = np.rad2deg(np.angle(other))
-        origin = "north (compass degrees?)" if abs(reference_deg - 90) <= 45 else "another axis"
-        return f"headings run clockwise from {origin}; expected counter-clockwise from east"
+        from_north = abs(reference_deg - 90) <= 45
+        origin = "north (compass degrees?)" if from_north else "another axis"
+        found, remedy = f"headings run clockwise from {origin}", _COMPASS if from_north else ""
+        return MotionFault("heading_rad", found, _EXPECTED, remedy=remedy)
     off_rad = float(np.angle(same))
     # A straight way has one course, which any sense of rotation fits.
     varied = abs(np.mean(np.exp(1j * course))) < _CONSTANT
     if varied and abs(same) >= _CONSTANT and abs(off_rad) >= _OFF_RAD:
         off_deg = np.rad2deg(off_rad)
-        origin = "; counted from north?" if abs(off_deg - 90) <= 20 else ""
-        return f"headings are {off_deg:.0f} degrees off the course of the positions{origin}"
-    return ""
+        origin = " (counted from north?)" if abs(off_deg - 90) <= 20 else ""
+        found = f"headings are {off_deg:.0f} degrees off the course of the positions{origin}"
+        return MotionFault("heading_rad", found, _EXPECTED)
+    return None
 
 
 def compass_fault(azimuth_deg: Floats, walked_m: float) -> str:

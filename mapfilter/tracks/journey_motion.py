@@ -12,6 +12,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.exchanged import check_columns
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -27,25 +28,11 @@ from mapfilter.tracks.pdr.options import WalkOptions, without_effect
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.position_motion import motion_from_positions
+from mapfilter.tracks.position_sources import measured_positions
 from mapfilter.tracks.readers.recording import Recording
 
-_PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
 _LONGEST_GAP_S = 3600.0
-_OF_RECEIVER = "motion comes from GNSS"
-
-
-def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
-    """Return measured positions of the best provider, and a note on those of others."""
-    rows = recording.tables.get("positions", recording.tables.get("places"))
-    if rows is None or "provider" not in rows or rows["provider"].isna().all():
-        return rows, ""
-    named = rows["provider"].fillna("").str.lower()
-    found = [name for name in _PROVIDERS if (named == name).any()]
-    if not found or (named == found[0]).all():
-        return rows, ""
-    left = int((named != found[0]).sum())
-    kept = rows[named == found[0]].reset_index(drop=True)
-    return kept, f"{recording.path.name}: {left} fixes of other providers than {found[0]} left out"
+OF_RECEIVER = "motion comes from GNSS"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +83,11 @@ def journey_motion(
     Raises
     ------
     InputError
-        Odometry pauses for more than an hour, or there are no positions where motion is to come
-        from them.
+        Odometry pauses for more than an hour, columns of motion are exchanged or in another unit,
+        or there are no positions where motion is to come from them.
     """
+    for recording in recordings:
+        notes += check_columns(recording)
     moved = _recorded(recordings, frame, notes)
     if moved is None and course_motion:
         moved = _course([*recordings, *true], sensors, frame, notes)
@@ -207,7 +196,7 @@ def _course(
     turned = reckon_velocity(sensors) if "gyroscope" in sensors else None
     if turned is not None:
         notes += ["motion from the speed of positions and the gyroscope", *turned[2]]
-        return Moved(turned[0], turned[1], source=_OF_RECEIVER)
+        return Moved(turned[0], turned[1], source=OF_RECEIVER)
     placed = [(r, rows) for r in recordings if (rows := _placed(r)) is not None]
     for recording, rows in placed:
         if "course_deg" in rows and rows["course_deg"].notna().any():
@@ -215,13 +204,13 @@ def _course(
             imu = course_errors(motion, *frame.east_north(rows, recording.crs))
             told = "speed and course of its fixes", "as they differ from its positions"
             notes.append(_receiver_note(recording, imu, *told))
-            return Moved(motion, imu, source=_OF_RECEIVER)
+            return Moved(motion, imu, source=OF_RECEIVER)
     for recording, rows in placed:
         time_s = rows["time_s"].to_numpy(dtype=np.float64)
         motion, imu = motion_from_positions(time_s, *frame.east_north(rows, recording.crs))
         told = "its positions, one to the next", "by their scatter about straight lines, with turns"
         notes.append(_receiver_note(recording, imu, *told))
-        return Moved(motion, imu, source=_OF_RECEIVER)
+        return Moved(motion, imu, source=OF_RECEIVER)
     names = ", ".join(r.path.name for r in recordings)
     expected = "positions, with speed and course or without"
     raise fail(InputError, names, expected, "none", "leave out --course-motion")

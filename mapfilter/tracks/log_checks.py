@@ -11,6 +11,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
 from mapfilter.geodesy import Lattice
+from mapfilter.tracks.clock_notes import week_fault
 from mapfilter.tracks.misplaced import FAR_M, misplaced_by
 
 # Tables may begin this long after another ends.
@@ -49,7 +50,8 @@ def check_clocks(
     gap_s = max(time[0] for time in times.values()) - min(time[-1] for time in times.values())
     hint = _milliseconds(times)
     if gap_s > _APART_S and not hint:
-        hint = "seconds of the day, or Unix time, in one of them, or milliseconds for s"
+        hint = week_fault(gap_s)
+        hint = hint or "seconds of the day, or Unix time, in one of them, or milliseconds for s"
     if hint:
         spans = "; ".join(f"{name} {time[0]:.10g}..{time[-1]:.10g}" for name, time in times.items())
         whole = names.get("log", "log")

@@ -6,7 +6,7 @@ Errors of sensors are not meant: only what differs from the positions by a facto
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,16 @@ import pandas as pd
 from mapfilter._types import Bools, Complexes, Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.headings import heading_fault
-from mapfilter.tracks.stretches import FEWEST_PLACES, Stretches, known_places, stretches
+from mapfilter.tracks.motion_fault import MotionFault
+from mapfilter.tracks.stretches import (
+    FEWEST_PLACES,
+    Stretches,
+    known_places,
+    motion_values,
+    steady_values,
+    stretches,
+)
+from mapfilter.tracks.turn_faults import turn_fault
 
 _FEWEST = 6
 _SHORTER, _LONGER = 0.6, 1.6
@@ -24,9 +33,7 @@ _LEAST_STRAIGHT = 0.25
 """Least share of pairs that are straight: of lines that are noise, one in ten or fewer."""
 _NAMED, _MOST_NAMED = 1.1, 2
 _REST_S, _REST_SHARE = 5.0, 0.1
-_STRAIGHT_RAD, _CORNER_RAD, _BACK_RAD = np.deg2rad(30.0), np.deg2rad(30.0), np.deg2rad(150.0)
-_AGREED_RAD = np.deg2rad(30.0)
-_FEWEST_CORNERS, _BOTH, _AGREED, _SELDOM = 5, 2 / 3, 0.85, 0.5
+_STRAIGHT_RAD, _AGREED_RAD = np.deg2rad(30.0), np.deg2rad(30.0)
 _A_SECOND = 1.2
 
 _FOOT_M, _KMH_MPS, _MPH_MPS, _KNOT_MPS = 0.3048, 1 / 3.6, 0.44704, 1852 / 3600
@@ -52,11 +59,8 @@ _SPEEDS: Mapping[str, float] = {
 }
 
 
-_FIRST_WORDS = {"heading_rad": "headings", "turn_rad": "turns", "step_m": "steps"}
-
-
-def motion_faults(motion: pd.DataFrame, places: pd.DataFrame) -> dict[str, str]:
-    """Return what is wrong with a log's motion, by its positions: a text for each such column.
+def motion_faults(motion: pd.DataFrame, places: pd.DataFrame) -> dict[str, MotionFault]:
+    """Return what is wrong with a log's motion, by its positions, for each such column.
 
     Parameters
     ----------
@@ -65,9 +69,10 @@ def motion_faults(motion: pd.DataFrame, places: pd.DataFrame) -> dict[str, str]:
     places : pandas.DataFrame
         time_s, east_m and north_m: ground truth, or fixes by GNSS.
     """
-    checks = {"heading_rad": heading_fault, "turn_rad": turn_fault, "step_m": step_fault}
-    found = {column: check(motion, places) for column, check in checks.items()}
-    return {column: fault for column, fault in found.items() if fault}
+    checks: tuple[Callable[[pd.DataFrame, pd.DataFrame], MotionFault | None], ...]
+    checks = (heading_fault, turn_fault, step_fault)
+    found = (check(motion, places) for check in checks)
+    return {fault.column: fault for fault in found if fault is not None}
 
 
 def compared_places(truth: pd.DataFrame, gnss: pd.DataFrame) -> pd.DataFrame:
@@ -82,20 +87,8 @@ def compared_places(truth: pd.DataFrame, gnss: pd.DataFrame) -> pd.DataFrame:
     return gnss if few and len(gnss) > len(truth) else truth
 
 
-def fault_notes(notes: Iterable[str], column: str) -> list[str]:
-    """Return those notes of a log that are a fault of a column of its motion by its positions.
-
-    Examples
-    --------
-    >>> notes = ["motion, turn_rad: turns run clockwise", "motion: 1 exact duplicate row dropped"]
-    >>> fault_notes(notes, "turn_rad"), fault_notes(notes, "step_m")
-    (['motion, turn_rad: turns run clockwise'], [])
-    """
-    return [note for note in notes if f", {column}: {_FIRST_WORDS[column]} " in note]
-
-
-def step_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
-    """Return what is wrong with the lengths of steps; an empty text for nothing.
+def step_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None:
+    """Return what is wrong with the lengths of steps; None for nothing.
 
     Dead reckoning by the steps, and by headings or turns, is compared with the distances of
     positions some 100 m apart; where directions are not known or wrong, it is the length of steps
@@ -116,114 +109,42 @@ def step_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
     >>> truth = pd.DataFrame({"time_s": time_s, "east_m": 10 * time_s, "north_m": 0.0})
     >>> motion = pd.DataFrame({"time_s": time_s, "step_m": 11.0})
     >>> motion = motion.assign(heading_rad=0.0, turn_rad=np.nan)
-    >>> step_fault(motion.assign(step_m=400.0), truth)
-    'steps are 40 times as long as the way between positions (inches for metres?); expected metres'
-    >>> step_fault(motion, truth)
-    ''
+    >>> print(step_fault(motion.assign(step_m=400.0), truth))
+    steps are 40 times as long as the way between positions (inches for metres?); expected metres \
+(--factor step_m=0.0254 mends it)
+    >>> step_fault(motion, truth) is None
+    True
     """
-    time_s, step_m = _column(motion, "time_s"), _known(motion, "step_m")
+    time_s, step_m = motion_values(motion, "time_s"), steady_values(motion, "step_m")
     ways = stretches(places, time_s, np.cumsum(np.abs(step_m)))
     if ways is None:
-        return ""
+        return None
     ways = ways.where(ways.grown(*_rests(time_s, step_m)).real <= _REST_SHARE * ways.lasted_s)
     ways, moved_m = _comparable(ways, motion)
     distance_m = np.abs(ways.before_m + ways.after_m)
     factor = np.abs(ways.grown(time_s, np.cumsum(moved_m))) / distance_m
     typical = float(np.median(factor)) if factor.size >= _FEWEST else 1.0
     if _SHORTER <= typical <= _LONGER or typical <= 0:
-        return ""
+        return None
     lasted_s = np.diff(time_s, prepend=time_s[:1])
     # As long as they were if the steps were speeds.
     of_speeds = np.abs(ways.grown(time_s, np.cumsum(moved_m * lasted_s))) / distance_m
-    causes = _matching(_UNITS, factor)
+    off = _matching(_UNITS, factor)
     speeds = _matching(_SPEEDS, of_speeds)
+    times = dict(_UNITS)
     apart_s = float(np.median(lasted_s[1:]))
     if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
-        causes |= {
-            f"speeds in {unit}, rows {apart_s:.2g} s apart": off for unit, off in speeds.items()
-        }
+        named = {unit: f"speeds in {unit}, rows {apart_s:.2g} s apart" for unit in speeds}
+        off |= {named[unit]: by for unit, by in speeds.items()}
+        times |= {named[unit]: _SPEEDS[unit] / apart_s for unit in speeds}
     if not (_is_constant(factor) or (speeds and _is_constant(of_speeds))):
-        return ""
-    likely = " or ".join(sorted(causes, key=causes.__getitem__)[:_MOST_NAMED])
-    times = f"steps are {typical:.3g} times as long as the way between positions"
-    return f"{times}{f' ({likely}?)' if likely else ''}; expected metres"
-
-
-def turn_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
-    """Return what is wrong with turns, their sense or unit; an empty text for nothing.
-
-    Dead reckoning by the steps and turns has corners of its own, which are compared with those of
-    the positions, between lines of some 50 m. Turns are wrong where corners of 30 to 150 degrees,
-    five or more, contradict them and fit the same turns the other way round, or in another unit.
-
-    Parameters
-    ----------
-    motion : pandas.DataFrame
-        time_s, step_m and turn_rad.
-    places : pandas.DataFrame
-        time_s, east_m and north_m.
-
-    Examples
-    --------
-    >>> turn = np.where(np.arange(400) % 20 == 10, np.pi / 2, 0.0) * np.repeat([1, -1, 1, -1], 100)
-    >>> heading = np.cumsum(turn)
-    >>> east, north = (np.cumsum(10 * f(heading - turn / 2)) for f in (np.cos, np.sin))
-    >>> motion = pd.DataFrame({"time_s": np.arange(400.0), "step_m": 10.0, "turn_rad": -turn})
-    >>> truth = pd.DataFrame({"time_s": np.arange(400.0), "east_m": east, "north_m": north})
-    >>> turn_fault(motion, truth)
-    'turns run clockwise by the course of the positions; expected radians counter-clockwise, \
-or latitude and longitude of the positions are swapped'
-    >>> turn_fault(motion.assign(turn_rad=turn), truth)
-    ''
-    """
-    turn_rad = _column(motion, "turn_rad")
-    if np.isfinite(turn_rad[1:]).sum() < _FEWEST:
-        return ""
-    time_s, step_m = _column(motion, "time_s"), _known(motion, "step_m")
-    corners = stretches(places, time_s, np.cumsum(np.abs(step_m)))
-    if corners is None:
-        return ""
-    unknown = np.cumsum(~np.isfinite(turn_rad), dtype=np.float64)
-    corners = corners.where(_is_corner(corners.turned_rad))
-    corners = corners.where(np.abs(corners.grown(time_s, unknown)) == 0)
-    if len(corners) < _FEWEST_CORNERS:
-        return ""
-    turn_rad = _known(motion, "turn_rad")
-    if _agreement(corners, time_s, step_m, turn_rad) > _SELDOM:
-        return ""
-    lasted_s = np.diff(time_s, prepend=time_s[:1])
-    apart_s = float(np.median(lasted_s[1:]))
-    units: dict[str, Floats | float] = {"": 1.0, "degrees": np.pi / 180, "counted twice": 0.5}
-    if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
-        units[f"rates (rad/s) in rows {apart_s:.2g} s apart"] = lasted_s
-        units[f"rates (degrees/s) in rows {apart_s:.2g} s apart"] = lasted_s * np.pi / 180
-    agreed = {
-        (unit, sign): _agreement(corners, time_s, step_m, sign * factor * turn_rad)
-        for unit, factor in units.items()
-        for sign in (1, -1)
-    }
-    (unit, sign), most = max(agreed.items(), key=lambda one: one[1])
-    if most < _AGREED:
-        return ""
-    alike = [other for other in units if other and agreed[other, sign] == most]
-    words = [f"are {' or '.join(alike)}"] if unit else []
-    words += ["run clockwise"] if sign < 0 else []
-    by = "by the course of the positions; expected radians counter-clockwise"
-    mirrored = (
-        "" if unit or sign > 0 else ", or latitude and longitude of the positions are swapped"
-    )
-    return f"turns {' and '.join(words)} {by}{mirrored}"
-
-
-def _column(motion: pd.DataFrame, name: str) -> Floats:
-    return np.asarray(motion[name], dtype=np.float64)
-
-
-def _known(motion: pd.DataFrame, name: str) -> Floats:
-    """Return a column's values from the second row on; 0 where one is not known."""
-    values = np.nan_to_num(_column(motion, name), nan=0.0)
-    values[:1] = 0.0
-    return values
+        return None
+    causes = sorted(off, key=off.__getitem__)[:_MOST_NAMED]
+    found = f"steps are {typical:.3g} times as long as the way between positions"
+    if not causes:
+        return MotionFault("step_m", found, "metres")
+    likely = " or ".join(causes)
+    return MotionFault("step_m", f"{found} ({likely}?)", "metres", 1 / times[causes[0]])
 
 
 def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Complexes]:
@@ -233,7 +154,7 @@ def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Compl
     which has the same distances. Else they are lengths, and pairs are straight; there are none
     where few are, as the lines are noise of positions then.
     """
-    time_s, step_m = _column(motion, "time_s"), _known(motion, "step_m")
+    time_s, step_m = motion_values(motion, "time_s"), steady_values(motion, "step_m")
     heading_rad, unknown = _directions(motion)
     moved_m = step_m * np.exp(1j * heading_rad)
     turned_rad = ways.turned_by(time_s, np.cumsum(moved_m))
@@ -249,18 +170,13 @@ def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Compl
 
 def _directions(motion: pd.DataFrame) -> tuple[Floats, Bools]:
     """Return headings, those since the start by turns where most are unknown, and unknown rows."""
-    heading_rad, turn_rad = _column(motion, "heading_rad"), _column(motion, "turn_rad")
+    heading_rad, turn_rad = motion_values(motion, "heading_rad"), motion_values(motion, "turn_rad")
     unknown = np.isnan(heading_rad)
     if unknown.mean() > _MOSTLY_UNKNOWN:
         unknown, turned_rad = np.isnan(turn_rad), np.nan_to_num(turn_rad)
         heading_rad = np.cumsum(turned_rad) - turned_rad / 2
     unknown[:1] = False
     return np.nan_to_num(heading_rad), unknown
-
-
-def _is_corner(turned_rad: Floats) -> Bools:
-    """Return which turns are of 30 to 150 degrees: those back look alike both ways round."""
-    return np.asarray((np.abs(turned_rad) >= _CORNER_RAD) & (np.abs(turned_rad) <= _BACK_RAD))
 
 
 def _rests(time_s: Floats, step_m: Floats) -> tuple[Floats, Floats]:
@@ -286,17 +202,3 @@ def _is_constant(factor: Floats) -> bool:
     """Return whether most are within 20 % of the median."""
     near = np.abs(np.log(np.maximum(factor, 1e-9) / np.median(factor))) <= np.log(_ALIKE)
     return bool(np.mean(near) >= _MOSTLY)
-
-
-def _agreement(corners: Stretches, time_s: Floats, step_m: Floats, turn_rad: Floats) -> float:
-    """Return the share of corners that dead reckoning by steps and turns has, too."""
-    heading_rad = np.cumsum(turn_rad)
-    reckoned_m = np.cumsum(step_m * np.exp(1j * (heading_rad - turn_rad / 2)))
-    turned_rad = corners.turned_by(time_s, reckoned_m)
-    both = _is_corner(turned_rad)
-    if both.sum() < max(_FEWEST_CORNERS, _BOTH * both.size):
-        return 0.0
-    # Five times a right angle has the same course, and is a whole turn more.
-    more_rad = corners.grown(time_s, heading_rad).real - corners.turned_rad
-    near = np.abs(wrap_rad(turned_rad - corners.turned_rad)) <= _AGREED_RAD
-    return float(np.mean((near & (np.abs(more_rad) <= np.pi))[both]))

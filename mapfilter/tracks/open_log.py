@@ -13,6 +13,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.combine import CombineOptions, combine
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.motion_factors import scaled_log
 from mapfilter.tracks.pdr.options import without_effect
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
@@ -27,7 +28,7 @@ _READY = "the motion of a track log is used as it is; convert the recording with
 
 @dataclass(frozen=True)
 class OpenOptions:
-    """How recordings of other programs are read and joined; track logs need none of it.
+    """How recordings of other programs are read and joined; track logs need the factors alone.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def open_log(
     given = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
     options = options or OpenOptions()
     if len(given) == 1 and _is_own(given[0]):
-        log = read_log(given[0])
+        log = scaled_log(read_log(given[0]), options.combine.factors, str(given[0]))
         walk = options.combine.walk
         unused = () if walk is None else without_effect(walk, (), _READY)
         log = replace(log, notes=(*log.notes, *unused)) if unused else log

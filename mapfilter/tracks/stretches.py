@@ -146,3 +146,15 @@ def _means(values: Floats | Complexes, group: Ints) -> Complexes:
     """Return the mean of each group."""
     east, north = (np.bincount(group, part) for part in (values.real, values.imag))
     return np.asarray((east + 1j * north) / np.bincount(group))
+
+
+def motion_values(motion: pd.DataFrame, name: str) -> Floats:
+    """Return a column of motion."""
+    return np.asarray(motion[name], dtype=np.float64)
+
+
+def steady_values(motion: pd.DataFrame, name: str) -> Floats:
+    """Return a column of motion from the second row on; 0 where a value is not known."""
+    values = np.nan_to_num(motion_values(motion, name), nan=0.0)
+    values[:1] = 0.0
+    return values

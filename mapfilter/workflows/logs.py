@@ -24,6 +24,7 @@ def open_options(track: Track) -> OpenOptions:
             truth=track.truth,
             course_motion=track.course_motion,
             walk=track.walk.of(WalkOptions) if track.steps else None,
+            factors=track.factors.given,
         ),
     )
 

@@ -136,8 +136,8 @@ def run_replay(
         check_figures_of_replay(folder)
     if database is None and config.cells.plan is None:
         journeys.check_siteless()
+    journeys.check(None if database is None else database.lattice)
     if database is not None:
-        journeys.check(database.lattice)
         over(database.lattice.crs, options, cells=True)
     baselines = Baselines(database, config.journeys.seed)
     wanted, count = config.output.pictures, len(journeys.paths)

@@ -19,7 +19,7 @@ from mapfilter.positioning.estimate import Fix, TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base, local_frame
-from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION, save
+from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION, png_of, save
 from mapfilter.report.coverage import plot_level
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.network import draw_cells, plot_best_server, plot_points_per_cell
@@ -388,10 +388,76 @@ def test_a_track_shows_where_it_got_lost(area, with_truth):
     axes = plot_track(replace(found, status=status), area.truth if with_truth else None, area.base)
     (lost,) = (one for one in axes.collections if one.get_label() == "got lost here")
     x, y = lost.get_offsets().T
-    assert list(x) == pytest.approx([20.0 + 1.4 * 150, 20.0 + 1.4 * 250])
-    assert set(y) == {100.0 if with_truth else 110.0}
+    # The last positions before, by the estimate: the truth lies 10 m south.
+    assert list(x) == pytest.approx([20.0 + 1.4 * 145, 20.0 + 1.4 * 245])
+    assert set(y) == {110.0}
     axes = plot_track(found, area.truth, area.base)
     assert all(one.get_label() != "got lost here" for one in axes.collections)
+
+
+def test_a_track_that_is_lost_before_it_has_a_position_has_its_cross_on_the_truth(area):
+    found = estimate(area, 0.0)
+    east_m = np.where(np.arange(len(found)) < 5, np.nan, found.east_m)
+    status = tuple(Status.LOST if i == 3 else one for i, one in enumerate(found.status))
+    axes = plot_track(replace(found, status=status, east_m=east_m), area.truth, area.base)
+    (lost,) = (one for one in axes.collections if one.get_label() == "got lost here")
+    assert lost.get_offsets().tolist() == [pytest.approx([20.0 + 1.4 * 15, 100.0])]
+
+
+def _names(axes):
+    return {text.get_text(): text for text in axes.texts if text.get_text() in ("start", "end")}
+
+
+@pytest.mark.parametrize("turned", range(8))
+def test_names_of_the_ends_stand_beside_the_path(area, turned):
+    """Whichever way the path leaves its start and reaches its end, also in a round trip."""
+    out = np.exp(1j * np.pi / 4 * turned) * np.arange(0, 200.0, 2.0)
+    for way in (out, np.concatenate([out, out[::-1]]) + np.linspace(0, 4, 200)):
+        east_m, north_m = WEST_M + 250 + way.real, NORTH_M - 200 + way.imag
+        time_s = np.arange(float(len(way)))
+        base = replace(area.base, bounds_m=(WEST_M, NORTH_M - 450, WEST_M + 500, NORTH_M + 50))
+        axes = plot_track(estimate(area, None), Truth(time_s, east_m, north_m), base, zoom=False)
+        png_of(axes)
+        path = next(line for line in axes.lines if line.get_label() == "truth")
+        at = axes.transData.transform(np.column_stack(path.get_data()))
+        for name in _names(axes).values():
+            box = name.get_window_extent()
+            inside = [box.x0 < x < box.x1 and box.y0 < y < box.y1 for x, y in at]
+            assert not any(inside), (turned, name.get_text())
+        boxes = [name.get_window_extent() for name in _names(axes).values()]
+        assert not boxes[0].overlaps(boxes[1])
+
+
+@pytest.mark.parametrize("jumps", [True, False])
+def test_a_lone_first_position_does_not_stretch_the_map(jumps):
+    """A walk to there after a long rest does."""
+    rest, away = np.zeros(995), np.full(5, 30_000.0) if jumps else np.zeros(5)
+    moved = np.concatenate([away, np.arange(995) % 200.0]) if jumps else rest
+    if not jumps:
+        moved = np.concatenate([rest, np.arange(1.0, 11.0) * 10])
+    found = _walked(WEST_M + moved, NORTH_M + 0 * moved)
+    axes = plot_track(found, None, None)
+    left, right = axes.get_xlim()
+    told = [text.get_text() for text in axes.texts]
+    assert right - left < 1000
+    assert ("5 estimates outside of the picture" in told) == jumps
+    if not jumps:
+        assert right > 100
+
+
+def _walked(east_m, north_m):
+    places = zip(east_m, north_m, strict=True)
+    return TrackEstimate.of_fixes(
+        CRS,
+        "ekf",
+        [
+            Fix(
+                float(i), east, north, np.full((2, 2), np.nan), np.full(3, np.nan),
+                Status.TRACKING, 1, np.nan, 0, np.nan, Reason.USED,
+            )
+            for i, (east, north) in enumerate(places)
+        ],
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("switch_s", [0.0, None])

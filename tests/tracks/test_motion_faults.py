@@ -13,12 +13,9 @@ import mapfilter as mf
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.log_options import fitted_to_log
-from mapfilter.tracks.motion_faults import (
-    fault_notes,
-    motion_faults,
-    step_fault,
-    turn_fault,
-)
+from mapfilter.tracks.motion_fault import fault_notes
+from mapfilter.tracks.motion_faults import motion_faults, step_fault
+from mapfilter.tracks.turn_faults import turn_fault
 
 FOOT_M = 0.3048
 
@@ -102,16 +99,25 @@ def test_turns_the_other_way_round_or_in_another_unit(seed, speed_mps, sd_m, clo
     sign, words = (-1.0, "run clockwise") if clockwise else (1.0, "")
     turn = sign * motion["turn_rad"]
     by = "by the course of the positions; expected radians counter-clockwise"
+
+    def told(turn):
+        fault = turn_fault(motion.assign(turn_rad=turn), places)
+        mended = motion.assign(turn_rad=fault.factor * turn)
+        assert turn_fault(mended, places) is None
+        return str(fault)
+
     if clockwise:
-        assert turn_fault(motion.assign(turn_rad=turn), places) == (
-            f"turns run clockwise {by}, or latitude and longitude of the positions are swapped"
+        assert told(turn) == (
+            f"turns run clockwise {by}, or latitude and longitude of the positions are swapped "
+            "(--factor turn_rad=-1 mends it)"
         )
-    more = f" and {words}" if words else ""
-    degrees = motion.assign(turn_rad=np.degrees(turn))
-    assert turn_fault(degrees, places) == f"turns are degrees{more} {by}"
-    rates = motion.assign(turn_rad=turn / 0.2)
-    found = turn_fault(rates, places)
-    assert found == f"turns are rates (rad/s) in rows 0.2 s apart{more} {by}"
+    more, minus = (f" and {words}", "-") if words else ("", "")
+    mends = f"(--factor turn_rad={minus}"
+    assert told(np.degrees(turn)) == f"turns are degrees{more} {by} {mends}0.01745 mends it)"
+    rates = f"turns are rates (rad/s) in rows 0.2 s apart{more} {by} {mends}0.2 mends it)"
+    assert told(turn / 0.2) == rates
+    half = f"turns are half as large as they should be{more} {by} {mends}2 mends it)"
+    assert told(turn / 2) == half
 
 
 @settings(max_examples=25, deadline=None)
@@ -135,11 +141,14 @@ def test_steps_in_another_unit(seed, speed_mps, sd_m, of):
     factor, mistake = of
     motion, truth = drive(seed, speed_mps=speed_mps, scale=1.02)
     places = fixes(truth, sd_m, seed) if sd_m else truth
-    found = step_fault(motion.assign(step_m=factor * motion["step_m"]), places)
+    fault = step_fault(motion.assign(step_m=factor * motion["step_m"]), places)
+    found = str(fault)
     assert mistake in found
     assert found.startswith("steps are ")
     times = float(found.split()[2])
     assert times == pytest.approx(factor, rel=0.1)
+    assert fault.factor == pytest.approx(1 / factor, rel=0.15)
+    assert found.endswith(f" (--factor step_m={fault.factor:.4g} mends it)")
 
 
 def test_speeds_in_rows_of_different_length():
@@ -154,13 +163,14 @@ def test_speeds_in_rows_of_different_length():
     assert motion_faults(rows, truth) == {}
     lasted_s = rows["time_s"].diff()
     speeds = rows.assign(step_m=(rows["step_m"] / lasted_s).fillna(0.0))
-    assert "speeds in m/s, rows 0.5 s apart?)" in step_fault(speeds, truth)
+    assert "speeds in m/s, rows 0.5 s apart?)" in str(step_fault(speeds, truth))
 
 
 def test_a_factor_without_a_unit_is_told_without_a_guess():
     motion, truth = drive(1)
     found = step_fault(motion.assign(step_m=7.0 * motion["step_m"]), truth)
-    assert found.endswith("times as long as the way between positions; expected metres")
+    assert not found.option
+    assert str(found).endswith("times as long as the way between positions; expected metres")
 
 
 @settings(max_examples=40, deadline=None)
@@ -225,7 +235,7 @@ def test_steps_of_a_dead_sensor_have_no_unit(value, period_s):
     motion, truth = drive(5, speed_mps=1.3)
     dead = (motion["time_s"] // (period_s / 2)) % 2 == 1
     steps = motion.assign(step_m=motion["step_m"].where(~dead, value))
-    assert step_fault(steps, truth) == ""
+    assert step_fault(steps, truth) is None
 
 
 def test_turns_back_and_straight_ways_tell_no_sense_of_rotation():

@@ -21,10 +21,11 @@ def test_an_unknown_table_names_its_columns_and_options_for_them(tmp_path):
     fault = refused(tmp_path, "time,speed,heading,rpm\n1,2,3,4\n")
     assert len(fault.expected) < 80
     assert fault.got == "none of them, but a table with the columns time, speed, heading, rpm"
-    assert fault.hint.endswith("such as speed_mps=speed and compass_deg=heading")
+    such = "such as (speed_mps=speed for m/s, or speed_kmh=speed for km/h) and compass_deg=heading"
+    assert fault.hint.endswith(such)
     fault = refused(tmp_path, "zeit,v\n1,2\n")
     assert fault.hint.startswith("a CSV without a column of times; a CSV with other names of ")
-    assert fault.hint.endswith("such as wheel_speed_mps=SPEED and time=COLUMN")
+    assert fault.hint.endswith("such as wheel_speed_mps=SPEED for m/s and time=COLUMN")
 
 
 @pytest.mark.parametrize("name", ["track.json", "track.xlsx"])

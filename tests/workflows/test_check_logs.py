@@ -44,7 +44,7 @@ def test_headings_by_a_compass_are_a_finding(check, log):
     change(log / "motion.csv", heading_rad=lambda heading: math.pi / 2 - heading)
     found = check(log)
     assert set(found) == {"log-headings"}
-    assert found["log-headings"]["severity"] == "warning"
+    assert found["log-headings"]["severity"] == "error"
     assert found["log-headings"]["where"] == str(log)
     assert "headings run clockwise from north" in found["log-headings"]["evidence"]
     assert "pi/2 minus a" in found["log-headings"]["remedy"]
@@ -73,13 +73,16 @@ def test_turns_and_steps_that_contradict_positions_are_findings(check, laps):
     change(laps / "motion.csv", turn_rad=lambda turn: -turn)
     found = check(laps)
     assert "log-steps" not in found
-    assert found["log-turns"]["severity"] == "warning"
+    assert found["log-turns"]["severity"] == "error"
     assert found["log-turns"]["where"] == str(laps)
     assert "motion.csv, turn_rad: turns run clockwise" in found["log-turns"]["evidence"]
     assert "counter-clockwise positive" in found["log-turns"]["remedy"]
+    taken = check(laps, "--set", "track.factors.turn_rad=1")
+    assert taken["log-turns"]["severity"] == "warning"
+    assert "log-turns" not in check(laps, "--set", "track.factors.turn_rad=-1")
     change(laps / "motion.csv", step_m=lambda step_m: step_m / 0.4)
     found = check(laps)
-    assert found["log-steps"]["severity"] == "warning"
+    assert found["log-steps"]["severity"] == "error"
     assert "speeds in m/s, rows 0.4 s apart" in found["log-steps"]["evidence"]
     assert "not speeds" in found["log-steps"]["remedy"]
 

@@ -85,7 +85,7 @@ def test_a_merged_file_whose_speeds_are_not_known_says_so(drive, replay):
     merged = drive.rename(columns={"Speed [km/h]": "velocity", "Yaw rate [deg/s]": "yaw"})
     done = replay({"merged": merged}, "--json")
     assert done.json["last_time_s"] == JAMMED
-    told = "merged.csv: columns not used: velocity (speed_mps or speed_kmh?), yaw (likely: "
+    told = "merged.csv: columns not used: velocity (speed_kmh?), yaw (likely: "
     assert done.err.count(told) == 1
     told = "rows go on for 279 s after the last one with a value that is used: of their columns "
     assert done.err.count(told) == 1

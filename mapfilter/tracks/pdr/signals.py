@@ -20,6 +20,9 @@ _FORCE = ("x_mps2", "y_mps2", "z_mps2")
 _RATE = ("x_radps", "y_radps", "z_radps")
 _FIELD = ("x_ut", "y_ut", "z_ut")
 
+_USUAL_RADPS, _MOST_RADPS = 6.0, 36.0
+"""A turn each second, and the end of the scale of a phone's gyroscope (2000 deg/s)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Signals:
@@ -73,6 +76,8 @@ def inertial_signals(
         why = "g given for m/s², or gravity left out"
         return [], (f"accelerometer: {typical:.3g} m/s² in the mean, at rest 9.8: {why}",)
     gyroscope = _table(sensors, "gyroscope", _RATE)
+    if gyroscope is not None and (fault := _rate_fault(gyroscope[1])):
+        return [], (fault,)
     field = _table(sensors, "magnetometer", _FIELD)
     notes = () if gyroscope is not None else ("no gyroscope: headings by the compass alone",)
     every = [_stretches(time_s)]
@@ -94,6 +99,16 @@ def inertial_signals(
     if field is None and gyroscope is None:
         return [], ("accelerometer without gyroscope and magnetometer: no headings",)
     return found, notes
+
+
+def _rate_fault(rate: Floats) -> str:
+    """Return what is wrong with the unit of a gyroscope; "" where a phone may turn so."""
+    size = np.linalg.norm(rate, axis=1)
+    usual, most = (float(np.quantile(size, share)) for share in (0.5, 0.99))
+    if usual <= _USUAL_RADPS and most <= _MOST_RADPS:
+        return ""
+    turns = f"{usual:.3g} rad/s in the median, {most:.3g} in the hundredth part of the time"
+    return f"gyroscope: {turns}: degrees for radians per second"
 
 
 def _table(

@@ -105,6 +105,8 @@ class Columns:
         """Return UTC seconds of a column of times, see :func:`parse_times`."""
         column = self._raw(*names)
         if column is not None and layout == "ISO8601":
+            if self.decimal_comma:
+                column = pc.replace_substring_regex(column, r"^(\s*\d+),(\d+\s*)$", r"\1.\2")
             try:
                 number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
             except pa.ArrowInvalid:

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
 
 from mapfilter.errors import Faults
 
 _ALIKE = 0.7
 _UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_m")
+_UNIT_WORDS = {
+    "_mps": "m/s",
+    "_kmh": "km/h",
+    "_radps": "rad/s",
+    "_degps": "deg/s",
+    "_rad": "radians",
+    "_deg": "degrees",
+}
+"""Units of fields by their endings, in words."""
 FIELDS: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
@@ -116,6 +125,26 @@ def column_option(field: str, column: str) -> str:
     ('--column time=Zeit', "--column 'speed_mps=v [m/s]'")
     """
     return f"--column {shlex.quote(f'{field}={column}')}"
+
+
+def column_options(fields: Sequence[str], column: str) -> str:
+    """Return the options that name the column of one of some fields, with the unit of each.
+
+    Examples
+    --------
+    >>> column_options(["speed_mps", "speed_kmh"], "v")
+    '--column speed_mps=v for m/s, or --column speed_kmh=v for km/h'
+    >>> column_options(["steps"], "count")
+    '--column steps=count'
+    """
+    options = [column_option(field, column) for field in fields]
+    return options[0] if len(options) == 1 else by_unit(fields, options)
+
+
+def by_unit(fields: Sequence[str], texts: Sequence[str]) -> str:
+    """Join texts on fields of one quantity with the unit of each."""
+    units = [next((u for end, u in _UNIT_WORDS.items() if f.endswith(end)), f) for f in fields]
+    return ", or ".join(f"{text} for {unit}" for text, unit in zip(texts, units, strict=True))
 
 
 def check_fields(columns: Mapping[str, str], faults: Faults) -> None:

@@ -18,7 +18,7 @@ from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.identities import available
 from mapfilter.tracks.readers.recording import Reading
 
-_DATE = "date"
+DATE = "date"
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 
 
@@ -46,7 +46,17 @@ class Mapped:
         """Return the names of columns that may hold a field."""
         if field in self.own:
             return (self.own[field].lower(),)
-        return (self.stated[field],) if field in self.stated else FIELDS[field]
+        if field in self.stated:
+            return (self.stated[field],)
+        # A column that a user names for one field is no other one's.
+        taken = {column.lower() for column in self.own.values()}
+        return tuple(name for name in FIELDS[field] if name not in taken)
+
+    @property
+    def taken(self) -> frozenset[str]:
+        """The columns that hold fields."""
+        found = (self.rows.find(*self.names(field)) for field in FIELDS)
+        return frozenset(name for name in found if name is not None)
 
     def has(self, *fields: str) -> bool:
         """Return whether there are columns of all these fields."""
@@ -142,10 +152,10 @@ def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Map
 def with_dates(mapped: Mapped) -> Mapped:
     """Return columns with times of day after the dates of the column ``date``, if there is one."""
     rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
-    if name in (None, _DATE) or not rows.has(_DATE) or not _OF_DAY.match(rows.first_text(name)):
+    if name in (None, DATE) or not rows.has(DATE) or not _OF_DAY.match(rows.first_text(name)):
         return mapped
-    rows.reading.note(f"time: columns {_DATE} and {name}")
-    return replace(mapped, rows=rows.joined(_DATE, name), beside=(_DATE,))
+    rows.reading.note(f"time: columns {DATE} and {name}")
+    return replace(mapped, rows=rows.joined(DATE, name), beside=(DATE,))
 
 
 def _stated(rows: Columns, own: Mapping[str, str]) -> dict[str, str]:

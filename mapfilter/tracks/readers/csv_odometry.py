@@ -49,6 +49,7 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     wheels = mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh")
     if not wheels:
         reading.note("speed: taken for a vehicle's, as there are no positions beside it")
+    _note_units(mapped, reading)
     speed = speeds_of(mapped, "wheel_speed" if wheels else "speed")
     yaw = _at_speeds(reading, time_s, speed, mapped.radians("yaw_rate", "ps"))
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
@@ -71,6 +72,18 @@ def _is_placed(mapped: Mapped) -> bool:
 
 def _is_turned(mapped: Mapped) -> bool:
     return mapped.has("yaw_rate_radps") or mapped.has("yaw_rate_degps")
+
+
+def _note_units(mapped: Mapped, reading: Reading) -> None:
+    """Note columns with usual names that state no unit, and what they are taken for."""
+    for field, units, other in (
+        ("wheel_speed_mps", "m/s; for km/h", "wheel_speed_kmh"),
+        ("yaw_rate_radps", "rad/s; for deg/s", "yaw_rate_degps"),
+    ):
+        column = mapped.rows.find(*mapped.names(field))
+        if column is not None and field not in mapped.own and mapped.unit(field) is None:
+            option = column_option(other, column)
+            reading.note(f"{column}: no unit in its name, taken for {units} {option}")
 
 
 def _note_speeds(mapped: Mapped, reading: Reading) -> None:

@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+from mapfilter._types import Floats
 from mapfilter.errors import listed
-from mapfilter.tracks.readers.csv_fields import FIELDS, column_option
+from mapfilter.tracks.readers.csv_fields import FIELDS, column_options
 from mapfilter.tracks.readers.csv_headers import likely_fields
 from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.readers.csv_odometry import has_odometry, has_unused_odometry
+from mapfilter.tracks.readers.csv_speed_units import speed_unit
 
 _OF_PLACES = ("altitude_m", "accuracy_m", "course_deg", "speed_mps", "speed_kmh")
 _OF_ODOMETRY = ("speed_mps", "speed_kmh", "yaw_rate_radps", "yaw_rate_degps")
 _OF_WHEELS = {"speed_mps": "wheel_speed_mps", "speed_kmh": "wheel_speed_kmh"}
 _OF_STEPS = ("compass_deg", "turn_rad", "turn_deg")
 _OF_COUNTED_STEPS = (*_OF_STEPS, "yaw_rate_radps", "yaw_rate_degps")
+_OF_SPEEDS = {"": "", "m/s": "_mps", "km/h": "_kmh"}
+"""Endings of fields of speeds by unit; of an unknown one of all."""
 _MEASURED = {*_OF_PLACES, *_OF_ODOMETRY, *_OF_STEPS, "heading_rad"}
 """Fields that are of use beside others only."""
 
 
-def unused_columns(mapped: Mapped) -> tuple[str, ...]:
-    """Return the columns that are not used, each with the fields that its name resembles."""
+def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
+    """Return the columns that are not used, each with the fields that its name resembles.
+
+    Parameters
+    ----------
+    mapped : Mapped
+    time_s : (N,) array
+        Times of the rows.
+    """
     found = [field for field in FIELDS if mapped.has(field)]
     useless = _MEASURED.intersection(found) - _useful(mapped)
     columns = {mapped.rows.find(*mapped.names(field)): field for field in useless}
@@ -31,6 +42,15 @@ def unused_columns(mapped: Mapped) -> tuple[str, ...]:
         likely = (
             [_OF_WHEELS.get(columns[name], "")] if name in columns else likely_fields(name, found)
         )
+        if likely == ["compass_deg"] and "heading" in name and not _walks(mapped):
+            # Beside positions alone a compass is of no use, a course is.
+            likely = ["course_deg"]
+        if len(likely) > 1 and likely[0].endswith("_mps"):
+            unit = speed_unit(mapped, name, time_s)
+            if unit not in _OF_SPEEDS:
+                texts.append(f"{name} (in {unit} by the positions: call it {name} [{unit}])")
+                continue
+            likely = [field for field in likely if field.endswith(_OF_SPEEDS[unit])]
         texts.append(_with_fields(name, [field for field in likely if field]))
     return tuple(texts)
 
@@ -41,8 +61,13 @@ def unused_note(unread: tuple[str, ...]) -> str:
     if not guessed:
         return f"columns not used: {listed(unread)}; see --column"
     name, _, fields = guessed[:-2].rpartition(" (")
-    option = column_option(fields.split(" or ")[0], name)
+    option = column_options(fields.split(" or "), name)
     return f"columns not used: {listed(unread)} (likely: {option})"
+
+
+def _walks(mapped: Mapped) -> bool:
+    placed = mapped.has("lat_deg", "lon_deg") and not mapped.has("course_deg")
+    return not placed or mapped.has("steps") or mapped.has("step_m")
 
 
 def _with_fields(name: str, fields: list[str]) -> str:

@@ -28,7 +28,7 @@ from mapfilter.tracks.readers import (
     tems,
 )
 from mapfilter.tracks.readers.columns import header_names, likely_separator
-from mapfilter.tracks.readers.csv_fields import usual_fields
+from mapfilter.tracks.readers.csv_fields import by_unit, usual_fields
 from mapfilter.tracks.readers.csv_headers import likely_fields, stated_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading, Recording
@@ -198,7 +198,9 @@ def _other_names(names: Sequence[str]) -> str:
     found = {*usual, *stated}
     others = [name for name in names if name and name not in (*usual.values(), *stated.values())]
     likely = {name: fields for name in others if (fields := likely_fields(name, found))}
-    such = [f"{fields[0]}={name}" for name, fields in likely.items()] or ["wheel_speed_mps=SPEED"]
+    such = [_pairs(name, fields) for name, fields in likely.items()] or [
+        "wheel_speed_mps=SPEED for m/s"
+    ]
     times = ""
     if "time" not in found:
         times = "a CSV without a column of times; "
@@ -207,3 +209,9 @@ def _other_names(names: Sequence[str]) -> str:
         f"--column FIELD=COLUMN (track.columns in a configuration), such as {' and '.join(such)}"
     )
     return f"{times}a CSV with other names of columns: {option}"
+
+
+def _pairs(name: str, fields: Sequence[str]) -> str:
+    """Return what names a column's field, by its unit where that is open."""
+    pairs = [f"{field}={name}" for field in fields]
+    return pairs[0] if len(pairs) == 1 else f"({by_unit(fields, pairs)})"

@@ -16,6 +16,8 @@ from mapfilter.radio.identities import LIMITS, parse_cgi
 from mapfilter.tracks.readers.recording import Reading
 
 _UNAVAILABLE = (-1, 2**31 - 1, 2**63 - 1)
+_NO_CELL = (2**28 - 1, 2**36 - 1)
+"""Identities with all bits set of LTE and NR, which are of no cell."""
 
 
 def available(values: Ints, there: Bools) -> Floats:
@@ -76,6 +78,7 @@ def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) ->
     given = dict(columns)
     for name in ("mcc", "mnc", "lac", "ci", "arfcn", "bsic", "timing_advance", "level_dbm"):
         given[name] = np.broadcast_to(np.asarray(given.get(name, np.nan), dtype=np.float64), count)
+    given["ci"] = np.where(np.isin(given["ci"], _NO_CELL), np.nan, given["ci"])
     families = given.get("technology")
     if families is None:
         families = np.full(count, None, dtype=object)

@@ -19,9 +19,11 @@ from mapfilter.tracks.readers.text import Text
 
 _SENTENCE = re.compile(rb"(?:NMEA,)?[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")
 """Apps for Android write ``NMEA,$GNGGA,…*hh,TIME``."""
+_MODE = ("magnetic", "side", "mode")
+"""Fields that old receivers do not have."""
 _KINDS = {
     b"GGA": ("time", "lat", "ns", "lon", "ew", "quality", "used", "hdop", "altitude"),
-    b"RMC": ("time", "status", "lat", "ns", "lon", "ew", "knots", "course", "date"),
+    b"RMC": ("time", "status", "lat", "ns", "lon", "ew", "knots", "course", "date", *_MODE),
     b"GST": ("time", "rms", "major", "minor", "axis", "lat_sd", "lon_sd"),
     b"ZDA": ("time", "day", "month", "year"),
 }
@@ -142,7 +144,8 @@ def _table(kind: bytes, lines: list[bytes], numbers: list[Ints], reading: Readin
     names += [f"field{i}" for i in range(len(names), _FIELDS)]
     rows = reading.rows
     places = _joined(numbers)
-    table = line_columns(lines, places, reading, names, ",", ragged=len(_KINDS[kind]) + 1)
+    least = len(_KINDS[kind]) + 1 - (len(_MODE) if kind == b"RMC" else 0)
+    table = line_columns(lines, places, reading, names, ",", ragged=least)
     reading.rows = rows
     return table
 
@@ -253,7 +256,8 @@ def _rmc(rows: Columns, dates: pd.DataFrame) -> pd.DataFrame:
         "lon_deg": _degrees(rows, "lon", "ew", "W"),
         "speed_mps": _KNOT_MPS * rows.number("knots"),
         "course_deg": rows.number("course"),
-        "valid": rows.texts("status") == "A",
+        # Dead reckoning of the receiver, as of GGA, and entered or simulated positions are none.
+        "valid": (rows.texts("status") == "A") & ~np.isin(rows.texts("mode"), tuple("EMSN")),
     }
     return pd.DataFrame(columns)
 

@@ -147,6 +147,7 @@ def _read_sensor_logger(text: Text, reading: Reading, options: ReadOptions) -> N
             # -1 where unknown.
             "speed_mps": np.where(speed < 0, np.nan, speed),
             "course_deg": np.where(course < 0, np.nan, course),
+            "provider": _provider(reading.path.name),
         }
         reading.add("positions", columns, rows.line)
     elif rows.has("pressure"):
@@ -167,6 +168,12 @@ def _read_sensor_logger(text: Text, reading: Reading, options: ReadOptions) -> N
         got = ", ".join(rows.names)[:100]
         expected = "columns of a sensor or of positions"
         raise fail(InputError, f"{reading.path} header", expected, got)
+
+
+def _provider(name: str) -> str:
+    """Return the provider of positions by the name of their file, such as LocationGps.csv."""
+    stem = re.sub(r"[^a-z]", "", name.split(".")[0].lower())
+    return next((one for one in ("gps", "network") if stem.endswith(one)), "fused")
 
 
 def _sensor(rows: Columns, reading: Reading) -> str:

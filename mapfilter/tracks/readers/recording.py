@@ -16,6 +16,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import listed
 from mapfilter.tracks.cut_times import cut_times
+from mapfilter.tracks.readers.held_positions import own_positions
 from mapfilter.tracks.readers.recorded_values import (
     checked_values,
     duplicates,
@@ -32,6 +33,7 @@ ClockKind = Literal["utc", "gps", "local", "monotonic"]
 
 _LINES_KEPT = 3
 _EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
+_TICKS = "likely: ticks since a phone was started; their unit in the header, as time_ms, reads them"
 _JUMP_S = 86_400.0
 _STRAY_SHARE = 0.1
 _SEVERAL = ("radio", "satellites", "ephemerides")
@@ -241,6 +243,12 @@ class Reading:
             # Elsewhere few bad values say nothing of their cause.
             hint = known.mistake(float(np.abs(values[ignored]).max())) if known.marks > 1 else ""
             where = f"first in line {first}" + (f"; likely: {hint}" if hint else "")
+            given = int(np.count_nonzero(good & ~missing))
+            if known.is_another(values[ignored], given):
+                # What is left of another quantity is none of this one either.
+                outside = ~missing
+                some = f"{int(ignored.sum())} of {number_of(given, 'value')} are"
+                where += "; the whole column"
             self.ignore(f"{label}: {some} not {known.expected}, ignored ({where})")
             checked[known.name] = np.where(outside, np.nan, values)
         return np.ones(len(line), dtype=bool)
@@ -261,7 +269,11 @@ class Reading:
         kept = np.ones(len(line), dtype=bool)
         if self.clock.kind != "monotonic":
             kept = (time_s >= _EARLIEST_UTC_S) & (time_s <= _LATEST_UTC_S)
-            self.refuse(line[good & ~kept], "time: not between 1980 and 2100")
+            outside = good & ~kept
+            # Milliseconds or nanoseconds of a phone that runs for days look like Unix times.
+            early = outside.any() and bool((time_s[good] < _EARLIEST_UTC_S).all())
+            hint = f" ({_TICKS})" if early else ""
+            self.refuse(line[outside], f"time: not between 1980 and 2100{hint}")
         index = np.flatnonzero(good & kept)
         if index.size < 3:
             return kept
@@ -342,4 +354,8 @@ class Reading:
             counted = time if table == "motion" and not by_cell else rows["time_s"]
             if table not in _SEVERAL and (cut := cut_times(np.asarray(counted))):
                 self.ignore(f"{table}: {cut}")
+        if table == "positions":
+            rows, notes = own_positions(rows)
+            for note in notes:
+                self.ignore(note)
         return rows

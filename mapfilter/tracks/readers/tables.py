@@ -40,7 +40,8 @@ class Field:
         Up to so many different values out of range are marks of missing ones, and no reason to
         refuse a file.
     mostly : float
-        Share of other values out of range above which it is refused.
+        Share of other values out of range above which it is refused, or where the column is not
+        vital left out as another quantity, if it may have marks.
     """
 
     name: str
@@ -58,6 +59,20 @@ class Field:
     def mistake(self, largest: float) -> str:
         """Return the likely mistake behind values out of range, by the largest; "" for none."""
         return next((hint for low, high, hint in self.hints if low <= largest <= high), "")
+
+    def is_another(self, outside: Floats, given: int) -> bool:
+        """Return whether values out of range show that a column holds another quantity.
+
+        Parameters
+        ----------
+        outside : (N,) array
+            Values out of range.
+        given : int
+            Number of all values.
+        """
+        if self.vital or self.marks < 2 or len(outside) <= self.mostly * given:
+            return False
+        return len(np.unique(outside)) > self.marks
 
     @property
     def kind(self) -> str:
@@ -99,7 +114,10 @@ _LATITUDE = Field(
 _LONGITUDE = Field(
     *("lon_deg", -180, 180, "degrees in -180..180"),
     required=True,
-    hints=_NO_DEGREES,
+    hints=(
+        (180.0, 360.0, "degrees east of 0 to 360; take 360 from those above 180"),
+        *_NO_DEGREES,
+    ),
 )
 _METRES = "metres"
 _EAST, _NORTH = (
@@ -116,7 +134,13 @@ FASTEST_VEHICLE_MPS, FASTEST_TURN_RADPS = 120.0, 3.5
 """No road vehicle or usual train exceeds 432 km/h, none turns by 200 degrees in a second; the yaw
 rates of a vehicle's bus end at 3.92 rad/s (SAE J1939), above which they are marks."""
 _NO_VALUE = "what a bus sends where it has no value, such as"
-_TURN = Field("turn_rad", -6.3, 6.3, "radians in -2π..2π", hints=_DEGREES, vital=True)
+_TURN = Field(
+    *("turn_rad", -6.3, 6.3, "radians in -2π..2π"),
+    hints=_DEGREES,
+    vital=True,
+    marks=3,
+    mostly=0.05,
+)
 _LEVEL = Field(
     *("level_dbm", -200, 0, "dBm in -200..0"),
     hints=(
@@ -136,7 +160,12 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         _LONGITUDE,
         Field("altitude_m", -500, 20_000, "metres in -500..20000"),
         Field("accuracy_m", 0, 1e5, "metres >= 0"),
-        Field("speed_mps", 0, 350, "m/s in 0..350"),
+        Field(
+            *("speed_mps", 0, 350, "m/s in 0..350"),
+            hints=((0.0, np.inf, "a mark of missing values, or exchanged columns"),),
+            marks=3,
+            mostly=0.1,
+        ),
         Field("course_deg", 0, 360, "degrees in 0..360"),
         _text("provider"),
     ),
@@ -244,7 +273,12 @@ RECORDED: dict[str, tuple[Field, ...]] = {
     "steps": (_TIME, Field("count", 0, 1e9, "steps >= 0", required=True)),
     "compass": (
         _TIME,
-        Field("magnetic_deg", -180, 360, "degrees in -180..360", required=True, vital=True),
+        Field(
+            *("magnetic_deg", -180, 360, "degrees in -180..360"),
+            required=True,
+            hints=((360.0, np.inf, "a step counter: the columns of steps and it are exchanged"),),
+            vital=True,
+        ),
     ),
     "turns": (
         _TIME,

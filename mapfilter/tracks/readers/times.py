@@ -30,6 +30,7 @@ _NAMED = re.compile(
     re.ASCII | re.IGNORECASE,
 )
 """Day, month in English, and year."""
+_UTC = re.compile(r"\s*\b(?:UTC|GMT)\s*$")
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
 _OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?", re.ASCII)
@@ -105,6 +106,7 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
         return time_s, True
     leap = rest.str.contains(r":60(?:\D|$)|_\d\d\.\d\d\.60$", regex=True).to_numpy()
     plain = rest.str.replace(r"([:.])60(?=\D|$)", r"\g<1>59", regex=True) if leap.any() else rest
+    plain = plain.str.replace(_UTC, "Z", regex=True) if layout == "ISO8601" else plain
     aware = plain.str.contains(r"(?:Z|z|[+-]\d\d:?\d\d)\s*$", regex=True).to_numpy()
     # Other years are beyond the range of timestamps, or no dates.
     if layout == "ISO8601":
@@ -123,7 +125,8 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
         seconds = np.where(aware, seconds, utc_from_local_s(seconds, zone))
     time_s[~is_number] = seconds
     understood = np.isfinite(seconds)
-    zoned = bool(zone) or bool(aware[understood].all() if understood.any() else False)
+    # A line of units or another header among Unix times has no zone.
+    zoned = bool(zone) or bool(aware[understood].all() if understood.any() else is_number.any())
     return time_s, zoned
 
 

@@ -1,0 +1,133 @@
+"""Times of a plain CSV: Unix time, dates, days of a spreadsheet, or seconds from some start."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
+from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.times import (
+    DAY_S,
+    parse_times,
+    unix_seconds,
+    utc_from_gps_s,
+    utc_from_local_s,
+    without_midnights,
+)
+
+_UNIX_S = 1e8
+_TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
+_DAYS, _EPOCH_DAYS, _NEAREST_S = (36_526.0, 73_050.0), 25_569.0, 1e-3
+"""Days of the years 2000 to 2099 since 1900, those until 1970, and rows a thousand a second."""
+_NUMBER = re.compile(r"\d+(?:\.\d*)?")
+_EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
+"""Unix times of 1998, 2020 and 2039."""
+
+
+def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
+    """Return UTC seconds, or seconds from an unknown start where they are small numbers.
+
+    Of several columns of times one in UTC goes first, then one of local times.
+    """
+    mapped = _best_column(mapped)
+    number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
+    known = number[np.isfinite(number)]
+    if known.size >= 0.5 * len(number) and known.size and abs(float(np.median(known))) < _UNIX_S:
+        if _is_days(known):
+            reading.note("time: days since 1900, as a spreadsheet writes them")
+            return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)
+        reading.clock = Clock("monotonic")
+        return number
+    reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
+    names = mapped.names("time")
+    # A zone that is given is that of the local times of all files.
+    rows, name = mapped.rows, mapped.rows.find(*names) or ""
+    zone = "UTC" if "utc" in name else options.zone
+    time_s, zoned = rows.times(*names, zone=zone)
+    reading.clock = Clock("utc") if zoned else Clock("local", zone)
+    _note_gps(reading, name, known)
+    if len(time_s) and not np.isfinite(time_s).any():
+        texts = mapped.texts("time").tolist()
+        at = next((row for row, text in enumerate(texts) if text), 0)
+        where = f"{reading.path} row {mapped.rows.line[at]}, time"
+        raise fail(
+            InputError, where, _TIMES, repr(texts[at][:40] or "nothing"), _of_time(texts[at])
+        )
+    return _over_midnight(mapped, reading, time_s)
+
+
+def _best_column(mapped: Mapped) -> Mapped:
+    """Return columns with the times of the one that says most."""
+    rows = mapped.rows
+    there = [name for name in mapped.names("time") if name in rows.names]
+    if len(there) < 2 or "time" in mapped.own:
+        return mapped
+    best = max(there, key=lambda name: _certainty(name, rows.first_text(name)))
+    if best == there[0]:
+        return mapped
+    return replace(mapped, stated={**mapped.stated, "time": best})
+
+
+def _certainty(name: str, text: str) -> int:
+    """Return 3 for times in UTC, 2 for local ones, 1 for other numbers, 0 for others."""
+    number = text.replace(",", ".")
+    if _NUMBER.fullmatch(number):
+        # Ticks since a phone was started are large, too.
+        return 3 if _EARLY_S < unix_seconds([float(number)])[0] < _LATEST_S else 1
+    time_s, zoned = parse_times(np.array([text], dtype=object), "UTC" if "utc" in name else "")
+    return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
+
+
+def _is_days(known: Floats) -> bool:
+    """Return whether numbers are days of this century: as seconds, rows would be too near."""
+    low, high = _DAYS
+    steps = np.diff(np.unique(known))
+    return bool(low <= known.min() and known.max() <= high and steps.size) and bool(
+        np.median(steps) < _NEAREST_S
+    )
+
+
+def _local(reading: Reading, local_s: Floats, zone: str) -> Floats:
+    reading.clock = Clock("local", zone)
+    return utc_from_local_s(local_s, zone) if zone else local_s
+
+
+def _note_gps(reading: Reading, name: str, known: Floats) -> None:
+    """Note a column of GPS time whose numbers may count from 1980."""
+    if "gps" not in name or not known.size:
+        return
+    seconds = unix_seconds(known[:1])
+    of_gps = float(utc_from_gps_s(seconds)[0])
+    if seconds[0] < _RECENT_S and of_gps < _LATEST_S:
+        day, other = (f"{datetime.fromtimestamp(x, UTC):%Y-%m-%d}" for x in (seconds[0], of_gps))
+        reading.note(
+            f"{name}: taken for Unix time ({day}); seconds of GPS since 1980 would be of {other}: "
+            f"--offset {reading.path.name}={of_gps - seconds[0]:.0f}"
+        )
+
+
+def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
+    """Return times that go on after midnight where a column of dates keeps the day of the start."""
+    if DATE not in mapped.beside or mapped.rows.changes(DATE).any():
+        return time_s
+    if not (np.diff(time_s[np.isfinite(time_s)]) < -DAY_S / 2).any():
+        return time_s
+    counted = without_midnights(time_s, reading.last_s if np.isfinite(reading.last_s) else np.nan)
+    reading.note("time: the date stays the same over midnight: times go on with the next day")
+    return counted
+
+
+def _of_time(text: str) -> str:
+    """Return the likely mistake behind a text that is no time."""
+    if re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", text.strip()):
+        return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
+    if re.match(r"\d{1,2}:\d\d", text.strip()):
+        return "a time of day without its date; write 2026-05-01T08:00:00, or seconds"
+    return ""

@@ -1,0 +1,99 @@
+"""Seconds by which the clocks of two recordings differ, by their speeds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapfilter._types import Floats
+
+_WITHIN_S, _PERIOD_S = 60.0, 0.5
+_FEWEST_S, _LEAST, _TIMES, _GAIN, _PEAK_S = 180.0, 0.7, 3.0, 0.05, 8.0
+"""What is left unexplained has to be three times as much without the shift."""
+_REMARKABLE_S, _HALF_S, _LONGEST_S = 1.5, 2.5, 7200.0
+_LEAP_S = (17.0, 19.0)
+"""GPS time is 18 s ahead of UTC since 2017."""
+
+Speeds = tuple[Floats, Floats]
+"""Times and speeds."""
+
+
+def shift_note(first: str, one: Speeds | None, other: Speeds | None) -> str:
+    """Return a note where speeds of two recordings agree far better some seconds apart; else "".
+
+    Parameters
+    ----------
+    first : str
+        Name of the recording of ``one``.
+    one, other : (times, speeds) or None
+        In order, on clocks that should be the same.
+
+    Examples
+    --------
+    >>> time_s = np.arange(600.0)
+    >>> speed = 10 + 5 * np.sin(time_s / 20) + 3 * np.sin(time_s / 7)
+    >>> shift_note("gps.csv", (time_s, speed), (time_s + 18, speed))
+    'speeds agree with those of gps.csv best -18.0 s shifted (correlation 1.00, not 0.26); not \
+applied, see --offset (likely: GPS time for UTC)'
+    >>> shift_note("gps.csv", (time_s, speed), (time_s, speed))
+    ''
+    """
+    if one is None or other is None:
+        return ""
+    shifts = np.arange(-_WITHIN_S, _WITHIN_S + _PERIOD_S / 2, _PERIOD_S)
+    agreed = np.array([_correlation(one, other, shift) for shift in shifts])
+    if not np.isfinite(agreed).all():
+        return ""
+    at = int(np.argmax(agreed))
+    shift_s, best, now = float(shifts[at]), float(agreed[at]), float(agreed[len(shifts) // 2])
+    # A speed that repeats itself, as between lights, agrees at several shifts.
+    peak = np.r_[False, (agreed[1:-1] >= agreed[:-2]) & (agreed[1:-1] >= agreed[2:]), False]
+    peak &= np.abs(shifts - shift_s) > _PEAK_S
+    other_best = float(agreed[peak].max(initial=-1.0))
+    clear = best >= _LEAST and 1 - max(now, other_best) >= _TIMES * (1 - best) + _GAIN
+    if not clear or abs(shift_s) < _REMARKABLE_S or at in (0, len(shifts) - 1):
+        return ""
+    low, high = _LEAP_S
+    leap = " (likely: GPS time for UTC)" if low <= abs(shift_s) <= high else ""
+    return (
+        f"speeds agree with those of {first} best {shift_s:+.1f} s shifted (correlation "
+        f"{best:.2f}, not {now:.2f}); not applied, see --offset{leap}"
+    )
+
+
+def speeds_of_places(time_s: Floats, east_m: Floats, north_m: Floats) -> Speeds:
+    """Return speeds over five seconds, or a way from one position to the next if that lasts longer.
+
+    Parameters
+    ----------
+    time_s, east_m, north_m : (N,) array
+        Of each time one position, in order.
+    """
+    half_s = max(_HALF_S, float(np.median(np.diff(time_s))) / 2)
+    begin_s, end_s = np.maximum(time_s - half_s, time_s[0]), np.minimum(time_s + half_s, time_s[-1])
+    moved = (
+        np.interp(end_s, time_s, axis_m) - np.interp(begin_s, time_s, axis_m)
+        for axis_m in (east_m, north_m)
+    )
+    return time_s, np.hypot(*moved) / (end_s - begin_s)
+
+
+def _correlation(one: Speeds, other: Speeds, shift_s: float) -> float:
+    """Return the correlation of speeds of which the second are shifted; NaN for a short time."""
+    begin_s = max(one[0][0], other[0][0] + shift_s)
+    end_s = min(one[0][-1], other[0][-1] + shift_s, begin_s + _LONGEST_S)
+    if end_s - begin_s < _FEWEST_S:
+        return float("nan")
+    at_s = np.arange(begin_s, end_s, _PERIOD_S)
+    first, second = _smoothed(one, at_s), _smoothed(other, at_s - shift_s)
+    spread = float(first.std() * second.std())
+    if spread <= 0:
+        return float("nan")
+    return float(np.mean((first - first.mean()) * (second - second.mean()))) / spread
+
+
+def _smoothed(speeds: Speeds, at_s: Floats) -> Floats:
+    """Return means over five seconds, in which the noise of positions is small."""
+    time_s, speed = speeds
+    way_m = np.concatenate([[0.0], np.cumsum(np.diff(time_s) * (speed[1:] + speed[:-1]) / 2)])
+    after, before = (np.interp(at_s + half, time_s, way_m) for half in (_HALF_S, -_HALF_S))
+    return np.asarray(after - before)

@@ -1,0 +1,108 @@
+"""Turns that contradict the corners of positions: their sense of rotation and their unit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Bools, Floats
+from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.motion_fault import MotionFault
+from mapfilter.tracks.stretches import Stretches, motion_values, steady_values, stretches
+
+_FEWEST = 6
+_CORNER_RAD, _BACK_RAD = np.deg2rad(30.0), np.deg2rad(150.0)
+_AGREED_RAD = np.deg2rad(30.0)
+_FEWEST_CORNERS, _BOTH, _AGREED, _SELDOM = 5, 2 / 3, 0.85, 0.5
+_A_SECOND = 1.2
+_UNITS = {
+    "degrees": np.pi / 180,
+    "counted twice": 0.5,
+    "half as large as they should be": 2.0,
+    "revolutions per minute": 2 * np.pi / 60,
+}
+"""Factors that mend turns, by the mistake."""
+
+
+def turn_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None:
+    """Return what is wrong with turns, their sense or unit; None for nothing.
+
+    Dead reckoning by the steps and turns has corners of its own, which are compared with those of
+    the positions, between lines of some 50 m. Turns are wrong where corners of 30 to 150 degrees,
+    five or more, contradict them and fit the same turns the other way round, or in another unit.
+
+    Parameters
+    ----------
+    motion : pandas.DataFrame
+        time_s, step_m and turn_rad.
+    places : pandas.DataFrame
+        time_s, east_m and north_m.
+
+    Examples
+    --------
+    >>> turn = np.where(np.arange(400) % 20 == 10, np.pi / 2, 0.0) * np.repeat([1, -1, 1, -1], 100)
+    >>> heading = np.cumsum(turn)
+    >>> east, north = (np.cumsum(10 * f(heading - turn / 2)) for f in (np.cos, np.sin))
+    >>> motion = pd.DataFrame({"time_s": np.arange(400.0), "step_m": 10.0, "turn_rad": -turn})
+    >>> truth = pd.DataFrame({"time_s": np.arange(400.0), "east_m": east, "north_m": north})
+    >>> print(turn_fault(motion, truth))
+    turns run clockwise by the course of the positions; expected radians counter-clockwise, \
+or latitude and longitude of the positions are swapped (--factor turn_rad=-1 mends it)
+    >>> turn_fault(motion.assign(turn_rad=turn), truth) is None
+    True
+    """
+    turn_rad = motion_values(motion, "turn_rad")
+    if np.isfinite(turn_rad[1:]).sum() < _FEWEST:
+        return None
+    time_s, step_m = motion_values(motion, "time_s"), steady_values(motion, "step_m")
+    corners = stretches(places, time_s, np.cumsum(np.abs(step_m)))
+    if corners is None:
+        return None
+    unknown = np.cumsum(~np.isfinite(turn_rad), dtype=np.float64)
+    corners = corners.where(_is_corner(corners.turned_rad))
+    corners = corners.where(np.abs(corners.grown(time_s, unknown)) == 0)
+    if len(corners) < _FEWEST_CORNERS:
+        return None
+    turn_rad = steady_values(motion, "turn_rad")
+    if _agreement(corners, time_s, step_m, turn_rad) > _SELDOM:
+        return None
+    lasted_s = np.diff(time_s, prepend=time_s[:1])
+    apart_s = float(np.median(lasted_s[1:]))
+    units: dict[str, Floats | float] = {"": 1.0, **_UNITS}
+    if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
+        units[f"rates (rad/s) in rows {apart_s:.2g} s apart"] = lasted_s
+        units[f"rates (degrees/s) in rows {apart_s:.2g} s apart"] = lasted_s * np.pi / 180
+    agreed = {
+        (unit, sign): _agreement(corners, time_s, step_m, sign * factor * turn_rad)
+        for unit, factor in units.items()
+        for sign in (1, -1)
+    }
+    (unit, sign), most = max(agreed.items(), key=lambda one: one[1])
+    if most < _AGREED:
+        return None
+    alike = [other for other in units if other and agreed[other, sign] == most]
+    words = [f"are {' or '.join(alike)}"] if unit else []
+    words += ["run clockwise"] if sign < 0 else []
+    found = f"turns {' and '.join(words)} by the course of the positions"
+    mirrored = "" if unit or sign > 0 else "latitude and longitude of the positions are swapped"
+    factor = sign * float(np.median(units[unit]))
+    return MotionFault("turn_rad", found, "radians counter-clockwise", factor, otherwise=mirrored)
+
+
+def _is_corner(turned_rad: Floats) -> Bools:
+    """Return which turns are of 30 to 150 degrees: those back look alike both ways round."""
+    return np.asarray((np.abs(turned_rad) >= _CORNER_RAD) & (np.abs(turned_rad) <= _BACK_RAD))
+
+
+def _agreement(corners: Stretches, time_s: Floats, step_m: Floats, turn_rad: Floats) -> float:
+    """Return the share of corners that dead reckoning by steps and turns has, too."""
+    heading_rad = np.cumsum(turn_rad)
+    reckoned_m = np.cumsum(step_m * np.exp(1j * (heading_rad - turn_rad / 2)))
+    turned_rad = corners.turned_by(time_s, reckoned_m)
+    both = _is_corner(turned_rad)
+    if both.sum() < max(_FEWEST_CORNERS, _BOTH * both.size):
+        return 0.0
+    # Five times a right angle has the same course, and is a whole turn more.
+    more_rad = corners.grown(time_s, heading_rad).real - corners.turned_rad
+    near = np.abs(wrap_rad(turned_rad - corners.turned_rad)) <= _AGREED_RAD
+    return float(np.mean((near & (np.abs(more_rad) <= np.pi))[both]))

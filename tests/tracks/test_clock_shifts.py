@@ -1,0 +1,64 @@
+"""Clocks that differ by seconds or by weeks: GPS time for UTC, dates of old receivers."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+from mapfilter.errors import InputError
+
+COUNT = 900
+TIME_S = 1_778_666_400.0 + np.arange(float(COUNT))
+METRES_PER_DEGREE = 111_195.0
+WEEKS_S = 1024 * 7 * 86_400
+
+
+@pytest.fixture
+def notes(tmp_path):
+    """Notes on a drive of uneven speed, with fixes of 3 m and a clock of its odometry."""
+
+    def of(shift_s, *, steady=False, seed=1):
+        rng = np.random.default_rng(seed)
+        knots = rng.uniform(0, 16, COUNT // 20 + 2)
+        speed = np.full(COUNT, 10.0) if steady else np.interp(np.arange(COUNT) / 20, *_at(knots))
+        rate = np.where(np.arange(COUNT) % 60 >= 54, np.pi / 12, 0.0) * rng.choice([-1, 1])
+        heading = np.cumsum(rate) - rate / 2
+        east_m, north_m = np.cumsum(speed * np.cos(heading)), np.cumsum(speed * np.sin(heading))
+        off_m = rng.normal(0, 3, (2, COUNT))
+        places = {"lat": 60 + (north_m + off_m[0]) / METRES_PER_DEGREE}
+        places["lon"] = 25 + 2 * (east_m + off_m[1]) / METRES_PER_DEGREE
+        odometry = {"wheel_speed_mps": speed, "yaw_rate_radps": rate}
+        for name, times, rows in (
+            ("fixes.csv", TIME_S, places),
+            ("odometry.csv", TIME_S + shift_s, odometry),
+        ):
+            pd.DataFrame({"time": times, **rows}).to_csv(tmp_path / name, index=False)
+        found = mf.read_log([tmp_path / "fixes.csv", tmp_path / "odometry.csv"]).notes
+        return [note for note in found if "speeds agree" in note]
+
+    return of
+
+
+def _at(knots):
+    return np.arange(len(knots), dtype=float), knots
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("shift_s", [18.0, -7.0])
+def test_a_clock_of_other_seconds_is_named(notes, shift_s, seed):
+    (note,) = notes(shift_s, seed=seed)
+    before, _, after = note.partition(" best ")
+    assert before == "odometry.csv: speeds agree with those of fixes.csv"
+    assert float(after.split()[0]) == pytest.approx(-shift_s, abs=1.0)
+    assert ("(likely: GPS time for UTC)" in note) == (shift_s == 18.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_common_clock_and_a_steady_speed_say_nothing(notes, seed):
+    assert notes(0.0, seed=seed) == []
+    assert notes(18.0, steady=True, seed=seed) == []
+
+
+def test_a_receiver_whose_week_number_began_anew(notes):
+    with pytest.raises(InputError, match=f"week number began anew: --offset FILE={WEEKS_S}"):
+        notes(-WEEKS_S)

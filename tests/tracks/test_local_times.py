@@ -1,0 +1,60 @@
+"""Local times without a zone are noted, whatever recordings have them."""
+
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+
+TIMES = pd.Timestamp("2026-05-01 10:00:00") + pd.to_timedelta(range(60), unit="s")
+LAT, LON = 60.0, 25.0
+
+
+def gpx(zone=""):
+    points = "".join(
+        f'<trkpt lat="{LAT + i / 1e4}" lon="{LON}"><time>{time.isoformat()}{zone}</time></trkpt>'
+        for i, time in enumerate(TIMES)
+    )
+    return f'<gpx version="1.1" creator="a watch"><trk><trkseg>{points}</trkseg></trk></gpx>'
+
+
+def table(zone="", **columns):
+    times = [f"{time.isoformat()}{zone}" for time in TIMES]
+    return pd.DataFrame({"time": times, **columns}).to_csv(index=False)
+
+
+PLACES = {"lat": [LAT + i / 1e4 for i in range(60)], "lon": LON}
+CELLS = {"mcc": 206, "mnc": 1, "lac": 7, "ci": 100, "rsrp": -90}
+TOLD = "local times that state no zone"
+
+
+@pytest.fixture
+def notes(tmp_path):
+    def of(zone="", **files):
+        for name, text in files.items():
+            path = tmp_path / name.replace("_", ".")
+            path.write_text(text)
+        log = mf.read_log(tmp_path, zone=zone)
+        return [note for note in log.notes if TOLD in note], log
+
+    return of
+
+
+def test_files_of_a_folder_that_all_have_local_times_are_named(notes):
+    found, log = notes(track_gpx=gpx(), cells_csv=table(**CELLS), speed_csv=table(speed_mps=1.0))
+    (note,) = found
+    assert note.startswith(f"cells.csv, speed.csv, track.gpx: {TOLD}, taken for one zone: ")
+    assert "--zone" in note
+    assert pd.isna(log.start_utc_s)
+
+
+@pytest.mark.parametrize("name", ["track_gpx", "places_csv"])
+def test_one_file_with_local_times_is_named(notes, name):
+    (note,), _ = notes(**{name: gpx() if name == "track_gpx" else table(**PLACES)})
+    assert note.startswith(f"{name.replace('_', '.')}: {TOLD}: UTC is unknown")
+
+
+def test_local_times_that_become_utc_are_not_named(notes):
+    assert notes("Europe/Brussels", track_gpx=gpx(), cells_csv=table(**CELLS))[0] == []
+    found, log = notes(track_gpx=gpx("Z"), cells_csv=table(**CELLS))
+    assert found == []
+    assert any("cells.csv: local time is UTC+00:00" in note for note in log.notes)

@@ -1,0 +1,97 @@
+"""Positions of one receiver in several files, those that it holds, and columns of times."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+from mapfilter.errors import InputError
+
+COUNT = 300
+TIME_S = 1_778_666_400.0 + np.arange(float(COUNT))
+LAT = 60 + np.arange(COUNT) * 1e-4
+LON = 25 + np.arange(COUNT) * 1e-5
+
+
+def table(time_s=TIME_S, **columns):
+    return pd.DataFrame({"time": time_s, **columns})
+
+
+@pytest.fixture
+def read(tmp_path):
+    def of(**files):
+        for name, rows in files.items():
+            rows.to_csv(tmp_path / f"{name}.csv", index=False)
+        return mf.read_log([tmp_path / f"{name}.csv" for name in files])
+
+    return of
+
+
+def test_a_receiver_that_two_files_have_counts_once(read):
+    log = read(one=table(lat=LAT, lon=LON), two=table(TIME_S + 0.01, lat=LAT, lon=LON))
+    assert len(log.gnss) == COUNT
+    assert "two.csv: 300 positions left out beside one.csv, as they are the same" in log.notes
+    rng = np.random.default_rng(1)
+    other = table(lat=LAT + rng.normal(0, 2e-5, COUNT), lon=LON)
+    assert len(read(one=table(lat=LAT, lon=LON), two=other).gnss) == 2 * COUNT
+
+
+def location(time_s=TIME_S):
+    ns = (time_s * 1e9).astype("int64")
+    rows = {"time": ns, "seconds_elapsed": time_s - time_s[0], "altitude": 10.0, "speed": -1.0}
+    rows |= {"bearing": -1.0, "horizontalAccuracy": 5.0, "latitude": LAT, "longitude": LON + 1e-4}
+    return pd.DataFrame(rows)
+
+
+def test_of_the_providers_of_one_program_gnss_is_taken(read):
+    files = {"Location": location(), "LocationNetwork": location()}
+    gps = location().assign(longitude=LON)
+    log = read(**files, LocationGps=gps)
+    assert len(log.gnss) == COUNT
+    told = [note for note in log.notes if "of another provider" in note]
+    assert [note.split(":")[0] for note in told] == ["Location.csv", "LocationNetwork.csv"]
+    # Where it has none of them the next one is.
+    assert len(read(Location=location(), LocationGps=location(TIME_S + 1000)).gnss) == 2 * COUNT
+
+
+@pytest.mark.parametrize("speed_mps", [10.0, 0.1])
+def test_positions_that_a_receiver_holds_on_a_drive_are_left_out(read, speed_mps):
+    at = np.minimum(np.arange(COUNT), 100)
+    motion = {"wheel_speed_mps": speed_mps, "yaw_rate_radps": 0.01}
+    log = read(a=table(lat=LAT[at], lon=LON[at], **motion))
+    told = [note for note in log.notes if "stay the same for up to 199 s" in note]
+    assert len(told) == (speed_mps > 1)
+    assert len(log.gnss) == (101 if told else COUNT)
+
+
+@pytest.mark.parametrize(
+    ("columns", "start"),
+    [
+        ({"time": np.arange(300), "timestamp": (TIME_S * 1000).astype("int64")}, TIME_S[0]),
+        ({"time": np.arange(300), "t": "x", "utc": TIME_S}, TIME_S[0]),
+        ({"time": "12:00:00", "timestamp": TIME_S}, TIME_S[0]),
+        ({"time": TIME_S, "timestamp": np.arange(300)}, TIME_S[0]),
+        ({"time": TIME_S, "timestamp": 123_456_000_000_000 + np.arange(300)}, TIME_S[0]),
+    ],
+)
+def test_of_several_columns_of_times_that_in_utc_is_read(read, columns, start):
+    log = read(a=pd.DataFrame({**columns, "lat": LAT, "lon": LON}))
+    assert log.start_utc_s == start
+    assert len(log.gnss) == COUNT
+
+
+def test_ticks_since_a_phone_was_started_are_no_utc(read):
+    ticks = 123_456_000_000_000 + np.arange(COUNT) * 10**9
+    log = read(a=table(np.arange(COUNT), timestamp=ticks, lat=LAT, lon=LON))
+    assert np.isnan(log.start_utc_s)
+    assert len(log.gnss) == COUNT
+
+
+def test_headings_for_turns_and_degrees_for_radians_are_refused(read):
+    rng = np.random.default_rng(1)
+    turn = np.where(np.arange(COUNT) % 20 >= 15, 0.3, 0.0) * rng.normal(1, 0.1, COUNT)
+    read(a=table(step_m=10.0, turn_rad=turn))
+    with pytest.raises(InputError, match=r"headings .* for their changes"):
+        read(a=table(step_m=10.0, turn_rad=(np.cumsum(turn) + 1) % 6.28))
+    with pytest.raises(InputError, match="degrees given for radians"):
+        read(a=table(step_m=10.0, turn_rad=np.degrees(turn)))

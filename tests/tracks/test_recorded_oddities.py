@@ -1,0 +1,241 @@
+"""Plain tables as programs write them: what looks usual and would be read wrongly."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+from mapfilter.errors import InputError
+from mapfilter.tracks.readers.formats import read_recording
+
+COUNT = 300
+START = pd.Timestamp("2026-05-13 10:00:00")
+TIME_S = START.timestamp() + np.arange(float(COUNT))
+METRES_PER_DEGREE = 111_195.0
+EAST_M = np.cumsum(10 * np.cos(np.arange(COUNT) / 40))
+NORTH_M = np.cumsum(10 * np.sin(np.arange(COUNT) / 40))
+LAT, LON = 60 + NORTH_M / METRES_PER_DEGREE, 25 + 2 * EAST_M / METRES_PER_DEGREE
+
+
+@pytest.fixture
+def read(tmp_path):
+    def of(rows=None, text="", **columns):
+        path = tmp_path / "a.csv"
+        path.write_text(text)
+        if not text:
+            (pd.DataFrame(columns) if rows is None else rows).to_csv(path, index=False)
+        return read_recording(path)
+
+    return of
+
+
+def places(found):
+    return found.tables["positions"]
+
+
+def test_positions_that_a_faster_program_repeats_are_those_of_the_receiver(read):
+    at = np.repeat(np.arange(COUNT), 10)
+    # A rest of 20 s.
+    at = np.where((at >= 100) & (at < 120), 100, at)
+    time_s = TIME_S[0] + np.arange(COUNT * 10) / 10
+    found = read(time=time_s, lat=LAT[at], lon=LON[at])
+    (note,) = found.ignored
+    assert note == (
+        "positions: 2700 rows repeat those of a receiver that measures every 1 s, left out"
+    )
+    assert len(places(found)) == COUNT
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S)
+
+
+@pytest.mark.parametrize("kind", ["each second", "at rest", "by distance"])
+def test_other_positions_are_not_left_out(read, kind):
+    at = np.arange(COUNT)
+    if kind == "at rest":
+        at = np.minimum(at, 100)
+    if kind == "by distance":
+        at = at // 12 * 12
+    found = read(time=TIME_S, lat=LAT[at], lon=LON[at])
+    assert len(places(found)) == COUNT
+    assert not found.ignored
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_the_last_position_of_before_is_left_out(read, count):
+    first = np.arange(COUNT) < count
+    found = read(time=TIME_S, lat=LAT + np.where(first, 1.0, 0.0), lon=LON)
+    assert len(places(found)) == COUNT - count
+    (note,) = found.ignored
+    assert "lies 111.2 km from" in note or "lie 111.2 km from" in note
+
+
+def test_positions_that_move_away_later_or_for_good_stay(read):
+    late = np.arange(COUNT) >= 150
+    found = read(time=TIME_S, lat=LAT + np.where(late, 1.0, 0.0), lon=LON)
+    assert len(places(found)) == COUNT
+
+
+@pytest.mark.parametrize(("decimals", "sd_m"), [(3, 32.1), (2, 321.0), (4, None)])
+def test_degrees_of_few_decimals_have_their_error(read, decimals, sd_m):
+    rows = {"time": TIME_S, "lat": LAT.round(decimals), "lon": LON.round(decimals)}
+    accuracy_m = places(read(**rows, accuracy=4.0))["accuracy_m"]
+    expected = 4.0 if sd_m is None else np.hypot(4.0, 1.515 * sd_m)
+    np.testing.assert_allclose(accuracy_m, expected, rtol=1e-3)
+
+
+def test_hemispheres_in_columns_of_their_own(read):
+    found = read(time=TIME_S, latitude=LAT, ns="S", longitude=LON, ew="W", rating="E5")
+    assert (places(found)["lat_deg"] < 0).all()
+    assert (places(found)["lon_deg"] < 0).all()
+    assert "lon_deg: 300 values of W by column ew: negative" in found.notes
+    assert len(found.unread) == 1
+    found = read(time=TIME_S, latitude=LAT, ns="N", longitude=LON, ew="E")
+    np.testing.assert_allclose(places(found)["lon_deg"], LON)
+    found = read(time=TIME_S, latitude=LAT, longitude=LON, lon_dir="W")
+    assert (places(found)["lon_deg"] < 0).all()
+    found = read(time=TIME_S, latitude=LAT, longitude=LON, state="S")
+    np.testing.assert_allclose(places(found)["lat_deg"], LAT)
+    # A sign that is there already stays.
+    found = read(time=TIME_S, latitude=-LAT, ns="S", longitude=-LON, ew="W")
+    np.testing.assert_allclose(places(found)["lat_deg"], -LAT)
+
+
+def test_courses_of_half_turns(read):
+    course = np.linspace(-179, 180, COUNT)
+    found = read(time=TIME_S, lat=LAT, lon=LON, bearing=course)
+    np.testing.assert_allclose(places(found)["course_deg"], course % 360)
+    # -1 is no course.
+    found = read(time=TIME_S, lat=LAT, lon=LON, bearing=np.where(course > 0, 90.0, -1.0))
+    assert places(found)["course_deg"].isna().sum() == np.sum(course <= 0)
+
+
+def test_courses_in_radians_are_refused(read, tmp_path):
+    course = (np.pi / 2 - np.arctan2(np.gradient(NORTH_M), np.gradient(EAST_M))) % (2 * np.pi)
+    rows = {"time": TIME_S, "lat": LAT, "lon": LON, "speed_mps": 10.0}
+    read(**rows, course=np.degrees(course))
+    mf.read_log(tmp_path / "a.csv")
+    read(**rows, course=course)
+    with pytest.raises(InputError, match=r"radians for degrees: call the column course \[rad\]"):
+        mf.read_log(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("name", ["time", "timestamp"])
+def test_days_of_a_spreadsheet(read, name):
+    days = TIME_S / 86_400 + 25_569
+    found = read(**{name: days, "lat": LAT, "lon": LON})
+    assert found.clock.kind == "local"
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S, atol=2e-3)
+    seconds = read(time=40_000 + np.arange(COUNT) / 100, lat=LAT, lon=LON)
+    assert seconds.clock.kind == "monotonic"
+
+
+def test_a_date_that_stays_over_midnight(read):
+    times = [(START + pd.Timedelta(50_300 + i, "s")).strftime("%H:%M:%S") for i in range(COUNT)]
+    found = read(date="2026-05-13", time=times, lat=LAT, lon=LON)
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S + 50_300)
+    assert any("the date stays the same over midnight" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("line", ["s,deg,deg", "time,lat,lon"])
+def test_a_line_of_units_or_a_second_header_leaves_unix_times_utc(read, line):
+    lines = pd.DataFrame({"time": TIME_S, "lat": LAT, "lon": LON}).to_csv(index=False).splitlines()
+    at = 1 if line.startswith("s") else 100
+    found = read(text="\n".join([*lines[:at], line, *lines[at:]]))
+    assert found.clock.kind == "utc"
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S)
+
+
+def test_utc_written_behind_times(read):
+    texts = [f"{START + pd.Timedelta(i, 's')} UTC" for i in range(COUNT)]
+    found = read(time=texts, lat=LAT, lon=LON)
+    assert found.clock.kind == "utc"
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S)
+
+
+def test_unix_times_with_decimal_commas(read):
+    rows = pd.DataFrame({"time": TIME_S + 0.5, "lat": LAT, "lon": LON})
+    found = read(text=rows.to_csv(index=False, sep=";", decimal=","))
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S + 0.5)
+
+
+def test_columns_of_one_name_are_noted(read):
+    lines = pd.DataFrame({"time": TIME_S, "lat": LAT, "lon": LON}).to_csv(index=False).splitlines()
+    found = read(text="\n".join([f"{lines[0]},lat", *(f"{line},0" for line in lines[1:])]))
+    np.testing.assert_allclose(places(found)["lat_deg"], LAT)
+    assert "several columns lat: the first one is read" in found.ignored
+
+
+def test_seconds_of_gps_are_named_beside_unix_times(read):
+    gps = TIME_S - 315_964_800 + 18
+    notes = read(gps_time=gps, lat=LAT, lon=LON).notes
+    assert any("would be of 2026-05-13: --offset a.csv=315964782" in note for note in notes)
+    assert not any("GPS" in note for note in read(gps_time=TIME_S, lat=LAT, lon=LON).notes)
+
+
+def test_degrees_of_a_whole_turn_are_named(read):
+    with pytest.raises(InputError, match="degrees east of 0 to 360"):
+        read(time=TIME_S, lat=LAT, lon=LON + 260)
+
+
+def test_positions_of_one_time_are_those_of_an_export(read):
+    found = read(time=np.full(COUNT, TIME_S[0]), lat=LAT, lon=LON)
+    assert any("all 300 rows have 1 time (likely: those of an export" in n for n in found.ignored)
+
+
+def test_positions_of_two_days_are_noted(read):
+    found = read(time=TIME_S + np.where(np.arange(COUNT) < 150, 0, 86_400), lat=LAT, lon=LON)
+    assert any(note.startswith("positions pause for 24.0 h") for note in found.ignored)
+
+
+@pytest.mark.parametrize("ci", [2**28 - 1, 2**36 - 1, 2**31 - 1])
+def test_identities_with_all_bits_set_are_of_no_cell(read, ci):
+    found = read(time=TIME_S, mcc=206, mnc=1, tac=7, ci=ci, rsrp=-90)
+    assert found.tables["radio"]["cell"].isna().all()
+
+
+def test_yaw_rates_without_their_sign_are_noted(read, tmp_path):
+    rate = np.random.default_rng(1).normal(0, 0.1, COUNT)
+    for values, told in ((rate, False), (np.abs(rate), True)):
+        read(time=TIME_S, wheel_speed_mps=10.0, yaw_rate_radps=values)
+        notes = mf.read_log(tmp_path / "a.csv").notes
+        assert any("all of one sign" in note for note in notes) == told
+
+
+def test_a_gyroscope_in_degrees_makes_no_motion(read, tmp_path):
+    time_s = TIME_S[0] + np.arange(3000) / 50
+    rng = np.random.default_rng(2)
+    rate = rng.normal(0, 0.6, (3000, 3))
+    swing = 9.8 + 2 * np.sin(2 * np.pi * 1.8 * time_s)
+    for factor, told in ((1.0, False), (180 / np.pi, True)):
+        columns = {f"gyr_{axis}": factor * rate[:, i] for i, axis in enumerate("xyz")}
+        read(time=time_s, acc_x=0.1, acc_y=0.1, acc_z=swing, **columns)
+        log = mf.read_log(tmp_path / "a.csv")
+        assert any("degrees for radians per second" in note for note in log.notes) == told
+        assert log.motion.empty == told
+
+
+def test_dead_reckoning_of_a_receiver_is_no_position(tmp_path):
+    def sentence(i, mode):
+        body = f"GNRMC,1000{i:02d}.00,A,6000.{i:03d}00,N,02500.00000,E,10.0,0.0,130526,,,{mode}"
+        total = 0
+        for letter in body:
+            total ^= ord(letter)
+        return f"${body}*{total:02X}"
+
+    modes = "AAAAADDDDDEEEEEEEEEE"
+    lines = [sentence(i, mode) for i, mode in enumerate(modes)]
+    (tmp_path / "a.nmea").write_text("\n".join(lines))
+    assert len(read_recording(tmp_path / "a.nmea").tables["positions"]) == 10
+    # Old receivers state no mode.
+    old = [line.rsplit(",,,", 1)[0] + ",,*00" for line in lines]
+    (tmp_path / "a.nmea").write_text("\n".join(line.replace("*00", "") for line in old))
+    assert len(read_recording(tmp_path / "a.nmea").tables["positions"]) == 20
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_ticks_since_a_phone_was_started_need_their_unit(read, unit, scale):
+    ticks = ((123_456 + np.arange(COUNT)) * scale).astype("int64")
+    with pytest.raises(InputError, match="ticks since a phone was started"):
+        read(timestamp=ticks, lat=LAT, lon=LON)
+    found = read(**{f"timestamp_{unit}": ticks, "lat": LAT, "lon": LON})
+    assert found.clock.kind == "monotonic"
+    np.testing.assert_allclose(places(found)["time_s"], 123_456 + np.arange(COUNT))
