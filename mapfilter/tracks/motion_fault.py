@@ -8,8 +8,6 @@ from math import nan
 
 _FIRST_WORDS = {"heading_rad": "headings", "turn_rad": "turns", "step_m": "steps"}
 
-_MENDS = " mends it)"
-
 MOTION_COLUMNS = tuple(_FIRST_WORDS)
 """Columns of motion that positions can contradict."""
 
@@ -52,7 +50,7 @@ class MotionFault:
 
     def __str__(self) -> str:
         other = f", or {self.otherwise}" if self.otherwise else ""
-        mended = f" ({self.option}{_MENDS}" if self.option else ""
+        mended = f" ({self.option} mends it)" if self.option else ""
         return f"{self.found}; expected {self.expected}{other}{mended}"
 
 
@@ -66,15 +64,3 @@ def fault_notes(notes: Iterable[str], column: str) -> list[str]:
     (['motion, turn_rad: turns run clockwise'], [])
     """
     return [note for note in notes if f", {column}: {_FIRST_WORDS[column]} " in note]
-
-
-def is_refused(note: str) -> bool:
-    """Return whether a log with such a note on its motion is not replayed, as an option mends it.
-
-    Examples
-    --------
-    >>> fault = MotionFault("step_m", "steps are 3.6 times too long", "metres", 1 / 3.6)
-    >>> is_refused(f"motion, step_m: {fault}"), is_refused("motion, step_m: steps are odd")
-    (True, False)
-    """
-    return note.endswith(_MENDS)

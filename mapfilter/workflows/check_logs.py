@@ -14,10 +14,11 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import outside_m
-from mapfilter.tracks.motion_fault import fault_notes, is_refused
+from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.range_units import range_notes
+from mapfilter.tracks.refused_motion import refused_faults
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
@@ -45,10 +46,10 @@ def check_logs(
             findings.add_faults(error, "log-invalid")
             continue
         _check_recordings(opened, findings)
+        refused = refused_faults(opened.log, config.track.factors.given)
         for column, code in _OF_COLUMNS.items():
-            given = column in config.track.factors.given
             for note in fault_notes(opened.log.notes, column):
-                severity: Severity = "error" if is_refused(note) and not given else "warning"
+                severity: Severity = "error" if column in refused else "warning"
                 findings.add(code, str(path), f"{note}.", severity)
         whose = config.filter.bayes.of(BayesFilter).vehicle, opened.log.vehicle, opened.log.imu
         # Positions say more of the lengths of steps than their speed does.

@@ -11,10 +11,9 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.tracks.log import leave_out
-from mapfilter.tracks.motion_fault import MOTION_COLUMNS, fault_notes
-from mapfilter.tracks.motion_faults import compared_places, motion_faults
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
+from mapfilter.tracks.refused_motion import refused_faults
 from mapfilter.tracks.schema import TABLES
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_lacks import check_log
@@ -76,23 +75,17 @@ class ReplayLogs:
         faults.raise_if_any(InputError)
 
     def _check_motion(self, path: Path, opened: OpenedLog, faults: Faults) -> None:
-        """Note columns of motion that the log's positions prove to be of another unit or sense.
+        """Note columns of motion that the log's fixes prove to be of another unit or sense.
 
         Dead reckoning by them would claim wrong positions where the positions end.
         """
-        log, factors = opened.log, self.config.track.factors.given
-        # Where positions are the likely fault there is no note on motion.
-        noted = {one for one in MOTION_COLUMNS if fault_notes(log.notes, one)} - set(factors)
-        if not noted:
-            return
+        found = refused_faults(opened.log, self.config.track.factors.given)
         moved = [one.path for one in opened.recordings if _MOVED & set(one.tables)] or [path]
-        places = compared_places(log.truth, log.gnss)
-        for column, fault in motion_faults(log.motion, places).items():
-            if column in noted and fault.option:
-                where = f"{', '.join(map(str, moved))}, motion, {column}"
-                other = f"; or {fault.otherwise}" if fault.otherwise else ""
-                hint = f"{fault.option} mends it, --factor {column}=1 takes it as it is{other}"
-                faults.add(where, fault.expected, fault.found, hint)
+        for column, fault in found.items():
+            where = f"{', '.join(map(str, moved))}, motion, {column}"
+            other = f"; or {fault.otherwise}" if fault.otherwise else ""
+            hint = f"{fault.option} mends it, --factor {column}=1 takes it as it is{other}"
+            faults.add(where, fault.expected, fault.found, hint)
 
     def check_siteless(self) -> None:
         """Refuse logs of which a filter without a map would need sites."""

@@ -1,5 +1,7 @@
 """Fixes that contradict a Kalman-type filter: outliers, a belief that is wrong, dead odometers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -193,8 +195,12 @@ def test_what_fixes_mean_by_hand():
         record, found = given(record, 30.0, time_s)
         assert found.ruling is Ruling.OUTLIER
     assert record.is_lost
-    assert record.at_time(80.0).rows == record.rows
-    assert record.at_time(80.1).rows == ()
+    # It lasted for longer than a burst does.
+    assert record.at_time(1e9).rows == record.rows
+    short = replace(record, rows=record.rows[:2], agreed=30)
+    assert short.at_time(70.0).rows == short.rows
+    assert short.at_time(70.1).rows == ()
+    assert replace(short, agreed=29).at_time(1e9).rows == short.rows
     # As often as the rest of it: five that lasted for half a minute.
     record, found = given(given(record, 30.0, 25.0)[0], 31.0, 31.0)
     assert (found.ruling, record.agreed, record.rows) == (Ruling.ANEW, 0, ())
@@ -265,5 +271,23 @@ def test_an_outlier_is_told():
         told.append((out.fix.reason, [one.reason for one in out.unused if one.kind == "gnss"]))
     rejected = Reason.REJECTED_BY_EVIDENCE
     assert told[20] == (rejected, [rejected])
-    assert set(reason for reason, _ in told[:20] + told[21:]) == {Reason.USED}
+    assert {reason for reason, _ in told[:20] + told[21:]} == {Reason.USED}
     assert not any(unused for _, unused in told[:20] + told[21:])
+
+
+def test_who_begins_anew_again_and_again_is_lost():
+    """Steps a twentieth of the way: no belief that they move agrees with the fixes for long."""
+    rng = np.random.default_rng(12)
+    steps, way = straight(rng, 300)
+    seen = 20 * way + errors(rng, 300, 3.0)
+    fixes = [fix_at(one) if k < 120 else None for k, one in enumerate(seen)]
+    *_, statuses, _, _ = followed(fixes, steps)
+    assert set(statuses[20:]) == {Status.LOST}
+
+
+def test_a_belief_is_settled_after_ten_fixes_that_agree():
+    one, record = np.eye(2), FixRecord(begun=2)
+    for k in range(10):
+        assert record.is_lost
+        record, _ = record.at_fix((float(k), np.zeros(2), one, one), 30.0, rests=False)
+    assert (record.begun, record.is_lost) == (0, False)

@@ -115,3 +115,12 @@ def test_a_factor_of_motion_that_is_not_there(drive, replay, tmp_path):
     assert_refused(outcome, "expected motion with heading_rad, found none")
     with pytest.raises(ConfigError, match="other than 0"):
         mf.read_log(tmp_path / "fixes.csv", factors={"turn_rad": 0})
+
+
+def test_what_ground_truth_alone_shows_is_noted(drive, replay, tmp_path):
+    """A filter is judged by it, also with faults that are meant."""
+    few = pd.read_csv(tmp_path / "fixes.csv")[:60]
+    few.to_csv(tmp_path / "fixes.csv", index=False)
+    outcome = replay(drive.assign(yaw_rate_radps=-drive["yaw_rate_radps"]))
+    notes = assert_done(outcome).json["notes"]
+    assert any("turns run clockwise" in note for note in notes)

@@ -152,7 +152,8 @@ def test_exchanged_degrees_of_the_truth_are_refused(drive, replay, tmp_path):
 def test_a_track_that_is_lost_by_exchanged_degrees_names_them(drive, replay):
     names = {"latitude": "longitude", "longitude": "latitude"}
     tables = apart(drive)
-    tables["positions"] = tables["positions"].rename(columns=names)
+    # They are lost at once, as turns contradict them.
+    tables["positions"] = tables["positions"][:50].rename(columns=names)
     assert "latitude and longitude are swapped)" in replay(tables).err
 
 

@@ -30,10 +30,12 @@ _MEMORY, _SHOWN, _MOST = 20.0, 1.5, 9.0
 from which on variances are raised, and the most by which they are."""
 _YOUNG = 3
 """Fixes that agreed with it, below which a belief has just begun."""
-_LOST_FROM = 3
-"""Fixes in a row that contradict it, from which on a position is lost."""
-_FORGOTTEN_S = 60.0
-"""Time without a further fix after which those that contradicted it are taken for outliers."""
+_LOST_FROM, _LOST_AFTER, _SETTLED = 3, 2, 10
+"""Fixes in a row that contradict it, from which on a position is lost; how often it begins anew
+until it is, as steps are wrong, and fixes that agree after which it is settled."""
+_FORGOTTEN_S, _BURST_S, _TRUSTED = 60.0, 15.0, 30
+"""Time without a further fix after which those that contradicted it are taken for outliers, for how
+long they may have done so, and how many have to have agreed before."""
 _LEAST_ROWS = 5
 """Fixes that show a belief to be wrong."""
 _MOVING_S, _MOVING_MPS = 5.0, 3.0
@@ -96,12 +98,15 @@ class FixRecord:
         Times that their squared distances have been larger than stated, of late.
     agreed : int
         Fixes that agreed since the belief began.
+    begun : int
+        How often it has begun anew since as many agreed that it was settled.
     rows : tuple of _Row
         The last ones in a row that did not: where they lay from the prediction.
     """
 
     excess: float = 1.0
     agreed: int = 0
+    begun: int = 0
     rows: tuple[_Row, ...] = ()
 
     @property
@@ -111,14 +116,15 @@ class FixRecord:
 
     @property
     def is_lost(self) -> bool:
-        """Whether fixes contradict the belief."""
-        return len(self.rows) >= _LOST_FROM
+        """Whether fixes contradict the belief, or what it is predicted by."""
+        return len(self.rows) >= _LOST_FROM or self.begun >= _LOST_AFTER
 
     def at_time(self, time_s: float) -> FixRecord:
         """Return it at a later time."""
-        if self.rows and time_s - self.rows[-1].time_s > _FORGOTTEN_S:
-            return replace(self, rows=())
-        return self
+        if not self.rows or time_s - self.rows[-1].time_s <= _FORGOTTEN_S:
+            return self
+        is_burst = self.rows[-1].time_s - self.rows[0].time_s <= _BURST_S
+        return replace(self, rows=()) if is_burst and self.agreed >= _TRUSTED else self
 
     def at_fix(
         self, fix: tuple[float, Floats, Floats, Floats], patience_s: float, *, rests: bool
@@ -141,22 +147,27 @@ class FixRecord:
         if squared <= _LIMIT:
             found = float(off_m @ np.linalg.solve(predicted_m2 + stated_m2, off_m)) / 2
             excess = self.excess + (min(found, _MOST) - self.excess) / _MEMORY
-            return FixRecord(excess, self.agreed + 1), Finding(Ruling.AGREES, squared / 2)
+            agreed = self.agreed + 1
+            begun = self.begun if agreed < _SETTLED else 0
+            return FixRecord(excess, agreed, begun), Finding(Ruling.AGREES, squared / 2)
         if self.agreed < _YOUNG:
-            return replace(self, agreed=0, rows=()), Finding(Ruling.EITHER, squared / 2)
+            return self._anew(), Finding(Ruling.EITHER, squared / 2)
         variance_m2 = max(float(np.trace(noise_m2)) / 2, _LEAST_SD_M**2)
         rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2))
         while time_s - rows[0].time_s > 2 * patience_s and len(rows) > _LEAST_ROWS:
             rows = rows[1:]
         ruling = _ruling(np.array(rows), patience_s, rests=rests)
         if ruling.begins:
-            return replace(self, agreed=0, rows=()), Finding(ruling, squared / 2)
+            return self._anew(), Finding(ruling, squared / 2)
         # So much larger that the fix is at the limit along the way to it.
         along = off_m / hypot(*off_m)
         own_m2 = float(along @ noise_m2 @ along)
         most_m2 = float(off_m @ off_m) / _LIMIT - float(along @ predicted_m2 @ along)
         larger = max(most_m2 / own_m2, 1.0)
         return replace(self, rows=rows), Finding(ruling, squared / 2, larger)
+
+    def _anew(self) -> FixRecord:
+        return FixRecord(self.excess, begun=self.begun + 1)
 
 
 def _ruling(rows: Floats, patience_s: float, *, rests: bool) -> Ruling:
