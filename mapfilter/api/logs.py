@@ -8,9 +8,9 @@ from pathlib import Path
 
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments, shown
 from mapfilter.errors import ConfigError, fail
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.options import WalkOptions
 
 _FILES = "a path, or several"

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer.main import get_command
 
-from mapfilter._io import VERSION
+from mapfilter._io import program_version
 from mapfilter._kernel_cache import keep_kernels
 from mapfilter._memory import keep_freed_memory, search_cycles_rarely
 from mapfilter.cli.convert import convert
@@ -59,7 +59,7 @@ def _version(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     if version:
-        sys.stdout.write(f"mapfilter {VERSION}\n")
+        sys.stdout.write(f"mapfilter {program_version()}\n")
         raise typer.Exit(DONE)
 
 
