@@ -254,6 +254,21 @@ def test_a_process_beside_a_command_imports_no_command():
     assert done.stdout.split() == []
 
 
+def test_a_check_imports_neither_scipy_before_it_is_used_nor_what_learns(world):
+    """Both take as long as the check of a small area; asked of a process of its own."""
+    given = ["check", "-c", str(world.toml)]
+    code = (
+        "import sys, mapfilter.config.load, mapfilter.workflows.check; from mapfilter import cli\n"
+        "heavy = {'scipy.ndimage', 'scipy.spatial', 'scipy.optimize'} & set(sys.modules)\n"
+        "try: cli.main()\n"
+        "except SystemExit as end: code = end.code\n"
+        "print(code, sorted(heavy | {'mapfilter.learning'} & set(sys.modules)))"
+    )
+    command = [sys.executable, "-c", code, *given]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "0 []"
+
+
 def test_only_the_options_of_the_command_that_is_run_are_looked_at(monkeypatch):
     looked_at = []
     monkeypatch.setattr(cli, "get_command", lambda app: looked_at.append(app) or (lambda: 0))
