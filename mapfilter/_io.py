@@ -16,7 +16,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from importlib.metadata import version
+from functools import cache
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -31,8 +31,14 @@ _SEAL = "sha256"
 _SYNCED_AT_ONCE = 16
 _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
-VERSION = version("mapfilter")
-"""Of the program, for the record in what it writes."""
+
+@cache
+def program_version() -> str:
+    """Return the version of the program, for the record in what it writes."""
+    # Here, as it takes a tenth of the time of --help, and few results need it.
+    from importlib.metadata import version
+
+    return version("mapfilter")
 
 
 def sha256_file(path: Path) -> str:

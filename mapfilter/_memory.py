@@ -11,17 +11,23 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 """Parameters of glibc's ``mallopt``."""
 _KEPT_BYTES, _LEAST_BYTES = 256 * 2**20, 32 * 2**20
 
-_NEW_OBJECTS = 5_000
+_FIRST_OBJECTS, _NEW_OBJECTS = 500_000, 5_000
 
 
 def search_cycles_rarely() -> None:
-    """Search for cycles of objects that nothing refers to each 5 000 new objects, not each 700.
+    """Search for cycles of objects when there are 500 000, then each 5 000 new ones, not each 700.
 
-    A command makes many objects while it imports modules, and keeps nearly all of them: the search
-    takes a tenth of a short command. The one at its end takes as long, and is left out: the memory
-    is given back then anyway.
+    A command makes hundreds of thousands while it imports modules, and keeps nearly all of them:
+    searching takes a tenth of a short command, which now ends before the first one. The search at
+    its end takes as long, and is left out: the memory is given back then anyway.
     """
-    gc.set_threshold(_NEW_OBJECTS)
+
+    def search_oftener(*_: object) -> None:
+        gc.callbacks.remove(search_oftener)
+        gc.set_threshold(_NEW_OBJECTS)
+
+    gc.callbacks.append(search_oftener)
+    gc.set_threshold(_FIRST_OBJECTS)
     atexit.register(gc.freeze)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import multiprocessing
@@ -13,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnContext
+from multiprocessing.context import SpawnContext, SpawnProcess
 from threading import Lock, Thread
 from typing import Any, ParamSpec, TypeVar
 
@@ -130,6 +131,19 @@ class LocalWorkers(ProcessPoolExecutor):
         return f"one that ended with exit code {deaths[0]} (out of memory?)" if deaths else ""
 
 
+class _Worker(SpawnProcess):
+    """A process that ends at once when it is done, as one that is forked does.
+
+    Python would take apart all modules before, while the main process waits.
+    """
+
+    def run(self) -> None:
+        """Work until there is nothing left to do; a worker that fails ends as any process."""
+        super().run()
+        atexit._run_exitfuncs()
+        os._exit(0)
+
+
 class _Context(SpawnContext):
     """Starts workers, and remembers them for their exit codes."""
 
@@ -143,7 +157,7 @@ class _Context(SpawnContext):
         return [one for one in self._made if one.pid is not None]
 
     def Process(self, *args: Any, **kwargs: Any) -> Any:  # type: ignore[override]  # noqa: N802
-        process = SpawnContext.Process(*args, **kwargs)
+        process = _Worker(*args, **kwargs)
         self._made.append(process)
         return process
 

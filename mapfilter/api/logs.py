@@ -9,10 +9,10 @@ from pathlib import Path
 
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments, shown
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import check_factors
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.options import WalkOptions
 
 _FILES = "a path, or several"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mapfilter.check.findings import Findings
 from mapfilter.errors import listed
@@ -89,6 +88,8 @@ def _alike(plan: CellPlan, ids: Sequence[str]) -> list[list[Cell]]:
 
 def _nearest(cells: Sequence[Cell]) -> list[tuple[Cell, float]]:
     """Return the nearest other one of each of two cells or more, and its distance."""
+    from scipy.spatial import cKDTree
+
     places_m = np.array([(cell.east_m, cell.north_m) for cell in cells])
     away_m, found = cKDTree(places_m).query(places_m, k=2)
     # Of cells at one place either may be found first.
@@ -102,6 +103,8 @@ def _reach_m(plan: CellPlan) -> dict[str, float]:
 
     Cells at one place, to the metre, are of one site, whatever it is called.
     """
+    from scipy.spatial import cKDTree
+
     cells_m = np.round([(cell.east_m, cell.north_m) for cell in plan.cells])
     places_m, of_cell = np.unique(cells_m, axis=0, return_inverse=True)
     count = min(_SITES_ABOUT + 1, len(places_m))

@@ -12,7 +12,6 @@ from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.check.samples import RasterSample
@@ -96,6 +95,8 @@ def find_lobe(
 
 def best_labels(lobes: Mapping[str, Lobe], azimuths_deg: Mapping[str, float]) -> dict[str, str]:
     """Return the cell of a site that each cell's raster fits best, every cell taken once."""
+    from scipy.optimize import linear_sum_assignment
+
     ids = list(lobes)
     score = np.array([[lobes[a].score(azimuths_deg[b]) for b in ids] for a in ids])
     rows, cols = linear_sum_assignment(-score)

@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from mapfilter._types import Floats32
 from mapfilter.check.findings import Findings
@@ -100,6 +99,8 @@ def _fits(seen: Sequence[RasterSample], plan: CellPlan) -> dict[str, _Fit]:
 
 def _exchanged(fits: Mapping[str, _Fit], site_of: Mapping[str, str]) -> dict[str, str]:
     """Return the site that each exchanged raster belongs to."""
+    from scipy.optimize import linear_sum_assignment
+
     sites = set(site_of.values())
     moved: dict[str, str] = {}
     # Where two sites exchanged some labels, rasters that prove less by themselves came along.

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Annotated
 
 import typer
 from typer.main import get_command
 
-from mapfilter._io import VERSION
+from mapfilter._io import program_version
 from mapfilter._kernel_cache import keep_kernels
 from mapfilter._memory import keep_freed_memory, search_cycles_rarely
 from mapfilter.cli.convert import convert
@@ -25,15 +25,6 @@ from mapfilter.cli.views import film, view
 from mapfilter.workflows.guard import guarded
 
 __all__ = ["app", "main"]
-
-app = typer.Typer(
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    no_args_is_help=True,
-    help="Find where a phone or a vehicle is without GNSS.",
-    epilog="\b\nStart with:\n  mapfilter demo\n\nDocumentation: docs/quickstart.rst",
-)
 
 _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
     (demo, "--out demo", "quickstart.rst"),
@@ -63,21 +54,36 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
 )
 """Commands, each with an example and a page of the documentation."""
 
-for _command, _example, _page in _COMMANDS:
-    _name = _command.__name__
-    app.command(
-        short_help=(_command.__doc__ or "").partition("\n")[0],
-        epilog=f"\b\nExample:\n  mapfilter {_name} {_example}\n\nDocumentation: docs/{_page}",
-    )(_command)
 
-
-@app.callback(invoke_without_command=True)
 def _version(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     if version:
-        sys.stdout.write(f"mapfilter {VERSION}\n")
+        sys.stdout.write(f"mapfilter {program_version()}\n")
         raise typer.Exit(DONE)
+
+
+def _app_of(commands: Sequence[tuple[Callable[..., None], str, str]]) -> typer.Typer:
+    """Return the command line of some of the commands."""
+    app = typer.Typer(
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        no_args_is_help=True,
+        help="Find where a phone or a vehicle is without GNSS.",
+        epilog="\b\nStart with:\n  mapfilter demo\n\nDocumentation: docs/quickstart.rst",
+    )
+    app.callback(invoke_without_command=True)(_version)
+    for command, example, page in commands:
+        name = command.__name__
+        app.command(
+            short_help=(command.__doc__ or "").partition("\n")[0],
+            epilog=f"\b\nExample:\n  mapfilter {name} {example}\n\nDocumentation: docs/{page}",
+        )(command)
+    return app
+
+
+app = _app_of(_COMMANDS)
 
 
 def main() -> None:
@@ -93,10 +99,14 @@ def main() -> None:
 
 def _run() -> int | None:
     keep_kernels()
-    return _command_line()()
+    return _command_line(sys.argv[1] if len(sys.argv) > 1 else "")()
 
 
 @cache
-def _command_line() -> Callable[[], int | None]:
-    """Return all commands; to look at the types of their options takes as long as many commands."""
-    return get_command(app)
+def _command_line(name: str) -> Callable[[], int | None]:
+    """Return the command of a name, or all of them where the arguments begin with none.
+
+    To look at the types of the options of all commands takes as long as many commands.
+    """
+    named = [command for command in _COMMANDS if command[0].__name__ == name]
+    return get_command(_app_of(named) if named else app)

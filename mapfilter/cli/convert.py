@@ -84,8 +84,7 @@ def convert(
     as_json: JsonOption = False,
 ) -> None:
     """Convert recordings of other programs to a track log."""
-    from mapfilter.tracks.combine import CombineOptions
-    from mapfilter.tracks.open_log import OpenOptions
+    from mapfilter.tracks.open_options import CombineOptions, OpenOptions
     from mapfilter.workflows.convert import parse_pairs, report_lines, run_convert
 
     given = [given_path(path) or path for path in files]

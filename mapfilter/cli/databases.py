@@ -50,7 +50,6 @@ def check(
     from mapfilter.check.findings import CheckResult, paragraphs
     from mapfilter.config.load import load_config
     from mapfilter.workflows.check import run_check
-    from mapfilter.workflows.check_suspects import checked_together, run_check_suspects
 
     if logs is None:
         refuse({"--db": database}, "check without --logs")
@@ -62,6 +61,9 @@ def check(
     with progress_bar("check") as progress:
         result = CheckResult(True, ()) if database is not None else run_check(loaded, progress)
         if logs is not None:
+            # Here, as it imports all that learns from journeys.
+            from mapfilter.workflows.check_suspects import checked_together, run_check_suspects
+
             result = checked_together(result, run_check_suspects(loaded, progress))
     if as_json:
         print_result(result, as_json)

@@ -14,9 +14,8 @@ from mapfilter.config.fields import (
 )
 from mapfilter.options import Positive
 from mapfilter.propagation.models import GroundTruthErrors, ModelName, PredictionModel
-from mapfilter.survey.measured_map import SurveyOptions
 from mapfilter.survey.measurement_rows import FIELDS as MEASUREMENT_COLUMNS
-from mapfilter.survey.read_measurements import SESSION_GAP_S
+from mapfilter.survey.options import SESSION_GAP_S, SurveyOptions
 
 
 @with_columns(*MEASUREMENT_COLUMNS)

@@ -35,7 +35,6 @@ from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.readers.csv_fields import FIELDS as RECORDED_FIELDS
-from mapfilter.tracks.readers.formats import FORMATS
 from mapfilter.tracks.schema import Without
 
 
@@ -52,7 +51,12 @@ def _each_once(values: tuple[float, ...]) -> tuple[float, ...]:
 
 def _format_name(value: str) -> str:
     """Check the name of a format of recordings; "" is none."""
-    if value and value not in (names := [known.name for known in FORMATS]):
+    if not value:
+        return value
+    # Here, as few commands name one, and it imports all readers.
+    from mapfilter.tracks.readers.formats import FORMATS
+
+    if value not in (names := [known.name for known in FORMATS]):
         raise ValueError(f"one of {', '.join(names)}")
     return value
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.database.checked import Part
@@ -152,6 +151,8 @@ class PointReader:
         StoreError
             The database has no points, or a part is damaged or was replaced.
         """
+        from scipy.ndimage import distance_transform_edt
+
         top, left, rows, cols = window
         margin, lattice = _FIRST_MARGIN_PX, self._lattice
         while True:

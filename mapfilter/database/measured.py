@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from scipy.ndimage import distance_transform_edt
 
 from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Floats32, Ints32
@@ -104,6 +103,9 @@ class Deviations:
         on_way : ndarray of bool, shape (rows, cols)
             Points of the database; pixels beside them have the value of the nearest one.
         """
+        # Here, as it takes long to import, and a database may be opened for its figures alone.
+        from scipy.ndimage import distance_transform_edt
+
         rows, cols = on_way.shape
         near = distance_transform_edt(~on_way, return_distances=False, return_indices=True)
         found = np.full((len(cell_ids), rows * cols), np.nan, dtype=np.float32)

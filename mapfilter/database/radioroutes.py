@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from mapfilter._html import html_table, shortened
 from mapfilter._types import Bools, Floats32, Ints, Ints32
@@ -79,6 +78,9 @@ def fill_field(
     ``pixels`` are rows and columns of the points in the window, at least one. ``received`` are the
     cell id, row, col and level_dbm of the points at which each cell is received, all among these.
     """
+    # Here, as it takes long to import, and a database may be opened for its figures alone.
+    from scipy.ndimage import distance_transform_edt
+
     size = (window.rows, window.cols)
     on_way = np.zeros(size, dtype=np.bool_)
     on_way[pixels] = True

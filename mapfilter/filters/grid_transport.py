@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtr
 
 from mapfilter._device import arrays_of
 from mapfilter._types import Floats32
@@ -23,6 +22,8 @@ def taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
     >>> taps(0.75, 0.0)
     (0, array([0.25, 0.75, 0.  ], dtype=float32))
     """
+    from scipy.special import ndtr
+
     nearest = round(shift_px)
     beside = shift_px - nearest
     variance = max(sd_px**2, abs(beside) * (1 - abs(beside)))

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
-from scipy.special import log_ndtr
 
 from mapfilter._kernels import exp32, log32
 from mapfilter._types import Floats, Floats32, Ints32
@@ -92,6 +91,8 @@ def log_serving(margin_db: ArrayLike, weights: ServingWeights) -> Floats:
     >>> log_serving([-20.0, -2.0, 20.0], ServingWeights()).round(3).tolist()
     [-3.783, -0.693, -0.007]
     """
+    from scipy.special import log_ndtr
+
     margin = np.asarray(margin_db, dtype=np.float64)
     return np.asarray(log_ndtr((margin + weights.hysteresis_db) / weights.sd_db))
 
@@ -105,6 +106,8 @@ def serving_table(weights: ServingWeights) -> Floats32:
 
 def bound_table() -> Floats32:
     """Return log Φ at -8 to 8 standard deviations, for the kernel."""
+    from scipy.special import log_ndtr
+
     steps = REACH_SD * STEPS_PER_SD
     sds = np.arange(-steps, steps + 1) / STEPS_PER_SD
     return np.asarray(log_ndtr(sds), dtype=np.float32)

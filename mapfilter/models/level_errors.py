@@ -29,7 +29,6 @@ from math import log
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import uniform_filter
 
 from mapfilter._types import Floats32, Ints32
 from mapfilter.errors import Faults
@@ -136,6 +135,8 @@ def roughness(level_dbm: Floats32, resolution_m: float) -> Floats32:
 
     It is that of a square of 45 to 50 m at pixels of 5 to 10 m, and of 3 x 3 pixels at least.
     """
+    from scipy.ndimage import uniform_filter
+
     size = roughness_px(resolution_m)
     found = np.empty(level_dbm.shape, dtype=np.float32)
     for band in range(level_dbm.shape[2]):

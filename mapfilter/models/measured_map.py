@@ -18,7 +18,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.geodesy import Lattice
@@ -86,6 +85,8 @@ class ServingStatistics:
 
         ``site`` is the site of each cell, as numbers from 0, shape (C,).
         """
+        from scipy.ndimage import gaussian_filter
+
         row, col = lattice.row_col(rows.east_m, rows.north_m)
         inside = np.asarray(lattice.contains(row, col))
         pixel = (np.asarray(row) * lattice.cols + np.asarray(col))[inside]

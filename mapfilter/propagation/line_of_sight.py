@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import label, uniform_filter
 
 from mapfilter._types import Bools, Floats32
 from mapfilter.errors import InputError, fail
@@ -48,6 +47,8 @@ def line_of_sight(
 
 def own_building(heights_m: Floats32, lattice: Lattice, east_m: float, north_m: float) -> Bools:
     """Return the pixels of the connected buildings about a place; none where it is outdoors."""
+    from scipy.ndimage import label
+
     row, col = lattice.row_col(east_m, north_m)
     if not lattice.contains(row, col) or heights_m[row, col] <= 0:
         return np.zeros(heights_m.shape, dtype=np.bool_)
@@ -69,6 +70,8 @@ def mean_roof_height(
     default_m : float
         Where no roof is near.
     """
+    from scipy.ndimage import uniform_filter
+
     size = 2 * round(radius_m / lattice.resolution_m) + 1
     heights = heights_m.astype(np.float64)
     share = uniform_filter((heights > 0).astype(np.float64), size, mode="constant")

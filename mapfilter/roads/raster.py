@@ -18,7 +18,6 @@ import shapely
 from numpy.typing import NDArray
 from rasterio.errors import RasterioError
 from rasterio.windows import Window
-from scipy.ndimage import label
 
 from mapfilter._gdal import open_raster
 from mapfilter._types import Bools, Floats, Ints
@@ -67,6 +66,8 @@ def read_raster_ways(
         The raster is missing or damaged, in another CRS, of another kind or place, or a class has
         no pixel anywhere in the box.
     """
+    from scipy.ndimage import label
+
     path = Path(path)
     with _opened(path) as source:
         _check(source, path, crs, classes)

@@ -13,7 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from mapfilter._io import VERSION
+from mapfilter._io import program_version
 from mapfilter.serving.documents import RequestError, one_fault, read_object
 from mapfilter.serving.door import PAGES, SAFE, Door, json_answer, no_route, read_body
 from mapfilter.serving.epoch_rows import MOST_EPOCHS
@@ -78,7 +78,7 @@ class Service:
         del request
         found = {
             "service": "mapfilter",
-            "version": VERSION,
+            "version": program_version(),
             "crs": self.sessions.filters.usual.positioner.crs,
             "sessions": len(self.sessions.all),
             "geolocate": self.geolocator is not None,

@@ -8,8 +8,6 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 from shapely import STRtree
 from shapely.geometry import LineString, Polygon
 
@@ -152,6 +150,9 @@ def without_stubs(pieces: Pieces, area: Bounds) -> Pieces:
 
 def connected(pieces: Pieces) -> Pieces:
     """Return the pieces of the largest network, by length."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
     at, start, end = pieces.ends
     graph = csr_array((np.ones(start.size), (start, end)), shape=(len(at), len(at)))
     _, part = connected_components(graph, directed=False)

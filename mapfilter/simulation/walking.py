@@ -9,7 +9,6 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Le
-from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.geodesy import Lattice
@@ -118,6 +117,8 @@ def path_beside(
     inside : callable, optional
         From east and north (m), shape (N,), to whether a building stands there.
     """
+    from scipy.ndimage import gaussian_filter1d
+
     count = max(int(np.ceil(along.length_m / _GRID_M)), 2)
     distance = np.linspace(0.0, along.length_m, count + 1)
     spacing = distance[1]
@@ -148,6 +149,8 @@ def _room(
     east_m: Floats, north_m: Floats, aside_east_m: Floats, aside_north_m: Floats, inside: Inside
 ) -> Floats:
     """Return the largest share of an offset that is clear of buildings, for places near by too."""
+    from scipy.ndimage import minimum_filter1d
+
     share = np.zeros_like(east_m)
     clear = np.ones(east_m.shape, dtype=bool)
     for part in _PARTS:

@@ -14,8 +14,9 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.cell_model import (
     Covariate,
 )
-from mapfilter.survey.measured_map import Survey, SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import Survey, fit_survey
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.options import SurveyOptions
 
 _MOST_FOLDS = 20
 _PARTS_OF_ONE_SESSION = 5

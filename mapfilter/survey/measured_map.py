@@ -10,16 +10,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
-from annotated_types import Ge, Le
 from threadpoolctl import ThreadpoolController
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
-from mapfilter.options import Options
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.cell_model import (
     Covariate,
@@ -39,6 +37,7 @@ from mapfilter.survey.cell_model import (
 from mapfilter.survey.exchanged_sectors import CALIBRATION
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.weakest_reported import WeakestReported, weakest_reported
 
 if TYPE_CHECKING:
@@ -47,47 +46,6 @@ if TYPE_CHECKING:
 _ROUNDS = 2
 _LOCATED_FROM = 300
 _PHONE_HEIGHT_M = 1.5
-_Count = Annotated[int, Ge(1), Le(1_000_000)]
-
-
-@dataclass(frozen=True, slots=True)
-class SurveyOptions(Options):
-    """How measurements become a map.
-
-    Parameters
-    ----------
-    method : {"gp", "knn", "trend"}
-        Gaussian process, nearest neighbours, or the trend alone.
-    trend : {"path_loss", "mean"}
-        Path loss from the antenna, or the cell's mean level. Not used where a prediction is
-        calibrated.
-    reach_m : float
-        Places farther than this from every reading of a cell count as not measured.
-    min_points : int
-        Cells received in fewer squares are left out.
-    min_points_to_locate : int
-        An antenna of unknown place is located from at least so many; with fewer the trend is the
-        mean.
-    min_points_to_fill : int
-        With fewer, or one level everywhere, the trend of a cell is not kept far from its readings,
-        unless its antenna or a prediction is given.
-    neighbours : int
-        Number of neighbours that "knn" averages.
-    square_m : float
-        Readings of one session in one such square count once.
-    most_points : int
-        Larger squares are taken for a cell until it has at most so many points.
-    """
-
-    method: Literal["gp", "knn", "trend"] = "gp"
-    trend: Literal["path_loss", "mean"] = "path_loss"
-    reach_m: Annotated[float, Ge(1)] = 100.0
-    min_points: _Count = 3
-    min_points_to_locate: Annotated[int, Ge(3), Le(1_000_000)] = 15
-    min_points_to_fill: _Count = 15
-    neighbours: _Count = 8
-    square_m: Annotated[float, Ge(0.1)] = 10.0
-    most_points: Annotated[int, Ge(10)] = 1500
 
 
 @cache

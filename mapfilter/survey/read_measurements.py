@@ -23,10 +23,9 @@ from mapfilter.survey.measurement_files import (
 )
 from mapfilter.survey.measurement_rows import Rows
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.options import SESSION_GAP_S
 
 Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
-SESSION_GAP_S = 1800.0
-"""A longer silence begins a new session."""
 _FILES_NAMED = 3
 _SUFFIXES = (".csv", ".log", ".tsv")
 _RECORDED_SUFFIXES = (".txt", ".gz")

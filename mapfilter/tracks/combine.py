@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.mirrored import mirrored_notes
 from mapfilter.tracks.motion_factors import scaled_motion
 from mapfilter.tracks.moved import places_of_poses
-from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.open_options import CombineOptions
 from mapfilter.tracks.position_sources import fixes_of, measured_positions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
 from mapfilter.tracks.readers.recording import Recording
@@ -30,42 +30,6 @@ from mapfilter.tracks.sensors import SENSOR_COLUMNS
 _NO_JOURNEY = {"cells", "ephemerides", "ionosphere"}
 _CELLS_HINT = "give it as [cells] plan"
 _CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci", "level_step_db")
-
-
-@dataclass(frozen=True)
-class CombineOptions:
-    """How recordings become a log.
-
-    Parameters
-    ----------
-    crs : str
-        Projected CRS of the log; "" for the UTM zone of its positions.
-    origin_deg : (float, float) or None
-        Latitude and longitude at which a local frame of metres has its origin.
-    truth : collection of Path
-        Recordings whose positions are the truth, and no measurements.
-    measured : collection of Path
-        Those of ``truth`` whose motion and sensors are measurements: they were given as logs, too.
-    offsets_s : mapping of Path to float
-        Seconds to add to the times of a recording.
-    course_motion : bool
-        Whether steps are made from the speed and course of a receiver, else from its positions,
-        where nothing else gives them.
-    walk : WalkOptions or None
-        How steps are made of a phone's sensors where nothing else gives them; None for no steps.
-    factors : mapping of str to float
-        By which columns of motion (``step_m``, ``heading_rad``, ``turn_rad``) are multiplied, also
-        those of a track log.
-    """
-
-    crs: str = ""
-    origin_deg: tuple[float, float] | None = None
-    truth: Collection[Path] = ()
-    measured: Collection[Path] = ()
-    offsets_s: Mapping[Path, float] = field(default_factory=dict)
-    course_motion: bool = False
-    walk: WalkOptions | None = field(default_factory=WalkOptions)
-    factors: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

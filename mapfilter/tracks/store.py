@@ -223,6 +223,11 @@ def check_log_replaceable(folder: Path) -> None:
     check_replaceable(folder, HEAD, FORMAT, _WRITTEN.__contains__)
 
 
+def files_in(folder: Path) -> list[Path]:
+    """Return the files of a folder that are not hidden, by name."""
+    return [p for p in sorted(folder.iterdir()) if p.is_file() and not p.name.startswith(".")]
+
+
 def list_logs(path: str | Path) -> list[Path]:
     """Return the log that ``path`` is, or the logs in it, by name; InputError without any."""
     path = Path(path)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._io import VERSION as PROGRAM
+from mapfilter._io import program_version
 from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError
@@ -121,7 +121,7 @@ def _head(
         "version": VERSION,
         "kind": kind,
         "title": title,
-        "mapfilter": PROGRAM,
+        "mapfilter": program_version(),
         "database": "",
         "frame": {
             "crs": frame.crs,

@@ -15,8 +15,9 @@ from mapfilter.errors import ConfigError, OutputError, fail
 from mapfilter.geodesy import short_crs
 from mapfilter.tracks.combine import combine
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.open_log import OpenOptions, read_recordings, with_measured
+from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.recordings import read_recordings, with_measured
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import check_log_replaceable, write_log
 

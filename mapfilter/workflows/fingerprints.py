@@ -17,9 +17,9 @@ from mapfilter.positioning.fingerprints.sources import (
 )
 from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
 from mapfilter.radio.cells import CellPlan
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.open_log import OpenOptions, list_journeys, open_log
+from mapfilter.tracks.open_log import list_journeys, open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.readers import plain_csv
 from mapfilter.tracks.readers.columns import header_names, likely_separator

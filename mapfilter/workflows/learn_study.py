@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._io import VERSION, sha256_file
+from mapfilter._io import program_version, sha256_file
 from mapfilter._parallel import Progress, local_executor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.config.sections import Config
@@ -272,7 +272,7 @@ def _key(
     use_truth: bool,
 ) -> str:
     """Return a checksum of everything that the tracks depend on."""
-    parts = [VERSION, database.generation, repr(choice), seed, use_truth]
+    parts = [program_version(), database.generation, repr(choice), seed, use_truth]
     digest = hashlib.sha256(repr(parts).encode())
     for file in _files(paths):
         digest.update(f"{file.parent.name}/{file.name} {sha256_file(file)}".encode())

@@ -7,8 +7,8 @@ from pathlib import Path
 from mapfilter.config.sections import Config, Track
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.tracks.combine import CombineOptions
-from mapfilter.tracks.open_log import OpenedLog, OpenOptions, list_journeys, open_log
+from mapfilter.tracks.open_log import OpenedLog, list_journeys, open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.options import WalkOptions
 
 

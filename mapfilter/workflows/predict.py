@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
-from mapfilter._io import VERSION, ensure_writable_folder, sha256_file
+from mapfilter._io import ensure_writable_folder, program_version, sha256_file
 from mapfilter._parallel import Progress, part_of
 from mapfilter._partial import nothing_left
 from mapfilter.config.sections import Config
@@ -153,7 +153,11 @@ def _predict_network(config: Config, progress: Progress | None) -> PredictResult
         *off_frequency(plan, antennas),
     )
     parts = 2 if both else 1
-    tags = {"SOFTWARE": f"mapfilter {VERSION}", "MODEL": model.model, "MAP": world.map_name}
+    tags = {
+        "SOFTWARE": f"mapfilter {program_version()}",
+        "MODEL": model.model,
+        "MAP": world.map_name,
+    }
     given = plan, lattice, world.heights_m, model
     levels = predict(*given, part_of(progress, 0, parts), antennas=antennas)
     write_rasters(target, lattice, levels, plan.ids, tags)

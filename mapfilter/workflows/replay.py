@@ -36,10 +36,6 @@ from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.store import is_log
-from mapfilter.viewing.bundle import replay_bundle
-from mapfilter.viewing.page import write_page
-from mapfilter.viewing.runs import ViewedRun
-from mapfilter.viewing.trace import TraceRecorder
 from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
@@ -51,7 +47,6 @@ from mapfilter.workflows.replayed import (
     ReplayedLog,
     ReplayResult,
     route_of,
-    run_figures,
     summary_figures,
     summary_of,
 )
@@ -59,7 +54,6 @@ from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.results import (
     ESTIMATES,
     FIGURES,
-    REPLAY_HTML,
     SUMMARY,
     check_figures_of_replay,
     older_results,
@@ -158,7 +152,12 @@ def run_replay(
         log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
-        recorder = TraceRecorder(filter_) if html else None
+        recorder = None
+        if html:
+            # Here, as most replays write no page.
+            from mapfilter.viewing.trace import TraceRecorder
+
+            recorder = TraceRecorder(filter_)
         truth, pictures = Truth.of_table(log.truth), Handed()
         base = _base_map(database) if drawn else None
 
@@ -194,7 +193,9 @@ def run_replay(
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)
         if recorder is not None:
-            written = _with_view(written, log, track, recorder, database, into)
+            from mapfilter.workflows.replay_page import with_page
+
+            written = with_page(written, log, track, recorder, database, into)
         files = tuple(out / file.relative_to(new) for file in written.outputs)
         foreign = foreign_cells(written.outcome.unknown_cells, sites(crs))
         return replace(written, outputs=files, foreign=foreign)
@@ -216,30 +217,6 @@ def run_replay(
         if count > 1:
             write_json(new / SUMMARY, to_jsonable(summary_figures(result)))
     return result
-
-
-def _with_view(
-    replayed: ReplayedLog,
-    log: TrackLog,
-    track: PositionedTrack,
-    recorder: TraceRecorder,
-    database: RadioRouteDatabase | None,
-    into: Path,
-) -> ReplayedLog:
-    """Write the page of one log."""
-    name, estimate = replayed.name, track.estimate
-    figures = run_figures(replayed.figures)
-    view = ViewedRun(
-        f"{name}, {estimate.filter}",
-        estimate,
-        log,
-        log_name=name,
-        trace=recorder,
-        figures=figures,
-        smoothed=recorder.filter.smoother() is not None,
-    )
-    write_page(replay_bundle(f"Replay of {name}", [view], database), into / REPLAY_HTML)
-    return replace(replayed, outputs=(*replayed.outputs, into / REPLAY_HTML))
 
 
 def unnamed_database(config: Config) -> Path | None:

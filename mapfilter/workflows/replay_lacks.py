@@ -17,7 +17,6 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
-from mapfilter.tracks.readers import plain_csv
 from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
 from mapfilter.viewing.words import REASONS
 
@@ -91,6 +90,11 @@ def lack_of(
 
 def columns_of_motion(opened: OpenedLog) -> str:
     """Return which columns of motion tables were looked for, and which others there are."""
+    if not opened.recordings:
+        return ""
+    # Here, as it imports readers, of which a track log needs none.
+    from mapfilter.tracks.readers import plain_csv
+
     tables = [one for one in opened.recordings if one.format == plain_csv.FORMAT.name]
     if not tables:
         return ""

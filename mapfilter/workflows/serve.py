@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter._inputs import read_input
-from mapfilter._io import VERSION
+from mapfilter._io import program_version
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -196,7 +196,9 @@ def _binding(config: Config, database: RadioRouteDatabase, positioner: BayesPosi
     """Return what states depend on: the database and the filter's options, given and taken."""
     model = positioner.model
     taken = positioner.options, positioner.rules, model.motion, model.weights, model.evidence
-    made_of = f"{database.generation} {filter_choice(config.filter)!r} {taken!r} {VERSION}"
+    made_of = (
+        f"{database.generation} {filter_choice(config.filter)!r} {taken!r} {program_version()}"
+    )
     return hashlib.sha256(made_of.encode()).hexdigest()
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import VERSION, atomic_file, ensure_writable_folder
+from mapfilter._io import atomic_file, ensure_writable_folder, program_version
 from mapfilter._parallel import Progress
 from mapfilter._words import number_of
 from mapfilter.config.sections import Config
@@ -22,8 +22,9 @@ from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.cell_model import Covariate
 from mapfilter.survey.leave_out import Validation, leave_out
-from mapfilter.survey.measured_map import Survey, SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import Survey, fit_survey
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.plan_faults import plan_faults
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.workflows.pictures import clear_pictures
@@ -87,7 +88,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         fill=section.fill,
         deviation_factor=factor,
         tags={
-            "SOFTWARE": f"mapfilter {VERSION}",
+            "SOFTWARE": f"mapfilter {program_version()}",
             "MODEL": f"survey {options.method}",
             READINGS_TAG: hashlib.sha256(readings).hexdigest(),
         },

@@ -12,8 +12,8 @@ from mapfilter.errors import ConfigError, InputError, fail, listed
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.survey.measured_map import SurveyOptions
 from mapfilter.survey.measurements import Measurements, named_after
+from mapfilter.survey.options import SurveyOptions
 from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.planned_cells import planned_cells

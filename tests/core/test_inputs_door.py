@@ -344,7 +344,7 @@ ALLOWED = {
     ("experiments/benchmarks/ottawa_sessions.py", "read_csv"), ("radio/tables.py", "ZipFile"),
     ("roads/osm_xml.py", "read_dataframe"), ("roads/osm_xml.py", "GzipFile"),
     ("roads/osm_xml.py", "open"),
-    ("workflows/info.py", "list_layers"), ("workflows/info.py", "read_info"),
+    ("workflows/info_geo.py", "list_layers"), ("workflows/info_geo.py", "read_info"),
     ("viewing/page.py", "GzipFile"),
     # Who calls it is listed here by `open_parquet`.
     ("_arrow.py", "ParquetFile"),

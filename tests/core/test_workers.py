@@ -244,3 +244,37 @@ def test_a_pipe_is_closed_by_one_thread_only(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split("\n")[:4] == ["done here"] * 4
+
+
+DONE_WITH = """
+import atexit, sys
+from functools import partial
+from pathlib import Path
+from mapfilter._parallel import worker_processes
+
+class Module:
+    def __init__(self, folder, touch=Path.touch):
+        self.file, self.touch = folder / "taken apart", touch
+
+    def __del__(self):
+        self.touch(self.file)
+
+def task(folder):
+    sys.modules["large"] = Module(folder)
+    atexit.register((folder / "cleaned up").touch)
+
+if __name__ == "__main__":
+    with worker_processes(1) as worker:
+        worker.submit(partial(task, Path(sys.argv[1]))).result()
+"""
+
+
+def test_a_worker_that_is_done_cleans_up_and_takes_no_module_apart(tmp_path):
+    """Which the main process would wait for."""
+    script, left = tmp_path / "done.py", tmp_path / "left"
+    script.write_text(DONE_WITH)
+    left.mkdir()
+    given = [sys.executable, str(script), str(left)]
+    done = subprocess.run(given, capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in left.iterdir()] == ["cleaned up"]

@@ -16,9 +16,10 @@ from mapfilter.survey.cell_model import (
     learn_shadowing,
 )
 from mapfilter.survey.leave_out import leave_out
-from mapfilter.survey.measured_map import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.options import SurveyOptions
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_673_000.0, 5.0, 160, 160)

@@ -14,7 +14,8 @@ from mapfilter.roads.ways import Ways
 from mapfilter.survey import measured_map
 from mapfilter.survey.cell_model import learn_shadowing
 from mapfilter.survey.leave_out import leave_out
-from mapfilter.survey.measured_map import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import fit_survey
+from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.survey.survey_rasters import surveyed_plan, write_survey
 

@@ -9,8 +9,9 @@ from mapfilter.geodesy import Lattice
 from mapfilter.propagation.shadowing import correlated_field
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.survey.measured_map import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.plan_faults import plan_faults
 
 CRS = "EPSG:32635"

@@ -13,8 +13,9 @@ from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLACK, save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 from mapfilter.survey.leave_out import LeftOut, leave_out
-from mapfilter.survey.measured_map import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.survey_rasters import write_survey
 from mapfilter.workflows import served, survey_pictures
 from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey

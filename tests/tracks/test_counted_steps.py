@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import ConfigError
-from mapfilter.tracks.combine import CombineOptions, combine
+from mapfilter.tracks.combine import combine
+from mapfilter.tracks.open_options import CombineOptions
 from mapfilter.tracks.pdr.counted import reckon_counted
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.readers.formats import read_recording

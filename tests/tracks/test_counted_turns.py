@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.tracks.combine import CombineOptions, combine
+from mapfilter.tracks.combine import combine
+from mapfilter.tracks.open_options import CombineOptions
 from mapfilter.tracks.pdr.counted import reckon_counted
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.turns import Turning, turning_of

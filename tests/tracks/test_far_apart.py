@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 
 TIME_S = np.arange(60.0)
 LAT, LON = 60.0 + 1e-4 * TIME_S, 25.0 + 2e-4 * TIME_S

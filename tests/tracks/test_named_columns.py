@@ -6,7 +6,8 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import unproject
-from mapfilter.tracks.open_log import OpenOptions, read_recordings
+from mapfilter.tracks.open_options import OpenOptions
+from mapfilter.tracks.recordings import read_recordings
 
 TIME_S = 1_777_629_600 + np.arange(60)
 

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.tracks.combine import CombineOptions
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.odometry_rows import usable_rows
 from mapfilter.tracks.readers.formats import read_recording
 

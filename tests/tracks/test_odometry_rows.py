@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.moved import motion_from_odometry, odometry_gaps
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry
 
 UTM = OpenOptions(combine=CombineOptions(crs="EPSG:32629"))

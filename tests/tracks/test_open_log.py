@@ -9,8 +9,8 @@ import mapfilter as mf
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import project
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.tracks.combine import CombineOptions
-from mapfilter.tracks.open_log import OpenOptions, list_journeys, open_log
+from mapfilter.tracks.open_log import list_journeys, open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.tracks.store import read_log, write_log
 

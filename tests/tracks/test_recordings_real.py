@@ -7,8 +7,7 @@ import pytest
 
 from mapfilter.geodesy import project, utm_crs
 from mapfilter.gnss.broadcast import place_by_broadcast
-from mapfilter.tracks.combine import CombineOptions
-from mapfilter.tracks.open_log import OpenOptions
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.convert import run_convert

@@ -10,6 +10,7 @@ import geopandas
 import pytest
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
+from mapfilter import cli
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.tracks.store import read_log
@@ -244,6 +245,39 @@ def test_help_is_quick_to_import(command):
     if not command:
         for name in ("demo", "predict", "build", "export", "info", "simulate", "replay"):
             assert any(line.strip().startswith(f"{name} ") for line in text), name
+
+
+def test_a_process_beside_a_command_imports_no_command():
+    """It imports the main module again, which is this one."""
+    code = "import sys, mapfilter.__main__; print(*{'typer', 'mapfilter.cli'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_a_check_imports_neither_scipy_before_it_is_used_nor_what_learns(world):
+    """Both take as long as the check of a small area; asked of a process of its own."""
+    given = ["check", "-c", str(world.toml)]
+    code = (
+        "import sys, mapfilter.config.load, mapfilter.workflows.check; from mapfilter import cli\n"
+        "heavy = {'scipy.ndimage', 'scipy.spatial', 'scipy.optimize'} & set(sys.modules)\n"
+        "try: cli.main()\n"
+        "except SystemExit as end: code = end.code\n"
+        "print(code, sorted(heavy | {'mapfilter.learning'} & set(sys.modules)))"
+    )
+    command = [sys.executable, "-c", code, *given]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "0 []"
+
+
+def test_only_the_options_of_the_command_that_is_run_are_looked_at(monkeypatch):
+    looked_at = []
+    monkeypatch.setattr(cli, "get_command", lambda app: looked_at.append(app) or (lambda: 0))
+    monkeypatch.setattr(cli, "_command_line", cli._command_line.__wrapped__)
+    for name in ("info", "infos"):
+        assert mapfilter(name).code == 0
+    one, every = (app.registered_commands for app in looked_at)
+    assert [command.callback.__name__ for command in one] == ["info"]
+    assert len(every) > 10
 
 
 def test_version_and_no_command():

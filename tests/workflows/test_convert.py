@@ -9,8 +9,7 @@ from made_recordings import COUNT, LAT_DEG, LON_DEG, MADE, START_UTC_S, STEP_S, 
 
 from mapfilter.errors import ConfigError, InputError, OutputError
 from mapfilter.geodesy import project
-from mapfilter.tracks.combine import CombineOptions
-from mapfilter.tracks.open_log import OpenOptions
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.convert import report_lines, run_convert

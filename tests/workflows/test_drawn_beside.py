@@ -112,6 +112,19 @@ def test_what_locates_imports_neither_what_draws_nor_what_reads_maps_and_rasters
     assert (done.returncode, done.stdout.split()) == (0, ["numba"]), done.stderr
 
 
+def test_a_replay_of_a_track_log_imports_no_readers_of_recordings_and_no_page():
+    """They are a sixth of the modules of its own; asked of a process of its own."""
+    others = {"mapfilter.tracks.combine", "mapfilter.tracks.readers.formats"}
+    others |= {"mapfilter.viewing.bundle", "mapfilter.survey.measured_map"}
+    code = (
+        "import sys, mapfilter.config.load, mapfilter.workflows.replay, "
+        "mapfilter.workflows.replay_text\n"
+        f"print(*{others!r} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
+
+
 class Noting(SerialExecutor):
     def __init__(self):
         self.drawn = []

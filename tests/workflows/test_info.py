@@ -270,11 +270,19 @@ def test_figures_of_another_program_are_no_results(tmp_path):
     assert info(tmp_path)["kind"] == "recordings"
 
 
-def test_no_filter_is_imported_to_describe_anything():
+@pytest.mark.parametrize(
+    ("kind", "unused"),
+    [
+        ("database", {"numba", "scipy", "pandas", "rasterio", "pyogrio", "mapfilter.config"}),
+        ("log", {"numba", "scipy", "rasterio", "pyogrio", "mapfilter.config"}),
+    ],
+)
+def test_what_other_kinds_need_is_not_imported(world, kind, unused):
     """It takes as long as all else; asked of a process of its own."""
+    path = world.database if kind == "database" else next(world.journeys.iterdir())
     code = (
-        "import sys, mapfilter.workflows.info as _\n"
-        "print(*{'numba', 'mapfilter.config.sections', 'mapfilter.positioning'} & set(sys.modules))"
+        "import sys; from pathlib import Path; from mapfilter.workflows.info import run_info\n"
+        f"print(run_info(Path({str(path)!r}))['kind'], *{unused!r} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
+    assert (done.returncode, done.stdout.split()) == (0, [kind]), done.stderr

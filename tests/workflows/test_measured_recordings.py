@@ -8,8 +8,7 @@ from made_recordings import COUNT, LEVEL_DBM, MADE
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project
 from mapfilter.survey.read_measurements import read_measurements
-from mapfilter.tracks.combine import CombineOptions
-from mapfilter.tracks.open_log import OpenOptions
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.workflows.convert import run_convert
 from mapfilter.workflows.measured import recorded_rows
 

@@ -48,10 +48,10 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.reported_power import reported_eirp_dbm
 from mapfilter.roads.corridors import Positions
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 
 ZONE = "Europe/Brussels"
 LEAST_S = 60.0

@@ -59,9 +59,9 @@ from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.store import read_log, write_log
 

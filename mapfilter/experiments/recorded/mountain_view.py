@@ -33,9 +33,9 @@ from mapfilter.experiments.recorded.outages import (
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import wrap_rad
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 
 PARTS = {"1-minute": 60.0, "3-minutes": 180.0}
 RUNS = 5

@@ -47,9 +47,9 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.corridors import Positions
-from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 
 SATELLITES = {"satellites-0": 0, "satellites-1": 1, "satellites-2": 2, "satellites-3": 3}
 ALL, OUTAGES = "satellites-all", "outages-60s"

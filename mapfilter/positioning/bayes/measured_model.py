@@ -11,7 +11,6 @@ from functools import cached_property
 from math import isfinite, log
 
 import numpy as np
-from scipy.special import logsumexp
 
 from mapfilter._threads import Call
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
@@ -48,6 +47,8 @@ class MeasuredMapModel(BayesModel):
 
         What is compared with a probability of so many cells at a place has to be one, too.
         """
+        from scipy.special import logsumexp
+
         model = self.serving_model
         if model is None:
             return super().usual_serving(serving, timing_advance)

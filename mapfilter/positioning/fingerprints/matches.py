@@ -22,7 +22,6 @@ from mapfilter.positioning.fingerprints.options import (
     SurveyMaps,
 )
 from mapfilter.positioning.fingerprints.reports import Reports
-from mapfilter.positioning.fingerprints.survey_levels import surveyed_levels
 
 _NO_LEVEL_DBM = -30.0
 _NEGLIGIBLE = 1e-4
@@ -118,6 +117,9 @@ def locator(method: Method, database: Reports) -> Locator:
         scale = Scale(method.representation, floor_dbm, method.exponent)
         return Locator(places, _neighbours(database, method, scale), median=False)
     if isinstance(method, SurveyMaps):
+        # Here, as it imports what fits surveys.
+        from mapfilter.positioning.fingerprints.survey_levels import surveyed_levels
+
         database = surveyed_levels(database)
     return Locator(places, _posterior(database, method, floor_dbm), median=True)
 

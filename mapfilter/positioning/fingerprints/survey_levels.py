@@ -8,8 +8,9 @@ import numpy as np
 
 from mapfilter.errors import InputError
 from mapfilter.positioning.fingerprints.reports import Reports
-from mapfilter.survey.measured_map import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.options import SurveyOptions
 
 _SQUARE_M = 5.0
 _MOST_POINTS = 400

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.pdr.options import STEP_FACTOR
@@ -59,7 +58,8 @@ def find_steps(force_up_mps2: Floats) -> Steps:
     force_up_mps2 : (N,) array
         At :data:`mapfilter.tracks.pdr.signals.RATE_HZ`; the device's axes do not matter.
     """
-    # Slow to import (it imports scipy.stats), and few commands need it.
+    # Slow to import (one imports scipy.stats), and few commands need them.
+    from scipy.ndimage import median_filter
     from scipy.signal import find_peaks
 
     swing = vertical_swing(force_up_mps2)
