@@ -28,7 +28,8 @@ from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.state import BayesState, Reported
