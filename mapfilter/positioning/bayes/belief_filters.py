@@ -82,11 +82,17 @@ class BeliefFilters:
         return not self.model.area.cell_ids and not self.grid
 
     def by_map_alone(self, state: BayesState) -> bool:
-        """Return whether the map alone is the evidence: no position was measured for some way."""
+        """Return whether the map alone is the evidence: no position was used for some way.
+
+        One that the alternative used counts as well: it is to be found by positions, too.
+        """
         if not self.map_may_start:
             return False
         gnss: GnssState = state.sources[GnssSource.name]
-        return state.reckoning.travelled_m - gnss.used_at_m > _POSITIONED_M
+        used_at_m, other = gnss.used_at_m, state.alternative
+        if other is not None and GnssSource.name in other.sources:
+            used_at_m = max(used_at_m, other.sources[GnssSource.name].used_at_m)
+        return state.reckoning.travelled_m - used_at_m > _POSITIONED_M
 
     def by_carriageways(
         self, state: BayesState, *, compass: bool | None = None

@@ -15,10 +15,8 @@ from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.trail import Contradiction
 
-_LEAST_TURNED_RAD, _MISREAD_RAD = radians(45.0), radians(60.0)
-_TOLD_RAD, _DEVIATIONS = radians(10.0), 3.0
-"""Smallest angle, also in deviations, by which headings are read otherwise; deviation up to which
-fixes tell the direction of any."""
+_MISREAD_RAD = radians(60.0)
+"""Angle from which on an alternative that reads headings otherwise is begun anew."""
 
 
 def hold_of_next(
@@ -34,10 +32,12 @@ def hold_of_next(
     contradiction : Contradiction or None
         Headings are as measured without one, and where it does not tell their direction.
     """
-    if contradiction is None or not state.compass or not _tells(contradiction):
-        return Hold(step_unit_m=step_unit_m)
-    hold, turned_rad = state.hold, contradiction.turned_rad
-    hold = hold.turned_by(turned_rad) if abs(turned_rad) > _LEAST_TURNED_RAD else hold
+    hold = Hold()
+    if contradiction is not None and state.compass:
+        if contradiction.is_turned:
+            hold = state.hold.turned_by(contradiction.turned_rad)
+        elif contradiction.is_told:
+            hold = state.hold
     return replace(hold, step_unit_m=step_unit_m)
 
 
@@ -49,14 +49,9 @@ def misreads(
     """Return whether an alternative that goes on reads headings otherwise than the fixes tell."""
     if alternative is None or contradiction is None:
         return False
-    if not (state.compass and _tells(contradiction)):
+    if not (state.compass and (contradiction.is_turned or contradiction.is_told)):
         return False
     own = alternative.hold
     wanted = hold_of_next(state, own.step_unit_m, contradiction)
     off_rad = wrap_one_rad(wanted.offset_rad - own.offset_rad)
     return wanted.sign != own.sign or abs(off_rad) > _MISREAD_RAD
-
-
-def _tells(contradiction: Contradiction) -> bool:
-    turned_rad, sd_rad = abs(contradiction.turned_rad), contradiction.sd_rad
-    return sd_rad <= _TOLD_RAD or turned_rad > max(_LEAST_TURNED_RAD, _DEVIATIONS * sd_rad)

@@ -9,7 +9,7 @@ spoofer, or a tram, makes a step in between that nobody walked.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import nan, sqrt
+from math import inf, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,10 @@ _APART_M, _APART_S = 5.0, 3.0
 _LEAST_SD_M, _DEVIATIONS, _LEAST_SHARE = 5.0, 2.0, 0.7
 """Errors of fixes last for longer than their noise; within how many deviations those lie that
 agree, and how many of them have to."""
+
+_TURNED_RAD, _TURNED_SD, _TOLD_RAD = radians(45.0), 3.0, radians(10.0)
+"""Smallest angle, also in deviations, by which a way is turned; largest deviation of one that is
+told, turned or not."""
 
 
 class TrailFix(NamedTuple):
@@ -61,6 +65,16 @@ class Contradiction(NamedTuple):
     fixes: int
     goes_on: bool
     nats: float = 0.0
+
+    @property
+    def is_told(self) -> bool:
+        """Whether they tell a direction."""
+        return self.sd_rad <= _TOLD_RAD
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether dead reckoning leads in another direction than they do."""
+        return abs(self.turned_rad) > max(_TURNED_RAD, _TURNED_SD * self.sd_rad)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,16 +150,22 @@ def _contradiction(rows: tuple[TrailFix, ...], first: int, least_s: float) -> Co
     """Return what the rejected fixes from ``first`` on show."""
     given = np.array(rows[first:])
     rejected = given[given[:, -1] > 0]
-    if len(rejected) < _LEAST_FIXES or rejected[-1, 0] - rejected[0, 0] < least_s:
-        return None
-    own = _Way.through(rejected)
-    if own is None:
+    if len(rejected) < 2:
         return None
     earlier = np.array(rows[max(first - _EARLIER, 0) : first]).reshape(-1, given.shape[1])
     whole = _Way.through(np.concatenate([earlier, rejected])) if len(earlier) else None
-    goes_on = whole is not None and whole.agree[: len(earlier)].sum() >= min(2, len(earlier))
-    found = whole if whole is not None and goes_on else own
-    return Contradiction(found.turned_rad, found.sd_rad, int(own.agree.sum()), bool(goes_on))
+    goes_on = whole is not None and bool(whole.agree[: len(earlier)].sum() >= min(2, len(earlier)))
+    if whole is not None and goes_on:
+        fixes = int(whole.agree[len(earlier) :].sum())
+        found = Contradiction(whole.turned_rad, whole.sd_rad, fixes, goes_on)
+        # Outliers do not lie on a way that is turned.
+        if found.is_turned and found.is_told and fixes >= 2:
+            return found
+    own = _Way.through(rejected) if len(rejected) >= _LEAST_FIXES else None
+    if own is None or rejected[-1, 0] - rejected[0, 0] < least_s:
+        return None
+    told = whole if whole is not None and goes_on else own
+    return Contradiction(told.turned_rad, told.sd_rad, int(own.agree.sum()), goes_on)
 
 
 class _Way(NamedTuple):
@@ -176,4 +196,4 @@ class _Way(NamedTuple):
             if agree.mean() < _LEAST_SHARE or agree.sum() < _LEAST_FIXES:
                 return None
         spread = float((weight * np.abs(off_way) ** 2).sum())
-        return cls(float(np.angle(turn)), 1 / sqrt(spread) if spread > 0 else nan, agree)
+        return cls(float(np.angle(turn)), 1 / sqrt(spread) if spread > 0 else inf, agree)
