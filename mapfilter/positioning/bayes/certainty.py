@@ -82,9 +82,10 @@ def certainty(
     """
     near, total = main.summary.mass_50m, 1.0
     if alternative is not None:
-        without_fixes = alternative.log_bayes_factor(main) - alternative.gnss_log_bayes_factor
-        log_odds = alternative.log_bayes_factor(main) - rules.lost_threshold
-        log_odds = max(log_odds, by_fixes + without_fixes)
+        lead = alternative.log_bayes_factor(main)
+        log_odds = lead - rules.lost_threshold
+        if isfinite(by_fixes):
+            log_odds = max(log_odds, by_fixes + lead - alternative.gnss_log_bayes_factor)
         if log_odds > _NEGLIGIBLE and _apart_m(alternative.belief, main) > NEAR_M:
             total += exp(min(log_odds, _CERTAIN))
     likely: list[tuple[float, ParticleBelief]] = []

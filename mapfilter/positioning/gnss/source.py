@@ -129,7 +129,9 @@ class GnssSource(EvidenceSource):
 
     def beside_other(self, state: GnssState) -> GnssState:
         """Return the state with a receiver and a trail that begin anew."""
-        receiver, state = state.receiver, replace(state, trail=FixTrail())
+        receiver = state.receiver
+        if state.trail.rows:
+            state = replace(state, trail=FixTrail())
         if receiver is None:
             return state
         return replace(state, receiver=begun_anew(self.options, receiver))
