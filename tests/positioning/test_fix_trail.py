@@ -9,6 +9,7 @@ import pytest
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail
+from mapfilter.serving.state_file import decode, encode
 
 EVERY_M, EVERY_S, LEAST_S = 10.0, 6.0, 10.0
 
@@ -118,3 +119,10 @@ def test_without_a_stated_deviation_a_fix_has_ten_metres_and_at_least_five():
     fix = replace(fix, var_east_m2=1.0, var_north_m2=1.0, cov_east_north_m2=0.0)
     (row,) = FixTrail().after(0.0, fix, way, LEAST_S, rejected=False).rows
     assert row.sd_m == 5.0
+
+
+def test_a_saved_trail_is_the_same_again():
+    given = followed("uuuurrr")
+    found = decode(encode({"trail": given}), "a session")["trail"]
+    assert found == given
+    assert isinstance(found.contradiction, Contradiction)
