@@ -163,7 +163,7 @@ def alternative(**more):
 def state_of(belief="main", beside=None, travelled_m=95.0, own=OWN):
     return SimpleNamespace(
         sources={"gnss": own}, reckoning=DeadReckoning(travelled_m),
-        belief=belief, alternative=beside,
+        belief=belief, alternative=beside, proven=False,
     )  # fmt: skip
 
 

@@ -186,10 +186,7 @@ class Weighing:
         disputed = disputed or now.null.log_odds >= rules.start_log_odds or gone
         # A turned phone may be ahead only because the belief is in a wrong place.
         if (
-            (
-                state.alternative is None
-                or (alternative and misreads(alternative, state, contradiction))
-            )
+            (state.alternative is None or misreads(alternative, state, contradiction))
             and now.status is not Status.CONVERGED
             and (disputed or beliefs.is_contested(state))
         ):

@@ -153,7 +153,7 @@ class GnssSource(EvidenceSource):
         main = self.gate.compare(belief, own, epoch, travelled_m, spacing_m)
         if epoch.fix is not None and main.compared and not main.state.distrusted:
             main = main._replace(state=self._followed(main, epoch.fix, epoch.time_s, state))
-        contradiction = self._weighted(main.state.trail.contradiction)
+        contradiction = self._weighted(main.state.trail.contradiction, proven=state.proven)
         alternative, terms, under_null = state.alternative, None, None
         if alternative is not None:
             before: GnssState = alternative.sources[self.name]
@@ -180,9 +180,12 @@ class GnssSource(EvidenceSource):
             contradiction=contradiction,
         )
 
-    def _weighted(self, found: Contradiction | None) -> Contradiction | None:
-        """Return a contradiction with what it gives an alternative."""
-        if found is None or not found.goes_on:
+    def _weighted(self, found: Contradiction | None, *, proven: bool) -> Contradiction | None:
+        """Return a contradiction with what it gives an alternative.
+
+        A belief that was found without positions knows where it is: they may lead away slowly.
+        """
+        if found is None or not found.goes_on or proven:
             return found
         nats = min(self.options.agreed_nats * found.fixes, self.options.agreed_trust)
         return found._replace(nats=nats)
@@ -208,11 +211,11 @@ class GnssSource(EvidenceSource):
     ) -> AlternativeHypothesis:
         """Add to the alternative's Bayes factor, within the trust in satellites as a whole.
 
-        Fixes whose way goes on from those before were not put elsewhere, and count for more.
+        Fixes that contradict a belief by what they give count for more.
         """
         most = self.options.trust
         most += max(time_s - alternative.start_s, 0.0) / self.options.trust_grows_s
-        if contradiction is not None and contradiction.goes_on:
+        if contradiction is not None and contradiction.nats > 0:
             most, step = self.options.agreed_trust, self.options.agreed_nats * step
         # What was given by then stays.
         most = max(most, abs(alternative.gnss_log_bayes_factor))
