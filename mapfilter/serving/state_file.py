@@ -28,7 +28,8 @@ from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.state import BayesState, Reported
@@ -38,6 +39,7 @@ from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
+from mapfilter.positioning.gnss.trail import Contradiction, FixTrail, TrailFix
 from mapfilter.positioning.integrity import SampleTail
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.pauses import RowTimes
@@ -45,7 +47,7 @@ from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 
-FORMAT, VERSION = "mapfilter session", 12
+FORMAT, VERSION = "mapfilter session", 13
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -58,8 +60,10 @@ _CLASSES: dict[str, type] = {
         BeliefSummary,
         Biases,
         Bins,
+        Contradiction,
         DeadReckoning,
         Fix,
+        FixTrail,
         GnssFix,
         GnssState,
         HeldOtherwise,
@@ -82,6 +86,7 @@ _CLASSES: dict[str, type] = {
         SensorWatch,
         StepOutput,
         TimingState,
+        TrailFix,
         UnusedReading,
     )
 }

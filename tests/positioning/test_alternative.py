@@ -22,6 +22,7 @@ from mapfilter.positioning.bayes.alternative import (
     resolve_alternative,
 )
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.hold import Hold
 
 RULES = AlternativeRules(
     start_log_odds=-3.0, search_threshold=4.0, lost_threshold=10.0, converge_log_odds=-5.0,
@@ -287,7 +288,7 @@ def test_the_bayes_factor_is_the_lead_in_evidence_since_the_alternative_began():
         beside = other.beside(log_prior)
         assert beside.log_bayes_factor(main) == 5.0 - log_prior
         assert (beside.start_m, beside.belief) == (100.0, belief)
-    assert (other.step_unit_m, other.gnss_log_bayes_factor, other.sources) == (1.0, 0.0, {})
+    assert (other.hold, other.gnss_log_bayes_factor, other.sources) == (Hold(), 0.0, {})
     assert other.null == NullHypothesis()
     assert NullHypothesis().travelled_m == 0.0
 

@@ -11,7 +11,8 @@ from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, AlternativeRules
 from mapfilter.positioning.bayes.certainty import Recovery, _share_near, certainty
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
 
 RULES = AlternativeRules()

@@ -55,7 +55,8 @@ def state(travelled_m=500.0, *, compass=False, used_at_m=None, compared=False):
     if compared:
         gnss = replace(gnss, compared_at_m=0.0)
     reckoning = SimpleNamespace(travelled_m=travelled_m)
-    return SimpleNamespace(reckoning=reckoning, compass=compass, sources={GnssSource.name: gnss})
+    sources = {GnssSource.name: gnss}
+    return SimpleNamespace(reckoning=reckoning, compass=compass, sources=sources, alternative=None)
 
 
 def chosen(beliefs, given):

@@ -11,6 +11,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import project
 from mapfilter.gnss.sky import GridFrame
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
+from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.gate import GnssComparison, GnssState
@@ -161,8 +162,8 @@ def alternative(**more):
 
 def state_of(belief="main", beside=None, travelled_m=95.0, own=OWN):
     return SimpleNamespace(
-        sources={"gnss": own}, reckoning=SimpleNamespace(travelled_m=travelled_m),
-        belief=belief, alternative=beside,
+        sources={"gnss": own}, reckoning=DeadReckoning(travelled_m),
+        belief=belief, alternative=beside, proven=False,
     )  # fmt: skip
 
 

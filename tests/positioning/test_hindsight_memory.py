@@ -11,7 +11,7 @@ from small_area import make_area
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.street_motion import STATES, MotionErrors
 from mapfilter.positioning.bayes import smoothing
-from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 

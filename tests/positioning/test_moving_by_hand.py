@@ -13,7 +13,8 @@ from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.moving import moved
@@ -329,7 +330,7 @@ def test_hypotheses_are_carried_on_once_steps_are_counted_again(left, rest, carr
 
 
 def test_an_alternative_reads_headings_as_they_are_and_lengths_in_its_unit():
-    other = AlternativeHypothesis(belief(SEARCHING, name=5), 0.0, 0.0, step_unit_m=0.5)
+    other = AlternativeHypothesis(belief(SEARCHING, name=5), 0.0, 0.0, hold=Hold(step_unit_m=0.5))
     state = walking(alternative=other, hold=Hold(-1.0, 0.2, 2.0))
     found, _, asked = move(state, STEP)
     (own,) = steps_of(asked)

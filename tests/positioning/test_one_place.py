@@ -13,7 +13,8 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes import claims
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.timing import TimingState, TimingTerm
 from mapfilter.positioning.bayes.weighing import Weighing, weighed_by
 from mapfilter.positioning.epochs import Epoch, ReportRow
@@ -54,7 +55,7 @@ class State:
         return self.held
 
 
-def judged(state, *, weighed=True, positioned=False, contested=False, left=False):
+def judged(state, *, weighed=True, positioned=False, contested=False, left=False, by_fixes=-inf):
     rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0)
     beliefs = SimpleNamespace(
         options=SimpleNamespace(split_mass=0.4),
@@ -62,6 +63,7 @@ def judged(state, *, weighed=True, positioned=False, contested=False, left=False
         rules_of=lambda _: rules,
         is_contested=lambda _: contested,
         may_have_left=lambda _: left,
+        log_odds_of_fixes=lambda _: by_fixes,
     )
     return claims.judged(beliefs, state, weighed=weighed, positioned=positioned)
 

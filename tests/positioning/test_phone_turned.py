@@ -17,7 +17,6 @@ from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
-    Hold,
     after_takeover,
     is_ahead,
     jumps,
@@ -25,6 +24,7 @@ from mapfilter.positioning.bayes.held import (
     still_open,
     winner,
 )
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -218,7 +218,7 @@ def test_takeovers_are_reported_also_where_reports_have_times_of_their_own():
     state, _ = walked(state, rng, (1.0, 5.0, 0.0))
     other = beside(state.belief, -250.0, log_evidence=100.0)
     sure = NullHypothesis(-40.0)
-    in_feet = AlternativeHypothesis(other, 0.0, 0.0, null=sure, step_unit_m=FOOT_M)
+    in_feet = AlternativeHypothesis(other, 0.0, 0.0, null=sure, hold=Hold(step_unit_m=FOOT_M))
     turned = HeldOtherwise(other, Hold(1.0, np.pi), 3.0, 0.0, sure)
     for beside_it, reason in (
         ({"alternative": in_feet}, Reason.OTHER_UNIT),

@@ -15,7 +15,7 @@ from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.sensors.rest import Rest

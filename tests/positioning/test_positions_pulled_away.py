@@ -27,7 +27,8 @@ from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm, RadioReading
 from mapfilter.positioning.bayes.filter import _in_doubt
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import PullRules
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.state import BayesState

@@ -11,7 +11,8 @@ from sky_world import HEIGHTS, START_UTC_S, no_rows, off_m, sky_log, sky_table
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.alternative import NullHypothesis
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, epochs
 from mapfilter.positioning.filter import estimate_of, locate

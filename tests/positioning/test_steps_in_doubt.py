@@ -9,7 +9,7 @@ import pytest
 from made_town import Town, slowed, walk_log
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.step_units import (
     asks_for_unit,
@@ -331,12 +331,13 @@ def test_when_an_alternative_in_another_unit_starts_and_holds_a_belief_back():
     assert log_odds_of_unit(FOOT_M) == log_odds_of_unit(3.0) == -4.0
     leads = (-9.0, FOOT_M, True), (-10.0, FOOT_M, False), (-11.0, FOOT_M, False), (-1.0, 1.0, False)
     for nats, unit_m, is_open in leads:
-        other = SimpleNamespace(step_unit_m=unit_m, log_bayes_factor=lambda _, nats=nats: nats)
+        hold = Hold(step_unit_m=unit_m)
+        other = SimpleNamespace(hold=hold, log_bayes_factor=lambda _, nats=nats: nats)
         state = unit_state(alternative=other)
         assert is_unit_open(state, SEARCH, FOOT_M) == is_open
         # A row has been faster than any walker's, in feet or not.
         assert not is_unit_open(state, SEARCH, 1.0)
-        assert hold_after_takeover(state) == Hold(step_unit_m=unit_m)
+        assert hold_after_takeover(state) is hold
 
 
 def in_feet(log):

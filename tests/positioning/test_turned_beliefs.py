@@ -15,7 +15,6 @@ from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
-    Hold,
     after_takeover,
     as_measured,
     forked,
@@ -25,6 +24,7 @@ from mapfilter.positioning.bayes.held import (
     still_open,
     winner,
 )
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 
 RULES = HoldRules(

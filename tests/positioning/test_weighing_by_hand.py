@@ -27,7 +27,8 @@ from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm, RadioReading
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epochs import Epoch
@@ -124,8 +125,8 @@ def test_a_belief_is_tracked_where_motion_is_measured(status, measured, tracked)
         # An alternative close behind, or one in another unit that keeps up.
         ({}, {"alternative": rival(-1.0)}, True),
         ({}, {"alternative": rival(-9.0)}, False),
-        ({"unit_m": 0.3}, {"alternative": rival(-9.0, step_unit_m=0.3)}, True),
-        ({"unit_m": 0.3}, {"alternative": rival(-11.0, step_unit_m=0.3)}, False),
+        ({"unit_m": 0.3}, {"alternative": rival(-9.0, hold=Hold(step_unit_m=0.3))}, True),
+        ({"unit_m": 0.3}, {"alternative": rival(-11.0, hold=Hold(step_unit_m=0.3))}, False),
     ],
 )
 def test_when_a_belief_does_not_converge(changes, state, doubted):
@@ -150,7 +151,7 @@ def test_an_alternative_is_weighed_by_its_own_terms(null):
 
 
 def test_an_alternative_that_has_won_takes_over_with_its_sources():
-    other = rival(9.0, status=CONVERGED, step_unit_m=0.3)
+    other = rival(9.0, status=CONVERGED, hold=Hold(step_unit_m=0.3))
     given = replace(
         STATE, alternative=other, recovery=Recovery(3.0), hold=Hold(-1.0, 0.5), takeovers=2,
         held=(HeldOtherwise(belief(), Hold(1.0, 3.0), -2.0, 0.0),),
@@ -196,7 +197,8 @@ def test_when_an_alternative_starts(changes, state, disputed, starts):
         unit = changes.get("unit_m", 1.0)
         # One in another unit is improbable beforehand.
         assert other.main_log_evidence == -12.0 + (0.0 if unit == 1.0 else -4.0)
-        assert (other.step_unit_m, other.null.log_odds) == (unit, pytest.approx(np.log(1 / 19)))
+        assert other.hold == Hold(step_unit_m=unit)
+        assert other.null.log_odds == pytest.approx(np.log(1 / 19))
 
 
 def test_one_source_is_enough_to_dispute_a_belief():

@@ -15,7 +15,8 @@ from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold
+from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate as replay

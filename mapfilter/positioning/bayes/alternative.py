@@ -52,6 +52,7 @@ from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.options import NotNegative, Options, Share
+from mapfilter.positioning.bayes.hold import Hold
 
 if TYPE_CHECKING:
     from mapfilter.positioning.bayes.evidence import RadioReading
@@ -186,8 +187,8 @@ class AlternativeHypothesis:
         Contribution of rejected satellites to the log Bayes factor; bounded, as all may be faulty.
     null : NullHypothesis
         Beside the alternative itself.
-    step_unit_m : float
-        Unit in which it reads lengths of steps.
+    hold : Hold
+        How it reads headings, and the unit in which it reads lengths of steps.
     """
 
     belief: MapBelief
@@ -197,7 +198,7 @@ class AlternativeHypothesis:
     sources: Mapping[str, Any] = field(default_factory=dict)
     gnss_log_bayes_factor: float = 0.0
     null: NullHypothesis = field(default_factory=NullHypothesis)
-    step_unit_m: float = 1.0
+    hold: Hold = field(default_factory=Hold)
 
     def log_bayes_factor(self, main: MapBelief) -> float:
         """Return the logarithm of the Bayes factor in favour of the alternative."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite, radians, sqrt
+from math import inf, isfinite, radians, sqrt
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,9 @@ MapFilter = BeliefFilter[Start, Any, RadioReading]
 _MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
 _FOLLOWED, _SOUGHT = (Status.TRACKING,), (Status.SEARCHING, Status.LOST, Status.OUTSIDE)
+_LED_LOG_ODDS, _PROVEN_LOG_ODDS = -3.0, -6.0
+"""Log odds of a belief that is wrong to fixes that are, where these lie apart from those before: of
+one that was found by positions, and of one that was found without them, too."""
 _POSITIONED_M = 200.0
 """Distance from the last position that was measured after which the map is the evidence again."""
 
@@ -79,11 +82,17 @@ class BeliefFilters:
         return not self.model.area.cell_ids and not self.grid
 
     def by_map_alone(self, state: BayesState) -> bool:
-        """Return whether the map alone is the evidence: no position was measured for some way."""
+        """Return whether the map alone is the evidence: no position was used for some way.
+
+        One that the alternative used counts as well: it is to be found by positions, too.
+        """
         if not self.map_may_start:
             return False
         gnss: GnssState = state.sources[GnssSource.name]
-        return state.reckoning.travelled_m - gnss.used_at_m > _POSITIONED_M
+        used_at_m, other = gnss.used_at_m, state.alternative
+        if other is not None and GnssSource.name in other.sources:
+            used_at_m = max(used_at_m, other.sources[GnssSource.name].used_at_m)
+        return state.reckoning.travelled_m - used_at_m > _POSITIONED_M
 
     def by_carriageways(
         self, state: BayesState, *, compass: bool | None = None
@@ -194,6 +203,20 @@ class BeliefFilters:
         if not rivals or not isinstance(main, ParticleBelief):
             return False
         return is_ahead(rules, rivals, main, state.reckoning.travelled_m)
+
+    def log_odds_of_fixes(self, state: BayesState) -> float:
+        """Return the log odds, beforehand, of an alternative at fixes that contradict the belief.
+
+        They are those of a belief that is wrong to fixes that are; -inf without such fixes.
+        """
+        gnss: GnssState = state.sources[GnssSource.name]
+        found = gnss.trail.contradiction
+        if found is None:
+            return -inf
+        if found.goes_on:
+            return 0.0
+        # Nobody has walked there, so these may be put elsewhere.
+        return _PROVEN_LOG_ODDS if state.proven else _LED_LOG_ODDS
 
     def positions_lead(self, state: BayesState) -> bool:
         """Return whether positions lead the belief, and a rival without them is to be begun."""

@@ -64,6 +64,7 @@ def certainty(
     alternative: AlternativeHypothesis | None = None,
     rivals: Iterable[HeldOtherwise] = (),
     enough: float = inf,
+    by_fixes: float = -inf,
 ) -> float:
     """Return the probability that the position lies within 50 m of a belief's leading hypothesis.
 
@@ -81,7 +82,10 @@ def certainty(
     """
     near, total = main.summary.mass_50m, 1.0
     if alternative is not None:
-        log_odds = alternative.log_bayes_factor(main) - rules.lost_threshold
+        lead = alternative.log_bayes_factor(main)
+        log_odds = lead - rules.lost_threshold
+        if isfinite(by_fixes):
+            log_odds = max(log_odds, by_fixes + lead - alternative.gnss_log_bayes_factor)
         if log_odds > _NEGLIGIBLE and _apart_m(alternative.belief, main) > NEAR_M:
             total += exp(min(log_odds, _CERTAIN))
     likely: list[tuple[float, ParticleBelief]] = []

@@ -39,7 +39,8 @@ def judged(
         options, enough = beliefs.options_of(state), rules.claimed_from
         if recovery is not None:
             enough = max(enough, options.switch_mass)
-        probability = certainty(rules, belief, state.alternative, state.rivals, enough)
+        by_fixes = beliefs.log_odds_of_fixes(state)
+        probability = certainty(rules, belief, state.alternative, state.rivals, enough, by_fixes)
         uncertain = probability < rules.claimed_from
         if recovery is not None and weighed:
             travelled_m = state.reckoning.travelled_m

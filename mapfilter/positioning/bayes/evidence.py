@@ -28,6 +28,7 @@ from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.gnss.trail import Contradiction
 from mapfilter.tracks.schema import Kind
 
 SERVING_UNDER_NULL = -0.7
@@ -189,7 +190,7 @@ class EvidenceUpdate(NamedTuple):
     alternative. ``radio`` and ``reason`` (whether the serving cell is used) come from the radio
     reports only. Beliefs in which the phone was turned are weighed by ``rival_terms``, too.
     ``path`` is the way that a belief starts with, where the map alone is the
-    evidence.
+    evidence. ``contradiction`` is a way by fixes that the belief rejects.
     """
 
     state: Any
@@ -205,6 +206,7 @@ class EvidenceUpdate(NamedTuple):
     path: RecentPath | None = None
     alternative_under_null: float | None = None
     rival_terms: tuple[Term, ...] = ()
+    contradiction: Contradiction | None = None
 
 
 class EvidenceSource(ABC):

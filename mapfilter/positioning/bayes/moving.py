@@ -16,7 +16,6 @@ from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
-    Hold,
     as_measured,
     forked,
     jumps,
@@ -179,9 +178,8 @@ def moved(
             belief = beliefs.remounted(belief, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
             if alternative is not None:
-                # It began anew, and nothing says that the phone is held otherwise.
                 other = alternative.belief
-                as_read = Hold(step_unit_m=alternative.step_unit_m).read(measured)
+                as_read = alternative.hold.read(measured)
                 other, _ = predict(other, _assumed(as_read, other), rng)
                 alternative = replace(alternative, belief=other)
             if twin is not None:

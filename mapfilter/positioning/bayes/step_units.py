@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.alternative import MapBelief
-from mapfilter.positioning.bayes.held import Hold
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.state import BayesState
 
 _OTHER_UNIT_NATS, _OPEN_NATS = -4.0, -10.0
@@ -59,11 +59,11 @@ def is_unit_open(state: BayesState, main: MapBelief, other_m: float) -> bool:
     ``other_m`` is the unit in which the speed would be a walker's; 1 for metres.
     """
     other, unit_m = state.alternative, state.hold.step_unit_m
-    if other is None or other.step_unit_m == unit_m or (other_m == unit_m == 1.0):
+    if other is None or other.hold.step_unit_m == unit_m or (other_m == unit_m == 1.0):
         return False
     return other.log_bayes_factor(main) > _OPEN_NATS
 
 
 def hold_after_takeover(state: BayesState) -> Hold:
-    """Return how motion is read once the alternative has taken over: headings as they are."""
-    return Hold() if state.alternative is None else Hold(step_unit_m=state.alternative.step_unit_m)
+    """Return how motion is read once the alternative has taken over."""
+    return Hold() if state.alternative is None else state.alternative.hold

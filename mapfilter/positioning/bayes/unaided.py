@@ -21,7 +21,8 @@ import numpy as np
 
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import MapBelief, NullHypothesis
-from mapfilter.positioning.bayes.held import HeldOtherwise, Hold, smaller
+from mapfilter.positioning.bayes.held import HeldOtherwise, smaller
+from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import PullRules
 from mapfilter.positioning.bayes.state import BayesState
 

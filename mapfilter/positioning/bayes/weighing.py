@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.alternative import (
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
+from mapfilter.positioning.bayes.contradicted import hold_of_next, misreads
 from mapfilter.positioning.bayes.evidence import (
     Context,
     EvidenceSource,
@@ -45,6 +46,7 @@ from mapfilter.positioning.bayes.step_units import (
 )
 from mapfilter.positioning.bayes.unaided import beside_alternative, searching_alone
 from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.gnss.trail import Contradiction
 
 _ALONE = 8
 """Salt of the draws of a belief that begins without positions."""
@@ -179,15 +181,16 @@ class Weighing:
             sources = {**sources, **alternative.sources}
         alternative = now.alternative
         disputed = any(one.disputed for one in updates)
+        contradiction = next((one.contradiction for one in updates if one.contradiction), None)
         disputed = disputed or asks_for_unit(state, now.belief, other_m)
         disputed = disputed or now.null.log_odds >= rules.start_log_odds or gone
         # A turned phone may be ahead only because the belief is in a wrong place.
         if (
-            state.alternative is None
+            (state.alternative is None or misreads(alternative, state, contradiction))
             and now.status is not Status.CONVERGED
             and (disputed or beliefs.is_contested(state))
         ):
-            alternative = self._alternative(state, now.belief, epoch, rng)
+            alternative = self._alternative(state, now.belief, epoch, contradiction, rng)
         after = BayesState(
             belief=now.belief,
             status=now.status,
@@ -269,7 +272,12 @@ class Weighing:
         return replace(twin, belief=belief) if info.reason is Reason.USED else None
 
     def _alternative(
-        self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
+        self,
+        state: BayesState,
+        main: MapBelief,
+        epoch: Epoch,
+        contradiction: Contradiction | None,
+        rng: np.random.Generator,
     ) -> AlternativeHypothesis | None:
         """Start an alternative from this epoch's evidence alone, as if it were the first."""
         updates = [source.first_after(state, epoch) for source in self.sources]
@@ -290,7 +298,8 @@ class Weighing:
             epoch.time_s,
             sources,
             null=null,
-            step_unit_m=unit_m,
+            hold=hold_of_next(state, unit_m, contradiction),
+            gnss_log_bayes_factor=0.0 if contradiction is None else contradiction.nats,
         )
 
 

@@ -10,7 +10,7 @@ belief that rejects readings for long may be wrong itself and is disputed
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -45,6 +45,7 @@ from mapfilter.positioning.gnss.receiver import (
     with_satellites,
 )
 from mapfilter.positioning.gnss.sky import Sky, Unused, range_sigma_m, sky_over
+from mapfilter.positioning.gnss.trail import FixTrail
 
 _RESET_GATE = 0.5
 _MIN_MOVED_M = 0.1
@@ -70,6 +71,8 @@ class GnssState:
         Readings have led away: they are not used until they have agreed for some way.
     agrees_from_m : float
         Distance travelled since which distrusted readings agree; NaN if they do not.
+    trail : FixTrail
+        The last fixes that were compared with the main belief.
     """
 
     receiver: Receiver | None = None
@@ -80,6 +83,7 @@ class GnssState:
     rejected_since_s: float = nan
     distrusted: bool = False
     agrees_from_m: float = nan
+    trail: FixTrail = field(default_factory=FixTrail)
 
     def due(self, options: GnssOptions, time_s: float, travelled_m: float) -> bool:
         """Return whether to compare again where no radio report asks for it."""
@@ -125,7 +129,8 @@ class GnssComparison(NamedTuple):
     ``belief`` carries clock and height in its hypotheses; ``under_null`` is the log-likelihood
     under the null hypothesis, relative to that under the belief. ``compared`` is whether there was
     anything to compare; ``unused`` holds kind, name and reason of readings left out. Rivals are
-    weighed by ``rival_terms``, too.
+    weighed by ``rival_terms``, too. ``unexplained`` is whether a belief that had converged would
+    reject the fix: one that searches keeps it, as its place may be among those not looked at.
     """
 
     belief: MapBelief
@@ -135,6 +140,7 @@ class GnssComparison(NamedTuple):
     compared: bool = False
     unused: tuple[Unused, ...] = ()
     rival_terms: tuple[Term, ...] = ()
+    unexplained: bool = False
 
     def without(
         self, kind: str, names: Iterable[str], why: Reason, **changes: Any
@@ -232,14 +238,21 @@ class GnssGate:
             state = self.rejected(found.state, time_s)
             why = Reason.REJECTED_BY_EVIDENCE
             rival = RejectedFixTerm(term, 1.0 + self._gate(belief))
-            found = found._replace(rival_terms=(rival,))
+            found = found._replace(rival_terms=(rival,), unexplained=True)
             return found.without("gnss", [""], why, state=state, compared=True)
         state = replace(state, fix_used_at_m=travelled_m, rejected_since_s=nan)
         # The likelihood of the whole belief is judged here, so it does not count in the CUSUM.
         terms = (*found.terms, term, FixedTerm(np.array([-total])))
         # Fixes in a row repeat the same error, and refute by the share that is new.
         under_null = refutation(wide, total, self.area_m2) / times
-        return found._replace(state=state, terms=terms, under_null=under_null, compared=True)
+        unexplained = total + 1.0 < -options.gate
+        return found._replace(
+            state=state,
+            terms=terms,
+            under_null=under_null,
+            compared=True,
+            unexplained=unexplained,
+        )
 
     def _compare_ranges(
         self, found: GnssComparison, epoch: Epoch, travelled_m: float, particle_spacing_m: float

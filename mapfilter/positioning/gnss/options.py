@@ -55,6 +55,9 @@ class GnssOptions(Options):
         Bound of the logarithm of the Bayes factor that satellites alone give an alternative.
     trust_grows_s : float
         Time in which ``trust`` grows by one, as spoofing is temporary.
+    agreed_trust, agreed_nats : float
+        The same bound, and what a fix gives, where the way of the rejected fixes goes on from those
+        that were used before.
     dispute_s : float
         Duration of a rejection after which an alternative is started.
     trial_m : float
@@ -83,6 +86,8 @@ class GnssOptions(Options):
     probation_s: NotNegative = 5.0
     trust: NotNegative = 3.0
     trust_grows_s: Positive = 120.0
+    agreed_trust: NotNegative = 12.0
+    agreed_nats: NotNegative = 2.0
     dispute_s: NotNegative = 10.0
     trial_m: NotNegative = 100.0
 

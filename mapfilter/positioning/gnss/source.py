@@ -18,10 +18,10 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBe
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.gnss.fixes import FixTerm
-from mapfilter.positioning.gnss.gate import GnssGate, GnssState
+from mapfilter.positioning.gnss.fixes import FixTerm, agrees_with, widened
+from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate, GnssState
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
@@ -32,6 +32,7 @@ from mapfilter.positioning.gnss.receiver import (
     with_satellites,
 )
 from mapfilter.positioning.gnss.sky import Sky, range_sigma_m, sky_over
+from mapfilter.positioning.gnss.trail import Contradiction, FixTrail
 from mapfilter.tracks.schema import Kind
 
 _FIRST_SPACING_M = 10.0
@@ -127,8 +128,10 @@ class GnssSource(EvidenceSource):
         return found.belief, found.state
 
     def beside_other(self, state: GnssState) -> GnssState:
-        """Return the state with a receiver that begins anew."""
+        """Return the state with a receiver and a trail that begin anew."""
         receiver = state.receiver
+        if state.trail.rows:
+            state = replace(state, trail=FixTrail())
         if receiver is None:
             return state
         return replace(state, receiver=begun_anew(self.options, receiver))
@@ -148,6 +151,9 @@ class GnssSource(EvidenceSource):
             return EvidenceUpdate(own)
         spacing_m = context.particle_spacing_m
         main = self.gate.compare(belief, own, epoch, travelled_m, spacing_m)
+        if epoch.fix is not None and main.compared and not main.state.distrusted:
+            main = main._replace(state=self._followed(main, epoch.fix, epoch.time_s, state))
+        contradiction = self._weighted(main.state.trail.contradiction, proven=state.proven)
         alternative, terms, under_null = state.alternative, None, None
         if alternative is not None:
             before: GnssState = alternative.sources[self.name]
@@ -157,8 +163,9 @@ class GnssSource(EvidenceSource):
             terms, under_null = other.terms, other.under_null
             if main.compared or other.compared:
                 step = float(main.state.contradicting) - float(other.state.contradicting)
-                alternative = self._supported(alternative, step, epoch.time_s)
+                alternative = self._supported(alternative, step, epoch.time_s, contradiction)
         rejected_s = epoch.time_s - main.state.rejected_since_s
+        disputed = main.state.contradicting and rejected_s >= self.options.dispute_s
         return EvidenceUpdate(
             main.state,
             main.terms,
@@ -169,14 +176,48 @@ class GnssSource(EvidenceSource):
             belief=main.belief,
             alternative=alternative,
             rival_terms=main.rival_terms,
-            disputed=main.state.contradicting and rejected_s >= self.options.dispute_s,
+            disputed=disputed or contradiction is not None,
+            contradiction=contradiction,
         )
 
+    def _weighted(self, found: Contradiction | None, *, proven: bool) -> Contradiction | None:
+        """Return a contradiction with what it gives an alternative.
+
+        A belief that was found without positions knows where it is: they may lead away slowly.
+        """
+        if found is None or not found.goes_on or proven:
+            return found
+        nats = min(self.options.agreed_nats * found.fixes, self.options.agreed_trust)
+        return found._replace(nats=nats)
+
+    def _followed(
+        self, found: GnssComparison, fix: GnssFix, time_s: float, state: BayesState
+    ) -> GnssState:
+        """Return the state with a fix in its trail."""
+        own, rejected = found.state, found.unexplained
+        if time_s < state.sources[self.name].probation_until_s:
+            # It was not compared: it may agree with the belief.
+            rejected = not agrees_with(found.belief, widened(fix, 1.0), self.gate.origin_m)
+        least_s = self.options.dispute_s
+        trail = own.trail.after(time_s, fix, state.reckoning, least_s, rejected=rejected)
+        return replace(own, trail=trail)
+
     def _supported(
-        self, alternative: AlternativeHypothesis, step: float, time_s: float
+        self,
+        alternative: AlternativeHypothesis,
+        step: float,
+        time_s: float,
+        contradiction: Contradiction | None,
     ) -> AlternativeHypothesis:
-        """Add to the alternative's Bayes factor, within the trust in satellites as a whole."""
+        """Add to the alternative's Bayes factor, within the trust in satellites as a whole.
+
+        Fixes that contradict a belief by what they give count for more.
+        """
         most = self.options.trust
         most += max(time_s - alternative.start_s, 0.0) / self.options.trust_grows_s
+        if contradiction is not None and contradiction.nats > 0:
+            most, step = self.options.agreed_trust, self.options.agreed_nats * step
+        # What was given by then stays.
+        most = max(most, abs(alternative.gnss_log_bayes_factor))
         total = min(max(alternative.gnss_log_bayes_factor + step, -most), most)
         return replace(alternative, gnss_log_bayes_factor=total)
