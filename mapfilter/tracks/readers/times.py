@@ -30,7 +30,7 @@ _NAMED = re.compile(
     re.ASCII | re.IGNORECASE,
 )
 """Day, month in English, and year."""
-_UTC = re.compile(r"\s*\b(?:UTC|GMT)\s*$")
+_UTC = re.compile(r"\s{0,3}\b(?:UTC|GMT)\s{0,3}$")
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
 _OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?", re.ASCII)
