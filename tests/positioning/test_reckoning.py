@@ -1,7 +1,7 @@
 """Dead reckoning of Kalman-type filters: errors that last, dead sensors, ways without headings."""
 
 from dataclasses import replace
-from math import degrees, hypot, nan, radians
+from math import degrees, hypot, inf, nan, radians
 
 import numpy as np
 import pytest
@@ -201,6 +201,9 @@ def test_a_way_without_headings_is_straight_for_a_while():
     assert gone_m2 > 100 * 30.0
     assert made.moved(MotionStep(1.0, 0.0), 1.0, OPTIONS, np.zeros(3))[0].headless_m == 0.0
     fixed, _ = made.fixed(7.0, GnssFix(EAST, NORTH), np.eye(2), KNOWN, OPTIONS)
+    # One that is rejected says nothing.
+    assert (fixed.headless_m, fixed.fixed_s) == (100.0, -inf)
+    fixed = fixed.positioned(7.0)
     assert (fixed.headless_m, fixed.fixed_s) == (0.0, 7.0)
 
 
@@ -263,7 +266,7 @@ def test_a_rest_in_doubt_is_told_and_its_way_is_missing_once_steps_are_counted()
     pace = Pace(160.0, 100.0, 100, 1.0, rests=True, speed_mps=1.4, recent_mps=1.4)
     made = Reckoning(SensorWatch(pace, 100.0, 160.0, rest), fixed_s=90.0)
     step = MotionStep(1.4, 0.3)
-    fixed, _ = made.fixed(150.0, GnssFix(EAST, NORTH), np.eye(2), KNOWN, OPTIONS)
+    fixed = made.positioned(150.0)
     for before, expected in ((made, 1), (fixed, 0), (replace(made, fixed_s=130.0), 0)):
         after, seen, unused = before.watched(Epoch(161.0, (step,)))
         assert (seen.motion[-1], len(seen.motion), unused) == (step, 1 + expected, [])

@@ -199,13 +199,13 @@ def test_options_of_the_candidate_filter(name, entry):
 
 @pytest.mark.parametrize("name", OF_KALMAN)
 def test_options_of_the_kalman_type_filters(name):
-    key = f"filter.kalman.{name}"
-    config, _ = load({key: 7, "filter.name": "ukf"})
+    key, value = f"filter.kalman.{name}", 0.5 if name == "fix_lasting_share" else 7
+    config, _ = load({key: value, "filter.name": "ukf"})
     choice = filter_choice(config.filter)
-    assert (choice.method, getattr(choice, name)) == ("ukf", 7)
+    assert (choice.method, getattr(choice, name)) == ("ukf", value)
     for other in ("bayes", "candidate", "mine:Filter"):
         with pytest.raises(ConfigError, match="has no such option"):
-            load({key: 7, "filter.name": other})
+            load({key: value, "filter.name": other})
     with pytest.raises(ConfigError, match="ekf has no such option"):
         load({"filter.bayes.step_sd_m": 7, "filter.name": "ekf"})
 

@@ -3,9 +3,9 @@
 A fix farther from the prediction than both may be off is an outlier, and not used where steps tell
 the way: so a burst of positions that walls reflect does not move what they tell. Without steps
 nothing else does, and its variance is raised until it is at the limit, as a heavy tail would have
-it (Huber 1964). Where fixes go on to contradict it, and lie on one line beside it, the belief is
-what is wrong, and begins anew with them. Of one that has just begun with a fix nobody knows which
-of the two is right, and it comes to cover both.
+it (Huber 1964). Where fixes go on to contradict it, and lie on one line or a smooth way beside it,
+the belief is what is wrong, and begins anew with them. Where a belief has just begun with a fix, or
+is in doubt, which of the two is right is not known, and it comes to cover both.
 
 Fixes that are off more often than their deviations say are less precise than they state. How often
 that is so is followed, and their variances are raised by it (innovation-based estimation; Mehra
@@ -36,8 +36,8 @@ until it is, as steps are wrong, and fixes that agree after which it is settled.
 _FORGOTTEN_S, _BURST_S, _TRUSTED = 60.0, 15.0, 30
 """Time without a further fix after which those that contradicted it are taken for outliers, for how
 long they may have done so, and how many have to have agreed before."""
-_LEAST_ROWS = 5
-"""Fixes that show a belief to be wrong."""
+_LEAST_ROWS, _FEWEST_ROWS = 5, 3
+"""Fixes that show a belief to be wrong, and those that do where they are far apart in time."""
 _MOVING_S, _MOVING_MPS = 5.0, 3.0
 """Time in which fixes that go on while steps say rest show it, and their speed."""
 _LEAST_SD_M, _MOST_MISFIT = 7.5, 2.0
@@ -64,7 +64,7 @@ class Ruling(Enum):
         return self in (Ruling.EITHER, Ruling.ANEW, Ruling.CARRIED)
 
 
-class Finding(NamedTuple):
+class FixVerdict(NamedTuple):
     """What a fix means.
 
     Parameters
@@ -79,6 +79,30 @@ class Finding(NamedTuple):
     ruling: Ruling
     squared: float
     larger: float = 1.0
+
+
+class ComparedFix(NamedTuple):
+    """A fix beside the prediction.
+
+    Parameters
+    ----------
+    time_s : float
+    off_m : (2,) array
+        The fix less the position predicted.
+    predicted_m2, stated_m2 : (2, 2) array
+        Covariances of both, of the fix as stated.
+    rests : bool
+        Whether steps say that one stands.
+    is_doubted : bool
+        Whether the prediction is in doubt anyway.
+    """
+
+    time_s: float
+    off_m: Floats
+    predicted_m2: Floats
+    stated_m2: Floats
+    rests: bool = False
+    is_doubted: bool = False
 
 
 class _Row(NamedTuple):
@@ -102,12 +126,15 @@ class FixRecord:
         How often it has begun anew since as many agreed that it was settled.
     rows : tuple of _Row
         The last ones in a row that did not: where they lay from the prediction.
+    is_over : bool
+        Whether these are taken for a burst of outliers that has ended.
     """
 
     excess: float = 1.0
     agreed: int = 0
     begun: int = 0
     rows: tuple[_Row, ...] = ()
+    is_over: bool = False
 
     @property
     def understated(self) -> float:
@@ -117,31 +144,28 @@ class FixRecord:
     @property
     def is_lost(self) -> bool:
         """Whether fixes contradict the belief, or what it is predicted by."""
-        return len(self.rows) >= _LOST_FROM or self.begun >= _LOST_AFTER
+        is_contradicted = len(self.rows) >= _LOST_FROM and not self.is_over
+        return is_contradicted or self.begun >= _LOST_AFTER
 
     def at_time(self, time_s: float) -> FixRecord:
         """Return it at a later time."""
         if not self.rows or time_s - self.rows[-1].time_s <= _FORGOTTEN_S:
             return self
         is_burst = self.rows[-1].time_s - self.rows[0].time_s <= _BURST_S
-        return replace(self, rows=()) if is_burst and self.agreed >= _TRUSTED else self
+        # They still count where the next fix contradicts the belief, too.
+        return replace(self, is_over=True) if is_burst and self.agreed >= _TRUSTED else self
 
-    def at_fix(
-        self, fix: tuple[float, Floats, Floats, Floats], patience_s: float, *, rests: bool
-    ) -> tuple[FixRecord, Finding]:
+    def at_fix(self, fix: ComparedFix, patience_s: float) -> tuple[FixRecord, FixVerdict]:
         """Return it after a fix, and what the fix means.
 
         Parameters
         ----------
-        fix : (float, (2,) array, (2, 2) array, (2, 2) array)
-            Its time, the fix less the position predicted, and the covariances of both,
-            of the fix as stated.
+        fix : ComparedFix
         patience_s : float
-            Time after which fixes that contradict a belief show it to be wrong.
-        rests : bool
-            Whether steps say that one stands.
+            Time after which fixes that contradict a belief show it to be wrong; one that has begun
+            anew before is given up sooner.
         """
-        time_s, off_m, predicted_m2, stated_m2 = fix
+        time_s, off_m, predicted_m2, stated_m2, *_ = fix
         noise_m2 = self.understated * stated_m2
         squared = float(off_m @ np.linalg.solve(predicted_m2 + noise_m2, off_m))
         if squared <= _LIMIT:
@@ -149,22 +173,26 @@ class FixRecord:
             excess = self.excess + (min(found, _MOST) - self.excess) / _MEMORY
             agreed = self.agreed + 1
             begun = self.begun if agreed < _SETTLED else 0
-            return FixRecord(excess, agreed, begun), Finding(Ruling.AGREES, squared / 2)
+            return FixRecord(excess, agreed, begun), FixVerdict(Ruling.AGREES, squared / 2)
+        if fix.is_doubted:
+            return replace(self, agreed=0, rows=()), FixVerdict(Ruling.EITHER, squared / 2)
         if self.agreed < _YOUNG:
-            return self._anew(), Finding(Ruling.EITHER, squared / 2)
+            return self._anew(), FixVerdict(Ruling.EITHER, squared / 2)
         variance_m2 = max(float(np.trace(noise_m2)) / 2, _LEAST_SD_M**2)
         rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2))
         while time_s - rows[0].time_s > 2 * patience_s and len(rows) > _LEAST_ROWS:
             rows = rows[1:]
-        ruling = _ruling(np.array(rows), patience_s, rests=rests)
+        patience_s /= 1 + min(self.begun, _LOST_AFTER)
+        ruling = _ruling(np.array(rows), patience_s, rests=fix.rests)
         if ruling.begins:
-            return self._anew(), Finding(ruling, squared / 2)
+            return self._anew(), FixVerdict(ruling, squared / 2)
         # So much larger that the fix is at the limit along the way to it.
         along = off_m / hypot(*off_m)
         own_m2 = float(along @ noise_m2 @ along)
         most_m2 = float(off_m @ off_m) / _LIMIT - float(along @ predicted_m2 @ along)
         larger = max(most_m2 / own_m2, 1.0)
-        return replace(self, rows=rows), Finding(ruling, squared / 2, larger)
+        after = replace(self, rows=rows, is_over=False)
+        return after, FixVerdict(ruling, squared / 2, larger)
 
     def _anew(self) -> FixRecord:
         return FixRecord(self.excess, begun=self.begun + 1)
@@ -174,14 +202,20 @@ def _ruling(rows: Floats, patience_s: float, *, rests: bool) -> Ruling:
     """Return what fixes in a row that contradict a belief mean."""
     time_s, off_m = rows[:, 0] - rows[:, 0].mean(), rows[:, 1:3]
     lasted_s = float(np.ptp(time_s))
-    if len(rows) < _LEAST_ROWS or lasted_s < (_MOVING_S if rests else patience_s):
+    least = _LEAST_ROWS if lasted_s < 2 * patience_s else _FEWEST_ROWS
+    if len(rows) < least or lasted_s < (_MOVING_S if rests else patience_s):
         return Ruling.OUTLIER
     beside_m = off_m - off_m.mean(axis=0)
     speed_mps = time_s @ beside_m / float(time_s @ time_s)
     beside_m = beside_m - np.outer(time_s, speed_mps)
     # Of both coordinates two are spent on the line.
-    misfit = float((beside_m**2).sum() / rows[:, 3].mean()) / (2 * len(rows) - 4)
-    if misfit > _MOST_MISFIT:
+    variance_m2 = float(rows[:, 3].mean())
+    misfit = float((beside_m**2).sum()) / variance_m2 / (2 * len(rows) - 4)
+    # Beside steps that do not turn a way has corners: it is smooth where second differences are
+    # those of the fixes' errors, which are six times as large.
+    bent_m = np.diff(off_m, n=2, axis=0)
+    bent = float((bent_m**2).sum()) / variance_m2 / (12 * len(bent_m))
+    if min(misfit, bent) > _MOST_MISFIT:
         return Ruling.OUTLIER
     if rests and float(np.hypot(*speed_mps)) >= _MOVING_MPS:
         return Ruling.CARRIED

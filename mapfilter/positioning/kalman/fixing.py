@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import nan
+from math import exp, isfinite, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.disputed import Finding, FixRecord, Ruling
+from mapfilter.positioning.kalman.disputed import ComparedFix, FixRecord, FixVerdict, Ruling
 from mapfilter.positioning.kalman.lasting import Motion, fix_layout, rescaled, white_part
 from mapfilter.positioning.kalman.models import KalmanOptions, compiled
 from mapfilter.positioning.kalman.readings import fix_covariance_m2
@@ -23,6 +23,8 @@ from mapfilter.positioning.kalman.reckoning import at_rest
 _RECKONED_S, _MOVING_S = 30.0, 5.0
 """Time after which fixes that contradict a belief show it to be wrong: one with dead reckoning, and
 one that knows but its velocity."""
+_UNSEEN_S = 20.0
+"""Time without a fix after which one that contradicts the belief is as likely to be right."""
 
 
 class FixErrors(NamedTuple):
@@ -34,10 +36,13 @@ class FixErrors(NamedTuple):
         Deviation along one axis of the error that lasts; 0 without one.
     record : FixRecord
         How well fixes have agreed with the belief.
+    fixed_s : float
+        Time of the last fix; NaN before the first.
     """
 
     lasting_m: float = 0.0
     record: FixRecord = FixRecord()
+    fixed_s: float = nan
 
     def at_time(self, time_s: float) -> FixErrors:
         """Return them at a later time."""
@@ -101,47 +106,88 @@ class FixWeighing:
         return self.options.has_lasting_fixes
 
     def weighed(
-        self, belief: SumBelief, errors: FixErrors, fix: GnssFix, time_s: float, *, rests: bool
+        self,
+        belief: SumBelief,
+        errors: FixErrors,
+        fix: GnssFix,
+        time_s: float,
+        *,
+        rests: bool = False,
+        is_doubted: bool = False,
     ) -> WeighedFix:
-        """Return what a fix leads to; ``rests`` is whether steps say that one stands."""
+        """Return what a fix leads to.
+
+        Parameters
+        ----------
+        belief : SumBelief
+        errors : FixErrors
+        fix : GnssFix
+        time_s : float
+        rests : bool
+            Whether steps say that one stands.
+        is_doubted : bool
+            Whether the belief may be wrong by what is known before the fix.
+        """
         own, record = self.own, errors.record
         stated = fix_covariance_m2(fix, self.options.fix_sd_m)
         noise = stated * record.understated
         motion, layout, white, lasting_m = at_rest(self.layout), self.layout, noise, 0.0
+        wanted_m = 0.0
         if self._lasts:
-            lasting_m = self.options.lasting_fix_m(float(np.trace(noise)) / 2)
+            wanted_m = self.options.lasting_fix_m(float(np.trace(noise)) / 2)
+            lasting_m = self._lasting_m(errors, wanted_m, time_s)
             motion = rescaled(own, self.layout.size, errors.lasting_m, lasting_m)
             belief, white = belief.predict(*motion), white_part(noise, lasting_m)
             layout = fix_layout(layout, own.size)
-        found: Finding | None = None
+        found: FixVerdict | None = None
         # Of a belief in many parts each has its own prediction.
         if belief.weights.size == 1:
             moments, where = belief.moments, [own.east, own.north]
             off_m = np.array([fix.east_m, fix.north_m]) - moments.mean[where]
             record, found = record.at_fix(
-                (time_s, off_m, moments.covariance[np.ix_(where, where)], stated),
+                ComparedFix(
+                    time_s,
+                    off_m,
+                    moments.covariance[np.ix_(where, where)],
+                    stated,
+                    rests,
+                    is_doubted or time_s - errors.fixed_s > _UNSEEN_S,
+                ),
                 _MOVING_S if own is MOVING else _RECKONED_S,
-                rests=rests,
             )
             if found.ruling.begins:
-                either_m2 = np.outer(off_m, off_m) if found.ruling is Ruling.EITHER else 0.0
-                motion = self._begun(fix, white + either_m2, lasting_m)
-                errors = FixErrors(lasting_m, record)
+                white = white_part(noise, wanted_m) if self._lasts else noise
+                # Of two places that are as likely as each other the middle, out to both.
+                back_m = off_m / 2 if found.ruling is Ruling.EITHER else np.zeros(2)
+                white = white + np.outer(back_m, back_m)
+                motion = self._begun((fix.east_m, fix.north_m) - back_m, white, wanted_m)
+                errors = FixErrors(wanted_m, record, time_s)
                 return WeighedFix(belief.predict(*motion), errors, motion, found.ruling, nan, True)
             if found.ruling is Ruling.OUTLIER and own is not MOVING:
-                errors = FixErrors(lasting_m, record)
+                errors = FixErrors(lasting_m, record, time_s)
                 return WeighedFix(belief, errors, motion, found.ruling, nan, False)
             white = white + (found.larger - 1) * noise
         model = compiled(position_fix(layout, white))
         place = [fix.east_m, fix.north_m]
         belief, info = belief.update(model, place, self.method, self.compared)
-        found = found or Finding(Ruling.AGREES, info.nis / 2)
+        found = found or FixVerdict(Ruling.AGREES, info.nis / 2)
         nis = found.squared if info.used and found.ruling is Ruling.AGREES else nan
-        errors = FixErrors(lasting_m, record)
+        errors = FixErrors(lasting_m, record, time_s)
         return WeighedFix(belief, errors, motion, found.ruling, nis, info.used)
 
-    def _begun(self, fix: GnssFix, white_m2: Floats, lasting_m: float) -> Motion:
-        """Return the motion to a fix that a belief begins at.
+    def _lasting_m(self, errors: FixErrors, wanted_m: float, time_s: float) -> float:
+        """Return B at a fix: smaller errors last less at once, larger ones come with time.
+
+        What is stated in turn as 3 and 30 m is of two sources, and not of one that jumps.
+        """
+        before_m = errors.lasting_m
+        if wanted_m <= before_m or not isfinite(errors.fixed_s):
+            return wanted_m
+        grown = 1 - exp(-2 * (time_s - errors.fixed_s) / self.options.fix_lasting_s)
+        return sqrt(before_m**2 + grown * (wanted_m**2 - before_m**2))
+
+    def _begun(self, place_m: Floats, white_m2: Floats, lasting_m: float) -> Motion:
+        """Return the motion to the place of a fix that a belief begins at.
 
         The place that fixes are of is the fix less white noise, and the position is that less what
         lasts. A velocity is unknown again.
@@ -151,7 +197,7 @@ class FixWeighing:
         places = [own, [self.own.size, self.own.size + 1]] if self._lasts else [own]
         for place in places:
             transition[place] = 0.0
-            shift[place] = fix.east_m, fix.north_m
+            shift[place] = place_m
             for other in places:
                 noise[np.ix_(place, other)] = white_m2
         noise[own, own] += lasting_m**2

@@ -137,6 +137,11 @@ class Reckoning:
             epoch = replace(epoch, motion=(missed_step(rested, time_s), *epoch.motion))
         return after, epoch, unused
 
+    def positioned(self, time_s: float) -> Reckoning:
+        """Return it after a fix that was used."""
+        watch = self.watch.positioned(time_s)
+        return replace(self, watch=watch, headless_m=0.0, fixed_s=time_s)
+
     def carried(self) -> Reckoning:
         """Return it where positions have shown that one goes on though no step is counted."""
         return replace(self, watch=self.watch.carried())
@@ -215,9 +220,11 @@ class Reckoning:
         belief: Gaussian,
         options: KalmanOptions,
     ) -> tuple[Reckoning, Direction | Turn | None]:
-        """Return it after a fix with a covariance, and what that has found of headings.
+        """Return it with a fix of a covariance, used or not, and what that has found of headings.
 
-        It is the direction of turns, or the jump of headings by which the belief is off.
+        It is the direction of turns, or the jump of headings by which the belief is off. Of errors
+        that last those of ``fix_lasting_m`` count: with what lasts of a usual fix a phone that was
+        turned would be found half a minute later, and no jump that is none was seen by less.
 
         Parameters
         ----------
@@ -240,9 +247,6 @@ class Reckoning:
         )
         after = replace(
             self,
-            watch=self.watch.positioned(time_s),
-            headless_m=0.0,
-            fixed_s=time_s,
             alignment=alignment,
             recent=recent if found is None else RecentWay(),
         )

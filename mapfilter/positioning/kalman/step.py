@@ -253,6 +253,7 @@ class KalmanStep:
             moments = self.belief.moments
             self.reckoning, found = self.reckoning.fixed(time_s, fix, noise, moments, self.options)
             if isinstance(found, Turn):
+                self.reckoning = self.reckoning.positioned(time_s)
                 self._jump(jump_to(found, layout, self.fixes.lasting_m if self.lasts else None))
                 if found.is_new:
                     self.unused.append(UnusedReading(time_s, "motion", "", Reason.PHONE_TURNED))
@@ -260,16 +261,18 @@ class KalmanStep:
         rest = self.reckoning.watch.rest
         rests = self.own is RECKONED and rest is not None and not rest.is_carried
         how = FixWeighing(self.options, self.own, layout, self.method, self.compared)
-        after = how.weighed(self.belief, self.fixes, fix, time_s, rests=rests)
+        doubted = self.own is RECKONED and self.reckoning.may_have_left
+        after = how.weighed(self.belief, self.fixes, fix, time_s, rests=rests, is_doubted=doubted)
         self.belief, self.fixes = after.belief, after.errors
         if self.motion is not None:
             self.motion = after_each_other(self.motion, after.motion)
         self.recent_nis = [] if after.ruling.begins else self._with_nis(after.nis)
-        if after.ruling is Ruling.CARRIED:
-            self.reckoning = self.reckoning.carried()
         if self.own is RECKONED and isinstance(found, Direction):
             self.belief = turned_to(self.belief, found)
         if after.used:
+            self.reckoning = self.reckoning.positioned(time_s)
+            if after.ruling is Ruling.CARRIED:
+                self.reckoning = self.reckoning.carried()
             return Reason.USED
         if after.ruling is Ruling.OUTLIER:
             self.unused.append(UnusedReading(time_s, "gnss", "", Reason.REJECTED_BY_EVIDENCE))
