@@ -155,10 +155,10 @@ def _located(
     log: TrackLog, truth: Truth, task: Task, over: OpenMap, lasting: LastingError | None
 ) -> dict[str, PositionedTrack]:
     """Locate a walk with fixes, of whose errors a part lasts, by all filters."""
-    plain = KalmanFilter()
-    kalman = plain
+    usual = KalmanFilter()
+    kalman = usual
     if lasting is not None:
-        kalman = replace(plain, fix_lasting_m=lasting.sd_m, fix_lasting_s=lasting.memory_s)
+        kalman = replace(usual, fix_lasting_m=lasting.sd_m, fix_lasting_s=lasting.memory_s)
 
     def rng() -> np.random.Generator:
         return named_rng(task.seed, "mall", task.unit, str(log.start_utc_s))
@@ -170,7 +170,7 @@ def _located(
         started = with_true_fixes(log, truth, truth.time_s <= truth.time_s[0])
         found[START] = _without_map(started, replace(kalman, smooth=True), rng())
         known = with_fix_errors(log, truth)
-        found[NOISE] = _without_map(known, replace(plain, smooth=True), rng())
+        found[NOISE] = _without_map(known, replace(usual, smooth=True), rng())
         moved = with_true_motion(log, truth)
         found[MOTION] = _without_map(moved, replace(kalman, smooth=True), rng())
     return found
