@@ -95,3 +95,17 @@ def test_headings_for_turns_and_degrees_for_radians_are_refused(read):
         read(a=table(step_m=10.0, turn_rad=(np.cumsum(turn) + 1) % 6.28))
     with pytest.raises(InputError, match="degrees given for radians"):
         read(a=table(step_m=10.0, turn_rad=np.degrees(turn)))
+
+
+@pytest.mark.parametrize("form", ["constant", "minutes"])
+def test_a_date_that_tells_no_rows_apart_replaces_no_seconds(read, form):
+    dates = pd.to_datetime(TIME_S if form == "minutes" else TIME_S[:1], unit="s")
+    texts = dates.strftime("%Y-%m-%d %H:%M").tolist() * (COUNT // len(dates))
+    log = read(a=table(np.arange(COUNT), date_time=texts, lat=LAT, lon=LON))
+    assert len(log.gnss) == COUNT
+    assert (np.diff(log.gnss["time_s"]) == 1).all()
+    times = "1 different time" if form == "constant" else f"{len(set(texts))} different times"
+    assert f"a.csv: date_time: {times} in 300 rows, not used" in log.notes
+    # Beside times that cannot be read it is what there is.
+    log = read(a=table("?", date_time=texts, lat=LAT, lon=LON))
+    assert log.gnss["time_s"].nunique() == len(set(texts))
