@@ -99,6 +99,25 @@ def test_hemispheres_in_columns_of_their_own(read):
     np.testing.assert_allclose(places(found)["lat_deg"], -LAT)
 
 
+@pytest.mark.parametrize("names", [("platform", ""), ("relation", ""), ("serving", "mode")])
+def test_letters_of_another_meaning_are_no_hemispheres(read, names):
+    letters = np.where(np.arange(COUNT) % 3 == 0, "S", "N")
+    columns = {name: values for name, values in zip(names, (letters, "E"), strict=True) if name}
+    found = read(time=TIME_S, latitude=LAT, longitude=LON, **columns)
+    np.testing.assert_allclose(places(found)["lat_deg"], LAT)
+
+
+def test_hemispheres_that_change_on_a_steady_way_are_refused(read):
+    letters = np.where(np.arange(COUNT) % 3 == 0, "S", "N")
+    with pytest.raises(InputError, match=r"a.csv row 3, ns: .* between N and S on a way without"):
+        read(time=TIME_S, latitude=LAT, longitude=LON, ns=letters)
+    # A way over the equator.
+    north_m = LAT - LAT.mean()
+    signs = np.where(north_m < 0, "S", "N")
+    found = read(time=TIME_S, latitude=np.abs(north_m), longitude=LON, lat_ref=signs)
+    np.testing.assert_allclose(places(found)["lat_deg"], north_m)
+
+
 def test_courses_of_half_turns(read):
     course = np.linspace(-179, 180, COUNT)
     found = read(time=TIME_S, lat=LAT, lon=LON, bearing=course)
