@@ -243,7 +243,14 @@ def test_dead_reckoning_of_a_receiver_is_no_position(tmp_path):
     modes = "AAAAADDDDDEEEEEEEEEE"
     lines = [sentence(i, mode) for i, mode in enumerate(modes)]
     (tmp_path / "a.nmea").write_text("\n".join(lines))
-    assert len(read_recording(tmp_path / "a.nmea").tables["positions"]) == 10
+    found = read_recording(tmp_path / "a.nmea")
+    assert len(found.tables["positions"]) == 10
+    (refused,) = found.unusable
+    assert refused.count == 10
+    assert refused.reason.startswith("RMC: mode E, M, S or N")
+    (tmp_path / "a.nmea").write_text("\n".join(sentence(i, "S") for i in range(20)))
+    with pytest.raises(InputError, match=r"20 rows: RMC: mode E, M, S or N .*simulated"):
+        read_recording(tmp_path / "a.nmea")
     # Old receivers state no mode.
     old = [line.rsplit(",,,", 1)[0] + ",,*00" for line in lines]
     (tmp_path / "a.nmea").write_text("\n".join(line.replace("*00", "") for line in old))

@@ -222,8 +222,8 @@ class Reading:
         else:
             missing = np.isnan(values)
             if (noise := known.is_noise(values)).any():
-                some = number_of(int(noise.sum()), "value")
-                self.note(f"{table}, {known.name}: {some} just below {known.low:g} taken for it")
+                some = f"{number_of(int(noise.sum()), 'value')} just below {known.low:g}"
+                self.note(f"{table}, {known.name}: {some}, taken for {known.low:g}")
                 values = checked[known.name] = np.where(noise, known.low, values)
             outside = ~missing & ~((values >= known.low) & (values <= known.high))
             if known.winds and not missing.all():
