@@ -116,7 +116,7 @@ def test_noise_of_speeds_at_rest_leaves_the_speeds(drive, read, tmp_path):
     read(**places, speed_mps=speed)
     found = read_recording(tmp_path / "drive.csv")
     np.testing.assert_allclose(found.tables["positions"]["speed_mps"], np.maximum(speed, 0))
-    assert found.notes == (f"positions, speed_mps: {below} values just below 0 taken for it",)
+    assert found.notes == (f"positions, speed_mps: {below} values just below 0, taken for 0",)
 
 
 def test_speeds_of_a_receiver_in_another_unit_are_noted(drive, read):
@@ -124,7 +124,9 @@ def test_speeds_of_a_receiver_in_another_unit_are_noted(drive, read):
     assert not any("speeds" in note for note in read(**places, speed_mps=drive["speed"]).notes)
     notes = read(**places, speed_mps=3.6 * drive["speed"]).notes
     told = "drive.csv: positions, speed_mps: speeds are 3.6"
-    assert any(note.startswith(told) and "km/h for m/s" in note for note in notes)
+    (note,) = [note for note in notes if note.startswith(told)]
+    assert note.endswith("?); expected m/s")
+    assert "speeds are 3.6 times those between positions (km/h for m/s" in note
 
 
 @pytest.mark.parametrize(
