@@ -114,7 +114,7 @@ def test_a_date_that_tells_no_rows_apart_replaces_no_seconds(read, form):
 @pytest.mark.parametrize("kind", ["part", "sparse", "accurate"])
 def test_a_file_of_a_part_of_the_journey_leaves_the_rest_of_another(read, kind):
     whole = table(lat=LAT, lon=LON)
-    part = whole[::10] if kind == "sparse" else whole[200:260]
+    part = whole[::10] if kind == "sparse" else whole[80:260]
     log = read(one=part.assign(accuracy=4.0) if kind == "accurate" else part, two=whole)
     # Beside those of an accuracy two rows before and two after are left out.
     accurate = kind == "accurate"
