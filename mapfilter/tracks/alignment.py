@@ -14,6 +14,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.tracks.clock_notes import apart_note, span_s, zoneless_note
 from mapfilter.tracks.misplaced import FAR_APART, FAR_M
+from mapfilter.tracks.position_units import METRES_PER_DEGREE
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.speed_shift import shift_note, speeds_of_places
 
@@ -28,7 +29,6 @@ _FINE_S = 0.1
 _SEARCH_S = 30.0
 _RATE_HZ = 5.0
 _LEAST_CORRELATION = 0.5
-_METRES_PER_DEGREE = 111_195.0
 _REMARKABLE_S = 1.5
 
 _Track = tuple[Floats, Floats, Floats]
@@ -202,7 +202,7 @@ def _degrees(time_s: pd.Series, lon_deg: object, lat_deg: object) -> _Track:
     lat = np.asarray(lat_deg, dtype=np.float64)[first]
     # One scale for both tracks: whole degrees of latitude give the same one nearly everywhere.
     wide = np.cos(np.radians(np.round(np.median(lat))))
-    return time, _METRES_PER_DEGREE * wide * lon, _METRES_PER_DEGREE * lat
+    return time, METRES_PER_DEGREE * wide * lon, METRES_PER_DEGREE * lat
 
 
 def _apart_m(one: _Track, other: _Track, shift_s: float, least: float) -> float:

@@ -8,6 +8,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.pdr.counted import are_own_counts
 from mapfilter.tracks.readers.recording import Recording
 
 _COLUMNS = {"odometry": ("speed_mps", "yaw_rate_radps"), "motion": ("step_m", "turn_rad")}
@@ -21,7 +22,8 @@ _SIDEWAYS_MPS2, _OFTEN, _FEWEST_FAST, _MOVING_MPS = 20.0, 0.05, 20, 1.0
 """Twice what tyres hold in a corner."""
 _FAST_MPS = 70.0
 _LARGE_RAD, _SLOW = 0.5, 0.2
-_FALLS, _STEPS_PER_S = 0.1, 5.0
+_FALLS = 0.1
+"""Share of rows in which no counter falls, however often it begins anew."""
 
 
 def check_columns(recording: Recording) -> tuple[str, ...]:
@@ -85,13 +87,12 @@ def check_columns(recording: Recording) -> tuple[str, ...]:
 
 
 def _check_counts(recording: Recording, steps: pd.DataFrame, faults: Faults) -> None:
-    """Note counted steps that fall again and again."""
+    """Note counted steps that fall again and again, and are too many for those of each row."""
     time_s, count = (steps[name].to_numpy(dtype=np.float64) for name in ("time_s", "count"))
     if count.size < _FEWEST:
         return
     falls = float(np.mean(np.diff(count) < 0))
-    usual_s = max(float(np.median(np.diff(time_s))), 1.0)
-    if falls <= _FALLS or count.max() <= _STEPS_PER_S * usual_s:
+    if falls <= _FALLS or are_own_counts(time_s, count):
         return
     got = f"{count.min():g} to {count.max():g}, falling in {falls:.0%} of the rows"
     hint = "another quantity, such as an azimuth (compass_deg) or a length (step_m)"

@@ -9,12 +9,12 @@ import pandas as pd
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.tracks.misplaced import FAR_M, UNDONE
+from mapfilter.tracks.position_units import METRES_PER_DEGREE
 from mapfilter.tracks.readers.recording import Recording
 
 _TIMES = 10.0
 _MIDDLE = (0.02, 0.98)
 """Quantiles of latitude and longitude: single positions may lie anywhere."""
-_METRES_PER_DEGREE = 111_195.0
 
 
 def check_far_apart(recordings: Sequence[Recording]) -> None:
@@ -64,4 +64,4 @@ def _apart_m(one: pd.DataFrame, other: pd.DataFrame) -> float:
     low, high = (np.array([rows.quantile(q) for rows in (one, other)]) for q in _MIDDLE)
     gap_deg = np.maximum(low.max(axis=0) - high.min(axis=0), 0.0)
     wide = np.cos(np.radians(one["lat_deg"].median()))
-    return float(np.hypot(_METRES_PER_DEGREE * wide * gap_deg[0], _METRES_PER_DEGREE * gap_deg[1]))
+    return float(np.hypot(METRES_PER_DEGREE * wide * gap_deg[0], METRES_PER_DEGREE * gap_deg[1]))

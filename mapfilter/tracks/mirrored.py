@@ -12,12 +12,12 @@ from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.headings import headings_and_courses
 from mapfilter.tracks.journey_motion import Moved
 from mapfilter.tracks.misplaced import UNDONE
+from mapfilter.tracks.position_units import METRES_PER_DEGREE
 from mapfilter.tracks.readers.recording import Recording
 
 _FEWEST = 20
 _AGREED = 0.85
 _LEAST_GAIN = 0.3
-_METRES_PER_DEGREE = 111_195.0
 
 
 def mirrored_notes(recordings: Sequence[Recording], moved: Moved) -> list[str]:
@@ -82,8 +82,8 @@ def _in_metres(places: pd.DataFrame, degrees: pd.DataFrame) -> pd.DataFrame:
     """Return positions about their middle on a plane that touches the earth there."""
     lon, lat = degrees["lon_deg"], degrees["lat_deg"]
     wide = np.cos(np.radians(lat.median()))
-    east_m = _METRES_PER_DEGREE * wide * (lon - lon.median())
-    north_m = _METRES_PER_DEGREE * (lat - lat.median())
+    east_m = METRES_PER_DEGREE * wide * (lon - lon.median())
+    north_m = METRES_PER_DEGREE * (lat - lat.median())
     return pd.DataFrame({"time_s": places["time_s"], "east_m": east_m, "north_m": north_m})
 
 

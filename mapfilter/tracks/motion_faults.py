@@ -36,6 +36,8 @@ _REST_S, _REST_SHARE = 5.0, 0.1
 _STRAIGHT_RAD, _AGREED_RAD = np.deg2rad(30.0), np.deg2rad(30.0)
 _A_SECOND = 1.2
 
+_LONG_STEPS = "steps are {} times as long as the way between positions"
+
 _FOOT_M, _KMH_MPS, _MPH_MPS, _KNOT_MPS = 0.3048, 1 / 3.6, 0.44704, 1852 / 3600
 _UNITS: Mapping[str, float] = {
     "feet for metres": 1 / _FOOT_M,
@@ -87,7 +89,9 @@ def compared_places(truth: pd.DataFrame, gnss: pd.DataFrame) -> pd.DataFrame:
     return gnss if few and len(gnss) > len(truth) else truth
 
 
-def step_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None:
+def step_fault(
+    motion: pd.DataFrame, places: pd.DataFrame, found: str = _LONG_STEPS
+) -> MotionFault | None:
     """Return what is wrong with the lengths of steps; None for nothing.
 
     Dead reckoning by the steps, and by headings or turns, is compared with the distances of
@@ -102,6 +106,8 @@ def step_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None
         time_s, step_m, heading_rad and turn_rad.
     places : pandas.DataFrame
         time_s, east_m and north_m.
+    found : str
+        What is said of the factor, which stands for ``{}``.
 
     Examples
     --------
@@ -140,7 +146,7 @@ def step_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None
     if not (_is_constant(factor) or (speeds and _is_constant(of_speeds))):
         return None
     causes = sorted(off, key=off.__getitem__)[:_MOST_NAMED]
-    found = f"steps are {typical:.3g} times as long as the way between positions"
+    found = found.format(f"{typical:.3g}")
     if not causes:
         return MotionFault("step_m", found, "metres")
     likely = " or ".join(causes)

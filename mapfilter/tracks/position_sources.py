@@ -10,15 +10,17 @@ import pandas as pd
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.tracks.frame import Frame
+from mapfilter.tracks.position_units import RADIUS_68
+from mapfilter.tracks.readers.held_positions import rounding_m
 from mapfilter.tracks.readers.recording import Recording
 
 PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
 """The best first."""
 _SAME_M, _FEWEST, _MOVED_M, _COMMON = 0.5, 20, 50.0, 0.5
-_HELD_S = 10.0
-
-_RADIUS_68 = 1.515
-"""Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
+_NEAR_S, _NEAR = 2.0, 1.5
+"""A position stands for others within 2 s of it, or one and a half of its file's intervals."""
+_HELD_S, _CELLS = 10.0, 2.0
+"""A way with corners within one step of rounded degrees is up to two steps long."""
 
 Placed = tuple[Recording, pd.DataFrame]
 """A recording, and its positions: time_s, east_m and north_m."""
@@ -56,7 +58,7 @@ def fixes_of(
     notes : list of str
         Grows by what is left out.
     """
-    placed = []
+    placed, rounded_m = [], {}
     for recording in recordings:
         rows, note = measured_positions(recording)
         if rows is None:
@@ -67,29 +69,31 @@ def fixes_of(
         variance = np.full(len(rows), np.nan)
         if "accuracy_m" in rows:
             radius = rows["accuracy_m"].to_numpy()
-            variance = np.where(radius > 0, (radius / _RADIUS_68) ** 2, np.nan)
+            variance = np.where(radius > 0, (radius / RADIUS_68) ** 2, np.nan)
         columns = {"time_s": rows["time_s"], "east_m": east, "north_m": north}
         columns |= {"var_east_m2": variance, "var_north_m2": variance}
         fixes = pd.DataFrame({**columns, "cov_east_north_m2": 0.0 * variance})
         placed.append((recording, fixes))
+        rounded_m[id(recording)] = rounding_m(rows)
     if not placed:
         return None
     kept, told = of_one_receiver(placed)
     notes += told
     parts = []
     for recording, fixes in kept:
-        fixes, note = without_held(fixes, motion)
+        fixes, note = without_held(fixes, motion, rounded_m[id(recording)])
         notes += [f"{recording.path.name}: {note}"] if note else []
         parts.append(fixes)
     return pd.concat(parts, ignore_index=True).sort_values("time_s")
 
 
 def of_one_receiver(placed: Sequence[Placed]) -> tuple[list[Placed], tuple[str, ...]]:
-    """Return recordings without those that repeat positions of another one, and notes on these.
+    """Return recordings without positions that repeat those of another one, and notes on these.
 
-    Of files by one program that name their provider the best one stays. Positions within half a
-    metre, nearly everywhere on a way, are those of one receiver, written twice: two receivers
-    differ by more.
+    Of files by one program that name their provider the best one goes first. Positions within half
+    a metre, nearly everywhere on a way, are those of one receiver, written twice: two receivers
+    differ by more. Those go first that state an accuracy, then those of the larger file. Left out
+    are those of moments at which another file has one: a file may hold a part of the journey.
 
     Parameters
     ----------
@@ -98,28 +102,35 @@ def of_one_receiver(placed: Sequence[Placed]) -> tuple[list[Placed], tuple[str, 
     """
     kept: list[Placed] = []
     notes = []
-    for one in sorted(placed, key=lambda pair: _rank(pair[0])):
-        for other in kept:
-            better = _rank(other[0]) < _rank(one[0]) and other[0].format == one[0].format
-            better = better and _inside(other[1], one[1]).mean() >= _COMMON
-            if better or _same(other[1], one[1]):
-                why = "as they are of another provider" if better else "as they are the same"
-                notes.append(
-                    f"{one[0].path.name}: {number_of(len(one[1]), 'position')} left out beside "
-                    f"{other[0].path.name}, {why}"
-                )
-                break
-        else:
-            kept.append(one)
+    for recording, rows in sorted(placed, key=_precedence):
+        left = rows
+        for other, first in kept:
+            better = _rank(other) < _rank(recording) and other.format == recording.format
+            if not (better or _same(first, rows)):
+                continue
+            repeated = _near(first, left)
+            if not repeated.any():
+                continue
+            why = "as they are of another provider" if better else "as they are the same"
+            notes.append(
+                f"{recording.path.name}: {number_of(int(repeated.sum()), 'position')} left out "
+                f"beside {other.path.name}, {why}"
+            )
+            left = left[~repeated].reset_index(drop=True)
+        if len(left):
+            kept.append((recording, left))
     order = [id(recording) for recording, _ in placed]
     return sorted(kept, key=lambda pair: order.index(id(pair[0]))), tuple(notes)
 
 
-def without_held(gnss: pd.DataFrame, motion: pd.DataFrame | None) -> tuple[pd.DataFrame, str]:
+def without_held(
+    gnss: pd.DataFrame, motion: pd.DataFrame | None, rounded_m: float = 0.0
+) -> tuple[pd.DataFrame, str]:
     """Return fixes without those that stay where they are while the phone moves, and a note.
 
     A receiver without satellites, or a program, may repeat its last position for minutes. Of equal
-    positions over more than 10 s, in which motion goes more than 50 m, the first one stays.
+    positions over more than 10 s, in which motion goes more than 50 m, the first one stays. Those
+    of rounded degrees are equal on a longer way.
 
     Parameters
     ----------
@@ -127,6 +138,8 @@ def without_held(gnss: pd.DataFrame, motion: pd.DataFrame | None) -> tuple[pd.Da
         time_s, east_m and north_m, in order.
     motion : pandas.DataFrame or None
         time_s and step_m.
+    rounded_m : float
+        The step of rounded degrees, see :func:`mapfilter.tracks.readers.held_positions.rounding_m`.
 
     Examples
     --------
@@ -144,7 +157,8 @@ def without_held(gnss: pd.DataFrame, motion: pd.DataFrame | None) -> tuple[pd.Da
     changed = np.concatenate([[True], (np.diff(east_m) != 0) | (np.diff(north_m) != 0)])
     first = np.flatnonzero(changed)
     last = np.append(first[1:], len(gnss)) - 1
-    held = (time_s[last] - time_s[first] > _HELD_S) & (way_m[last] - way_m[first] > _MOVED_M)
+    moved_m = max(_MOVED_M, _CELLS * rounded_m)
+    held = (time_s[last] - time_s[first] > _HELD_S) & (way_m[last] - way_m[first] > moved_m)
     if not held.any():
         return gnss, ""
     dropped = np.repeat(held, last - first + 1) & ~changed
@@ -168,10 +182,17 @@ def _rank(recording: Recording) -> int:
     return PROVIDERS.index(name) if name in PROVIDERS else 0
 
 
+def _precedence(placed: Placed) -> tuple[int, bool, int]:
+    recording, rows = placed
+    stated = "var_east_m2" in rows and bool(rows["var_east_m2"].notna().any())
+    return _rank(recording), not stated, -len(rows)
+
+
 def _same(one: pd.DataFrame, other: pd.DataFrame) -> bool:
+    """Return whether positions of common moments are the same; those of half of a file at least."""
     (time_s, east_m, north_m), (at_s, *there_m) = _columns(one), _columns(other)
-    inside = _inside(one, other)
-    if inside.sum() < max(_FEWEST, _COMMON * inside.size):
+    inside = _near(one, other)
+    if inside.sum() < max(_FEWEST, _COMMON * min(len(one), len(other))):
         return False
     off_m = np.hypot(
         np.interp(at_s, time_s, east_m) - there_m[0], np.interp(at_s, time_s, north_m) - there_m[1]
@@ -180,10 +201,16 @@ def _same(one: pd.DataFrame, other: pd.DataFrame) -> bool:
     return bool(moved > _MOVED_M and np.quantile(off_m, 0.9) < _SAME_M)
 
 
-def _inside(one: pd.DataFrame, other: pd.DataFrame) -> Bools:
-    """Return which rows of the other table lie within the times of the one."""
-    begin_s, end_s = one["time_s"].iloc[[0, -1]]
-    return np.asarray(other["time_s"].between(begin_s, end_s), dtype=np.bool_)
+def _near(one: pd.DataFrame, other: pd.DataFrame) -> Bools:
+    """Return which rows of the other table have one of the first near them in time."""
+    time_s, at_s = (rows["time_s"].to_numpy(dtype=np.float64) for rows in (one, other))
+    usual_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
+    after = np.searchsorted(time_s, at_s)
+    off_s = np.minimum(
+        np.abs(time_s[np.minimum(after, time_s.size - 1)] - at_s),
+        np.abs(time_s[np.maximum(after - 1, 0)] - at_s),
+    )
+    return np.asarray(off_s <= max(_NEAR_S, _NEAR * usual_s), dtype=np.bool_)
 
 
 def _columns(rows: pd.DataFrame) -> tuple[Floats, Floats, Floats]:

@@ -49,8 +49,7 @@ def check_speeds(recording: Recording, east_m: Floats, north_m: Floats) -> tuple
     fault = speed_unit_fault(known["time_s"], known["speed_mps"], places)
     if fault is None:
         return ()
-    text = fault.found.replace("steps are", "speeds are").replace("way", "speed")
-    return (f"{recording.path.name}: positions, speed_mps: {text}; expected m/s",)
+    return (f"{recording.path.name}: positions, speed_mps: {fault.found}; expected m/s",)
 
 
 def speed_unit_fault(
@@ -67,7 +66,8 @@ def speed_unit_fault(
     """
     step_m = speed_mps * time_s.diff()
     motion = pd.DataFrame({"time_s": time_s, "step_m": step_m})
-    return step_fault(motion.assign(heading_rad=np.nan, turn_rad=np.nan), places)
+    motion = motion.assign(heading_rad=np.nan, turn_rad=np.nan)
+    return step_fault(motion, places, "speeds are {} times those between positions")
 
 
 def _in_radians(known: pd.DataFrame, places: pd.DataFrame) -> bool:

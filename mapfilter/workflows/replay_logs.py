@@ -19,6 +19,7 @@ from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_lacks import check_log
 
 _MOST_KEPT_ROWS = 1_000_000
+_AS_HEADING = "heading_rad as π/2 minus the azimuth in radians"
 _MOVED = {"motion", "odometry", "poses", "steps", "accelerometer"}
 """Tables of recordings of which motion is made."""
 
@@ -84,7 +85,11 @@ class ReplayLogs:
         for column, fault in found.items():
             where = f"{', '.join(map(str, moved))}, motion, {column}"
             other = f"; or {fault.otherwise}" if fault.otherwise else ""
-            hint = f"{fault.option} mends it, --factor {column}=1 takes it as it is{other}"
+            mends = f"{fault.option} mends it"
+            if fault.remedy and not opened.recordings:
+                # A column of a recording is none of the log that was made of it.
+                mends = f"convert the recording again with {fault.option}, or write {_AS_HEADING}"
+            hint = f"{mends}; --factor {column}=1 takes it as it is{other}"
             faults.add(where, fault.expected, fault.found, hint)
 
     def check_siteless(self) -> None:

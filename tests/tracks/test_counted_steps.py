@@ -189,6 +189,12 @@ def test_own_counts_with_few_falls_are_summed():
     assert "counted in each row" in notes[0]
 
 
+@pytest.mark.parametrize("every", [2, 5, 20])
+def test_steps_that_come_in_batches_are_summed(every):
+    own = np.where(np.arange(200) % every == 0, 2 * every, 0)
+    np.testing.assert_allclose(lengths(own), own)
+
+
 def test_motion_after_a_pause_is_unknown():
     time_s = np.concatenate([np.arange(20.0), 9000.0 + np.arange(20.0)])
     count = np.concatenate([np.arange(20.0), 8000.0 + np.arange(20.0)])

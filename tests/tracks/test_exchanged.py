@@ -107,12 +107,26 @@ def test_speeds_of_a_receiver_that_are_another_quantity_are_left_out(drive, read
     assert read_recording(tmp_path / "drive.csv").tables["positions"]["speed_mps"].notna().any()
 
 
+def test_noise_of_speeds_at_rest_leaves_the_speeds(drive, read, tmp_path):
+    places = {name: drive[name] for name in ("latitude", "longitude")}
+    noise = np.random.default_rng(3).normal(0, 0.02, COUNT)
+    speed = np.where(np.arange(COUNT) // 60 % 2, 0.0, 10.0) + noise
+    below = int(np.sum(speed < 0))
+    assert below > 100
+    read(**places, speed_mps=speed)
+    found = read_recording(tmp_path / "drive.csv")
+    np.testing.assert_allclose(found.tables["positions"]["speed_mps"], np.maximum(speed, 0))
+    assert found.notes == (f"positions, speed_mps: {below} values just below 0, taken for 0",)
+
+
 def test_speeds_of_a_receiver_in_another_unit_are_noted(drive, read):
     places = {name: drive[name] for name in ("latitude", "longitude")}
     assert not any("speeds" in note for note in read(**places, speed_mps=drive["speed"]).notes)
     notes = read(**places, speed_mps=3.6 * drive["speed"]).notes
     told = "drive.csv: positions, speed_mps: speeds are 3.6"
-    assert any(note.startswith(told) and "km/h for m/s" in note for note in notes)
+    (note,) = [note for note in notes if note.startswith(told)]
+    assert note.endswith("?); expected m/s")
+    assert "speeds are 3.6 times those between positions (km/h for m/s" in note
 
 
 @pytest.mark.parametrize(
@@ -179,6 +193,11 @@ def test_azimuths_for_steps_are_refused(walk, read, whole):
 def test_steps_of_each_row_may_fall(walk, read):
     log = read(**walk | {"steps": np.diff(walk["steps"], prepend=15_000)})
     assert log.motion["step_m"].sum() > 500
+
+
+def test_steps_of_a_batch_are_read(walk, read):
+    batches = np.where(np.arange(COUNT) % 5 == 0, 9, 0)
+    assert read(**walk | {"steps": batches}).motion["step_m"].sum() > 0.69 * batches.sum()
 
 
 def test_usual_names_without_a_unit_say_what_they_are_taken_for(drive, tmp_path):

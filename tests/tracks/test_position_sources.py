@@ -95,3 +95,50 @@ def test_headings_for_turns_and_degrees_for_radians_are_refused(read):
         read(a=table(step_m=10.0, turn_rad=(np.cumsum(turn) + 1) % 6.28))
     with pytest.raises(InputError, match="degrees given for radians"):
         read(a=table(step_m=10.0, turn_rad=np.degrees(turn)))
+
+
+@pytest.mark.parametrize("form", ["constant", "minutes"])
+def test_a_date_that_tells_no_rows_apart_replaces_no_seconds(read, form):
+    dates = pd.to_datetime(TIME_S if form == "minutes" else TIME_S[:1], unit="s")
+    texts = dates.strftime("%Y-%m-%d %H:%M").tolist() * (COUNT // len(dates))
+    log = read(a=table(np.arange(COUNT), date_time=texts, lat=LAT, lon=LON))
+    assert len(log.gnss) == COUNT
+    assert (np.diff(log.gnss["time_s"]) == 1).all()
+    times = "1 different time" if form == "constant" else f"{len(set(texts))} different times"
+    assert f"a.csv: date_time: {times} in 300 rows, not used" in log.notes
+    # Beside times that cannot be read it is what there is.
+    log = read(a=table("?", date_time=texts, lat=LAT, lon=LON))
+    assert log.gnss["time_s"].nunique() == len(set(texts))
+
+
+@pytest.mark.parametrize("kind", ["part", "sparse", "accurate"])
+def test_a_file_of_a_part_of_the_journey_leaves_the_rest_of_another(read, kind):
+    whole = table(lat=LAT, lon=LON)
+    part = whole[::10] if kind == "sparse" else whole[80:260]
+    log = read(one=part.assign(accuracy=4.0) if kind == "accurate" else part, two=whole)
+    # Beside those of an accuracy two rows before and two after are left out.
+    accurate = kind == "accurate"
+    assert len(log.gnss) == COUNT - 4 * accurate
+    assert log.gnss["var_east_m2"].notna().sum() == len(part) * accurate
+    assert np.diff(log.gnss["time_s"]).max() <= 3
+    assert log.gnss["time_s"].is_unique
+
+
+def test_a_provider_that_pauses_is_followed_by_the_next_one(read):
+    gps = location().iloc[np.r_[0:100, 280:300]]
+    log = read(Location=location(), LocationGps=gps)
+    assert len(log.gnss) == COUNT - 4
+    assert (
+        "Location.csv: 124 positions left out beside LocationGps.csv, as they are of another "
+        "provider" in log.notes
+    )
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_rounded_degrees_of_a_slow_way_are_not_held(read, held):
+    lat = np.round(60 + np.arange(COUNT) * 5 / 111_195, 3)
+    if held:
+        lat[100:200] = lat[100]
+    log = read(a=table(lat=lat, lon=LON.round(3), wheel_speed_mps=5.0, yaw_rate_radps=0.01))
+    assert len(log.gnss) == COUNT if not held else len(log.gnss) < COUNT - 90
+    assert any("held by a receiver" in note for note in log.notes) == held

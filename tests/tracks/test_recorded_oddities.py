@@ -99,6 +99,25 @@ def test_hemispheres_in_columns_of_their_own(read):
     np.testing.assert_allclose(places(found)["lat_deg"], -LAT)
 
 
+@pytest.mark.parametrize("names", [("platform", ""), ("relation", ""), ("serving", "mode")])
+def test_letters_of_another_meaning_are_no_hemispheres(read, names):
+    letters = np.where(np.arange(COUNT) % 3 == 0, "S", "N")
+    columns = {name: values for name, values in zip(names, (letters, "E"), strict=True) if name}
+    found = read(time=TIME_S, latitude=LAT, longitude=LON, **columns)
+    np.testing.assert_allclose(places(found)["lat_deg"], LAT)
+
+
+def test_hemispheres_that_change_on_a_steady_way_are_refused(read):
+    letters = np.where(np.arange(COUNT) % 3 == 0, "S", "N")
+    with pytest.raises(InputError, match=r"a.csv row 3, ns: .* between N and S on a way without"):
+        read(time=TIME_S, latitude=LAT, longitude=LON, ns=letters)
+    # A way over the equator.
+    north_m = LAT - LAT.mean()
+    signs = np.where(north_m < 0, "S", "N")
+    found = read(time=TIME_S, latitude=np.abs(north_m), longitude=LON, lat_ref=signs)
+    np.testing.assert_allclose(places(found)["lat_deg"], north_m)
+
+
 def test_courses_of_half_turns(read):
     course = np.linspace(-179, 180, COUNT)
     found = read(time=TIME_S, lat=LAT, lon=LON, bearing=course)
@@ -224,7 +243,14 @@ def test_dead_reckoning_of_a_receiver_is_no_position(tmp_path):
     modes = "AAAAADDDDDEEEEEEEEEE"
     lines = [sentence(i, mode) for i, mode in enumerate(modes)]
     (tmp_path / "a.nmea").write_text("\n".join(lines))
-    assert len(read_recording(tmp_path / "a.nmea").tables["positions"]) == 10
+    found = read_recording(tmp_path / "a.nmea")
+    assert len(found.tables["positions"]) == 10
+    (refused,) = found.unusable
+    assert refused.count == 10
+    assert refused.reason.startswith("RMC: mode E, M, S or N")
+    (tmp_path / "a.nmea").write_text("\n".join(sentence(i, "S") for i in range(20)))
+    with pytest.raises(InputError, match=r"20 rows: RMC: mode E, M, S or N .*simulated"):
+        read_recording(tmp_path / "a.nmea")
     # Old receivers state no mode.
     old = [line.rsplit(",,,", 1)[0] + ",,*00" for line in lines]
     (tmp_path / "a.nmea").write_text("\n".join(line.replace("*00", "") for line in old))

@@ -89,12 +89,19 @@ def test_a_track_log_is_mended_when_it_is_converted_or_replayed(drive, tmp_path)
     assert not any("turns run" in note for note in log.notes)
 
 
-def test_headings_by_a_compass_are_refused_with_the_column_that_mends_them(drive, replay):
+def test_headings_by_a_compass_are_refused_with_the_column_that_mends_them(drive, replay, tmp_path):
     heading = np.cumsum(drive["yaw_rate_radps"])
     rows = drive[["time"]].assign(step_m=10.0, heading_rad=np.pi / 2 - heading)
     outcome = replay(rows)
     assert_refused(outcome, "headings run clockwise from north", "--column compass_deg=COLUMN")
     assert_done(replay(rows, "--column", "compass_deg=heading_rad"))
+    # A log that was made of it takes no columns of a recording.
+    names = [tmp_path / "fixes.csv", tmp_path / "odometry.csv"]
+    assert_done(mapfilter("convert", *names, "--out", tmp_path / "log"))
+    ekf = ["--filter", "ekf", "--out", tmp_path / "of-log"]
+    outcome = mapfilter("replay", "--log", tmp_path / "log", *ekf)
+    remedy = "convert the recording again with --column compass_deg=COLUMN, or write heading_rad as"
+    assert_refused(outcome, remedy)
 
 
 @pytest.mark.parametrize(

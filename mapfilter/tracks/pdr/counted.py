@@ -24,6 +24,7 @@ _STEPS_PER_S = 5.0
 """More than these nobody walks or runs."""
 _LATE_S, _JITTER = 10.0, 20.0
 """Counters are read up to so many seconds late; falls of fewer steps are of rows out of order."""
+_FALLING = 0.5
 _NEAR_S, _PAUSE_S = 2.0, 30.0
 _TURNED = 0.9
 _COUNTED_LATE = 0.5
@@ -65,8 +66,8 @@ def reckon_counted(
     Parameters
     ----------
     sensors : mapping of str to pandas.DataFrame
-        ``steps`` (time_s, count: since some start, or in each row where counts fall and none
-        exceeds what can be walked between two rows) and ``compass`` (time_s, magnetic_deg,
+        ``steps`` (time_s, count: since some start, or in each row, see
+        :func:`are_own_counts`) and ``compass`` (time_s, magnetic_deg,
         clockwise from magnetic north); without a compass ``turns``, or ``gyroscope`` with
         ``gravity`` or ``accelerometer``: see :func:`mapfilter.tracks.pdr.turns.turning_of`.
     options : WalkOptions, optional
@@ -177,12 +178,35 @@ def _by_turns(time_s: Floats, sensors: Mapping[str, pd.DataFrame]) -> tuple[_Cou
     return _Course(nothing, turn, whole, walk_rad, source, "no turn known in", notes), ""
 
 
+def are_own_counts(time_s: Floats, count: Floats) -> bool:
+    """Return whether counts are the steps of each row, and not those since some start.
+
+    They fall, and are those of a walk: each, or in the mean where they fall nearly as often as they
+    rise, as steps that come in batches do. A counter that begins anew now and then mostly rises.
+
+    Parameters
+    ----------
+    time_s, count : (N,) array
+
+    Examples
+    --------
+    >>> are_own_counts(np.arange(6.0), np.array([9.0, 0.0, 0.0, 9.0, 0.0, 0.0]))
+    True
+    >>> are_own_counts(np.arange(6.0), np.array([8.0, 9.0, 0.0, 1.0, 3.0, 4.0]))
+    False
+    """
+    change = np.diff(count)
+    if not (change < 0).any():
+        return False
+    most = _STEPS_PER_S * max(float(np.median(np.diff(time_s))), 1.0)
+    batches = np.sum(change < 0) >= _FALLING * np.sum(change > 0)
+    return bool(count.max() <= most or (batches and count.mean() <= most))
+
+
 def _counted(time_s: Floats, count: Floats) -> tuple[Floats, str]:
     """Return the steps of each row, NaN where unknown, and what the counts were taken for."""
     lasted_s = np.diff(time_s)
-    usual_s = max(float(np.median(lasted_s)), 1.0) if lasted_s.size else 1.0
-    falls = bool((np.diff(count) < 0).any())
-    is_own = falls and count.max() <= _STEPS_PER_S * usual_s
+    is_own = are_own_counts(time_s, count)
     if is_own:
         change, how = count[1:], _OWN_COUNTS
     else:

@@ -8,13 +8,19 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
+from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.csv_odometry import speeds_of
 from mapfilter.tracks.readers.recording import Reading
 
 _HEMISPHERES = {"lat_deg": ("N", "S"), "lon_deg": ("E", "W")}
-_NAMED = re.compile(r"lat|lon|lng|hemi|^n[ /_]?s$|^e[ /_]?w$")
+_NAMED = re.compile(
+    r"(?:gps)?[ _]?(?:lat|latitude|lon|long|lng|longitude)[ /_]?"
+    r"(?:(?:dir|hemi|ind|ref)\w*|n[ /_]?s|e[ /_]?w)|hemi\w*|n[ /_]?s|e[ /_]?w"
+)
+_FAR_DEG = 1.0
+"""Farther from the equator and the meridian of Greenwich, none crosses them to the next row."""
 _FEWEST_WEST = 3
 """So many different negative courses are no mark of missing ones."""
 
@@ -22,7 +28,8 @@ _FEWEST_WEST = 3
 def hemisphere_columns(rows: Columns, taken: frozenset[str] = frozenset()) -> dict[str, str]:
     """Return the columns that hold the hemisphere of a latitude or longitude, by field.
 
-    All their texts are N and S, or E and W; there is one for both, or its name says what it is.
+    All their texts are N and S, or E and W, and their names say what they are: a letter may be a
+    mark of anything.
 
     Parameters
     ----------
@@ -32,7 +39,7 @@ def hemisphere_columns(rows: Columns, taken: frozenset[str] = frozenset()) -> di
     """
     found: dict[str, str] = {}
     for name in rows.names:
-        if not name or name in taken or rows.names.count(name) > 1:
+        if not _NAMED.fullmatch(name) or name in taken or rows.names.count(name) > 1:
             continue
         first = rows.first_text(name).upper()
         for field, letters in _HEMISPHERES.items():
@@ -40,16 +47,19 @@ def hemisphere_columns(rows: Columns, taken: frozenset[str] = frozenset()) -> di
                 texts = {str(text).upper() for text in np.unique(rows.texts(name))}
                 if texts <= {*letters, ""}:
                     found[field] = name
-    if len(found) == len(_HEMISPHERES):
-        return found
-    # A letter alone may be a mark of anything.
-    return {field: name for field, name in found.items() if _NAMED.search(name)}
+    return found
 
 
 def add_places(
     mapped: Mapped, reading: Reading, time_s: Floats, hemispheres: dict[str, str]
 ) -> None:
-    """Add positions in degrees, with speed and course."""
+    """Add positions in degrees, with speed and course.
+
+    Raises
+    ------
+    InputError
+        A column of hemispheres turns the positions of a steady way to and fro.
+    """
     if not mapped.has("lat_deg", "lon_deg"):
         return
     names = ("lat_deg", "lon_deg", "altitude_m", "accuracy_m", "course_deg")
@@ -65,13 +75,32 @@ def add_places(
 def _signed(mapped: Mapped, reading: Reading, degrees: Floats, field: str, column: str) -> Floats:
     """Return degrees that are negative where their hemisphere is that of S or W."""
     letter = _HEMISPHERES[field][1]
-    other = np.array([str(text).upper() == letter for text in mapped.rows.texts(column)])
+    letters = np.array([str(text).upper() for text in mapped.rows.texts(column)], dtype=object)
+    other = np.asarray(letters == letter, dtype=np.bool_)
+    _check_steady(mapped, reading, degrees, letters, column)
     wrong = other & (degrees > 0)
     if count := int(wrong.sum()):
         reading.note(
             f"{field}: {number_of(count, 'value')} of {letter} by column {column}: negative"
         )
     return np.where(wrong, -degrees, degrees)
+
+
+def _check_steady(
+    mapped: Mapped, reading: Reading, degrees: Floats, letters: np.ndarray, column: str
+) -> None:
+    """Refuse letters that change from row to row where the degrees do not."""
+    at = np.flatnonzero((letters != "") & (degrees > 0))
+    far = np.minimum(degrees[at[1:]], degrees[at[:-1]]) > _FAR_DEG
+    steady = far & (np.abs(np.diff(degrees[at])) < _FAR_DEG)
+    jumps = at[1:][steady & (letters[at[1:]] != letters[at[:-1]])]
+    if not jumps.size:
+        return
+    changes = number_of(int(jumps.size), "change")
+    where = f"{reading.path} row {mapped.rows.line[jumps[0]]}, {column}"
+    got = f"{changes} between {' and '.join(sorted(set(letters[at])))} on a way without jumps"
+    hint = "another quantity than a hemisphere: give the column another name, or leave it out"
+    raise fail(InputError, where, "the hemisphere of the degrees", got, hint)
 
 
 def _within_turn(course_deg: Floats) -> Floats:

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
+from mapfilter.tracks.position_units import METRES_PER_DEGREE
 from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.receiver_speeds import speed_unit_fault
 
-_METRES_PER_DEGREE = 111_195.0
 _FASTEST_MPS, _MOST = 70.0, 0.95
 """Vehicles are slower most of the time: numbers beyond are km/h."""
 _OFF = 1.1
@@ -46,8 +46,8 @@ def _by_places(mapped: Mapped, time_s: Floats, speed: Floats, known: Bools) -> s
     places = pd.DataFrame(
         {
             "time_s": time_s,
-            "east_m": _METRES_PER_DEGREE * wide * lon,
-            "north_m": _METRES_PER_DEGREE * lat,
+            "east_m": METRES_PER_DEGREE * wide * lon,
+            "north_m": METRES_PER_DEGREE * lat,
         }
     )
     rows = pd.DataFrame({"time_s": time_s[known], "speed_mps": speed[known]})

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
 from mapfilter.tracks.readers.format import ReadOptions
@@ -26,6 +27,7 @@ _UNIX_S = 1e8
 _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 _DAYS, _EPOCH_DAYS, _NEAREST_S = (36_526.0, 73_050.0), 25_569.0, 1e-3
 """Days of the years 2000 to 2099 since 1900, those until 1970, and rows a thousand a second."""
+_LEAST_DIFFERENT = 0.5
 _NUMBER = re.compile(r"\d+(?:\.\d*)?")
 _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
 """Unix times of 1998, 2020 and 2039."""
@@ -36,7 +38,7 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
 
     Of several columns of times one in UTC goes first, then one of local times.
     """
-    mapped = _best_column(mapped)
+    mapped = _best_column(mapped, reading)
     number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
     known = number[np.isfinite(number)]
     if known.size >= 0.5 * len(number) and known.size and abs(float(np.median(known))) < _UNIX_S:
@@ -63,15 +65,28 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     return _over_midnight(mapped, reading, time_s)
 
 
-def _best_column(mapped: Mapped) -> Mapped:
-    """Return columns with the times of the one that says most."""
+def _best_column(mapped: Mapped, reading: Reading) -> Mapped:
+    """Return columns with the times of the one that says most, and tells rows apart.
+
+    A start of the recording that stands in each row, or times in whole minutes, do not replace
+    others that can be read.
+    """
     rows = mapped.rows
     there = [name for name in mapped.names("time") if name in rows.names]
     if len(there) < 2 or "time" in mapped.own:
         return mapped
-    best = max(there, key=lambda name: _certainty(name, rows.first_text(name)))
-    if best == there[0]:
+    certain = {name: _certainty(name, rows.first_text(name)) for name in there}
+    better = [name for name in there if certain[name] > certain[there[0]]]
+    if better and certain[there[0]]:
+        count = {name: np.unique(rows.texts(name)).size for name in (there[0], *better)}
+        coarse = [name for name in better if count[name] < _LEAST_DIFFERENT * count[there[0]]]
+        for name in coarse:
+            times = number_of(count[name], "different time")
+            reading.note(f"{name}: {times} in {number_of(len(rows), 'row')}, not used")
+        better = [name for name in better if name not in coarse]
+    if not better:
         return mapped
+    best = max(better, key=certain.__getitem__)
     return replace(mapped, stated={**mapped.stated, "time": best})
 
 

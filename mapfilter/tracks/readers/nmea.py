@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter.tracks.position_units import RADIUS_68
 from mapfilter.tracks.readers.columns import Columns, line_columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
@@ -30,7 +31,6 @@ _KINDS = {
 _FIELDS = 20
 _KNOT_MPS = 1852.0 / 3600.0
 _UERE_M = 4.0
-_RADIUS_68 = 1.515
 _DAY_S = 86_400.0
 _LINE_FEED = 10
 _DIGITS = np.array([int(c, 16) if (c := chr(i)) in hexdigits else -1 for i in range(256)])
@@ -56,7 +56,8 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
         reading.note("no date in the file (neither RMC nor ZDA): times count from a midnight")
         reading.clock = Clock("monotonic")
     known = tables[b"GGA"], tables[b"RMC"]
-    rows = pd.concat([_gga(known[0], dates), _rmc(known[1], dates)], ignore_index=True)
+    parts = [_gga(known[0], dates, reading), _rmc(known[1], dates, reading)]
+    rows = pd.concat(parts, ignore_index=True)
     rows = rows[rows["valid"]].sort_values("line", kind="stable")
     if rows.empty:
         return
@@ -234,8 +235,13 @@ def _degrees(rows: Columns, name: str, sign: str, negative: str) -> Floats:
     return np.asarray(np.where(rows.texts(sign) == negative, -result, result))
 
 
-def _gga(rows: Columns, dates: pd.DataFrame) -> pd.DataFrame:
+def _gga(rows: Columns, dates: pd.DataFrame, reading: Reading) -> pd.DataFrame:
     quality = rows.texts("quality")
+    computed = np.isin(quality, ("6", "7", "8"))
+    reading.refuse(
+        rows.line[computed],
+        "GGA: quality 6, 7 or 8 (dead reckoning, entered or simulated): no measured position",
+    )
     columns = {
         "line": rows.line,
         "time_s": _utc(rows, dates),
@@ -243,12 +249,18 @@ def _gga(rows: Columns, dates: pd.DataFrame) -> pd.DataFrame:
         "lon_deg": _degrees(rows, "lon", "ew", "W"),
         "altitude_m": rows.number("altitude"),
         "accuracy_m": _UERE_M * rows.number("hdop"),
-        "valid": ~np.isin(quality, ("", "0", "6", "7", "8")),
+        "valid": ~np.isin(quality, ("", "0")) & ~computed,
     }
     return pd.DataFrame(columns)
 
 
-def _rmc(rows: Columns, dates: pd.DataFrame) -> pd.DataFrame:
+def _rmc(rows: Columns, dates: pd.DataFrame, reading: Reading) -> pd.DataFrame:
+    valid = rows.texts("status") == "A"
+    computed = valid & np.isin(rows.texts("mode"), tuple("EMSN"))
+    reading.refuse(
+        rows.line[computed],
+        "RMC: mode E, M, S or N (dead reckoning, entered, simulated or none): no measured position",
+    )
     columns = {
         "line": rows.line,
         "time_s": _utc(rows, dates),
@@ -256,8 +268,7 @@ def _rmc(rows: Columns, dates: pd.DataFrame) -> pd.DataFrame:
         "lon_deg": _degrees(rows, "lon", "ew", "W"),
         "speed_mps": _KNOT_MPS * rows.number("knots"),
         "course_deg": rows.number("course"),
-        # Dead reckoning of the receiver, as of GGA, and entered or simulated positions are none.
-        "valid": (rows.texts("status") == "A") & ~np.isin(rows.texts("mode"), tuple("EMSN")),
+        "valid": valid & ~computed,
     }
     return pd.DataFrame(columns)
 
@@ -266,7 +277,7 @@ def _accuracy(rows: Columns, dates: pd.DataFrame, first: pd.DataFrame) -> Floats
     """Return the 68 % radius of GST sentences at the times of positions, NaN without."""
     if not len(rows):
         return np.full(len(first), np.nan)
-    radius = _RADIUS_68 * np.sqrt((rows.number("lat_sd") ** 2 + rows.number("lon_sd") ** 2) / 2)
+    radius = RADIUS_68 * np.sqrt((rows.number("lat_sd") ** 2 + rows.number("lon_sd") ** 2) / 2)
     known = pd.Series(radius, index=_utc(rows, dates)).groupby(level=0).first()
     return np.asarray(known.reindex(first["time_s"]), dtype=np.float64)
 

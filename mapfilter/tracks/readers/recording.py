@@ -221,6 +221,10 @@ class Reading:
             outside = np.zeros(len(values), dtype=bool)
         else:
             missing = np.isnan(values)
+            if (noise := known.is_noise(values)).any():
+                some = f"{number_of(int(noise.sum()), 'value')} just below {known.low:g}"
+                self.note(f"{table}, {known.name}: {some}, taken for {known.low:g}")
+                values = checked[known.name] = np.where(noise, known.low, values)
             outside = ~missing & ~((values >= known.low) & (values <= known.high))
             if known.winds and not missing.all():
                 values, outside = self._unwound(table, known, values, outside)

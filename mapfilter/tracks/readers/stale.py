@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter.tracks.position_units import METRES_PER_DEGREE
 
 _LONG_S = 30.0
 _LEAST_ROWS = 3
 _FAR_M = 50.0
-_METRES_PER_DEGREE = 111_195.0
 
 
 def repeated_readings(state: Ints, time_s: Floats, lat_deg: Floats, lon_deg: Floats) -> Bools:
@@ -35,7 +35,7 @@ def repeated_readings(state: Ints, time_s: Floats, lat_deg: Floats, lon_deg: Flo
         if not known.any() or np.ptp(time_s[rows]) <= _LONG_S:
             continue
         wide = np.cos(np.radians(np.mean(lat[known])))
-        extent_m = _METRES_PER_DEGREE * np.hypot(np.ptp(lat[known]), np.ptp(lon[known]) * wide)
+        extent_m = METRES_PER_DEGREE * np.hypot(np.ptp(lat[known]), np.ptp(lon[known]) * wide)
         if extent_m > _FAR_M:
             repeated[first + 1 : last] = True
     return repeated

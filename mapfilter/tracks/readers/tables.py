@@ -13,6 +13,8 @@ import numpy as np
 
 from mapfilter._types import Bools, Floats
 
+_NOISE_SHARE = 0.2
+
 
 @dataclass(frozen=True, slots=True)
 class Field:
@@ -42,6 +44,8 @@ class Field:
     mostly : float
         Share of other values out of range above which it is refused, or where the column is not
         vital left out as another quantity, if it may have marks.
+    noise : float
+        Values below the range by less are noise about its end, see :meth:`is_noise`.
     """
 
     name: str
@@ -55,6 +59,7 @@ class Field:
     winds: bool = False
     marks: int = 1
     mostly: float = 0.5
+    noise: float = 0.0
 
     def mistake(self, largest: float) -> str:
         """Return the likely mistake behind values out of range, by the largest; "" for none."""
@@ -73,6 +78,23 @@ class Field:
         if self.vital or self.marks < 2 or len(outside) <= self.mostly * given:
             return False
         return len(np.unique(outside)) > self.marks
+
+    def is_noise(self, values: Floats) -> Bools:
+        """Return which values below the range are noise about its end, and mean the end itself.
+
+        There are none where they are more than a fifth as far below as the largest value is above:
+        such are values of both signs.
+
+        Parameters
+        ----------
+        values : (N,) array
+            All values; NaN where missing.
+        """
+        near = (values < self.low) & (values > self.low - self.noise)
+        if not near.any():
+            return near
+        beyond, above = self.low - values[near].min(), np.nanmax(values) - self.low
+        return near & bool(beyond <= _NOISE_SHARE * above)
 
     @property
     def kind(self) -> str:
@@ -165,6 +187,8 @@ RECORDED: dict[str, tuple[Field, ...]] = {
             hints=((0.0, np.inf, "a mark of missing values, or exchanged columns"),),
             marks=3,
             mostly=0.1,
+            # Forward speeds of an inertial system at rest.
+            noise=0.5,
         ),
         Field("course_deg", 0, 360, "degrees in 0..360"),
         _text("provider"),

@@ -1,0 +1,9 @@
+"""What turns degrees and radii of positions into metres and standard deviations."""
+
+from __future__ import annotations
+
+METRES_PER_DEGREE = 111_195.0
+"""Of a great circle of the mean earth: for differences, not for places."""
+
+RADIUS_68 = 1.515
+"""Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
