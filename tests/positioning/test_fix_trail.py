@@ -28,6 +28,8 @@ def followed(rejected, *, turned_rad=0.0, away=None, sd_m=5.0, every_m=EVERY_M, 
             east_m, north_m = east_m + away[0], north_m + away[1]
         if kind == "o":
             north_m += 100.0 * (-1) ** index
+        # A position that is measured anew differs.
+        north_m += 1e-6 * index
         # Positions lie to the left of where headings point.
         way = DeadReckoning(gone_m, gone_m * cos(turned_rad), -gone_m * sin(turned_rad))
         fix = GnssFix(east_m, north_m, sd_m**2, sd_m**2, 0.0)
@@ -51,6 +53,8 @@ def followed(rejected, *, turned_rad=0.0, away=None, sd_m=5.0, every_m=EVERY_M, 
         ("uuuurrruu", None),
         ("uuuurrrurr", 5),
         ("uuuuuuu", None),
+        # Of two kinds in turn, of which one agrees with the belief.
+        ("uuuu" + "ru" * 6, None),
     ],
 )
 def test_rejected_fixes_that_agree_contradict_a_belief(kinds, fixes):
@@ -68,7 +72,7 @@ def test_they_have_to_last():
 
 
 @pytest.mark.parametrize(("away_m", "goes_on"), [(8.0, True), (300.0, False)])
-def test_a_way_that_nobody_walked_does_not_go_on(away_m, goes_on):
+def test_a_way_that_dead_reckoning_does_not_have_does_not_go_on(away_m, goes_on):
     """A spoofer moves all of them at once; they agree with each other all the same."""
     found = followed("uuuurrrr", away=(0.0, away_m)).contradiction
     assert (found.fixes, found.goes_on) == (4, goes_on)
@@ -89,13 +93,13 @@ def test_a_turn_of_two_that_is_not_told_well_is_not_used():
     assert followed("uuuurr", turned_rad=radians(44.0)).contradiction is None
 
 
-def test_what_is_turned_and_what_is_told():
+def test_what_is_turned_and_what_has_direction():
     ahead = Contradiction(radians(50.0), radians(9.0), 3, goes_on=True)
     assert ahead.is_turned
-    assert ahead.is_told
+    assert ahead.has_direction
     wide = ahead._replace(sd_rad=radians(17.0))
     assert not wide.is_turned
-    assert not wide.is_told
+    assert not wide.has_direction
     assert not ahead._replace(turned_rad=radians(-44.0)).is_turned
     assert ahead._replace(turned_rad=radians(-46.0)).is_turned
 
@@ -126,3 +130,36 @@ def test_a_saved_trail_is_the_same_again():
     found = decode(encode({"trail": given}), "a session")["trail"]
     assert found == given
     assert isinstance(found.contradiction, Contradiction)
+
+
+def test_fixes_before_are_those_that_were_used():
+    """Two genuine ones within a spoofed minute do not make the others go on."""
+    found = followed("uuuurruurrr", away=(0.0, 300.0)).contradiction
+    assert (found.fixes, found.goes_on) == (3, False)
+    # One that was used before is enough.
+    assert followed("urrr", away=(0.0, 8.0)).contradiction.goes_on
+
+
+def test_a_way_that_goes_on_does_so_until_fixes_are_used_again():
+    """Those before fall out of the rows that are kept."""
+    assert followed("uuuu" + 24 * "r").contradiction.goes_on
+    assert not followed("uuuu" + 4 * "r" + "uu" + 4 * "r", away=(0.0, 300.0)).contradiction.goes_on
+
+
+def test_a_position_that_a_receiver_holds_counts_once():
+    trail = FixTrail()
+    held = GnssFix(5e5, 4.5e6, 25.0, 25.0, 0.0)
+    for k in range(12):
+        way = DeadReckoning(6.0 * k, 6.0 * k, 0.0)
+        trail = trail.after(4.0 * k, held, way, LEAST_S, rejected=True)
+    assert (len(trail.rows), trail.contradicts) == (1, False)
+
+
+def test_a_trail_begins_anew_after_minutes_without_fixes():
+    trail = followed("uuuurrr")
+    assert trail.contradicts
+    way = DeadReckoning(500.0, 500.0, 0.0)
+    fix = GnssFix(500_500.0, 4.5e6, 25.0, 25.0, 0.0)
+    for later_s, rows in ((300.0, 8), (300.1, 1)):
+        after = trail.after(36.0 + later_s, fix, way, LEAST_S, rejected=False)
+        assert (len(after.rows), after.contradicts) == (rows, False)

@@ -165,7 +165,6 @@ def test_a_compass_that_is_askew_is_found_by_fixes(askew_deg):
         wrong += int((claimed & (error_m > 50)).sum())
         right += int((claimed & (error_m <= 50)).sum())
         count += len(claimed)
-    # Before, 0.83 and nothing were claimed, 29 positions and none of them wrongly.
     assert right > 0.8 * count
     assert wrong < 10
 

@@ -215,7 +215,7 @@ class BeliefFilters:
             return -inf
         if found.goes_on:
             return 0.0
-        # Nobody has walked there, so these may be put elsewhere.
+        # Dead reckoning does not lead there, so these may be put elsewhere.
         return _PROVEN_LOG_ODDS if state.proven else _LED_LOG_ODDS
 
     def positions_lead(self, state: BayesState) -> bool:

@@ -71,7 +71,7 @@ def certainty(
     Parameters
     ----------
     rules : AlternativeRules
-        An alternative has prior odds that its threshold for taking over makes even.
+        An alternative has prior odds that its threshold for taking over makes even, but at fixes.
     main : MapBelief
     alternative : AlternativeHypothesis or None
     rivals : iterable of HeldOtherwise
@@ -79,6 +79,9 @@ def certainty(
     enough : float
         Where even a bound from below is so large, that is returned: where rivals lie takes longer
         than how probable they are.
+    by_fixes : float
+        Log odds beforehand of an alternative at fixes that contradict the belief; -inf without such
+        fixes. They replace the threshold's, and the fixes' own part of its lead.
     """
     near, total = main.summary.mass_50m, 1.0
     if alternative is not None:

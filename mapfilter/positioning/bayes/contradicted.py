@@ -1,6 +1,6 @@
 """Beliefs that fixes contradict, which agree with each other and with the motion between them.
 
-An alternative that is begun there reads headings as these fixes tell: a compass may be askew from
+An alternative that is begun there reads headings as these fixes show: a compass may be askew from
 the start, as of a phone in a holder, or have been turned unseen.
 """
 
@@ -30,13 +30,13 @@ def hold_of_next(
     step_unit_m : float
         Unit in which it reads lengths.
     contradiction : Contradiction or None
-        Headings are as measured without one, and where it does not tell their direction.
+        Headings are as measured without one, and where it does not show their direction.
     """
     hold = Hold()
     if contradiction is not None and state.compass:
         if contradiction.is_turned:
             hold = state.hold.turned_by(contradiction.turned_rad)
-        elif contradiction.is_told:
+        elif contradiction.has_direction:
             hold = state.hold
     return replace(hold, step_unit_m=step_unit_m)
 
@@ -46,10 +46,10 @@ def misreads(
     state: BayesState,
     contradiction: Contradiction | None,
 ) -> bool:
-    """Return whether an alternative that goes on reads headings otherwise than the fixes tell."""
+    """Return whether an alternative that goes on reads headings otherwise than the fixes show."""
     if alternative is None or contradiction is None:
         return False
-    if not (state.compass and (contradiction.is_turned or contradiction.is_told)):
+    if not (state.compass and (contradiction.is_turned or contradiction.has_direction)):
         return False
     own = alternative.hold
     wanted = hold_of_next(state, own.step_unit_m, contradiction)

@@ -208,7 +208,7 @@ class Weighing:
             last_fix=state.last_fix,
             recovery=None if now.taken_over else state.recovery,
             twin=state.twin,
-            # An alternative reads headings as they are.
+            # Headings are read as the alternative reads them.
             hold=hold_after_takeover(state) if now.taken_over else state.hold,
             walking_rad=state.walking_rad,
             held=() if now.taken_over else state.held,

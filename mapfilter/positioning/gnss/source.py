@@ -153,7 +153,9 @@ class GnssSource(EvidenceSource):
         main = self.gate.compare(belief, own, epoch, travelled_m, spacing_m)
         if epoch.fix is not None and main.compared and not main.state.distrusted:
             main = main._replace(state=self._followed(main, epoch.fix, epoch.time_s, state))
-        contradiction = self._weighted(main.state.trail.contradiction, proven=state.proven)
+        contradiction = None
+        if main.state.trail.contradicts:
+            contradiction = self._weighted(main.state.trail.contradiction, proven=state.proven)
         alternative, terms, under_null = state.alternative, None, None
         if alternative is not None:
             before: GnssState = alternative.sources[self.name]

@@ -2,8 +2,8 @@
 
 One fix that contradicts a belief is an outlier. Several in a row that lie as dead reckoning leads
 from one to the next, turned by any angle, are a way: the belief may be wrong, or its headings are.
-Where the way goes on from the fixes that the belief used before, nobody has put them elsewhere: a
-spoofer, or a tram, makes a step in between that nobody walked.
+Where the way goes on from the fixes that the belief used before, they were not put elsewhere: a
+spoofer, or a tram, makes a step in between that dead reckoning does not have.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from mapfilter.positioning.gnss.fixes import widened
 
 _MOST_FIXES, _EARLIER, _LEAST_FIXES = 20, 4, 3
 """Fixes that are kept; those that were used before that are looked at; the least that agree."""
-_APART_M, _APART_S = 5.0, 3.0
+_APART_M, _APART_S, _LASTS_S = 5.0, 3.0, 300.0
+"""Way or time between two fixes that are kept; time without any after which these begin anew."""
 _LEAST_SD_M, _DEVIATIONS, _LEAST_SHARE = 5.0, 2.0, 0.7
 """Errors of fixes last for longer than their noise; within how many deviations those lie that
 agree, and how many of them have to."""
 
-_TURNED_RAD, _TURNED_SD, _TOLD_RAD = radians(45.0), 3.0, radians(10.0)
-"""Smallest angle, also in deviations, by which a way is turned; largest deviation of one that is
-told, turned or not."""
+_TURNED_RAD, _TURNED_SD, _MOST_SD_RAD = radians(45.0), 3.0, radians(10.0)
+"""Smallest angle, also in deviations, by which a way is turned; largest deviation of a direction
+that is known, turned or not."""
 
 
 class TrailFix(NamedTuple):
@@ -67,9 +68,9 @@ class Contradiction(NamedTuple):
     nats: float = 0.0
 
     @property
-    def is_told(self) -> bool:
-        """Whether they tell a direction."""
-        return self.sd_rad <= _TOLD_RAD
+    def has_direction(self) -> bool:
+        """Whether they show a direction."""
+        return self.sd_rad <= _MOST_SD_RAD
 
     @property
     def is_turned(self) -> bool:
@@ -91,6 +92,11 @@ class FixTrail:
 
     rows: tuple[TrailFix, ...] = ()
     contradiction: Contradiction | None = None
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the last fix contradicts the belief, with others."""
+        return self.contradiction is not None and self.rows[-1].rejected
 
     def after(
         self,
@@ -119,11 +125,15 @@ class FixTrail:
             gone_m = reckoning.travelled_m - last.travelled_m
             if gone_m < _APART_M and time_s - last.time_s < _APART_S:
                 return self
+            # A receiver that holds its position has measured it once.
+            if (fix.east_m, fix.north_m) == (last.east_m, last.north_m):
+                return self
         wide = widened(fix, 1.0)
         sd_m = max(sqrt((wide.var_east_m2 + wide.var_north_m2) / 2), _LEAST_SD_M)
         way = reckoning.travelled_m, reckoning.east_m, reckoning.north_m
         row = TrailFix(time_s, *way, fix.east_m, fix.north_m, sd_m, rejected)
-        rows = (*self.rows, row)[-_MOST_FIXES:]
+        kept = () if self.rows and time_s - self.rows[-1].time_s > _LASTS_S else self.rows
+        rows = (*kept, row)[-_MOST_FIXES:]
         after = replace(self, rows=rows)
         first = _first_rejected(rows)
         if first == len(rows):
@@ -131,7 +141,11 @@ class FixTrail:
         if not rejected:
             # One that agrees with the belief may be an outlier of the others.
             return after
-        return replace(after, contradiction=_contradiction(rows, first, least_s))
+        found, before = _contradiction(rows, first, least_s), self.contradiction
+        if found is not None and before is not None and before.goes_on:
+            # Dead reckoning errs more the farther it goes, and old rows fall out.
+            found = found._replace(goes_on=True)
+        return replace(after, contradiction=found)
 
 
 def _first_rejected(rows: tuple[TrailFix, ...]) -> int:
@@ -150,22 +164,24 @@ def _contradiction(rows: tuple[TrailFix, ...], first: int, least_s: float) -> Co
     """Return what the rejected fixes from ``first`` on show."""
     given = np.array(rows[first:])
     rejected = given[given[:, -1] > 0]
-    if len(rejected) < 2:
+    # Where as many agree with the belief they are of two kinds, and it is right for one.
+    if len(rejected) < max(2.0, _LEAST_SHARE * len(given)):
         return None
-    earlier = np.array(rows[max(first - _EARLIER, 0) : first]).reshape(-1, given.shape[1])
+    used = [one for one in rows[:first] if not one.rejected]
+    earlier = np.array(used[-_EARLIER:]).reshape(-1, given.shape[1])
     whole = _Way.through(np.concatenate([earlier, rejected])) if len(earlier) else None
     goes_on = whole is not None and bool(whole.agree[: len(earlier)].sum() >= min(2, len(earlier)))
     if whole is not None and goes_on:
         fixes = int(whole.agree[len(earlier) :].sum())
         found = Contradiction(whole.turned_rad, whole.sd_rad, fixes, goes_on)
         # Outliers do not lie on a way that is turned.
-        if found.is_turned and found.is_told and fixes >= 2:
+        if found.is_turned and found.has_direction and fixes >= 2:
             return found
     own = _Way.through(rejected) if len(rejected) >= _LEAST_FIXES else None
     if own is None or rejected[-1, 0] - rejected[0, 0] < least_s:
         return None
-    told = whole if whole is not None and goes_on else own
-    return Contradiction(told.turned_rad, told.sd_rad, int(own.agree.sum()), goes_on)
+    way = whole if whole is not None and goes_on else own
+    return Contradiction(way.turned_rad, way.sd_rad, int(own.agree.sum()), goes_on)
 
 
 class _Way(NamedTuple):
