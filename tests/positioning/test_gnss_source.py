@@ -18,6 +18,7 @@ from mapfilter.positioning.gnss.gate import GnssComparison, GnssState
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.gnss.source import FirstFix, FirstRanges, GnssSource
+from mapfilter.positioning.gnss.trail import FixTrail
 
 CRS = "EPSG:32632"
 EAST_M, NORTH_M = (float(one) for one in project(CRS, 9.3, 48.5))
@@ -262,3 +263,21 @@ def test_beside_another_belief_the_receiver_begins_anew():
     np.testing.assert_array_equal(found.receiver.covariance, np.diag([9e10, 1e4, 0.0]))
     assert (found.receiver.time_s, found.receiver.travelled_m) == (10.0, 50.0)
     assert (found.receiver.used_at_m, found.compared_at_m) == (45.0, 90.0)
+
+
+def test_a_trail_has_fixes_that_were_compared_by_a_belief_that_trusts_them():
+    found = finding("main")
+    (row,) = updated(Gate(main=found), state_of()).state.trail.rows
+    assert (row.east_m, row.time_s, row.rejected) == (EAST_M, 100.0, False)
+    rejected = finding("main", unexplained=True)
+    assert updated(Gate(main=rejected), state_of()).state.trail.rows[0].rejected
+    for other in (
+        finding("main", compared=False),
+        found._replace(state=replace(found.state, distrusted=True)),
+    ):
+        assert updated(Gate(main=other), state_of()).state.trail.rows == ()
+
+
+def test_beside_another_belief_a_trail_begins_anew():
+    trail = updated(Gate(main=finding("main")), state_of()).state.trail
+    assert SOURCE.beside_other(replace(OWN, trail=trail)).trail == FixTrail()

@@ -27,6 +27,7 @@ def test_the_usual_options_of_satellites_and_timing():
         "height_sd_m": 200.0, "slope": 0.3, "clock_sd_m": 3e5, "drift_sd_mps": 100.0,
         "outliers": 0.05, "gate": 8.0, "search_gate": 16.0, "probation_s": 5.0, "trust": 3.0,
         "trust_grows_s": 120.0, "dispute_s": 10.0, "trial_m": 100.0,
+        "agreed_trust": 12.0, "agreed_nats": 2.0,
     }  # fmt: skip
     assert asdict(TimingOptions()) == {
         "step_m": pytest.approx(553.46, abs=0.01), "advance_sd_m": 200.0,
