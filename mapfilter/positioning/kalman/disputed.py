@@ -171,6 +171,8 @@ class FixRecord:
         if squared <= _LIMIT:
             found = float(off_m @ np.linalg.solve(predicted_m2 + stated_m2, off_m)) / 2
             excess = self.excess + (min(found, _MOST) - self.excess) / _MEMORY
+            # Fixes that leave a rest may be right: a lift, or a queue of cars.
+            excess = min(excess, self.excess) if fix.rests else excess
             agreed = self.agreed + 1
             begun = self.begun if agreed < _SETTLED else 0
             return FixRecord(excess, agreed, begun), FixVerdict(Ruling.AGREES, squared / 2)
@@ -202,8 +204,9 @@ def _ruling(rows: Floats, patience_s: float, *, rests: bool) -> Ruling:
     """Return what fixes in a row that contradict a belief mean."""
     time_s, off_m = rows[:, 0] - rows[:, 0].mean(), rows[:, 1:3]
     lasted_s = float(np.ptp(time_s))
-    least = _LEAST_ROWS if lasted_s < 2 * patience_s else _FEWEST_ROWS
-    if len(rows) < least or lasted_s < (_MOVING_S if rests else patience_s):
+    needed_s = _MOVING_S if rests else patience_s
+    least = _LEAST_ROWS if lasted_s < 2 * needed_s else _FEWEST_ROWS
+    if len(rows) < least or lasted_s < needed_s:
         return Ruling.OUTLIER
     beside_m = off_m - off_m.mean(axis=0)
     speed_mps = time_s @ beside_m / float(time_s @ time_s)
