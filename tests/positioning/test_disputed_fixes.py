@@ -378,3 +378,23 @@ def test_a_fix_far_from_a_rest_in_doubt_covers_both_places():
         lost += found[249][2] is Status.LOST
         assert all(off_m <= radius_m for off_m, radius_m, _ in found[250:255])
     assert lost >= 1
+
+
+@pytest.mark.parametrize(("speed_mps", "every_s"), [(1.0, 1), (2.0, 1), (9.0, 10)])
+def test_a_ride_without_steps_is_followed(speed_mps, every_s):
+    """An escalator, a lift, a tram: fixes go on, and steps stand still."""
+    rng = np.random.default_rng(16)
+    speeds = np.full(700, 1.4)
+    speeds[200:300], speeds[300:340] = speed_mps, 0.0
+    way = np.cumsum(speeds * np.exp(0.4j))
+    steps = [
+        MotionStep(0.0 if 200 <= k < 340 else 1.4, 0.4 + one)
+        for k, one in enumerate(rng.normal(0, 0.1, 700).tolist())
+    ]
+    seen = way + errors(rng, 700)
+    fixes = [fix_at(one) if k % every_s == 0 else None for k, one in enumerate(seen)]
+    places, _, statuses, _, _ = followed(fixes, steps)
+    off_m = np.abs(places - way)
+    assert np.median(off_m[260:340]) < 25.0
+    assert off_m[350:].max() < 40.0
+    assert sum(one is Status.LOST for one in statuses) <= 40

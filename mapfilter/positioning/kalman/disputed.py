@@ -38,8 +38,8 @@ _FORGOTTEN_S, _BURST_S, _TRUSTED = 60.0, 15.0, 30
 long they may have done so, and how many have to have agreed before."""
 _LEAST_ROWS, _FEWEST_ROWS = 5, 3
 """Fixes that show a belief to be wrong, and those that do where they are far apart in time."""
-_MOVING_S, _MOVING_MPS = 5.0, 3.0
-"""Time in which fixes that go on while steps say rest show it, and their speed."""
+_MOVING_S, _MOVING_MPS, _SLOW_S, _SLOW_MPS = 5.0, 3.0, 10.0, 1.5
+"""Times in which fixes that go on while steps say rest show it, and their least speeds."""
 _LEAST_SD_M, _MOST_MISFIT = 7.5, 2.0
 """Least deviation of a fix beside a line; largest mean square beside it, in their variances."""
 
@@ -218,8 +218,18 @@ def _ruling(rows: Floats, patience_s: float, *, rests: bool) -> Ruling:
     # those of the fixes' errors, which are six times as large.
     bent_m = np.diff(off_m, n=2, axis=0)
     bent = float((bent_m**2).sum()) / variance_m2 / (12 * len(bent_m))
+    if rests and len(rows) >= _LEAST_ROWS and _goes_on(off_m, lasted_s):
+        return Ruling.CARRIED
     if min(misfit, bent) > _MOST_MISFIT:
         return Ruling.OUTLIER
-    if rests and float(np.hypot(*speed_mps)) >= _MOVING_MPS:
+    least_mps = _MOVING_MPS if lasted_s < _SLOW_S else _SLOW_MPS
+    if rests and float(np.hypot(*speed_mps)) >= least_mps:
         return Ruling.CARRIED
     return Ruling.ANEW if lasted_s >= patience_s else Ruling.OUTLIER
+
+
+def _goes_on(off_m: Floats, lasted_s: float) -> bool:
+    """Return whether each of several fixes is farther along than the one before, as of a tram."""
+    whole_m = off_m[-1] - off_m[0]
+    gone_m = float(np.hypot(*whole_m))
+    return gone_m >= _MOVING_MPS * lasted_s and bool((np.diff(off_m, axis=0) @ whole_m > 0).all())
