@@ -77,8 +77,8 @@ def fixes_of(
         rounded_m[id(recording)] = rounding_m(rows)
     if not placed:
         return None
-    kept, told = of_one_receiver(placed)
-    notes += told
+    kept, of_sources = of_one_receiver(placed)
+    notes += of_sources
     parts = []
     for recording, fixes in kept:
         fixes, note = without_held(fixes, motion, rounded_m[id(recording)])

@@ -5,7 +5,8 @@ the way: so a burst of positions that walls reflect does not move what they tell
 nothing else does, and its variance is raised until it is at the limit, as a heavy tail would have
 it (Huber 1964). Where fixes go on to contradict it, and lie on one line or a smooth way beside it,
 the belief is what is wrong, and begins anew with them. Where a belief has just begun with a fix, or
-is in doubt, which of the two is right is not known, and it comes to cover both.
+is in doubt, which of the two is right is not known, and it comes to cover both. Where steps say
+rest and fixes go on, as on a tram or beside a dead odometer, the way was not measured.
 
 Fixes that are off more often than their deviations say are less precise than they state. How often
 that is so is followed, and their variances are raised by it (innovation-based estimation; Mehra
@@ -123,7 +124,7 @@ class FixRecord:
     agreed : int
         Fixes that agreed since the belief began.
     begun : int
-        How often it has begun anew since as many agreed that it was settled.
+        How often it has begun anew since ten fixes in a row agreed with it.
     rows : tuple of _Row
         The last ones in a row that did not: where they lay from the prediction.
     is_over : bool

@@ -224,7 +224,7 @@ class Reckoning:
 
         It is the direction of turns, or the jump of headings by which the belief is off. Of errors
         that last those of ``fix_lasting_m`` count: with what lasts of a usual fix a phone that was
-        turned would be found half a minute later, and no jump that is none was seen by less.
+        turned would be found half a minute later, and false jumps would be as many.
 
         Parameters
         ----------
