@@ -233,7 +233,12 @@ class GnssGate:
         term, log_weight = FixTerm(wide, self.origin_m), belief.log_weight
         gain = term.log_likelihood(belief.state)
         total = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
-        if total + 1.0 < -self._gate(belief):
+        # What it adds is little where its error is that of the one before; its own error is not.
+        judged = total
+        if times > 1.0:
+            gain = FixTerm(fix, self.origin_m).log_likelihood(belief.state)
+            judged = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
+        if judged + 1.0 < -self._gate(belief):
             # Whether it is trusted again stays as it was.
             state = self.rejected(found.state, time_s)
             why = Reason.REJECTED_BY_EVIDENCE
@@ -245,7 +250,7 @@ class GnssGate:
         terms = (*found.terms, term, FixedTerm(np.array([-total])))
         # Fixes in a row repeat the same error, and refute by the share that is new.
         under_null = refutation(wide, total, self.area_m2) / times
-        unexplained = total + 1.0 < -options.gate
+        unexplained = judged + 1.0 < -options.gate
         return found._replace(
             state=state,
             terms=terms,

@@ -41,12 +41,14 @@ class Going(NamedTuple):
     """What an epoch's motion rows say.
 
     ``gone_m`` is the length of their steps, in the log's unit; ``measured`` is whether any has one,
-    ``moves`` whether it is a walk or drive at the usual pace, and not a rest or far slower.
+    ``moves`` whether it is a walk or drive at the usual pace, and not a rest or far slower, and
+    ``slows`` whether that is slow all the same.
     """
 
     gone_m: float
     measured: bool
     moves: bool
+    slows: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,8 +120,9 @@ class Pace:
         is_walker = self.is_known and step_unit_m * self.speed_mps <= WALKERS_MPS
         share = recent_mps / self.speed_mps if is_walker else 1.0
         moves = goes and share >= _SLOW_SHARE
+        going = Going(gone_m, measured, moves, moves and share < _SLOWER_SHARE)
         if not motion:
-            return self, Going(gone_m, measured, moves)
+            return self, going
         interval_s, irregular_s, speed_mps = self.interval_s, self.irregular_s, self.speed_mps
         if isfinite(since_s) and since_s > 0:
             new = 1 / min(self.rows, 20)
@@ -144,7 +147,7 @@ class Pace:
             max(self.fastest_mps, row_mps),
             row_mps,
         )
-        return pace, Going(gone_m, measured, moves)
+        return pace, going
 
     def braked_mps2(self, time_s: float) -> float:
         """Return how a vehicle has braked that rests at a time; 0 from a walker's speed."""

@@ -91,6 +91,8 @@ class Rest:
         How a vehicle has braked to it.
     turned_rad, turned_s : float
         Sum of recent turns that were measured without a way or a heading, and the time of the last.
+    carried_mps : float
+        Speed of a phone that is carried on, as positions show it; NaN where none do.
     """
 
     since_s: float
@@ -109,6 +111,7 @@ class Rest:
     braked_mps2: float = 0.0
     turned_rad: float = 0.0
     turned_s: float = -inf
+    carried_mps: float = nan
 
     def turned(self, time_s: float, steps: tuple[MotionStep, ...]) -> Rest:
         """Add turns without a way: a vehicle that takes a corner is carried on.
@@ -183,9 +186,16 @@ class Rest:
         shown_nats = _SHOWN_AGAIN_NATS if self.is_doubtful else _SHOWN_NATS
         return far and still_nats <= _SHOWABLE_NATS and left_nats > shown_nats
 
-    def carried(self) -> Rest:
-        """Return the rest as one that is none."""
-        return replace(self, carried_nats=_CARRIED_NATS, is_doubtful=False)
+    def carried(self, speed_mps: float = nan) -> Rest:
+        """Return the rest as one that is none; positions may show its speed."""
+        return replace(
+            self, carried_nats=_CARRIED_NATS, is_doubtful=False, carried_mps=speed_mps
+        )
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether levels show that the phone stands."""
+        return self.left_nats <= _SHOWN_AGAIN_NATS
 
     def missed_mps(self, gone_s: float) -> float:
         """Return the pace before less what was measured, over a time since it began."""

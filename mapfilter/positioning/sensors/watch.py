@@ -15,7 +15,7 @@ vehicle.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
@@ -23,6 +23,7 @@ from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.sensors.impossible_steps import without_impossible
 from mapfilter.positioning.sensors.pace import Going, Pace
 from mapfilter.positioning.sensors.pauses import RowTimes, longest_s, unrecorded_s
+from mapfilter.positioning.sensors.places import Places
 from mapfilter.positioning.sensors.repeats import MotionRepeats, without_repeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.stale_radio import STALE_NATS, repeated_nats
@@ -59,6 +60,8 @@ class SensorWatch(NamedTuple):
         How motion rows repeat each other.
     times : RowTimes
         When rows came.
+    places : Places
+        Positions since steps became fewer than usual.
     """
 
     pace: Pace = Pace()
@@ -71,6 +74,7 @@ class SensorWatch(NamedTuple):
     repeated_nats: float = 0.0
     repeats: MotionRepeats = MotionRepeats()
     times: RowTimes = RowTimes()
+    places: Places = Places()
 
     def positioned(self, time_s: float) -> SensorWatch:
         """Return the watch after a position was measured and used.
@@ -154,17 +158,30 @@ def _followed(
         paused_s = unrecorded_s(known, times, time_s, going, watch.known_s, rested=rested)
         if paused_s > 0:
             return _after_a_pause(watch, epoch, paused_s, known.speed_mps, going)
-    if going.moves:
+    if going.moves and not going.slows:
+        watch = watch._replace(places=Places()) if watch.places.rows else watch
         return watch._moving(time_s), epoch, Reason.USED
     if not isfinite(watch.moving_s):
         if not steps:
             return watch, epoch, Reason.USED
         watch = watch._moving(time_s)
+    places = watch.places.after(time_s, epoch.fix, step_unit_m * going.gone_m)
+    found = places.carried if places is not watch.places else None
+    watch = watch._replace(places=places)
+    was_shown = watch.rest is not None and not isnan(watch.rest.carried_mps)
+    if going.moves and found is None and not was_shown:
+        return watch._moving(time_s), epoch, Reason.USED
     rest = watch.rest or Rest(
         watch.known_s,
         pace_mps=step_unit_m * pace.speed_mps,
         braked_mps2=known.braked_mps2(time_s) if going.measured else 0.0,
     )
+    if found is not None and not rest.is_shown:
+        if not rest.is_carried:
+            # The way is measured up to where it began.
+            watch = watch._replace(moving_s=found.since_s, known_s=found.since_s, unmeasured_s=0.0)
+            rest = replace(rest, since_s=found.since_s, measured_m=0.0)
+        rest = rest.carried(found.speed_mps)
     was_carried = rest.is_carried
     rest = rest.heard(time_s, epoch.radio, step_unit_m * going.gone_m).turned(time_s, steps)
     why = Reason.USED
@@ -190,7 +207,10 @@ def _followed(
         if not was_carried and rested_s > 0:
             # What the counter did not miss is in the belief already.
             missed = max(1 - rest.measured_m / (rest.pace_mps * rested_s), 0.0)
-    step = unmeasured_step(missed * pace.speed_mps, watch.unmeasured_s, to_s)
+    speed_mps = missed * pace.speed_mps
+    if isfinite(rest.carried_mps):
+        speed_mps = rest.carried_mps / step_unit_m
+    step = unmeasured_step(speed_mps, watch.unmeasured_s, to_s)
     if any(isfinite(one.turn_rad) for one in steps):
         step = replace(step, turned_sd_rad=0.0)
     watch = watch._replace(
