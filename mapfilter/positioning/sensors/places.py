@@ -1,0 +1,101 @@
+"""Positions while steps are fewer than usual: whether the phone is carried on, and how fast.
+
+One cannot get farther than the steps between two positions are long. Where positions that were
+measured lie farther apart than that, beyond their errors, and go on from one to the next, a counter
+stands still or misses steps. A single jump is none: receivers make these at rest, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, isfinite, sqrt
+from typing import NamedTuple
+
+from mapfilter.positioning.epochs import GnssFix
+
+_APART_S, _LASTS_S = 2.0, 60.0
+"""Least time between two positions that are kept, and for how long they are."""
+_DEVIATIONS, _LEAST_SD_M, _USUAL_SD_M = 4.0, 5.0, 10.0
+"""Deviations of the distance of two positions beyond which it is one; the least deviation of a
+position, whose errors last, and that of one that states none."""
+_LEAST_INTERVALS, _LEAST_S = 4, 8.0
+"""The least that shows a way: intervals between positions, and time."""
+_MOST_OF_ONE, _LEAST_OF_HALVES = 0.5, 0.3
+"""Largest share of one interval in the way; least share by which the middles of both halves are
+apart, which for a steady one is a half."""
+
+
+class Place(NamedTuple):
+    """A measured position, and the length of the steps until then."""
+
+    time_s: float
+    way_m: float
+    east_m: float
+    north_m: float
+    sd_m: float
+
+
+class Carried(NamedTuple):
+    """A way that positions show and steps do not: when it began, and its speed."""
+
+    since_s: float
+    speed_mps: float
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Positions since steps became fewer than usual, oldest first.
+
+    ``way_m`` is the length of the steps since then.
+    """
+
+    rows: tuple[Place, ...] = ()
+    way_m: float = 0.0
+
+    def after(self, time_s: float, fix: GnssFix | None, gone_m: float) -> Places:
+        """Return them after steps of a length and, with a new position, that one."""
+        way_m = self.way_m + gone_m
+        rows = self.rows
+        if fix is None or not (isfinite(fix.east_m) and isfinite(fix.north_m)):
+            return self if gone_m == 0 else Places(rows, way_m)
+        if rows:
+            last = rows[-1]
+            # A receiver that holds its position has measured it once.
+            held = (fix.east_m, fix.north_m) == (last.east_m, last.north_m)
+            if held or time_s - last.time_s < _APART_S:
+                return self if gone_m == 0 else Places(rows, way_m)
+            rows = tuple(row for row in rows if time_s - row.time_s <= _LASTS_S)
+        variance_m2 = (fix.var_east_m2 + fix.var_north_m2) / 2
+        sd_m = sqrt(variance_m2) if 0 < variance_m2 < float("inf") else _USUAL_SD_M
+        place = Place(time_s, way_m, fix.east_m, fix.north_m, max(sd_m, _LEAST_SD_M))
+        return Places((*rows, place), way_m)
+
+    @property
+    def carried(self) -> Carried | None:
+        """The latest way that they show and steps do not; None if there is none."""
+        rows = self.rows
+        for first in range(len(rows) - 1 - _LEAST_INTERVALS, -1, -1):
+            some = rows[first:]
+            start, end = some[0], some[-1]
+            lasted_s = end.time_s - start.time_s
+            if lasted_s < _LEAST_S:
+                continue
+            gone_m = hypot(end.east_m - start.east_m, end.north_m - start.north_m)
+            missed_m = gone_m - (end.way_m - start.way_m)
+            if missed_m >= _DEVIATIONS * hypot(start.sd_m, end.sd_m) and _goes_on(some, gone_m):
+                return Carried(start.time_s, gone_m / lasted_s)
+        return None
+
+
+def _goes_on(rows: tuple[Place, ...], whole_m: float) -> bool:
+    """Return whether a way between positions is one, and no jump."""
+    most_m = max(
+        hypot(after.east_m - row.east_m, after.north_m - row.north_m)
+        for row, after in zip(rows[:-1], rows[1:], strict=True)
+    )
+    half = len(rows) // 2
+    apart_m = hypot(
+        sum(row.east_m for row in rows[-half:]) - sum(row.east_m for row in rows[:half]),
+        sum(row.north_m for row in rows[-half:]) - sum(row.north_m for row in rows[:half]),
+    )
+    return most_m <= _MOST_OF_ONE * whole_m and apart_m >= _LEAST_OF_HALVES * half * whole_m
