@@ -37,8 +37,8 @@ from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.epochs import GnssFix, ReportRow
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.gnss.biases import Biases
-from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import Receiver
+from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail, TrailFix
 from mapfilter.positioning.integrity import SampleTail
 from mapfilter.positioning.sensors.pace import Pace

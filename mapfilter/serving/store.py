@@ -18,9 +18,9 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.receiver import LINEAR
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.serving.filters import statement_of
 from mapfilter.serving.state_file import read_session, write_session
 

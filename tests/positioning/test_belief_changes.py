@@ -16,8 +16,8 @@ from mapfilter.models.street_motion import BIAS, NORTH, STATES, MotionErrors
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.sensors.rest import Rest
 
 COUNT = 40_000

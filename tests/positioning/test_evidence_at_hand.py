@@ -16,8 +16,8 @@ from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters, carriageway_filters
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.positioning.gnss.state import GnssState
 
 MODEL = BayesModel(make_area(), MotionErrors(), MapWeights())
 MAP_ALONE = ParticleOptions(max_particles=5000, min_search_particles=2000, min_particles=900)

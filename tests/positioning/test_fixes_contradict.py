@@ -18,8 +18,8 @@ from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.filter import locate
-from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail
 from mapfilter.tracks.log import make_log
 

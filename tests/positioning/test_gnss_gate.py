@@ -15,8 +15,9 @@ from mapfilter.gnss.sky import GridFrame
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.gnss.fixes import FixTerm, refutation, widened
-from mapfilter.positioning.gnss.gate import GnssGate, GnssState
+from mapfilter.positioning.gnss.gate import GnssGate
 from mapfilter.positioning.gnss.options import GnssOptions
+from mapfilter.positioning.gnss.state import GnssState
 
 CRS = "EPSG:32632"
 EAST_M, NORTH_M = (float(one) for one in project(CRS, 9.3, 48.5))

@@ -14,10 +14,11 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.gnss.gate import GnssComparison, GnssState
+from mapfilter.positioning.gnss.gate import GnssComparison
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.gnss.source import FirstFix, FirstRanges, GnssSource
+from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import FixTrail
 
 CRS = "EPSG:32632"

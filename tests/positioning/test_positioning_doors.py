@@ -30,8 +30,8 @@ from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
+from mapfilter.positioning.gnss.state import GnssState
 
 
 def test_the_usual_options():

@@ -26,8 +26,8 @@ from mapfilter.positioning.bayes.held import HeldOtherwise, is_ahead
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules, RivalRules
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.sensors.unmeasured import spread_m2
 
 MapFilter = BeliefFilter[Start, Any, RadioReading]

@@ -45,9 +45,9 @@ from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
-from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
+from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.known_start import check_start
 from mapfilter.positioning.sensors.watch import UNMEASURED, watched
 

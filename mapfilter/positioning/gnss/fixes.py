@@ -102,12 +102,17 @@ def agrees_with(belief: MapBelief, fix: GnssFix, origin_m: tuple[float, float]) 
     origin_m : tuple of float
         Of the frame of the hypotheses.
     """
+    return squared_distance(belief, fix, origin_m) <= _AGREES
+
+
+def squared_distance(belief: MapBelief, fix: GnssFix, origin_m: tuple[float, float]) -> float:
+    """Return the squared distance of a fix from a belief's mean, in deviations of both."""
     summary, cross_m2 = belief.summary, cross_of(fix.var_east_m2, fix.var_north_m2, fix)
     covariance_m2 = summary.covariance_m2 + np.array(
         [[fix.var_east_m2, cross_m2], [cross_m2, fix.var_north_m2]]
     )
     apart_m = np.array([fix.east_m, fix.north_m]) - np.array(origin_m) - summary.mean[:2]
-    return float(apart_m @ np.linalg.solve(covariance_m2, apart_m)) <= _AGREES
+    return float(apart_m @ np.linalg.solve(covariance_m2, apart_m))
 
 
 def widened(fix: GnssFix, times: float) -> GnssFix:

@@ -10,8 +10,8 @@ belief that rejects readings for long may be wrong itself and is disputed
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
-from math import inf, isfinite, nan
+from dataclasses import dataclass, replace
+from math import nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from mapfilter.positioning.gnss.fixes import (
     RejectedFixTerm,
     agrees_with,
     refutation,
+    squared_distance,
     widened,
 )
 from mapfilter.positioning.gnss.options import GnssOptions
@@ -45,82 +46,10 @@ from mapfilter.positioning.gnss.receiver import (
     with_satellites,
 )
 from mapfilter.positioning.gnss.sky import Sky, Unused, range_sigma_m, sky_over
-from mapfilter.positioning.gnss.trail import FixTrail
+from mapfilter.positioning.gnss.state import GnssState
 
 _RESET_GATE = 0.5
 _MIN_MOVED_M = 0.1
-
-
-@dataclass(frozen=True, eq=False)
-class GnssState:
-    """State of GNSS beside one belief.
-
-    Parameters
-    ----------
-    receiver : Receiver or None
-        Clock and height; None before the first pseudorange.
-    fix_used_at_m : float
-        Distance travelled when a fix was last used.
-    compared_at_m, compared_at_s : float
-        Distance travelled and time at the last comparison.
-    probation_until_s : float
-        Nothing is used before.
-    rejected_since_s : float
-        Start of the present series of rejections; NaN outside one.
-    distrusted : bool
-        Readings have led away: they are not used until they have agreed for some way.
-    agrees_from_m : float
-        Distance travelled since which distrusted readings agree; NaN if they do not.
-    trail : FixTrail
-        The last fixes that were compared with the main belief.
-    """
-
-    receiver: Receiver | None = None
-    fix_used_at_m: float = -inf
-    compared_at_m: float = -inf
-    compared_at_s: float = -inf
-    probation_until_s: float = -inf
-    rejected_since_s: float = nan
-    distrusted: bool = False
-    agrees_from_m: float = nan
-    trail: FixTrail = field(default_factory=FixTrail)
-
-    def due(self, options: GnssOptions, time_s: float, travelled_m: float) -> bool:
-        """Return whether to compare again where no radio report asks for it."""
-        gone_m = travelled_m - self.compared_at_m
-        return gone_m >= options.spacing_m or time_s - self.compared_at_s >= options.pause_s
-
-    @property
-    def used_at_m(self) -> float:
-        """Distance travelled when a fix or pseudoranges were last used; -inf before any were."""
-        ranges_m = -inf if self.receiver is None else self.receiver.used_at_m
-        return max(self.fix_used_at_m, ranges_m)
-
-    @property
-    def met(self) -> bool:
-        """Whether a fix or pseudoranges were there at all, used or not."""
-        return self.receiver is not None or isfinite(self.compared_at_m)
-
-    def was_used(self, time_s: float) -> bool:
-        """Return whether a fix or pseudoranges of that time were compared, and not rejected."""
-        return self.compared_at_s == time_s >= self.probation_until_s and not self.rejecting
-
-    def on_trial(self, options: GnssOptions, travelled_m: float) -> GnssState:
-        """Return the state after distrusted readings that agree; trusted after some way of them."""
-        from_m = self.agrees_from_m if isfinite(self.agrees_from_m) else travelled_m
-        if travelled_m - from_m < options.trial_m:
-            return replace(self, agrees_from_m=from_m)
-        return replace(self, distrusted=False, agrees_from_m=nan)
-
-    @property
-    def rejecting(self) -> bool:
-        """Whether the last readings contradicted the belief, or are on trial since."""
-        return isfinite(self.rejected_since_s)
-
-    @property
-    def contradicting(self) -> bool:
-        """Whether the last readings contradicted the belief."""
-        return self.rejecting and not isfinite(self.agrees_from_m)
 
 
 class GnssComparison(NamedTuple):
@@ -163,6 +92,17 @@ def _neutral(found: GnssComparison) -> GnssComparison:
     return found._replace(terms=(*terms, FixedTerm(own - total)))
 
 
+def _total(belief: MapBelief, term: FixTerm) -> float:
+    """Return the log-likelihood of a fix under a whole belief."""
+    log_weight = belief.log_weight
+    found = np.logaddexp.reduce(log_weight + term.log_likelihood(belief.state))
+    return float(found - np.logaddexp.reduce(log_weight))
+
+
+def _is_found(belief: MapBelief) -> bool:
+    return belief.status is not Status.SEARCHING
+
+
 @dataclass(frozen=True)
 class GnssGate:
     """Compares fixes and pseudoranges with beliefs, in the map's CRS and the hypotheses' frame.
@@ -202,8 +142,7 @@ class GnssGate:
         return found
 
     def _gate(self, belief: MapBelief) -> float:
-        searching = belief.status is Status.SEARCHING
-        return self.options.search_gate if searching else self.options.gate
+        return self.options.gate if _is_found(belief) else self.options.search_gate
 
     def rejected(self, state: GnssState, time_s: float) -> GnssState:
         """Return a state in which all readings of a time are rejected."""
@@ -229,28 +168,24 @@ class GnssGate:
                 return found.without("gnss", [""], why, state=state, compared=True)
         gone_m = travelled_m - state.fix_used_at_m
         times = max(options.fix_memory_m / max(gone_m, _MIN_MOVED_M), 1.0)
-        wide = widened(fix, times)
-        term, log_weight = FixTerm(wide, self.origin_m), belief.log_weight
-        gain = term.log_likelihood(belief.state)
-        total = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
-        # What it adds is little where its error is that of the one before; its own error is not.
-        judged = total
-        if times > 1.0:
-            gain = FixTerm(fix, self.origin_m).log_likelihood(belief.state)
-            judged = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
-        if judged + 1.0 < -self._gate(belief):
+        # It adds little where its error is that of the one before. Its error is as stated.
+        wide = widened(fix, times * state.understated)
+        term, as_stated = FixTerm(wide, self.origin_m), FixTerm(fix, self.origin_m)
+        total, fits = (_total(belief, one) for one in (term, as_stated))
+        if fits + 1.0 < -self._gate(belief):
             # Whether it is trusted again stays as it was.
             state = self.rejected(found.state, time_s)
             why = Reason.REJECTED_BY_EVIDENCE
-            rival = RejectedFixTerm(term, 1.0 + self._gate(belief))
+            rival = RejectedFixTerm(as_stated, 1.0 + self._gate(belief))
             found = found._replace(rival_terms=(rival,), unexplained=True)
             return found.without("gnss", [""], why, state=state, compared=True)
-        state = replace(state, fix_used_at_m=travelled_m, rejected_since_s=nan)
+        squared = squared_distance(belief, widened(fix, 1.0), self.origin_m) / 2
+        state = state.after_fix(squared if _is_found(belief) else 1.0, travelled_m)
         # The likelihood of the whole belief is judged here, so it does not count in the CUSUM.
         terms = (*found.terms, term, FixedTerm(np.array([-total])))
         # Fixes in a row repeat the same error, and refute by the share that is new.
         under_null = refutation(wide, total, self.area_m2) / times
-        unexplained = judged + 1.0 < -options.gate
+        unexplained = fits + 1.0 < -options.gate
         return found._replace(
             state=state,
             terms=terms,
@@ -317,7 +252,7 @@ class GnssGate:
         The receiver is the one given, or, where its clock jumped, one with another clock.
         """
         gate, place, log_weight = self._gate(belief), belief.state[:2], belief.log_weight
-        searching = belief.status is Status.SEARCHING
+        searching = not _is_found(belief)
         once = sigma if searching else range_sigma_m(self.options, sky, 0.0)
 
         def weigh(chosen: Bools, clock: Receiver, free: int, gate: float) -> Weighed | None:

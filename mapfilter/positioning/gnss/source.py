@@ -21,7 +21,7 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.fixes import FixTerm, agrees_with, widened
-from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate, GnssState
+from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
@@ -32,6 +32,7 @@ from mapfilter.positioning.gnss.receiver import (
     with_satellites,
 )
 from mapfilter.positioning.gnss.sky import Sky, range_sigma_m, sky_over
+from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail
 from mapfilter.tracks.schema import Kind
 

@@ -8,7 +8,8 @@ stands still or misses steps. A single jump is none: receivers make these at res
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, isfinite, sqrt
+from itertools import pairwise
+from math import hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
 from mapfilter.positioning.epochs import GnssFix
@@ -66,7 +67,7 @@ class Places:
                 return self if gone_m == 0 else Places(rows, way_m)
             rows = tuple(row for row in rows if time_s - row.time_s <= _LASTS_S)
         variance_m2 = (fix.var_east_m2 + fix.var_north_m2) / 2
-        sd_m = sqrt(variance_m2) if 0 < variance_m2 < float("inf") else _USUAL_SD_M
+        sd_m = sqrt(variance_m2) if 0 < variance_m2 < inf else _USUAL_SD_M
         place = Place(time_s, way_m, fix.east_m, fix.north_m, max(sd_m, _LEAST_SD_M))
         return Places((*rows, place), way_m)
 
@@ -91,7 +92,7 @@ def _goes_on(rows: tuple[Place, ...], whole_m: float) -> bool:
     """Return whether a way between positions is one, and no jump."""
     most_m = max(
         hypot(after.east_m - row.east_m, after.north_m - row.north_m)
-        for row, after in zip(rows[:-1], rows[1:], strict=True)
+        for row, after in pairwise(rows)
     )
     half = len(rows) // 2
     apart_m = hypot(

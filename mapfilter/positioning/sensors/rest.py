@@ -188,9 +188,7 @@ class Rest:
 
     def carried(self, speed_mps: float = nan) -> Rest:
         """Return the rest as one that is none; positions may show its speed."""
-        return replace(
-            self, carried_nats=_CARRIED_NATS, is_doubtful=False, carried_mps=speed_mps
-        )
+        return replace(self, carried_nats=_CARRIED_NATS, is_doubtful=False, carried_mps=speed_mps)
 
     @property
     def is_shown(self) -> bool:
