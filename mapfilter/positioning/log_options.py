@@ -19,6 +19,7 @@ from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.speeds import FASTEST_MPS, speed_fault
+from mapfilter.tracks.turn_drift import turn_drift_radps
 
 STREETS_ALONE = "no cells in the log: located by streets, and by positions where it has some"
 
@@ -109,6 +110,13 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         )
         notes.append(f"errors of motion as the log states them: {shown}")
         changes |= measured
+    drift_deg_per_s = _turn_drift_deg_per_s(options, log)
+    if drift_deg_per_s > changes.get("turn_rate_sd_deg_per_s", 0.0):
+        changes["turn_rate_sd_deg_per_s"] = drift_deg_per_s
+        notes.append(
+            f"turns drift by {drift_deg_per_s:.2g} deg/s beside the course of the positions, as of "
+            "a gyroscope with a bias: turn_rate_sd_deg_per_s is as large"
+        )
     return _changed(options, changes), tuple(notes)
 
 
@@ -197,7 +205,17 @@ def _motion_errors(log: TrackLog) -> dict[str, float]:
     usual_mps = _usual_mps(log)
     if walk_deg > 0 and usual_mps > 0:
         found["drift_deg_per_sqrt_m"] = walk_deg / usual_mps**0.5
+        if imu.turns == "gyro":
+            found["turn_drift_deg_per_sqrt_m"] = found["drift_deg_per_sqrt_m"]
     return found
+
+
+def _turn_drift_deg_per_s(options: Any, log: TrackLog) -> float:
+    """Return how fast turns drift beside the fixes, where headings are their sums; else 0."""
+    has_headings = bool(log.motion["heading_rad"].notna().any())
+    if has_headings or not has_default(options, "turn_rate_sd_deg_per_s"):
+        return 0.0
+    return abs(float(np.degrees(turn_drift_radps(log.motion, log.gnss))))
 
 
 def _has_long_rows(log: TrackLog) -> bool:

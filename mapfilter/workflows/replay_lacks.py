@@ -7,6 +7,8 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, listed
 from mapfilter.filters.contract import Reason, Status
@@ -18,6 +20,7 @@ from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
+from mapfilter.tracks.turn_drift import turn_drift_radps
 from mapfilter.viewing.words import REASONS
 
 _MOTION_COLUMNS = (
@@ -170,8 +173,19 @@ def early_end_note(
     reason, count = unused.most_common(1)[0] if unused else (Reason.USED, 0)
     text += f"{status} from there on, {_UNLOCATED[status]}"
     if status is Status.LOST and len(opened.log.gnss) and len(opened.log.motion):
-        text += f" (likely: {_CONTRADICTING}{', or ways that the map lacks' if over_map else ''})"
+        text += f" (likely: {_likely(opened.log, over_map=over_map)})"
     return (f"{text}; {count} readings: {reason} ({REASONS[reason]})" if count else text,)
+
+
+def _likely(log: TrackLog, *, over_map: bool) -> str:
+    """Return why motion and fixes of a log contradict each other, as far as they show it."""
+    drift_deg_per_s = abs(float(np.degrees(turn_drift_radps(log.motion, log.gnss))))
+    if drift_deg_per_s > 0:
+        return (
+            f"a gyroscope noisier than stated: turns drift by {drift_deg_per_s:.2g} deg/s beside "
+            "the course of the positions; convert a recording that begins with 10 s at rest"
+        )
+    return f"{_CONTRADICTING}{', or ways that the map lacks' if over_map else ''}"
 
 
 def receiver_motion(opened: OpenedLog) -> str:

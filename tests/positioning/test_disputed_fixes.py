@@ -398,3 +398,38 @@ def test_a_ride_without_steps_is_followed(speed_mps, every_s):
     assert np.median(off_m[260:340]) < 25.0
     assert off_m[350:].max() < 40.0
     assert sum(one is Status.LOST for one in statuses) <= 40
+
+
+def turning(rng, count, bias_degps, speed_mps=10.0):
+    """Turns of a second by a gyroscope with a bias, and where the way leads."""
+    turn = np.where(np.arange(count) % 40 == 20, np.pi / 2, 0.0) * rng.choice([-1, 1], count)
+    way = np.cumsum(speed_mps * np.exp(1j * (0.4 + np.cumsum(turn) - turn / 2)))
+    seen = turn + np.radians(bias_degps) + rng.normal(0, np.radians(0.3), count)
+    return [MotionStep(speed_mps, np.nan, float(one)) for one in seen], way
+
+
+@pytest.mark.parametrize("bias_degps", [2.0, -2.0])
+def test_turns_that_lead_astray_are_believed_less(bias_degps):
+    """They led away again each time, and the position stayed LOST, some 40 m off."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        steps, way = turning(rng, 600, bias_degps)
+        seen = way + errors(rng, 600)
+        fixes = [fix_at(one) if k % 5 == 0 else None for k, one in enumerate(seen)]
+        places, radii_m, statuses, _, state = followed(fixes, steps)
+        off_m = np.abs(places - way)[300:]
+        assert np.median(off_m) < 8.0
+        assert statuses[300:].count(Status.LOST) < 30
+        assert (off_m <= radii_m[300:]).mean() > 0.9
+        rate_degps = np.degrees(state.belief.moments.mean[4])
+        assert rate_degps == pytest.approx(-bias_degps, abs=0.3)
+
+
+def test_turns_that_lead_right_are_believed_as_before():
+    """Bursts of outliers open none of their errors."""
+    rng = np.random.default_rng(8)
+    steps, way = turning(rng, 300, 0.0)
+    seen = way + errors(rng, 300)
+    seen[100:112] += 60.0
+    _, _, _, _, state = followed([fix_at(one) for one in seen], steps)
+    assert np.degrees(state.belief.moments.covariance[4, 4] ** 0.5) < 0.06

@@ -47,6 +47,7 @@ MAY_BE_0 = (
     "fix_lasting_share",
     "bias_sd_deg",
     "drift_deg_per_sqrt_m",
+    "turn_drift_deg_per_sqrt_m",
     "turn_rate_sd_deg_per_s",
     "scale",
 )
@@ -78,7 +79,7 @@ def test_the_usual_options():
         "fix_sd_m": 10.0, "fix_lasting_share": 0.7, "fix_lasting_m": 0.0, "fix_lasting_s": 30.0,
         "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0, "step_sd_m": 0.3,
         "heading_sd_deg": 11.459155902616464, "bias_sd_deg": 10.0, "drift_deg_per_sqrt_m": 0.6,
-        "turn_rate_sd_deg_per_s": 0.05,
+        "turn_drift_deg_per_sqrt_m": 0.3, "turn_rate_sd_deg_per_s": 0.05,
         "scale": 0.03, "drift_m_per_sqrt_s": 0.3, "start_sd_m": 1500.0,
         "start_parts": 21, "start_spacing_m": 600.0, "reach_m": 35_000.0,
         "converged_radius_m": 1000.0,

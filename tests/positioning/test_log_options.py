@@ -183,6 +183,37 @@ def test_errors_of_a_gyroscope_are_a_drift():
     assert fitted.drift_deg_per_sqrt_m == pytest.approx(0.15)
     assert fitted.heading_sd_deg == BayesFilter().heading_sd_deg
     assert fitted.step_sd_m == 0.05
+    # Also a larger one than other turns have.
+    noisy = moving(turns="gyro", gyro_noise_deg_per_sqrt_s=2.0)
+    kalman, _ = fitted_to_log(KalmanFilter(), noisy)
+    assert kalman.turn_drift_deg_per_sqrt_m == pytest.approx(1.0)
+    by_compass, _ = fitted_to_log(KalmanFilter(), moving(drift_deg_per_sqrt_s=2.0))
+    assert by_compass.turn_drift_deg_per_sqrt_m == KalmanFilter().turn_drift_deg_per_sqrt_m
+
+
+def biased_log(drift_degps, imu=None, **columns):
+    """A straight drive of 10 m/s, with a fix each second."""
+    time_s = np.arange(300.0)
+    turn = np.radians(drift_degps)
+    motion = {"time_s": time_s, "step_m": 10.0, "turn_rad": turn} | columns
+    gnss = {"time_s": time_s, "east_m": 500_000.0 + 10 * time_s, "north_m": 4_600_000.0}
+    return make_log(CRS, motion=pd.DataFrame(motion), gnss=pd.DataFrame(gnss), imu=imu)
+
+
+def test_turns_that_drift_beside_the_fixes_have_a_lasting_error_as_large():
+    fitted, notes = fitted_to_log(KalmanFilter(), biased_log(-1.5))
+    assert fitted.turn_rate_sd_deg_per_s == pytest.approx(1.5, rel=0.01)
+    assert notes[-1] == (
+        "turns drift by 1.5 deg/s beside the course of the positions, as of a gyroscope with a "
+        "bias: turn_rate_sd_deg_per_s is as large"
+    )
+    stated = ImuNoise(turns="gyro", gyro_bias_deg_per_s=0.4)
+    assert fitted_to_log(KalmanFilter(), biased_log(1.5, stated))[0].turn_rate_sd_deg_per_s > 1.4
+    assert fitted_to_log(KalmanFilter(), biased_log(0.35, stated))[0].turn_rate_sd_deg_per_s == 0.4
+    for given in (biased_log(0.2), biased_log(1.5, heading_rad=0.0)):
+        assert fitted_to_log(KalmanFilter(), given)[0].turn_rate_sd_deg_per_s == 0.05
+    chosen = KalmanFilter(turn_rate_sd_deg_per_s=0.07)
+    assert fitted_to_log(chosen, biased_log(1.5))[0] == chosen
 
 
 def test_the_bias_of_a_gyroscope_is_a_lasting_error_of_the_rate_of_turns():

@@ -105,6 +105,18 @@ def test_motion_is_linear_about_the_errors_found_so_far():
         np.testing.assert_allclose(transition[:2, 2 + i], slope, rtol=1e-8)
 
 
+@pytest.mark.parametrize("drift_deg", [0.0, 0.3, 1.2])
+def test_sums_of_turns_wander_as_the_options_say(drift_deg):
+    made = Reckoning(alignment=Alignment(0.4, known=True), turned_s=3.0)
+    options = replace(OPTIONS, turn_drift_deg_per_sqrt_m=drift_deg)
+    for step, wander_deg in (
+        (MotionStep(9.0, nan, 0.1), drift_deg),
+        (MotionStep(9.0, 0.2, 0.1), OPTIONS.drift_deg_per_sqrt_m),
+    ):
+        _, (_, noise, _), _ = made.moved(step, 8.0, options, np.zeros(3))
+        assert noise[2, 2] == pytest.approx(9.0 * radians(wander_deg) ** 2)
+
+
 def test_a_lasting_error_of_a_rate_turns_headings_by_its_time():
     """Where headings are sums of turns, whose direction was found."""
     made = Reckoning(alignment=Alignment(0.4, known=True), turned_s=3.0)

@@ -132,6 +132,26 @@ def test_a_track_that_is_lost_long_before_its_end_says_so(drive, replay):
     )
 
 
+def test_turns_that_drift_are_named_as_the_likely_mistake(drive, replay):
+    """Of a gyroscope that is assumed to have no bias, and has one of 3 deg/s."""
+    turn = np.radians(drive["Yaw rate [deg/s]"].to_numpy() + 3.0)
+    motion = pd.DataFrame({"time": drive["time"], "step_m": 10.0, "turn_rad": turn})
+    places = drive[["time", "latitude", "longitude"]].dropna().iloc[::5]
+    tables = {"positions": places, "odometry": motion}
+    done = replay(tables, "--set", "filter.kalman.turn_rate_sd_deg_per_s=0.001")
+    told = re.search(
+        r"LOST from there on, as the readings contradict the position \(likely: a gyroscope "
+        r"noisier than stated: turns drift by (\S+) deg/s beside the course of the positions",
+        done.err,
+    )
+    assert told is not None, done.err
+    assert float(told[1]) == pytest.approx(3.0, abs=0.4)
+    # By default it is taken into account.
+    done = replay(tables)
+    assert "turn_rate_sd_deg_per_s is as large" in done.err
+    assert "LOST" not in done.err
+
+
 def test_motion_alone_has_nothing_to_start_from(drive, replay, tmp_path):
     done = replay({"odometry": apart(drive)["odometry"]})
     assert done.code == 3

@@ -73,8 +73,10 @@ class KalmanOptions(Options):
     bias_sd_deg : float
         Assumed deviation of a heading's error that lasts, at the start.
     drift_deg_per_sqrt_m : float
-        Assumed random walk of that error of a compass. Of headings that are sums of turns at most
-        0.3.
+        Assumed random walk of that error of a compass.
+    turn_drift_deg_per_sqrt_m : float
+        Assumed random walk of headings that are sums of turns: of wheels that slip, of cameras that
+        shake, and of the noise of gyroscopes.
     turn_rate_sd_deg_per_s : float
         Assumed deviation of the lasting error of a rate of turns, where headings are their sums.
     scale : float
@@ -115,6 +117,7 @@ class KalmanOptions(Options):
     heading_sd_deg: Positive = 11.459155902616464
     bias_sd_deg: NotNegative = 10.0
     drift_deg_per_sqrt_m: NotNegative = 0.6
+    turn_drift_deg_per_sqrt_m: NotNegative = 0.3
     turn_rate_sd_deg_per_s: NotNegative = 0.05
     scale: NotNegative = 0.03
     drift_m_per_sqrt_s: Positive = 0.3

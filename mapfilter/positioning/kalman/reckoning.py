@@ -41,9 +41,11 @@ the rate of turns in rad/s."""
 ERRORS = slice(2, 5)
 """Components that are errors of dead reckoning."""
 _TURNED, _SCALE, _RATE, _LEAST = 2, 3, 4, 1e-6
-_TURNS_SD_RAD, _TURNS_DRIFT_RAD = radians(2.0), radians(0.3)
-"""White error of headings that turns add up to, and their random walk over the root of a metre, at
-most: what wheels slip and cameras shake. A compass is read again and again, among iron."""
+_TURNS_SD_RAD = radians(2.0)
+"""White error of headings that turns add up to, at most: a compass is read again and again, among
+iron."""
+_ASTRAY_RAD, _ASTRAY_RADPS = radians(30.0), radians(1.0)
+"""What is added to the errors of turns and of their rate where they have led astray."""
 
 
 def at_rest(layout: StateLayout) -> Motion:
@@ -185,8 +187,8 @@ class Reckoning:
         after = replace(self, alignment=alignment, turned_s=turned_s, recent=recent)
         if not isfinite(step.step_m):
             return after, (transition, noise, shift), Reason.NO_STEP
-        drift_rad = radians(options.drift_deg_per_sqrt_m)
-        drift_rad = min(drift_rad, _TURNS_DRIFT_RAD) if by_turns else drift_rad
+        drift_deg = options.turn_drift_deg_per_sqrt_m if by_turns else options.drift_deg_per_sqrt_m
+        drift_rad = radians(drift_deg)
         noise[_TURNED, _TURNED] = drift_rad**2 * abs(step.step_m)
         if not isfinite(step.heading_rad):
             why = Reason.USED
@@ -281,6 +283,17 @@ def jump_to(turn: Turn, layout: StateLayout, lasting_m: float | None) -> Motion:
     noise = cause @ known @ cause.T
     if lasting_m is not None:
         noise[of, of] += lasting_m**2
+    return transition, noise, shift
+
+
+def turns_in_doubt(layout: StateLayout) -> Motion:
+    """Return the motion of headings that turns have led astray: their errors are open again.
+
+    Turns that were noisier than assumed, or had a larger bias, lead a belief away from its fixes
+    until it begins anew; with what it had of their errors it would be led away again.
+    """
+    transition, noise, shift = at_rest(layout)
+    noise[_TURNED, _TURNED], noise[_RATE, _RATE] = _ASTRAY_RAD**2, _ASTRAY_RADPS**2
     return transition, noise, shift
 
 

@@ -42,6 +42,7 @@ from mapfilter.positioning.kalman.reckoning import (
     at_rest,
     jump_to,
     turned_to,
+    turns_in_doubt,
 )
 from mapfilter.positioning.kalman.start import first_belief
 from mapfilter.positioning.kalman.turned import Turn
@@ -264,8 +265,14 @@ class KalmanStep:
         doubted = self.own is RECKONED and self.reckoning.may_have_left
         after = how.weighed(self.belief, self.fixes, fix, time_s, rests=rests, is_doubted=doubted)
         self.belief, self.fixes = after.belief, after.errors
+        motion = after.motion
+        # One fix that contradicts a belief may be an outlier; steps that are wrong do so again.
+        again = after.ruling is Ruling.EITHER and after.errors.record.is_lost
+        if (after.ruling is Ruling.ANEW or again) and self.reckoning.alignment.known:
+            doubt = turns_in_doubt(layout)
+            self.belief, motion = self.belief.predict(*doubt), after_each_other(motion, doubt)
         if self.motion is not None:
-            self.motion = after_each_other(self.motion, after.motion)
+            self.motion = after_each_other(self.motion, motion)
         self.recent_nis = [] if after.ruling.begins else self._with_nis(after.nis)
         if self.own is RECKONED and isinstance(found, Direction):
             self.belief = turned_to(self.belief, found)

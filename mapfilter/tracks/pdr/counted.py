@@ -14,7 +14,7 @@ from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import MAD_TO_SD
-from mapfilter.tracks.pdr.heading import RATE_SD_RADPS
+from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.turns import turning_of
 from mapfilter.tracks.pdr.walk import DECLINATION_SD_RAD

@@ -14,6 +14,7 @@ import numpy as np
 
 from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS, UNSEEN_SD_RADPS, WALK_RAD_PER_SQRT_S
 
 _SIZE_SHARE = 0.2
 _DIP_RAD = np.radians(12.0)
@@ -22,12 +23,11 @@ _CORRELATION_S = 4.0
 _DEGREES_OF_FREEDOM = 3.0
 _ROUNDS = 6
 _APART_RAD = np.radians(25.0)
-RATE_SD_RADPS = float(np.radians(0.1))
-"""Standard deviation of the gyroscope's constant rate error before anything is measured."""
-WALK_RAD_PER_SQRT_S = float(np.radians(0.15))
-"""Random walk of the gyroscope's yaw."""
 _RATE_WALK = np.radians(0.002)
 _BINS = 72
+_PAIR_S, _PAIR_SHARE, _SHOWN = 20.0, 0.5, 4.0
+"""Time over which the compass shows a rate, the share of pairs of it that have to agree, and
+deviations from 0 that are no chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,13 @@ def compass_samples(
 
 
 def yaw_offset(
-    compass: Compass, rates: Floats, rate_sds: Floats, *, use_compass: bool = True
+    compass: Compass,
+    rates: Floats,
+    rate_sds: Floats,
+    *,
+    use_compass: bool = True,
+    walk_rad_per_sqrt_s: float = WALK_RAD_PER_SQRT_S,
+    usual_radps: float = 0.0,
 ) -> YawOffset:
     """Smooth the offset between yaw and magnetic headings.
 
@@ -124,6 +130,10 @@ def yaw_offset(
         NaN where the device moved.
     use_compass : bool
         Without, only the rate is estimated.
+    walk_rad_per_sqrt_s : float
+        Random walk of the gyroscope's yaw.
+    usual_radps : float
+        Its rate error, beside which that of a time is small.
 
     Returns
     -------
@@ -135,8 +145,16 @@ def yaw_offset(
     # Where the field is disturbed nearly everywhere, a disturbed compass is better than none.
     if use_compass and good.sum() < 0.2 * len(good):
         good = np.isfinite(compass.north_rad) & (compass.size_ut > 0)
+    first_sd_radps = RATE_SD_RADPS
+    if not np.isfinite(rates).any():
+        usual_radps, first_sd_radps = _rate_by_compass(compass, good)
+    # What is left beside it is smoothed.
+    rates = rates - usual_radps
+    turned = usual_radps * (compass.time_s - compass.time_s[0])
+    measured = measured + turned
     start = _usual_angle(measured[good]) if good.any() else 0.0
     measured = start + wrap_rad(measured - start)
+    walks = first_sd_radps, walk_rad_per_sqrt_s
     base = _COMPASS_SD_RAD**2 * 2 * _CORRELATION_S
     weight = np.where(good, 1.0, 0.0)
     offset = np.full(len(measured), start)
@@ -144,7 +162,7 @@ def yaw_offset(
     for _ in range(_ROUNDS if good.any() else 1):
         variance = np.where(weight > 0, base / np.maximum(weight, 1e-12), np.inf)
         offset, sd, rate, rate_sd = _smooth(
-            compass.time_s, measured, variance, rates, rate_sds, start
+            compass.time_s, measured, variance, rates, rate_sds, start, walks
         )
         ratio = (wrap_rad(measured - offset) / _COMPASS_SD_RAD) ** 2
         freedom = _DEGREES_OF_FREEDOM
@@ -155,7 +173,30 @@ def yaw_offset(
     spread = float(np.sqrt(np.mean(residual**2))) if residual.size else float(np.pi)
     if not good.any():
         sd = np.full(len(sd), np.pi)
-    return YawOffset(compass.time_s, offset, sd, rate, rate_sd, ~used, spread)
+        rate_sd = rate_sd if np.isfinite(rates).any() else UNSEEN_SD_RADPS
+    rate += usual_radps
+    return YawOffset(compass.time_s, offset - turned, sd, rate, rate_sd, ~used, spread)
+
+
+def _rate_by_compass(compass: Compass, good: Bools) -> tuple[float, float]:
+    """Return the rate error by which the compass turns in the level frame, and its deviation.
+
+    It is the mean turn over 20 s, over a recording in which nothing rests. A compass that is
+    off elsewhere at the end than at the start shows a small one: what that may be is none.
+    """
+    index = np.flatnonzero(good)
+    time_s, north = compass.time_s[index], compass.north_rad[index]
+    later = np.searchsorted(time_s, time_s + _PAIR_S)
+    first = np.flatnonzero(later < len(time_s))
+    first = first[time_s[later[first]] - time_s[first] < _PAIR_S + 1.0]
+    if not first.size:
+        return 0.0, RATE_SD_RADPS
+    last = later[first]
+    mean = np.mean(np.exp(1j * (north[last] - north[first])))
+    rate_radps = float(np.angle(mean) / np.mean(time_s[last] - time_s[first]))
+    sd_radps = float(np.hypot(2**0.5 * _APART_RAD / np.ptp(time_s), RATE_SD_RADPS))
+    shown = abs(mean) > _PAIR_SHARE and abs(rate_radps) > _SHOWN * sd_radps
+    return (rate_radps, sd_radps) if shown else (0.0, RATE_SD_RADPS)
 
 
 def _usual_angle(angles: Floats) -> float:
@@ -176,20 +217,25 @@ def _smooth(
     rates: Floats,
     rate_sds: Floats,
     start_rad: float,
+    walks: tuple[float, float],
 ) -> tuple[Floats, Floats, float, float]:
-    """Run a Kalman filter and the smoother of Rauch, Tung and Striebel over offset and rate."""
+    """Run a Kalman filter and the smoother of Rauch, Tung and Striebel over offset and rate.
+
+    ``walks`` are the deviation of the first rate and the random walk of the yaw.
+    """
     count = len(time_s)
     state = np.array([start_rad, 0.0])
-    spread = np.diag([np.pi**2, RATE_SD_RADPS**2])
+    spread = np.diag([np.pi**2, walks[0] ** 2])
     before, after = np.empty((count, 2)), np.empty((count, 2))
     before_p, after_p = np.empty((count, 2, 2)), np.empty((count, 2, 2))
     moves = np.empty((count, 2, 2))
+    rate_walk = _RATE_WALK * max(walks[1] / WALK_RAD_PER_SQRT_S, 1.0)
     for k in range(count):
         step_s = time_s[k] - time_s[k - 1] if k else 0.0
         # A yaw that grows by a rate error is put back by an offset that falls.
         moves[k] = [[1.0, -step_s], [0.0, 1.0]]
         state = moves[k] @ state
-        noise = np.diag([WALK_RAD_PER_SQRT_S**2, _RATE_WALK**2]) * step_s
+        noise = np.diag([walks[1] ** 2, rate_walk**2]) * step_s
         spread = moves[k] @ spread @ moves[k].T + noise
         before[k], before_p[k] = state, spread
         for row, value, error in (

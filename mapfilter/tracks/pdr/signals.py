@@ -75,7 +75,7 @@ def inertial_signals(
     if not low <= typical <= high:
         why = "g given for m/s², or gravity left out"
         return [], (f"accelerometer: {typical:.3g} m/s² in the mean, at rest 9.8: {why}",)
-    gyroscope = _table(sensors, "gyroscope", _RATE)
+    gyroscope = gyroscope_samples(sensors)
     if gyroscope is not None and (fault := _rate_fault(gyroscope[1])):
         return [], (fault,)
     field = _table(sensors, "magnetometer", _FIELD)
@@ -99,6 +99,11 @@ def inertial_signals(
     if field is None and gyroscope is None:
         return [], ("accelerometer without gyroscope and magnetometer: no headings",)
     return found, notes
+
+
+def gyroscope_samples(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats] | None:
+    """Return times that grow and rates as they were measured; None where there are not two."""
+    return _table(sensors, "gyroscope", _RATE)
 
 
 def _rate_fault(rate: Floats) -> str:

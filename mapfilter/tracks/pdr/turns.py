@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.tracks.moved import MAD_TO_SD
-from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S
+from mapfilter.tracks.pdr.gyroscope import WALK_RAD_PER_SQRT_S, sample_noise
 
 _LONGEST_S = 2.0
 """Rates that lie farther apart say nothing about what is between them."""
@@ -119,8 +118,7 @@ def _of_rate(time_s: Floats, rate: Floats, source: str) -> Turning:
     time_s, rate = time_s[known], rate[known]
     lasted_s = np.diff(time_s)
     turn = np.where(lasted_s <= _LONGEST_S, lasted_s * (rate[1:] + rate[:-1]) / 2, np.nan)
-    bends = np.abs(np.diff(rate, 2))
-    scatter = MAD_TO_SD * float(np.median(bends)) / 6**0.5 if bends.size else 0.0
+    scatter = sample_noise(np.diff(rate, 2))
     usual_s = float(np.median(lasted_s)) if lasted_s.size else 0.0
     walk = float(np.hypot(WALK_RAD_PER_SQRT_S, scatter * usual_s**0.5))
     return Turning(time_s, np.concatenate([[np.nan], turn])[: len(time_s)], walk, source)

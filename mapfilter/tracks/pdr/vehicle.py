@@ -11,15 +11,28 @@ from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry, odometry_gaps
+from mapfilter.tracks.moved import (
+    MAD_TO_SD,
+    UNDIRECTED,
+    long_gaps,
+    motion_from_odometry,
+    odometry_gaps,
+)
 from mapfilter.tracks.pdr.attitude import attitude
-from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S, Compass, YawOffset, yaw_offset
+from mapfilter.tracks.pdr.gyroscope import (
+    MOST_BIAS_RADPS,
+    WALK_RAD_PER_SQRT_S,
+    error_notes,
+    shown_bias,
+)
+from mapfilter.tracks.pdr.heading import Compass, YawOffset, yaw_offset
 from mapfilter.tracks.pdr.odometry_rows import usable_rows
 from mapfilter.tracks.pdr.signals import inertial_signals
 
 _STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
 _SETTLING_S = 0.4
-_MOST_BIAS_RADPS = 0.05
+_APART_RADPS, _DEVIATIONS = 0.05, 4.0
+"""How far a rate at standstill may be from the usual one, also in deviations of its noise."""
 _LEAST_RATE_SD_RADPS = 5e-4
 _COURSE_MPS = 2.0
 _SPEED_SD_MPS = 0.05
@@ -55,7 +68,7 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     speed = rows["speed_mps"].to_numpy(dtype=np.float64)
     rate = rows["yaw_rate_radps"].to_numpy(dtype=np.float64)
     standing = _settled(time_s, np.abs(speed) < _STANDING_MPS)
-    found = _bias(time_s, rate, standing, None)
+    found, walk_rad = _bias(time_s, rate, standing, None, _usual_s(time_s))
     correction = np.interp(time_s, found.time_s, found.offset_rad)
     # Over a rest without rows nothing was read of the gyroscope.
     rested = long_gaps(time_s) & (motion["turn_rad"].to_numpy() == 0)
@@ -70,7 +83,9 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
         notes += (f"odometry: no yaw rate over {blind_s:.1f} s of driving: motion is not known",)
         motion = motion.assign(step_m=motion["step_m"].where(~blind))
     speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
-    imu = _noise(time_s, found, float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS)
+    notes += error_notes(walk_rad)
+    speed_sd_mps = float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS
+    imu = _noise(time_s, found, walk_rad, speed_sd_mps)
     notes += _gap_notes(time_s, speed, turn)
     if rested.any():
         longest_s = float(np.diff(time_s, prepend=time_s[0])[rested].max())
@@ -115,7 +130,9 @@ def reckon_velocity(
     rate = np.gradient(yaw, time_s)
     standing = _settled(time_s, speed < _GNSS_STANDING_MPS)
     driving = (speed > _COURSE_MPS) & np.isfinite(course)
-    found = _bias(time_s, rate, standing, np.where(driving, course - yaw, np.nan))
+    # Each rate is a mean over two intervals.
+    course_offset = np.where(driving, course - yaw, np.nan)
+    found, walk_rad = _bias(time_s, rate, standing, course_offset, 2 * _usual_s(time_s))
     heading = yaw + np.interp(time_s, found.time_s, found.offset_rad)
     lasted_s = np.diff(time_s)
     step = np.concatenate([[0.0], lasted_s * (speed[1:] + speed[:-1]) / 2])
@@ -128,8 +145,8 @@ def reckon_velocity(
             "turn_rad": wrap_rad(np.diff(heading, prepend=heading[0])),
         }
     )
-    notes = _notes(found, int(standing.sum()), has_rate=True)
-    return motion, _noise(time_s, found, _SPEED_SD_MPS), notes
+    notes = (*_notes(found, int(standing.sum()), has_rate=True), *error_notes(walk_rad))
+    return motion, _noise(time_s, found, walk_rad, _SPEED_SD_MPS), notes
 
 
 def _gap_notes(time_s: Floats, speed: Floats, turn: Floats) -> tuple[str, ...]:
@@ -161,19 +178,36 @@ def _settled(time_s: Floats, standing: Bools) -> Bools:
     return settled
 
 
-def _bias(time_s: Floats, rate: Floats, standing: Bools, course_offset: Floats | None) -> YawOffset:
-    """Smooth the gyroscope's bias, and the offset between its yaw and the course."""
+def _usual_s(time_s: Floats) -> float:
+    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+
+
+def _bias(
+    time_s: Floats, rate: Floats, standing: Bools, course_offset: Floats | None, averaged_s: float
+) -> tuple[YawOffset, float]:
+    """Smooth the gyroscope's bias, and the offset between its yaw and the course.
+
+    Returns also the random walk of the yaw (rad/√s), by the noise of rates at standstill, which are
+    means over ``averaged_s``.
+    """
     # Seconds with rows only, and longer spans of a long recording, bound the smoother's steps.
     elapsed_s = time_s - time_s[0]
     span_s = max(1.0, float(np.ceil(len(np.unique(np.floor(elapsed_s))) / _MOST_SPANS)))
     number, span = np.unique(np.floor(elapsed_s / span_s), return_inverse=True)
     rates, sds, north = (np.full(len(number), np.nan) for _ in range(3))
-    usable = standing & np.isfinite(rate) & (np.abs(rate) < _MOST_BIAS_RADPS)
+    usable, spread = standing & np.isfinite(rate), 0.0
     if usable.any():
-        spread = 1.4826 * float(np.median(np.abs(rate[usable] - np.median(rate[usable]))))
+        usual = float(np.median(rate[usable]))
+        spread = MAD_TO_SD * float(np.median(np.abs(rate[usable] - usual)))
+        near = np.abs(rate - usual) < max(_APART_RADPS, _DEVIATIONS * spread)
+        usable &= near & (abs(usual) < MOST_BIAS_RADPS)
+    bias = 0.0
+    if usable.any():
+        bias = float(shown_bias(rate[usable, None], spread)[0])
         still = pd.Series(rate[usable]).groupby(span[usable]).agg(["median", "size"])
         rates[still.index] = still["median"]
         sds[still.index] = np.maximum(spread / np.sqrt(still["size"]), _LEAST_RATE_SD_RADPS)
+    walk_rad = float(np.hypot(WALK_RAD_PER_SQRT_S, spread * averaged_s**0.5))
     if course_offset is not None:
         known = np.isfinite(course_offset)
         north[span[known]] = np.pi / 2 - course_offset[known]
@@ -181,7 +215,15 @@ def _bias(time_s: Floats, rate: Floats, standing: Bools, course_offset: Floats |
     none = np.full(len(number), np.nan)
     centre_s = time_s[0] + (number + 0.5) * span_s
     compass = Compass(centre_s, np.nan_to_num(north), none, none, missing)
-    return yaw_offset(compass, rates, sds, use_compass=not missing.all())
+    found = yaw_offset(
+        compass,
+        rates,
+        sds,
+        use_compass=not missing.all(),
+        walk_rad_per_sqrt_s=walk_rad,
+        usual_radps=bias,
+    )
+    return found, walk_rad
 
 
 def _notes(found: YawOffset, stood: int, *, has_rate: bool) -> tuple[str, ...]:
@@ -197,9 +239,8 @@ def _notes(found: YawOffset, stood: int, *, has_rate: bool) -> tuple[str, ...]:
     return (f"yaw rate: bias {bias}, of {stood} rows at standstill",)
 
 
-def _noise(time_s: Floats, found: YawOffset, speed_sd_mps: float) -> ImuNoise:
-    period_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
-    walk = float(np.degrees(WALK_RAD_PER_SQRT_S))
+def _noise(time_s: Floats, found: YawOffset, walk_rad: float, speed_sd_mps: float) -> ImuNoise:
+    period_s, walk = _usual_s(time_s), float(np.degrees(walk_rad))
     bias = float(np.hypot(np.degrees(found.rate_sd_radps), _UNSEEN_BIAS_DEG_PER_S))
     with_course = bool(found.sd_rad[0] < np.pi)
     lasting = float(np.degrees(np.sqrt(np.mean(found.sd_rad**2)))) if with_course else 0.0

@@ -17,6 +17,7 @@ from mapfilter.tracks.pdr.direction import (
     direction_by_device,
     walking_direction,
 )
+from mapfilter.tracks.pdr.gyroscope import Gyroscope, gyroscope_at_rest
 from mapfilter.tracks.pdr.heading import YawOffset, compass_samples, yaw_offset
 from mapfilter.tracks.pdr.height import Climb, climbs
 from mapfilter.tracks.pdr.options import Pose, WalkOptions
@@ -26,7 +27,6 @@ from mapfilter.tracks.pdr.steps import find_steps, step_lengths, still
 from mapfilter.tracks.pdr.walk_noise import walk_noise, walk_notes
 
 _AROUND_S = 0.75
-_QUIET_RADPS, _FASTEST_BIAS_RADPS = 0.02, 0.05
 DECLINATION_SD_RAD = np.radians(8.0)
 """Error of headings by a compass whose magnetic declination is not known."""
 _DRIVING_MPS, _SPEED_LASTS_S = 4.0, 3.0
@@ -96,7 +96,12 @@ def reckon_walk(
     options = options or WalkOptions()
     stretches, notes = inertial_signals(sensors)
     speed = sensors.get("velocity")
-    parts = [_reckon(signals, options, speed) for signals in stretches]
+    rests = [still(signals.force_mps2) for signals in stretches]
+    gyroscope = gyroscope_at_rest(sensors, stretches, rests)
+    parts = [
+        _reckon(gyroscope.without_bias(signals), gyroscope, quiet, options, speed)
+        for signals, quiet in zip(stretches, rests, strict=True)
+    ]
     counts = [int((part.rows["step_m"] > 0).sum()) for part in parts]
     if not sum(counts):
         return None, (*notes, *(["no steps found"] if parts else []))
@@ -120,9 +125,9 @@ def reckon_walk(
         float(np.hypot(main.direction_sd_rad, north_sd_rad)),
         main.sway_rad,
         compass=compass,
-        gyroscope=has_gyroscope,
+        gyroscope=gyroscope if has_gyroscope else None,
     )
-    words = (*notes, *walk_notes(rows, len(parts) - 1, found, compass=compass))
+    words = (*notes, *gyroscope.notes, *walk_notes(rows, len(parts) - 1, found, compass=compass))
     if compass and options.declination_deg is None:
         words += ("no magnetic declination given: magnetic north taken for true north",)
     return Reckoned(motion, imu, reckoning, sum(counts), found, words), notes
@@ -136,7 +141,13 @@ def _begun(rows: pd.DataFrame, number: int) -> pd.DataFrame:
     return rows
 
 
-def _reckon(signals: Signals, options: WalkOptions, speed: pd.DataFrame | None) -> _Part:
+def _reckon(
+    signals: Signals,
+    gyroscope: Gyroscope,
+    quiet: Bools,
+    options: WalkOptions,
+    speed: pd.DataFrame | None,
+) -> _Part:
     turned = attitude(signals)
     level = turned.to_level.apply(signals.force_mps2)
     steps = find_steps(level[:, 2])
@@ -144,8 +155,7 @@ def _reckon(signals: Signals, options: WalkOptions, speed: pd.DataFrame | None) 
     if speed is not None and len(speed):
         walked = _speed_at(signals.time_s[index], speed) < _DRIVING_MPS
         index, swing = index[walked], swing[walked]
-    quiet = still(signals.force_mps2)
-    offset = _offset(signals, turned, quiet, options)
+    offset = _offset(signals, gyroscope, turned, quiet, options)
     directions, sds = _directions(turned, level, index, options.pose)
     compass = offset.sd_rad[0] < np.pi
     yaw = turned.yaw_rad + np.interp(signals.time_s, offset.time_s, offset.offset_rad)
@@ -193,7 +203,9 @@ def _to_nearest(values: Floats, known: Floats) -> Floats:
     return nearest
 
 
-def _offset(signals: Signals, turned: Attitude, quiet: Bools, options: WalkOptions) -> YawOffset:
+def _offset(
+    signals: Signals, gyroscope: Gyroscope, turned: Attitude, quiet: Bools, options: WalkOptions
+) -> YawOffset:
     """Return what the compass and the times of standing still say of the gyroscope's yaw."""
     field = signals.field_ut
     level = np.full((len(signals.time_s), 3), np.nan)
@@ -201,27 +213,12 @@ def _offset(signals: Signals, turned: Attitude, quiet: Bools, options: WalkOptio
         known = np.isfinite(field[:, 0])
         level[known] = turned.to_level[known].apply(field[known])
     compass = compass_samples(signals.time_s, level, options.field_ut)
-    rates, sds = _rates_at_rest(signals, turned, quiet, len(compass.time_s))
-    return yaw_offset(compass, rates, sds)
-
-
-def _rates_at_rest(
-    signals: Signals, turned: Attitude, quiet: Bools, count: int
-) -> tuple[Floats, Floats]:
-    """Return yaw rate and its standard deviation in each second in which nothing moved."""
+    count = len(compass.time_s)
     rates, sds = np.full(count, np.nan), np.full(count, np.nan)
-    if signals.rate_radps is None:
-        return rates, sds
-    up = turned.to_level.apply(signals.rate_radps)[:, 2]
-    width = int(RATE_HZ)
-    for k in range(min(count, len(up) // width)):
-        part = slice(k * width, (k + 1) * width)
-        if not quiet[part].all():
-            continue
-        mean, noise = float(up[part].mean()), float(signals.rate_radps[part].std(axis=0).max())
-        if noise < _QUIET_RADPS and abs(mean) < _FASTEST_BIAS_RADPS:
-            rates[k], sds[k] = mean, max(noise, 1e-4)
-    return rates, sds
+    if signals.rate_radps is not None:
+        up = turned.to_level.apply(signals.rate_radps)[:, 2]
+        rates, sds = gyroscope.rates_at_rest(signals.rate_radps, up, quiet, count)
+    return yaw_offset(compass, rates, sds, walk_rad_per_sqrt_s=gyroscope.walk_rad_per_sqrt_s)
 
 
 def _directions(turned: Attitude, level: Floats, index: Ints, pose: Pose) -> tuple[Floats, Floats]:

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S, YawOffset
+from mapfilter.tracks.pdr.gyroscope import Gyroscope
+from mapfilter.tracks.pdr.heading import YawOffset
 from mapfilter.tracks.pdr.height import Climb
 
 STEP_SHARE = 0.1
@@ -24,7 +25,7 @@ def walk_noise(
     sway_rad: float,
     *,
     compass: bool,
-    gyroscope: bool,
+    gyroscope: Gyroscope | None,
 ) -> ImuNoise:
     """Return the errors of the motion, as far as the recording shows them.
 
@@ -38,17 +39,17 @@ def walk_noise(
     period_s = float(np.median(between_s)) if between_s.size else 0.5
     lasting = np.sqrt(np.mean(offset.sd_rad**2) + direction_sd_rad**2 + _COMPASS_BIAS_RAD**2)
     white = max(float(np.degrees(sway_rad)), _LEAST_HEADING_DEG)
-    walk = float(np.degrees(WALK_RAD_PER_SQRT_S))
-    if not gyroscope:
+    walk = 0.0 if gyroscope is None else float(np.degrees(gyroscope.walk_rad_per_sqrt_s))
+    if gyroscope is None:
         white = float(np.degrees(offset.spread_rad))
     return ImuNoise(
         period_s=period_s,
         sigma_trans_m=STEP_SHARE * float(stepped["step_m"].mean()),
         sigma_orient_deg=min(white, 180.0),
         bias_sd_deg=min(float(np.degrees(lasting)), 180.0) if compass else 0.0,
-        drift_deg_per_sqrt_s=walk if compass and gyroscope else 0.0,
+        drift_deg_per_sqrt_s=walk if compass else 0.0,
         scale=SCALE,
-        heading_correlation_s=0.0 if gyroscope else _NO_GYROSCOPE_CORRELATION_S,
+        heading_correlation_s=_NO_GYROSCOPE_CORRELATION_S if gyroscope is None else 0.0,
         step_scale_wander=_SCALE_WANDER,
         step_scale_correlation_s=_SCALE_WANDER_S,
         turns="headings" if compass else "gyro",
