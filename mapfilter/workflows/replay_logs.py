@@ -10,6 +10,7 @@ from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.geodesy import Lattice
+from mapfilter.positioning.kalman.siteless import needs_sites
 from mapfilter.tracks.log import leave_out
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
@@ -93,12 +94,11 @@ class ReplayLogs:
             faults.add(where, fault.expected, fault.found, hint)
 
     def check_siteless(self) -> None:
-        """Refuse logs of which a filter without a map would need sites."""
+        """Refuse logs that a filter without a map can only locate by the sites of their cells."""
         for path in self.paths:
-            log = leave_out(self.open(path).log, self.config.track.without)
-            if len(log.radio) or len(log.tdoa):
+            if needs_sites(leave_out(self.open(path).log, self.config.track.without)):
                 hint = (
-                    "filters without a map take the sites from there, or from a database (--db); "
-                    "--without radio,tdoa leaves positions and dead reckoning"
+                    f"{shown(path.name)} has no positions to start from, and filters without a map "
+                    "take the sites of its cells from there, or from a database (--db)"
                 )
                 raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
