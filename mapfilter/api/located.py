@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from html import escape
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from mapfilter._arguments import Argument, Setting, check_arguments, generator
-from mapfilter.api.given import log_argument, opened, optional_database, read
+from mapfilter._arguments import Argument, Entries, Setting, check_arguments, generator
+from mapfilter.api.given import log_argument, opened, optional_database
 from mapfilter.api.mapless import over_sites, own_sites, without_sites
+from mapfilter.api.motion import with_right_motion
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
@@ -139,6 +142,7 @@ def locate(
     snapshots: bool = False,
     risk: float = DEFAULT_RISK,
     record: bool = False,
+    factors: Mapping[str, float] | None = None,
 ) -> Track:
     """Locate a log from an unknown start.
 
@@ -170,11 +174,15 @@ def locate(
         Probability, at each epoch, that the error exceeds the protection level (``protection_m``).
     record : bool
         Whether to record what :meth:`Track.view` explains; takes a few times as long.
+    factors : mapping of str to float, optional
+        By which columns of motion are multiplied, as of :func:`mapfilter.read_log`. One of 1 takes
+        a column as it is, although the log's fixes contradict it.
 
     Raises
     ------
     InputError
-        The log is in another CRS than the database.
+        The log is in another CRS than the database, or its fixes prove that a column of its motion
+        is of another unit or sense, for which there is no factor.
     StoreError
         A path holds no database, or one that is damaged.
     ConfigError
@@ -191,13 +199,14 @@ def locate(
             Setting("snapshots", snapshots, bool),
             Setting("risk", risk, Probability),
             Setting("record", record, bool),
+            Entries("factors", factors, Real, "a number", "the factor of each column of motion"),
         ],
     )
     rng = generator("locate", seed)
     given_filter = filter_options(filter) if isinstance(filter, str) else filter
     database = None if database is None else opened(database)
     plan = own_sites(given_filter) if database is None else database.plan
-    log = read(log, plan.crs if plan is not None else "")
+    log = with_right_motion(log, plan.crs if plan is not None else "", factors or {})
     if plan is None:
         log, plan = without_sites(log), CellPlan(log.crs, ())
     else:
