@@ -24,6 +24,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 
 _SHORT = 20
+_LEAST_UTM_DEG, _MOST_UTM_DEG = -80.0, 84.0
 
 
 def wrap_rad(angle_rad: ArrayLike) -> Floats:
@@ -179,16 +180,37 @@ def same_crs(a: str, b: str) -> bool:
     return a == b or bool(CRS.from_user_input(a).equals(CRS.from_user_input(b)))
 
 
-def utm_crs(lon_deg: float, lat_deg: float) -> str:
-    """Return the WGS 84 / UTM zone of a place.
+def utm_zone(lon_deg: float, lat_deg: float) -> int:
+    """Return the UTM zone of a place, 1 to 60, with the exceptions of Norway and Svalbard.
 
     Examples
     --------
-    >>> utm_crs(-8.6, 41.1), utm_crs(24.9, 60.2), utm_crs(18.4, -33.9)
-    ('EPSG:32629', 'EPSG:32635', 'EPSG:32734')
+    >>> utm_zone(-8.5, 51.9), utm_zone(5.3, 60.4), utm_zone(15.6, 78.2)
+    (29, 32, 33)
     """
-    zone = int(np.clip((lon_deg + 180.0) // 6.0 + 1, 1, 60))
+    if 56.0 <= lat_deg < 64.0 and 3.0 <= lon_deg < 12.0:
+        return 32
+    if lat_deg >= 72.0 and 0.0 <= lon_deg < 42.0:
+        return 31 + 2 * int((lon_deg + 3.0) // 12.0)
+    return int(np.clip((lon_deg + 180.0) // 6.0 + 1, 1, 60))
+
+
+def utm_zone_crs(zone: int, lat_deg: float) -> str:
+    """Return the CRS of a UTM zone (WGS 84) on the hemisphere of a latitude."""
     return f"EPSG:{(32600 if lat_deg >= 0 else 32700) + zone}"
+
+
+def utm_crs(lon_deg: float, lat_deg: float) -> str:
+    """Return the WGS 84 / UTM zone of a place; UPS (east, north) beyond 84° N and 80° S.
+
+    Examples
+    --------
+    >>> utm_crs(-8.6, 41.1), utm_crs(24.9, 60.2), utm_crs(18.4, -33.9), utm_crs(0.0, 89.0)
+    ('EPSG:32629', 'EPSG:32635', 'EPSG:32734', 'EPSG:5041')
+    """
+    if lat_deg > _MOST_UTM_DEG or lat_deg < _LEAST_UTM_DEG:
+        return "EPSG:5041" if lat_deg > 0 else "EPSG:5042"
+    return utm_zone_crs(utm_zone(lon_deg, lat_deg), lat_deg)
 
 
 def project(crs: str, lon_deg: ArrayLike, lat_deg: ArrayLike) -> tuple[Floats, Floats]:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from html import escape
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from mapfilter._arguments import Argument, Setting, check_arguments, generator
-from mapfilter.api.given import log_argument, opened, optional_database, read
-from mapfilter.api.mapless import no_sites, over_sites, own_sites
+from mapfilter._arguments import Argument, Entries, Setting, check_arguments, generator
+from mapfilter.api.given import log_argument, opened, optional_database
+from mapfilter.api.mapless import over_sites, own_sites, without_sites
+from mapfilter.api.motion import with_right_motion
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
@@ -26,6 +29,7 @@ from mapfilter.positioning.log_lacks import NO_MOTION, advice_of, lack_of_log
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.positioning.undirected_steps import with_joined_steps
+from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.placeless import in_frame
@@ -138,6 +142,7 @@ def locate(
     snapshots: bool = False,
     risk: float = DEFAULT_RISK,
     record: bool = False,
+    factors: Mapping[str, float] | None = None,
 ) -> Track:
     """Locate a log from an unknown start.
 
@@ -149,8 +154,9 @@ def locate(
     database : RadioRouteDatabase, path or None
         A path is opened by each call; open it once for many logs. Kalman-type filters need none:
         ``locate(log, filter="ekf")`` is by GNSS fixes and dead reckoning. For levels and timing
-        advances they need sites: ``KalmanFilter().over_sites(plan)``. Without a database a path is
-        read in the UTM zone of its positions, or the CRS of its sites.
+        advances they need sites: ``KalmanFilter().over_sites(plan)``; else these are left out, with
+        a note. Without a database a path is read in the UTM zone of its positions, or the CRS of
+        its sites.
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out. What the log states
@@ -168,17 +174,21 @@ def locate(
         Probability, at each epoch, that the error exceeds the protection level (``protection_m``).
     record : bool
         Whether to record what :meth:`Track.view` explains; takes a few times as long.
+    factors : mapping of str to float, optional
+        By which columns of motion are multiplied, as of :func:`mapfilter.read_log`. One of 1 takes
+        a column as it is, although the log's fixes contradict it.
 
     Raises
     ------
     InputError
-        The log is in another CRS than the database.
+        The log is in another CRS than the database, or its fixes prove that a column of its motion
+        is of another unit or sense, for which there is no factor.
     StoreError
         A path holds no database, or one that is damaged.
     ConfigError
         Log or database is neither, the filter needs a database and there is none, or sites for the
-        radio of the log, the seed is none, the filter is none, a custom filter fails,
-        the risk does not lie between 0 and 1, or another argument is of another type.
+        radio of a log without positions, the seed is none, the filter is none, a custom filter
+        fails, the risk does not lie between 0 and 1, or another argument is of another type.
     """
     check_arguments(
         "locate",
@@ -189,15 +199,16 @@ def locate(
             Setting("snapshots", snapshots, bool),
             Setting("risk", risk, Probability),
             Setting("record", record, bool),
+            Entries("factors", factors, Real, "a number", "the factor of each column of motion"),
         ],
     )
     rng = generator("locate", seed)
     given_filter = filter_options(filter) if isinstance(filter, str) else filter
     database = None if database is None else opened(database)
     plan = own_sites(given_filter) if database is None else database.plan
-    log = read(log, plan.crs if plan is not None else "")
+    log = with_right_motion(log, plan.crs if plan is not None else "", factors or {})
     if plan is None:
-        plan = no_sites(log)
+        log, plan = without_sites(log), CellPlan(log.crs, ())
     else:
         log = in_frame(log, plan.crs)
     log = with_range_notes(name_by_plan(log, plan), plan)

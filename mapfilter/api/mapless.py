@@ -7,9 +7,12 @@ from typing import Any
 from mapfilter.errors import ConfigError, fail
 from mapfilter.positioning import BUILT_IN
 from mapfilter.positioning.kalman.filter import KalmanFilter, KalmanTracker
+from mapfilter.positioning.kalman.siteless import needs_sites, without_cells
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import TrackLog
+
+_OVER_SITES = "KalmanFilter().over_sites(plan)"
 
 
 def own_sites(given: Any) -> CellPlan | None:
@@ -36,23 +39,19 @@ def own_sites(given: Any) -> CellPlan | None:
     raise fail(ConfigError, "locate, database", expected, "None", hint)
 
 
-def no_sites(log: TrackLog) -> CellPlan:
-    """Return no sites, for a log that needs none.
+def without_sites(log: TrackLog) -> TrackLog:
+    """Return a log for a filter that has no sites: levels, timing and time differences left out.
 
     Raises
     ------
     ConfigError
-        The log has levels, timing advances or time differences.
+        The log has these, and no positions to start from.
     """
-    if len(log.radio) or len(log.tdoa):
+    if needs_sites(log):
         expected = "a database, or a filter over sites, for the radio of the log"
-        hint = (
-            "KalmanFilter().over_sites(plan) takes the sites of a cell plan; "
-            'mapfilter.tracks.log.leave_out(log, ["radio", "tdoa"]) leaves positions and dead '
-            "reckoning"
-        )
+        hint = f"a log without positions; {_OVER_SITES} takes the sites of a cell plan"
         raise fail(ConfigError, "locate, database", expected, "None", hint)
-    return CellPlan(log.crs, ())
+    return without_cells(log, f"a database, or {_OVER_SITES} of a cell plan")
 
 
 def over_sites(given: Any, plan: CellPlan) -> KalmanTracker:

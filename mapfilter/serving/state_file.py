@@ -44,10 +44,11 @@ from mapfilter.positioning.integrity import SampleTail
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.pauses import RowTimes
 from mapfilter.positioning.sensors.repeats import MotionRepeats
+from mapfilter.positioning.sensors.places import Place, Places
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 
-FORMAT, VERSION = "mapfilter session", 13
+FORMAT, VERSION = "mapfilter session", 14
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -80,6 +81,8 @@ _CLASSES: dict[str, type] = {
         ReportRow,
         Reported,
         Pace,
+        Place,
+        Places,
         Rest,
         RowTimes,
         SampleTail,

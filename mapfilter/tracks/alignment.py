@@ -12,11 +12,12 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
-from mapfilter.tracks.clock_notes import apart_note, span_s, zoneless_note
+from mapfilter.tracks.clock_notes import apart_note, zoneless_note
+from mapfilter.tracks.gps_dates import early_dates, later, span_s, week_start_s
 from mapfilter.tracks.misplaced import FAR_APART, FAR_M
 from mapfilter.tracks.position_units import METRES_PER_DEGREE
 from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.speed_shift import shift_note, speeds_of_places
+from mapfilter.tracks.speed_shift import shift_note, speed_agreement, speeds_of_places
 
 _QUARTER_S = 900.0
 _MOST_ZONE_S = 14 * 3600.0
@@ -51,28 +52,32 @@ def align(recordings: Sequence[Recording], given_s: Mapping[Path, float]) -> Ali
 
     Clocks of UTC and GPS need no offset; local times without a zone take the quarter of an hour
     by which positions, or the times themselves, agree; clocks from an unknown start are aligned by
-    positions or by speeds in common. Offsets that were given are taken as they are.
+    positions, as seconds of the GPS week, or by speeds in common. Dates that are early by a mistake
+    of GPS are mended where others tell (:mod:`mapfilter.tracks.gps_dates`). Offsets that were given
+    are taken as they are.
 
     Raises
     ------
     InputError
         A clock cannot be aligned.
     """
+    early_s, notes = early_dates(recordings, given_s)
+    given, offsets = recordings, []
+    recordings = [later(one, s) for one, s in zip(given, early_s, strict=True)]
     reference = _reference(recordings)
     first = recordings[reference]
-    offsets, notes = [], []
-    for recording in recordings:
+    for recording, dated_s in zip(recordings, early_s, strict=True):
         if recording.path in given_s:
             offsets.append(given_s[recording.path])
             notes.append(f"{recording.path.name}: {given_s[recording.path]:+g} s, as given")
             continue
         offset_s, note = (0.0, "") if recording is first else _offset(recording, first)
-        offsets.append(offset_s + given_s.get(first.path, 0.0))
+        offsets.append(dated_s + offset_s + given_s.get(first.path, 0.0))
         if note:
             notes.append(f"{recording.path.name}: {note}")
     if not first.clock.absolute:
         notes += zoneless_note([one for one in recordings if one.path not in given_s])
-    notes += apart_note(recordings, offsets)
+    notes += apart_note(given, offsets)
     return Alignment(tuple(offsets), first.clock.absolute, tuple(notes))
 
 
@@ -108,7 +113,12 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
         shift_s, apart_m = _best_shift(one, other, np.arange(low, high + step_s, step_s))
         if apart_m < _NEAR_M:
             return shift_s, f"{shift_s:+.1f} s, by positions (median {apart_m:.1f} m apart)"
-    shift, correlation = _by_speed(_speed(first), _speed(recording))
+    speeds = _speed(first), _speed(recording)
+    start_s = week_start_s(recording, first) if first.clock.absolute else None
+    # An unknown agreement is not less.
+    if start_s is not None and not speed_agreement(*speeds, start_s) < _LEAST_CORRELATION:
+        return start_s, f"{start_s:+.1f} s, as seconds of the GPS week"
+    shift, correlation = _by_speed(*speeds)
     if correlation >= _LEAST_CORRELATION:
         return shift, f"{shift:+.1f} s, by speeds (correlation {correlation:.2f})"
     expected = f"positions or speeds in common with {first.path.name}"

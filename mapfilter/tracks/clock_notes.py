@@ -5,17 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mapfilter.errors import listed
+from mapfilter.tracks.gps_dates import ERA_S, span_s
 from mapfilter.tracks.readers.recording import Recording
 
 _HOUR_S = 3600.0
 _APART_S = _HOUR_S
-_DAY_S, _WEEKS_S = 86_400.0, 1024 * 7 * 86_400
-
-
-def span_s(recording: Recording) -> tuple[float, float]:
-    """Return the first and the last time of a recording."""
-    times = [rows["time_s"] for rows in recording.tables.values() if "time_s" in rows]
-    return min(float(t.iloc[0]) for t in times), max(float(t.iloc[-1]) for t in times)
+_DAY_S = 86_400.0
 
 
 def zoneless_note(recordings: Sequence[Recording]) -> list[str]:
@@ -26,7 +21,7 @@ def zoneless_note(recordings: Sequence[Recording]) -> list[str]:
     same = ", taken for one zone" if len(names) > 1 else ""
     return [
         f"{listed(names)}: local times that state no zone{same}: UTC is unknown "
-        "(--zone Europe/Brussels, or +01:00, gives it)"
+        "(--zone gives it: that of your place, such as Europe/Brussels or +01:00)"
     ]
 
 
@@ -56,11 +51,11 @@ def week_fault(gap_s: float) -> str:
 
     Old receivers count weeks of GPS from 0 to 1023, and not how often.
     """
-    anew = round(gap_s / _WEEKS_S)
-    if not anew or abs(gap_s - anew * _WEEKS_S) >= _DAY_S:
+    anew = round(gap_s / ERA_S)
+    if not anew or abs(gap_s - anew * ERA_S) >= _DAY_S:
         return ""
-    seconds = anew * _WEEKS_S
-    return f"the date of a receiver whose week number began anew: --offset FILE={seconds}"
+    seconds = anew * ERA_S
+    return f"the date of a receiver whose week number began anew: --offset FILE={seconds:.0f}"
 
 
 def _hours_off(one: tuple[float, float], other: tuple[float, float]) -> bool:

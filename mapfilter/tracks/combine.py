@@ -15,6 +15,7 @@ from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.far_apart import check_far_apart
 from mapfilter.tracks.frame import Frame
+from mapfilter.tracks.gps_dates import later
 from mapfilter.tracks.journey_motion import OF_RECEIVER, journey_motion
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.mirrored import mirrored_notes
@@ -63,7 +64,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     check_far_apart(journey)
     alignment = align(journey, options.offsets_s)
     shifted = [
-        _shifted(recording, offset)
+        later(recording, offset)
         for recording, offset in zip(journey, alignment.offsets_s, strict=True)
     ]
     frame = Frame(shifted, options.crs, options.origin_deg)
@@ -98,11 +99,12 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     notes += mirrored
     by_receiver = moved.source == OF_RECEIVER
     others = [one for one in shifted if one.path not in options.truth]
+    truth = _truth(shifted, frame, options)
     tables = {
         "motion": moved.rows,
         "radio": _joined(shifted, "radio"),
-        "gnss": fixes_of(others, frame, None if by_receiver else moved.rows, notes),
-        "truth": _truth(shifted, frame, options),
+        "gnss": fixes_of(others, frame, None if by_receiver else moved.rows, notes, truth),
+        "truth": truth,
         "pseudoranges": _satellites(recordings, shifted, notes),
     }
     start_s = min(
@@ -142,16 +144,6 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         names = ", ".join(r.path.name for r in recordings)
         raise fail(InputError, names, "rows of a journey", "none")
     return Combined(log, sensors, alignment, tuple(notes))
-
-
-def _shifted(recording: Recording, offset_s: float) -> Recording:
-    if offset_s == 0.0:
-        return recording
-    tables = {
-        name: rows.assign(time_s=rows["time_s"] + offset_s) if "time_s" in rows else rows
-        for name, rows in recording.tables.items()
-    }
-    return replace(recording, tables=tables)
 
 
 def _joined(recordings: Sequence[Recording], table: str) -> pd.DataFrame | None:

@@ -311,5 +311,6 @@ def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
         else:
             count, kept = len(rows), rows.iloc[:0]
         log = replace(log, **{table: kept})
-        notes.append(f"{kind}: {count} left out")
+        if count:
+            notes.append(f"{kind}: {count} left out")
     return replace(log, notes=tuple(notes))

@@ -13,6 +13,7 @@ from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.position_units import RADIUS_68
 from mapfilter.tracks.readers.held_positions import rounding_m
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.stated_errors import stated_note
 
 PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
 """The best first."""
@@ -45,6 +46,7 @@ def fixes_of(
     frame: Frame,
     motion: pd.DataFrame | None,
     notes: list[str],
+    truth: pd.DataFrame | None = None,
 ) -> pd.DataFrame | None:
     """Return the positions of recordings as fixes of a log; None without any.
 
@@ -56,7 +58,9 @@ def fixes_of(
     motion : pandas.DataFrame or None
         Motion that is no receiver's, by which positions that a receiver holds are known.
     notes : list of str
-        Grows by what is left out.
+        Grows by what is left out, and by stated errors that are far too small.
+    truth : pandas.DataFrame, optional
+        time_s, east_m and north_m.
     """
     placed, rounded_m = [], {}
     for recording in recordings:
@@ -77,6 +81,7 @@ def fixes_of(
         rounded_m[id(recording)] = rounding_m(rows)
     if not placed:
         return None
+    notes += _stated_notes(placed, truth)
     kept, of_sources = of_one_receiver(placed)
     notes += of_sources
     parts = []
@@ -170,6 +175,21 @@ def without_held(
         "without satellites)"
     )
     return gnss[~dropped].reset_index(drop=True), note
+
+
+def _stated_notes(placed: Sequence[Placed], truth: pd.DataFrame | None) -> list[str]:
+    """Return notes on plain CSV whose positions state far smaller errors than others show."""
+    notes = []
+    for recording, fixes in placed:
+        if recording.format != "csv":
+            continue
+        others = [(one.path.name, rows) for one, rows in placed if one is not recording]
+        if truth is not None and len(truth):
+            others = [("the truth", truth), *others]
+        found = (stated_note(fixes, rows, name) for name, rows in others)
+        if note := next(filter(None, found), ""):
+            notes.append(f"{recording.path.name}: {note}")
+    return notes
 
 
 def _rank(recording: Recording) -> int:

@@ -7,3 +7,7 @@ METRES_PER_DEGREE = 111_195.0
 
 RADIUS_68 = 1.515
 """Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
+
+UERE_M = 4.0
+"""Radius of 68 % of the errors of a receiver's positions, for a dilution of precision (HDOP) of 1.
+"""

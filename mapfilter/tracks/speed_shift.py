@@ -60,6 +60,11 @@ applied, see --offset (likely: GPS time for UTC)'
     )
 
 
+def speed_agreement(one: Speeds | None, other: Speeds | None, shift_s: float) -> float:
+    """Return the correlation of speeds of which the second are shifted; NaN where nothing tells."""
+    return float("nan") if one is None or other is None else _correlation(one, other, shift_s)
+
+
 def speeds_of_places(time_s: Floats, east_m: Floats, north_m: Floats) -> Speeds:
     """Return speeds over five seconds, or a way from one position to the next if that lasts longer.
 

@@ -13,7 +13,15 @@ from mapfilter.check.findings import Findings
 from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, listed
-from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
+from mapfilter.geodesy import (
+    Lattice,
+    project,
+    projected_crs,
+    same_crs,
+    unproject,
+    utm_zone,
+    utm_zone_crs,
+)
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg
@@ -141,8 +149,9 @@ def _inside(east: Floats, north: Floats, lattice: Lattice) -> Bools:
 def _other_systems(box: BoxDeg) -> Iterator[str]:
     """Yield the UTM zones of a place and about it, and Web Mercator."""
     lon, lat = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
-    for zones in sorted(range(-_MOST_ZONES, _MOST_ZONES + 1), key=abs):
-        yield utm_crs((lon + 6 * zones + 180) % 360 - 180, lat)
+    zone = utm_zone(lon, lat)
+    for apart in sorted(range(-_MOST_ZONES, _MOST_ZONES + 1), key=abs):
+        yield utm_zone_crs((zone + apart - 1) % 60 + 1, lat)
     yield "EPSG:3857"
 
 

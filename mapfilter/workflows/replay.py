@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.kalman.siteless import without_cells
 from mapfilter.positioning.log_lacks import advice_of
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
@@ -67,6 +68,8 @@ from mapfilter.workflows.track_pictures import (
     drawn_beside,
     with_error_picture,
 )
+
+_SITES = "a cell plan (cells.plan) or a database (--db)"
 
 
 def run_replay(
@@ -128,7 +131,8 @@ def run_replay(
     several = journeys.paths if len(journeys.paths) > 1 else []
     for folder in (out, *(out / path.name for path in several)):
         check_figures_of_replay(folder)
-    if database is None and config.cells.plan is None:
+    has_sites = database is not None or config.cells.plan is not None
+    if not has_sites:
         journeys.check_siteless()
     journeys.check(None if database is None else database.lattice)
     if database is not None:
@@ -141,7 +145,7 @@ def run_replay(
         opened = journeys.open(path)
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
-        log = with_range_notes(log, sites(crs))
+        log = with_range_notes(log, sites(crs)) if has_sites else without_cells(log, _SITES)
         fitted, notes = fitted_to_log(options, log)
         notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))
         if database is not None and by_streets_alone(fitted, log, database):

@@ -10,16 +10,17 @@ from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.geodesy import Lattice
+from mapfilter.positioning.kalman.siteless import needs_sites
 from mapfilter.tracks.log import leave_out
+from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
-from mapfilter.tracks.refused_motion import refused_faults
+from mapfilter.tracks.refused_motion import AS_HEADING, note_refused
 from mapfilter.tracks.schema import TABLES
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_lacks import check_log
 
 _MOST_KEPT_ROWS = 1_000_000
-_AS_HEADING = "heading_rad as π/2 minus the azimuth in radians"
 _MOVED = {"motion", "odometry", "poses", "steps", "accelerometer"}
 """Tables of recordings of which motion is made."""
 
@@ -76,29 +77,25 @@ class ReplayLogs:
         faults.raise_if_any(InputError)
 
     def _check_motion(self, path: Path, opened: OpenedLog, faults: Faults) -> None:
-        """Note columns of motion that the log's fixes prove to be of another unit or sense.
+        """Note columns of motion that the log's fixes prove to be of another unit or sense."""
 
-        Dead reckoning by them would claim wrong positions where the positions end.
-        """
-        found = refused_faults(opened.log, self.config.track.factors.given)
-        moved = [one.path for one in opened.recordings if _MOVED & set(one.tables)] or [path]
-        for column, fault in found.items():
-            where = f"{', '.join(map(str, moved))}, motion, {column}"
-            other = f"; or {fault.otherwise}" if fault.otherwise else ""
-            mends = f"{fault.option} mends it"
+        def mends(fault: MotionFault) -> tuple[str, str]:
+            mended = f"{fault.option} mends it"
             if fault.remedy and not opened.recordings:
                 # A column of a recording is none of the log that was made of it.
-                mends = f"convert the recording again with {fault.option}, or write {_AS_HEADING}"
-            hint = f"{mends}; --factor {column}=1 takes it as it is{other}"
-            faults.add(where, fault.expected, fault.found, hint)
+                mended = f"convert the recording again with {fault.option}, or write {AS_HEADING}"
+            return mended, f"--factor {fault.column}=1"
+
+        moved = [one.path for one in opened.recordings if _MOVED & set(one.tables)] or [path]
+        given = self.config.track.factors.given
+        note_refused(opened.log, given, ", ".join(map(str, moved)), mends, faults)
 
     def check_siteless(self) -> None:
-        """Refuse logs of which a filter without a map would need sites."""
+        """Refuse logs that a filter without a map can only locate by the sites of their cells."""
         for path in self.paths:
-            log = leave_out(self.open(path).log, self.config.track.without)
-            if len(log.radio) or len(log.tdoa):
+            if needs_sites(leave_out(self.open(path).log, self.config.track.without)):
                 hint = (
-                    "filters without a map take the sites from there, or from a database (--db); "
-                    "--without radio,tdoa leaves positions and dead reckoning"
+                    f"{shown(path.name)} has no positions to start from, and filters without a map "
+                    "take the sites of its cells from there, or from a database (--db)"
                 )
                 raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)

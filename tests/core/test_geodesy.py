@@ -145,6 +145,44 @@ def test_utm_zones_at_the_seams(lon, lat, zone):
 
 
 @pytest.mark.parametrize(
+    ("lon", "lat", "code"),
+    [
+        # Cork, Dublin, Brussels, Nairobi, Cape Town, Ushuaia, Sydney, Tokyo, Honolulu.
+        (-8.47, 51.90, 32629), (-6.26, 53.35, 32629), (4.35, 50.85, 32631), (36.8, -1.29, 32737),
+        (18.4, -33.9, 32734), (-68.3, -54.8, 32719), (151.2, -33.9, 32756), (139.7, 35.7, 32654),
+        (-157.9, 21.3, 32604),
+        # Bergen and Oslo, and the edges of 32V.
+        (5.32, 60.39, 32632), (10.75, 59.91, 32632), (2.99, 60.0, 32631), (3.0, 56.0, 32632),
+        (4.0, 55.99, 32631), (4.0, 64.0, 32631), (12.0, 60.0, 32633),
+        # Svalbard, of whose zones three are missing.
+        (8.99, 78.0, 32631), (9.0, 78.0, 32633), (15.63, 78.22, 32633), (21.0, 80.0, 32635),
+        (33.0, 80.0, 32637), (41.99, 80.0, 32637), (42.0, 80.0, 32638), (-0.01, 80.0, 32630),
+        (15.0, 71.99, 32633), (8.0, 71.99, 32632),
+        # Beyond its latitudes UPS takes the place of UTM.
+        (10.0, 84.0, 32633), (10.0, 84.01, 5041), (0.0, 90.0, 5041), (10.0, -80.0, 32732),
+        (10.0, -80.01, 5042), (0.0, -90.0, 5042),
+    ],
+)  # fmt: skip
+def test_places_of_the_world_have_their_zone(lon, lat, code):
+    assert utm_crs(lon, lat) == f"EPSG:{code}"
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_about_the_poles_a_metre_is_one(sign):
+    """By the sphere: 100 m along the meridian, and as far along the parallel, within 1 %."""
+    lon, lat = 30.0, 86.0 * sign
+    crs = projected_crs(utm_crs(lon, lat))
+    step_deg = 100 / 111_195
+    wide_deg = step_deg / np.cos(np.radians(lat))
+    east, north = project(crs, [lon, lon, lon + wide_deg], [lat, lat + step_deg, lat])
+    moved = (east[1:] - east[0]) + 1j * (north[1:] - north[0])
+    assert np.abs(moved) == pytest.approx([100, 100], rel=0.01)
+    # North is left of grid north by the convergence, and east right of north.
+    to_north_rad = np.pi / 2 + grid_convergence_rad(crs, lon, lat)
+    assert np.angle(moved) == pytest.approx([to_north_rad, to_north_rad - np.pi / 2], abs=1e-3)
+
+
+@pytest.mark.parametrize(
     "spec",
     ["EPSG:32629", "epsg:32629", 32629, "+proj=utm +zone=29 +datum=WGS84 +units=m +type=crs"],
 )

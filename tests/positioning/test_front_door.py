@@ -103,6 +103,18 @@ def test_a_filter_without_a_map_may_have_sites_of_its_own(database):
         assert note == "nothing is located: no positions and no radio to start from"
 
 
+def test_cells_without_sites_are_left_out_where_there_are_fixes():
+    walk = walk_log()
+    fixes = walk.truth[["time_s", "east_m", "north_m"]]
+    placed = mf.make_log(walk.crs, motion=walk.motion, radio=walk.radio, gnss=fixes)
+    found = mf.locate(placed, filter="ekf")
+    (note,) = found.log.notes
+    assert note.startswith(f"{len(walk.radio)} rows of cells (radio) left out: ")
+    assert "KalmanFilter().over_sites(plan)" in note
+    bare = mf.locate(mf.make_log(walk.crs, motion=walk.motion, gnss=fixes), filter="ekf")
+    pd.testing.assert_frame_equal(bare.to_dataframe(), found.to_dataframe())
+
+
 @pytest.mark.parametrize("filter_", [mf.CandidateFilter(), "candidate"], ids=str)
 def test_a_filter_is_given_by_options_or_name(filter_, database, track):
     found = mf.locate(walk_log(), database, filter_)

@@ -125,7 +125,7 @@ def test_exchanged_arguments_are_named_with_their_order(world, order, call):
         ("for the filter bayes, found None (likely: left out; ekf,", lambda w: mf.locate(w["log"])),
         ("for the filter own, found None", lambda w: mf.locate(w["log"], filter=own)),
         (
-            "for the radio of the log, found None (likely: KalmanFilter().over_sites(plan)",
+            "for the radio of the log, found None (likely: a log without positions; ",
             lambda w: mf.locate(w["log"], None, mf.KalmanFilter()),
         ),
         ("locate_reports, log: expected", lambda w: mf.locate_reports(3, w["database"])),

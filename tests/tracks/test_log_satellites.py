@@ -211,3 +211,4 @@ def test_kinds_are_left_out_one_by_one():
         "gnss: 1 left out",
         "pseudoranges: 3 left out",
     )
+    assert leave_out(make_log(CRS, gnss=fix), ["tdoa", "ta", "radio"]).notes == ()

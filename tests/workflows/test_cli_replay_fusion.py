@@ -193,8 +193,29 @@ def test_replay_needs_a_plan_and_no_map(tmp_path):
     assert {"track.png", "error.png"} == {file.name for file in (tmp_path / "out").glob("*.png")}
     done = CliRunner().invoke(app, [*words, *plan, "--smooth"], catch_exceptions=False)
     assert json.loads(done.stdout.splitlines()[-1])["error_mean_m"] < told["error_mean_m"]
-    with pytest.raises(ConfigError, match=r"cells\.plan"):
-        CliRunner().invoke(app, words, catch_exceptions=False)
+
+
+def test_fixes_and_steps_are_replayed_without_the_sites_of_the_cells(tmp_path):
+    log, _ = walk(motion=True, gnss=True)
+    write_log(log, tmp_path / "walk")
+    words = ["replay", "--filter", "ekf", "--log", str(tmp_path / "walk"), "--json"]
+    told, radio = {}, len(log.radio)
+    for name, more in (("all", []), ("less", ["--without", "radio,tdoa"])):
+        given = [*words, *more, "--out", str(tmp_path / name)]
+        done = CliRunner().invoke(app, given, catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        told[name] = json.loads(done.stdout.splitlines()[-1])
+    note = f"{radio} rows of cells (radio) left out: their sites are unknown without a cell plan"
+    assert [one for one in told["all"]["notes"] if "left out" in one] == [
+        f"{note} (cells.plan) or a database (--db)"
+    ]
+    assert [one for one in told["less"]["notes"] if "left out" in one] == [
+        f"radio: {radio} left out"
+    ]
+    assert told["all"]["error_mean_m"] == told["less"]["error_mean_m"]
+    # Nothing is left to start from.
+    with pytest.raises(ConfigError, match=r"cells\.plan.*'walk' has no positions"):
+        CliRunner().invoke(app, [*words, "--without", "gnss"], catch_exceptions=False)
 
 
 @pytest.mark.parametrize("table", ["gnss", "motion"])

@@ -200,7 +200,7 @@ def test_without_a_database_the_remedies_are_named(recordings, tmp_path, monkeyp
     given = ("replay", "--log", recordings, "--out", tmp_path / "out")
     told = "database.path: expected a radio-route database, found none, and nothing at"
     assert_refused(mapfilter(*given), told, "--roads-only", "mapfilter locate", "--filter ekf")
-    assert_refused(mapfilter(*given, "--filter", "ekf"), "cells.plan", "--without radio,tdoa")
+    assert_refused(mapfilter(*given, "--filter", "ekf"), "cells.plan", "has no positions", "--db")
 
 
 def test_pseudoranges_that_no_filter_without_a_map_uses_are_said_to_be(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from command_line import assert_done, assert_refused, mapfilter
 
 import mapfilter as mf
-from mapfilter.errors import ConfigError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.positioning.estimate_store import read_estimate
 
 COUNT, JAMMED = 500, 320
@@ -61,6 +61,41 @@ def test_turns_the_other_way_round_are_refused_and_mended(drive, replay, tmp_pat
     taken = assert_done(replay(wrong, "--factor", "turn_rad=1")).json
     assert any("turns run clockwise" in note for note in taken["notes"])
     assert len(read_estimate(tmp_path / "out" / "estimate.parquet")) == COUNT
+
+
+def test_the_front_door_refuses_what_replay_does(drive, replay, tmp_path):
+    wrong = drive.assign(yaw_rate_radps=-drive["yaw_rate_radps"])
+    outcome = replay(wrong)
+    told = "turns run clockwise by the course of the positions (likely: {}"
+    assert_refused(outcome, told.format("--factor turn_rad=-1 mends it; --factor turn_rad=1"))
+    names = [tmp_path / "fixes.csv", tmp_path / "odometry.csv"]
+    log = mf.read_log(names, truth=tmp_path / "truth.csv")
+    mf.write_log(log, tmp_path / "log")
+    cause = told.format('factors={"turn_rad": -1} mends it; factors={"turn_rad": 1} takes it as')
+    for given, where in ((log, "log"), (tmp_path / "log", str(tmp_path / "log"))):
+        with pytest.raises(InputError) as refused:
+            mf.locate(given, filter="ekf")
+        assert str(refused.value).startswith(f"{where}, motion, turn_rad: expected radians")
+        assert cause in str(refused.value)
+        mended = mf.locate(given, filter="ekf", factors={"turn_rad": -1})
+        assert mf.score(mended, log.truth).error_95_m < 20
+        kept = mf.locate(given, filter="ekf", factors={"turn_rad": 1})
+        assert mf.score(kept, log.truth).error_95_m > 100
+    with pytest.raises(ConfigError, match="expected one of heading_rad"):
+        mf.locate(log, filter="ekf", factors={"turn": -1})
+    with pytest.raises(ConfigError, match="locate, factors"):
+        mf.locate(log, filter="ekf", factors=-1)
+
+
+def test_the_front_door_names_the_column_of_compass_degrees(drive, replay, tmp_path):
+    heading = np.cumsum(drive["yaw_rate_radps"])
+    replay(drive[["time"]].assign(step_m=10.0, heading_rad=np.pi / 2 - heading))
+    names = [tmp_path / "fixes.csv", tmp_path / "odometry.csv"]
+    with pytest.raises(InputError, match="headings run clockwise") as refused:
+        mf.locate(mf.read_log(names), filter="ekf")
+    assert 'columns={"compass_deg": "COLUMN"}) of the recording mends it' in str(refused.value)
+    mended = mf.read_log(names, columns={"compass_deg": "heading_rad"})
+    assert len(mf.locate(mended, filter="ekf")) == COUNT
 
 
 def test_steps_in_another_unit_are_refused_and_mended(drive, replay):

@@ -22,12 +22,13 @@ _UNIT_WORDS = {
 FIELDS: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
-        *("measured_at", "recorded_at"),
+        *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
     ),
     "lat_deg": ("lat_deg", "lat", "latitude"),
     "lon_deg": ("lon_deg", "lon", "lng", "long", "longitude"),
     "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
     "accuracy_m": ("accuracy_m", "accuracy"),
+    "hdop": ("hdop",),
     "speed_mps": ("speed_mps",),
     "speed_kmh": ("speed_kmh",),
     "course_deg": ("course_deg", "bearing", "course"),

@@ -19,6 +19,12 @@ from mapfilter.tracks.readers.identities import available
 from mapfilter.tracks.readers.recording import Reading
 
 DATE = "date"
+_AZIMUTHS = ("azimuth", "compass", "compass_azimuth")
+_DIRECTIONS = (
+    *("compass_deg", "heading_rad", "turn_rad", "turn_deg"),
+    *("yaw_rate_radps", "yaw_rate_degps"),
+)
+_CELLS = ("cell", "cgi", "ci", "level_dbm", "bars")
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 
 
@@ -146,7 +152,29 @@ def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Map
         hint = "--column time=COLUMN"
         faults.add(where, "a column of times", present, hint)
     faults.raise_if_any(InputError)
-    return mapped
+    return _with_azimuths(mapped, reading)
+
+
+def _with_azimuths(mapped: Mapped, reading: Reading) -> Mapped:
+    """Return columns with azimuths without a unit as those of a compass, where they are degrees.
+
+    Beside steps without another direction they tell which way these went; an azimuth is clockwise
+    from north by its meaning, as a heading need not be. Beside cells it may be that of an antenna.
+    """
+    name = mapped.rows.find(*_AZIMUTHS)
+    walked = mapped.has("steps") or mapped.has("step_m")
+    others = any(mapped.has(field) for field in (*_DIRECTIONS, *_CELLS))
+    if name is None or not walked or others or mapped.rows.names.count(name) > 1:
+        return mapped
+    if name in {column.lower() for column in mapped.own.values()}:
+        return mapped
+    azimuth = mapped.rows.number(name)
+    known = azimuth[np.isfinite(azimuth)]
+    in_degrees = known.size and known.min() >= -180 and 2 * np.pi < known.max() <= 360
+    if not (in_degrees or reading.columns.get("compass_deg") == name):
+        return mapped
+    reading.note(f"{name}: taken for degrees clockwise from north, by its values")
+    return replace(mapped, stated={**mapped.stated, "compass_deg": name})
 
 
 def with_dates(mapped: Mapped) -> Mapped:

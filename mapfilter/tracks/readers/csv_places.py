@@ -9,7 +9,9 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
+from mapfilter.tracks.position_units import UERE_M
 from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.csv_odometry import speeds_of
 from mapfilter.tracks.readers.recording import Reading
@@ -21,6 +23,11 @@ _NAMED = re.compile(
 )
 _FAR_DEG = 1.0
 """Farther from the equator and the meridian of Greenwich, none crosses them to the next row."""
+_SATELLITES = re.compile(
+    r"(?:gps[ _]?)?(?:num(?:ber)?[ _]?(?:of[ _]?)?|n)?[ _]?(?:sats?|satellites?|svs?)"
+    r"(?:[ _]?(?:used|count|in[ _]use|in[ _]fix|num|number))?"
+)
+_FEWEST_HDOP, _HDOP, _EXACT = 20, (0.4, 2.0), 1e-6
 _FEWEST_WEST = 3
 """So many different negative courses are no mark of missing ones."""
 
@@ -66,10 +73,36 @@ def add_places(
     columns = {name: mapped.number(name) for name in names}
     for field, column in hemispheres.items():
         columns[field] = _signed(mapped, reading, columns[field], field, column)
+    if mapped.has("accuracy_m"):
+        _note_hdop(mapped, reading, columns["accuracy_m"])
+    elif mapped.has("hdop"):
+        columns["accuracy_m"] = UERE_M * mapped.number("hdop")
     columns["course_deg"] = _within_turn(columns["course_deg"])
     there = np.isfinite(columns["lat_deg"]) | np.isfinite(columns["lon_deg"])
     columns |= {"time_s": time_s, "speed_mps": speeds_of(mapped, "speed")}
     add_rows(reading, "positions", columns, mapped.rows, there)
+
+
+def _note_hdop(mapped: Mapped, reading: Reading, accuracy: Floats) -> None:
+    """Note accuracies without a unit that look like a dilution of precision (HDOP).
+
+    Of a receiver that counts its satellites, many programs write HDOP: tenths, of which some are
+    below 1. Phones state metres, and hardly ever less than 1.
+    """
+    column = mapped.rows.find(*mapped.names("accuracy_m"))
+    known = accuracy[np.isfinite(accuracy) & (accuracy > 0)]
+    if column != "accuracy" or "accuracy_m" in mapped.own or known.size < _FEWEST_HDOP:
+        return
+    low, middle = float(known.min()), float(np.median(known))
+    tenths = np.abs(10 * known - np.round(10 * known)) < _EXACT
+    counted = any(_SATELLITES.fullmatch(name) for name in mapped.rows.names)
+    if not (counted and tenths.all() and _HDOP[0] <= low < 1 and middle <= _HDOP[1]):
+        return
+    if np.unique(known).size > 2:
+        reading.note(
+            "accuracy: tenths, some below 1, beside a number of satellites, as HDOP has them: taken"
+            f" for metres; {column_option('hdop', column)} reads HDOP"
+        )
 
 
 def _signed(mapped: Mapped, reading: Reading, degrees: Floats, field: str, column: str) -> Floats:

@@ -12,6 +12,7 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
+from mapfilter.tracks.readers.csv_weeks import over_weeks, week_column, weeks_of
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.times import (
@@ -20,6 +21,7 @@ from mapfilter.tracks.readers.times import (
     unix_seconds,
     utc_from_gps_s,
     utc_from_local_s,
+    utc_from_week_s,
     without_midnights,
 )
 
@@ -45,8 +47,12 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
         if _is_days(known):
             reading.note("time: days since 1900, as a spreadsheet writes them")
             return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)
+        if week := week_column(mapped):
+            reading.clock = Clock("gps")
+            reading.note(f"time: seconds of the GPS week in column {week}")
+            return utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
         reading.clock = Clock("monotonic")
-        return number
+        return over_weeks(reading, number)
     reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
     names = mapped.names("time")
     # A zone that is given is that of the local times of all files.

@@ -10,7 +10,7 @@ from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.readers.csv_odometry import has_odometry, has_unused_odometry
 from mapfilter.tracks.readers.csv_speed_units import speed_unit
 
-_OF_PLACES = ("altitude_m", "accuracy_m", "course_deg", "speed_mps", "speed_kmh")
+_OF_PLACES = ("altitude_m", "accuracy_m", "hdop", "course_deg", "speed_mps", "speed_kmh")
 _OF_ODOMETRY = ("speed_mps", "speed_kmh", "yaw_rate_radps", "yaw_rate_degps")
 _OF_WHEELS = {"speed_mps": "wheel_speed_mps", "speed_kmh": "wheel_speed_kmh"}
 _OF_STEPS = ("compass_deg", "turn_rad", "turn_deg")

@@ -15,13 +15,13 @@ import pyarrow.compute as pc
 
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail
+from mapfilter.tracks.position_units import UERE_M
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 
 _POINTS = ("trkpt", "wpt", "rtept")
-_UERE_M = 4.0
 _PART_BYTES = 1 << 22
 _AFTER_NAME = np.frombuffer(b" \t\n\r>/", dtype=np.uint8)
 # As most programs write a point: first its place, then height and time.
@@ -73,7 +73,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
             "altitude_m": rows.number("ele"),
             "speed_mps": rows.number("speed"),
             "course_deg": rows.number("course"),
-            "accuracy_m": _UERE_M * rows.number("hdop"),
+            "accuracy_m": UERE_M * rows.number("hdop"),
         }
         reading.rows += len(lines)
         reading.add("positions", columns, lines)

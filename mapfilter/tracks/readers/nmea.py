@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.tracks.position_units import RADIUS_68
+from mapfilter.tracks.position_units import RADIUS_68, UERE_M
 from mapfilter.tracks.readers.columns import Columns, line_columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
@@ -30,7 +30,6 @@ _KINDS = {
 }
 _FIELDS = 20
 _KNOT_MPS = 1852.0 / 3600.0
-_UERE_M = 4.0
 _DAY_S = 86_400.0
 _LINE_FEED = 10
 _DIGITS = np.array([int(c, 16) if (c := chr(i)) in hexdigits else -1 for i in range(256)])
@@ -248,7 +247,7 @@ def _gga(rows: Columns, dates: pd.DataFrame, reading: Reading) -> pd.DataFrame:
         "lat_deg": _degrees(rows, "lat", "ns", "S"),
         "lon_deg": _degrees(rows, "lon", "ew", "W"),
         "altitude_m": rows.number("altitude"),
-        "accuracy_m": _UERE_M * rows.number("hdop"),
+        "accuracy_m": UERE_M * rows.number("hdop"),
         "valid": ~np.isin(quality, ("", "0")) & ~computed,
     }
     return pd.DataFrame(columns)

@@ -21,6 +21,7 @@ from mapfilter.tracks.readers.csv_odometry import add_odometry
 from mapfilter.tracks.readers.csv_places import add_places, hemisphere_columns
 from mapfilter.tracks.readers.csv_times import times_of
 from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
+from mapfilter.tracks.readers.csv_weeks import week_column
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading
 from mapfilter.tracks.readers.text import Text
@@ -51,7 +52,9 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     mapped = with_dates(mapped_columns(rows, reading, options))
     rows = mapped.rows
     hemispheres = hemisphere_columns(rows, mapped.taken)
-    mapped = replace(mapped, beside=(*mapped.beside, *hemispheres.values()))
+    week = week_column(mapped)
+    beside = (*mapped.beside, *hemispheres.values(), *([week] if week else []))
+    mapped = replace(mapped, beside=beside)
     _note_repeated(mapped, reading)
     reading.named = tuple(mapped.own)
     reading.tallies.columns |= {

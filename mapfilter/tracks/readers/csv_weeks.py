@@ -1,0 +1,62 @@
+"""Seconds of the GPS week in a plain CSV: beside a column of weeks, and over the end of a week."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.gnss.almanacs import WEEK_S
+from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.csv_mapped import Mapped
+from mapfilter.tracks.readers.recording import Reading
+
+_NAMES = ("gps_week", "gpsweek", "gps week", "week_number", "week", "wn")
+_TURN, _LATEST = 1024, 4096
+"""Weeks of files may be counted modulo 1024; those of a year are fewer than 54."""
+_WEEKS_OF_YEAR = 54
+_NEAR_END_S = 3600.0
+
+
+def week_column(mapped: Mapped) -> str:
+    """Return the column of GPS weeks beside seconds of the week; "" without one."""
+    name = mapped.rows.find(*_NAMES)
+    if name is None or name in mapped.taken or not len(mapped.rows):
+        return ""
+    week, second = mapped.rows.number(name), mapped.number("time")
+    known = week[np.isfinite(week)]
+    seconds = second[np.isfinite(second)]
+    if not known.size or not seconds.size or (known != np.round(known)).any():
+        return ""
+    in_week = seconds.min() >= 0 and seconds.max() <= WEEK_S
+    of_gps = known.min() >= (0 if "gps" in name else _WEEKS_OF_YEAR) and known.max() < _LATEST
+    return name if in_week and of_gps else ""
+
+
+def weeks_of(rows: Columns, name: str, reading: Reading) -> Floats:
+    """Return GPS weeks, counted on; those below 1024 are of the last count, since April 2019."""
+    week = rows.number(name)
+    if np.nanmax(week) < _TURN:
+        reading.note(f"{name}: weeks counted modulo 1024, taken for those since 2019-04-07")
+        return np.asarray(week + 2 * _TURN)
+    return week
+
+
+def over_weeks(reading: Reading, second: Floats) -> Floats:
+    """Return seconds of the GPS week that go on where the week begins anew."""
+    known = np.isfinite(second)
+    before_s = [reading.last_s] if np.isfinite(reading.last_s) else []
+    seconds = np.concatenate([before_s, second[known]])
+    if not seconds.size or second[known].min() < 0 or second[known].max() > WEEK_S:
+        return second
+    back = np.flatnonzero(np.diff(seconds) < -WEEK_S / 2)
+    if not back.size:
+        return second
+    # Those of a part that was read before may have gone on already.
+    goes_on = bool(before_s) and before_s[0] > WEEK_S
+    left_s, begun_s = WEEK_S - seconds[back], seconds[back + 1]
+    if not goes_on and max(left_s.max(), begun_s.max()) > _NEAR_END_S:
+        return second
+    counted = second.copy()
+    counted[known] = np.unwrap(seconds, period=WEEK_S)[len(before_s) :]
+    reading.note("time: seconds of the GPS week begin anew: times go on")
+    return counted

@@ -1,0 +1,145 @@
+"""Dates of GPS that were misread: weeks counted anew, seconds since 1980, seconds of the week."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.formats import read_recording
+
+COUNT = 600
+UTC_S = datetime(2026, 5, 1, 10, tzinfo=UTC).timestamp()
+LEAPS_S = 18
+SINCE_1980_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp() - LEAPS_S
+"""Unix time less seconds of GPS, in 2026."""
+WEEK_S, ERA_S = 604_800, 1024 * 604_800
+ELAPSED_S = np.arange(float(COUNT))
+WAY = {"lat": 60 + ELAPSED_S / 1e4, "lon": 25.0 + (ELAPSED_S % 60) / 1e5}
+
+
+def written(path, time_s, **columns):
+    pd.DataFrame({"time": time_s, **columns}).to_csv(path, index=False)
+    return path
+
+
+def cells(path, time_s=UTC_S, **more):
+    identity = {"mcc": 244, "mnc": 5, "lac": 7, "ci": 1234, "rsrp": -90}
+    return written(path, time_s + ELAPSED_S[::10], **identity, **more)
+
+
+def gnss_begins_at(log):
+    return log.start_utc_s + float(log.gnss["time_s"].iloc[0])
+
+
+@pytest.mark.parametrize("first", ["fixes", "cells"])
+@pytest.mark.parametrize(
+    ("early_s", "cause"),
+    [
+        (ERA_S, "the date of a receiver whose week number began anew"),
+        (SINCE_1980_S, "seconds of GPS time since 1980"),
+    ],
+)
+def test_dates_that_are_early_are_those_of_the_other_files(tmp_path, early_s, cause, first):
+    fixes = written(tmp_path / "fixes.csv", UTC_S - early_s + ELAPSED_S, **WAY)
+    files = [fixes, cells(tmp_path / "cells.csv")]
+    log = mf.read_log(files if first == "fixes" else files[::-1])
+    assert gnss_begins_at(log) == UTC_S
+    assert f"fixes.csv: +{early_s:.0f} s, by the other files: {cause}" in log.notes
+    assert log.start_utc_s + log.radio["time_s"].iloc[0] == UTC_S
+
+
+def test_recordings_of_other_years_are_left_where_they_are(tmp_path):
+    """Two days beside the mistakes, and where another file has the early date, too."""
+    fixes = written(tmp_path / "fixes.csv", UTC_S - ERA_S - 2 * 86_400 + ELAPSED_S, **WAY)
+    with pytest.raises(mf.MapfilterError, match="tables that overlap in time"):
+        mf.read_log([fixes, cells(tmp_path / "cells.csv")])
+    written(fixes, UTC_S - ERA_S + ELAPSED_S, **WAY)
+    log = mf.read_log([fixes, cells(tmp_path / "early.csv", UTC_S - ERA_S)])
+    assert gnss_begins_at(log) == UTC_S - ERA_S
+
+
+def test_the_name_of_a_file_contradicts_its_dates(tmp_path):
+    for early_s, days in ((ERA_S, "2006-09-15"), (SINCE_1980_S, "2016-04-26")):
+        path = written(tmp_path / "drive_2026-05-01.csv", UTC_S - early_s + ELAPSED_S, **WAY)
+        (note,) = mf.read_log(path).notes
+        assert f"times are of {days}, but 2026-05-01 by its name" in note
+        assert f"--offset {path.name}={early_s:.0f} for 2026-05-01)" in note
+    assert mf.read_log(written(path, UTC_S + ELAPSED_S, **WAY)).notes == ()
+    # Another day is no mistake of GPS.
+    other = written(tmp_path / "drive_20250501.csv", UTC_S - ERA_S + ELAPSED_S, **WAY)
+    assert mf.read_log(other).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("technology", "time_s", "offsets"),
+    [
+        ("LTE", UTC_S - ERA_S, [f"{ERA_S} for 2026-05-01", "315964783 for 2016-09-19"]),
+        ("NR", UTC_S - SINCE_1980_S, [f"{ERA_S} for 2035-12-1", "315964782 for 2026-05-01"]),
+        ("NR", UTC_S, []),
+        ("GSM", UTC_S - ERA_S, []),
+    ],
+)
+def test_no_phone_used_a_network_before_it_was_opened(tmp_path, technology, time_s, offsets):
+    path = cells(tmp_path / "cells.csv", time_s, technology=technology, lat=60.0, lon=25.0)
+    notes = [note for note in mf.read_log(path).notes if "times are of" in note]
+    assert len(notes) == bool(offsets)
+    for offset in offsets:
+        assert f"--offset cells.csv={offset}" in notes[0]
+
+
+def test_seconds_of_the_week_get_the_week_of_the_other_file(tmp_path):
+    """Also over the end of a week, where they begin anew."""
+    elapsed_s = (UTC_S - SINCE_1980_S) % WEEK_S
+    for begin_s in (UTC_S, UTC_S + WEEK_S - elapsed_s - COUNT / 2):
+        tow_s = (begin_s - SINCE_1980_S + ELAPSED_S) % WEEK_S
+        fixes = written(tmp_path / "fixes.csv", tow_s, **WAY)
+        log = mf.read_log([fixes, cells(tmp_path / "cells.csv", begin_s)])
+        assert gnss_begins_at(log) == begin_s
+        assert np.ptp(log.gnss["time_s"]) == COUNT - 1
+        assert any("as seconds of the GPS week" in note for note in log.notes)
+        anew = any("of the GPS week begin anew" in note for note in log.notes)
+        assert anew == (begin_s != UTC_S)
+
+
+def test_elapsed_seconds_are_none_of_a_week(tmp_path):
+    fixes = written(tmp_path / "fixes.csv", ELAPSED_S, **WAY)
+    sunday_s = UTC_S - (UTC_S - SINCE_1980_S) % WEEK_S
+    with pytest.raises(mf.MapfilterError, match="expected positions or speeds in common"):
+        mf.read_log([fixes, cells(tmp_path / "cells.csv", sunday_s)])
+
+
+@pytest.mark.parametrize(
+    ("name", "counted", "told"),
+    [
+        ("week", 0, ""),
+        ("gps_week", 0, ""),
+        ("gps_week", 2048, "gps_week: weeks counted modulo 1024, taken for those since 2019-04-07"),
+    ],
+)
+def test_a_column_of_weeks_dates_seconds_of_the_week(tmp_path, name, counted, told):
+    of_gps_s = UTC_S - SINCE_1980_S + ELAPSED_S
+    week = (of_gps_s // WEEK_S).astype(int) - counted
+    path = tmp_path / "fixes.csv"
+    pd.DataFrame({name: week, "tow": of_gps_s % WEEK_S, **WAY}).to_csv(path, index=False)
+    recording = read_recording(path)
+    assert recording.clock.kind == "gps"
+    assert recording.tables["positions"]["time_s"].tolist() == (UTC_S + ELAPSED_S).tolist()
+    notes = [f"time: seconds of the GPS week in column {name}", *([told] if told else [])]
+    assert list(recording.notes) == notes
+
+
+def test_weeks_of_a_year_are_none_of_gps(tmp_path):
+    path = written(tmp_path / "fixes.csv", ELAPSED_S, week=18, **WAY)
+    assert read_recording(path).clock.kind == "monotonic"
+
+
+def test_weeks_begin_anew_between_parts_of_a_file(tmp_path, monkeypatch):
+    """A large file is read by parts, of which the later ones go on."""
+    monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", 1 << 12)
+    tow_s = (WEEK_S - 100 + ELAPSED_S) % WEEK_S
+    path = written(tmp_path / "fixes.csv", tow_s, **WAY)
+    rows = read_recording(path, options=ReadOptions()).tables["positions"]
+    assert rows["time_s"].tolist() == (WEEK_S - 100 + ELAPSED_S).tolist()

@@ -1,0 +1,28 @@
+"""Sites in the zone of UTM that its rule without exceptions gives to western Norway."""
+
+import numpy as np
+
+from mapfilter.check.findings import Findings
+from mapfilter.geodesy import Lattice, project, utm_crs
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.workflows.check_places import check_sites
+
+BERGEN = 5.32, 60.39
+
+
+def test_sites_in_zone_31_are_found_about_bergen():
+    crs = utm_crs(*BERGEN)
+    east, north = (float(value) for value in project(crs, *BERGEN))
+    lattice = Lattice(crs, east - 2000, north + 2000, 10.0, 400, 400)
+    lon, lat = BERGEN[0] + np.arange(4) / 200, BERGEN[1] + np.arange(4) / 400
+    places = zip(*project("EPSG:32631", lon, lat), strict=True)
+    cells = [
+        Cell(id=f"C{at}", site=f"S{at}", east_m=float(x), north_m=float(y), height_m=30.0,
+             azimuth_deg=0.0, eirp_dbm=50.0, frequency_mhz=1800.0)
+        for at, (x, y) in enumerate(places)
+    ]  # fmt: skip
+    findings = Findings()
+    check_sites(CellPlan(crs, tuple(cells)), lattice, "cells.csv", findings)
+    (found,) = findings.found
+    assert found.code == "crs-mixed"
+    assert "With their numbers read as EPSG:32631, 4 of them lie inside" in found.evidence
