@@ -125,11 +125,15 @@ def compile_gaussian() -> None:
     from mapfilter.filters._updates import kernel_of, run_lanes_kernel
     from mapfilter.filters.gaussian import METHODS
     from mapfilter.models.terms import measure_kernel
+    from mapfilter.positioning.gaussian_tail import GaussianTail
+    from mapfilter.positioning.kalman.place import gaussian_radii_m
 
     for kernel in (measure_kernel, run_lanes_kernel, weigh_kernel):
         kernel()
     for method in METHODS.values():
         kernel_of(method)
+    radii_m, _ = gaussian_radii_m(np.eye(2), 1.0)
+    protected_m(GaussianTail(np.ones(1), np.zeros((1, 2)), np.eye(2)[None]), radii_m)
 
 
 def compile_all() -> None:

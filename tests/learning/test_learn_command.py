@@ -1,6 +1,7 @@
 """``mapfilter learn`` and ``check --logs`` from end to end, and what they refuse."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,7 +26,7 @@ from mapfilter.workflows import learn_study
 from mapfilter.workflows.check_suspects import run_check_suspects
 from mapfilter.workflows.learn import run_learn
 
-JOURNEYS = 5
+JOURNEYS, FEW_JOURNEYS = 5, 3
 FEW = ["filter.bayes.max_particles=3000", "filter.bayes.min_search_particles=3000"]
 
 
@@ -107,12 +108,15 @@ def test_tables_and_patch_say_the_same(taught):
 
 @pytest.mark.long
 def test_without_truth_and_interrupted_it_goes_on_where_it_was(faulty, tmp_path, monkeypatch):
-    config, out = configured(*faulty), tmp_path / "out"
+    database, logs = faulty
+    for number in range(FEW_JOURNEYS):
+        shutil.copytree(logs / f"j{number}", tmp_path / "logs" / f"j{number}")
+    config, out = configured(database, tmp_path / "logs"), tmp_path / "out"
     locate, calls = learn_study.locate, []
 
     def interrupted(*args):
         calls.append(args)
-        if len(calls) == 4:
+        if len(calls) == FEW_JOURNEYS:
             raise KeyboardInterrupt
         return locate(*args)
 
@@ -123,9 +127,10 @@ def test_without_truth_and_interrupted_it_goes_on_where_it_was(faulty, tmp_path,
     result = run_learn(
         config, out, use_truth=False, resume=True, progress=lambda *at: shown.append(at)
     )
-    # Three were kept; where the map alone places no journey of equal blocks, there is a third pass.
-    assert len(calls) == 4 + (JOURNEYS - 3) + JOURNEYS * (1 + len(result.notes))
-    assert shown[-1] == (3 * JOURNEYS, 3 * JOURNEYS)
+    # All but one were kept; where the map alone places no journey of equal blocks, there is a third
+    # pass.
+    assert len(calls) == FEW_JOURNEYS + 1 + FEW_JOURNEYS * (1 + len(result.notes))
+    assert shown[-1] == (3 * FEW_JOURNEYS, 3 * FEW_JOURNEYS)
     assert [done for done, _ in shown] == sorted(done for done, _ in shown)
     assert {("dead", "S1C")} <= found(result) <= {("offset", "S2B"), ("dead", "S1C")}
     assert not list(tmp_path.glob(".out*"))

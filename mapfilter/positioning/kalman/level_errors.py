@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import exp, inf
 from typing import NamedTuple
 
@@ -168,6 +169,7 @@ class LastingLevels:
         return wide, spread, np.concatenate([shift, np.zeros(more)])
 
 
+@lru_cache(32)
 def with_own_spread(method: Method, errors: int) -> Method:
     """Return a method whose sigma points lie as far out as without so many errors that last.
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import exp, log, nan
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 from mapfilter._types import Floats
 from mapfilter.filters.gaussian import Gaussian
@@ -24,7 +25,7 @@ _NEWTON_STEPS = 20
 
 def place_of(belief: Gaussian, where: list[int]) -> dict[str, Any]:
     """Return the position of a belief as fields of a fix; ``where`` are east and north."""
-    covariance = belief.covariance[np.ix_(where, where)]
+    covariance = belief.covariance[where][:, where]
     radii, mass = gaussian_radii_m(covariance, WITHIN_M)
     east_m, north_m = (float(value) for value in belief.mean[where])
     return {
@@ -57,19 +58,29 @@ def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, fl
     ([11.77, 14.89, 24.48], 0.8647)
     """
     high_m, variances = _spread(covariance_m2)
+    radii_m = high_m * np.sqrt(_squared_radii(variances))
+    return radii_m, _share(high_m, variances, within_m)
+
+
+@njit(error_model="numpy", cache=True)
+def _squared_radii(variances: Floats) -> Floats:
+    """Return the squares of the radii that hold 50, 67 and 95 %; the largest variance is 1."""
     # The logarithm of what lies beyond is a convex function of the squared radius (the hazard of a
     # sum of two squared normal numbers never grows). So Newton's steps, which begin where the
     # belief is a line, come from below and never pass the root.
-    squared = _LINE_SQUARED
-    for _ in range(_NEWTON_STEPS):
-        decay = np.exp(-0.5 * squared[:, None] / variances)
-        beyond = decay.mean(axis=1)
-        slope = -0.5 * (decay / variances).mean(axis=1)
-        step = np.log((1 - _SHARES) / beyond) * beyond / slope
-        squared = squared + step
-        if np.all(np.abs(step) <= 1e-12 * squared):
-            break
-    return high_m * np.sqrt(squared), share_within(covariance_m2, within_m)
+    squared, rate = _LINE_SQUARED.copy(), -0.5 / variances
+    for k in range(squared.size):
+        for _ in range(_NEWTON_STEPS):
+            beyond = slope = 0.0
+            for i in range(rate.size):
+                decay = exp(squared[k] * rate[i])
+                beyond += decay
+                slope += decay * rate[i]
+            step = log((1 - _SHARES[k]) * rate.size / beyond) * beyond / slope
+            squared[k] += step
+            if abs(step) <= 1e-12 * squared[k]:
+                break
+    return squared
 
 
 def share_within(covariance_m2: Floats, within_m: float) -> float:
@@ -80,7 +91,10 @@ def share_within(covariance_m2: Floats, within_m: float) -> float:
     >>> round(share_within(np.diag([100.0, 100.0]), 20.0), 4)
     0.8647
     """
-    high_m, variances = _spread(covariance_m2)
+    return _share(*_spread(covariance_m2), within_m)
+
+
+def _share(high_m: float, variances: Floats, within_m: float) -> float:
     return float(1 - np.exp(-0.5 * (within_m / high_m) ** 2 / variances).mean())
 
 
