@@ -43,8 +43,8 @@ from mapfilter.positioning.gnss.trail import Contradiction, FixTrail, TrailFix
 from mapfilter.positioning.integrity import SampleTail
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.pauses import RowTimes
-from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.places import Place, Places
+from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 
