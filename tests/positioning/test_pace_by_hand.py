@@ -59,7 +59,7 @@ def test_a_step_covers_the_time_since_the_last_one_of_a_walk(stepped_s, fastest_
 
 def test_a_first_row_covers_no_time_and_is_a_walk_however_short():
     pace, going = Pace().read(7.0, (MotionStep(0.05, 0.1),), 1.0)
-    assert going == (0.05, True, True)
+    assert going == (0.05, True, True, False)
     assert (pace.motion_s, pace.stepped_s, pace.rows, pace.rests) == (7.0, 7.0, 1, False)
     assert (pace.recent_mps, pace.speed_mps, pace.interval_s) == (1.4, 1.4, 0.0)
 

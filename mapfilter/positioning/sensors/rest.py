@@ -92,7 +92,7 @@ class Rest:
     turned_rad, turned_s : float
         Sum of recent turns that were measured without a way or a heading, and the time of the last.
     carried_mps : float
-        Speed of a phone that is carried on, as positions show it; NaN where none do.
+        Speed of a phone that is carried on, as positions show it; 0 where none do.
     """
 
     since_s: float
@@ -111,7 +111,7 @@ class Rest:
     braked_mps2: float = 0.0
     turned_rad: float = 0.0
     turned_s: float = -inf
-    carried_mps: float = nan
+    carried_mps: float = 0.0
 
     def turned(self, time_s: float, steps: tuple[MotionStep, ...]) -> Rest:
         """Add turns without a way: a vehicle that takes a corner is carried on.
@@ -186,7 +186,7 @@ class Rest:
         shown_nats = _SHOWN_AGAIN_NATS if self.is_doubtful else _SHOWN_NATS
         return far and still_nats <= _SHOWABLE_NATS and left_nats > shown_nats
 
-    def carried(self, speed_mps: float = nan) -> Rest:
+    def carried(self, speed_mps: float = 0.0) -> Rest:
         """Return the rest as one that is none; positions may show its speed."""
         return replace(self, carried_nats=_CARRIED_NATS, is_doubtful=False, carried_mps=speed_mps)
 

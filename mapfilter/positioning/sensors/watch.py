@@ -15,7 +15,7 @@ vehicle.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite, isnan, nan
+from math import isfinite, nan
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
@@ -168,7 +168,7 @@ def _followed(
     places = watch.places.after(time_s, epoch.fix, step_unit_m * going.gone_m)
     found = places.carried if places is not watch.places else None
     watch = watch._replace(places=places)
-    was_shown = watch.rest is not None and not isnan(watch.rest.carried_mps)
+    was_shown = watch.rest is not None and watch.rest.carried_mps > 0
     if going.moves and found is None and not was_shown:
         return watch._moving(time_s), epoch, Reason.USED
     rest = watch.rest or Rest(
@@ -208,7 +208,7 @@ def _followed(
             # What the counter did not miss is in the belief already.
             missed = max(1 - rest.measured_m / (rest.pace_mps * rested_s), 0.0)
     speed_mps = missed * pace.speed_mps
-    if isfinite(rest.carried_mps):
+    if rest.carried_mps > 0:
         speed_mps = rest.carried_mps / step_unit_m
     step = unmeasured_step(speed_mps, watch.unmeasured_s, to_s)
     if any(isfinite(one.turn_rad) for one in steps):

@@ -1,0 +1,124 @@
+"""Positions that show a phone to be carried on while steps are fewer than usual."""
+
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_town import CRS, Town, slowed, walk_log
+
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.epochs import GnssFix
+from mapfilter.positioning.filter import locate
+from mapfilter.positioning.sensors.places import Places
+from mapfilter.tracks.log import make_log
+
+
+def places(east_m, *, every_s=2.0, step_m=0.0, variance_m2=25.0):
+    found = Places()
+    for index, east in enumerate(east_m):
+        fix = GnssFix(east, 0.0, variance_m2, variance_m2, 0.0)
+        found = found.after(index * every_s, fix, step_m)
+    return found
+
+
+def test_a_way_that_goes_on_beyond_the_steps_is_one():
+    # 4 deviations of the distance of two positions of 5 m are 28.3 m.
+    assert places([3.0 * k for k in range(10)]).carried is None
+    found = places([3.0 * k for k in range(11)]).carried
+    assert found == (0.0, pytest.approx(1.5))
+    # The latest one that shows it: two metres a second since ten seconds.
+    found = places([0.0, 1.0, -1.0, 0.0, 6.0, 12.0, 18.0, 24.0, 30.0]).carried
+    assert found == (6.0, pytest.approx(3.0))
+
+
+def test_steps_explain_as_much_as_they_are_long():
+    found = places([3.0 * k for k in range(16)], step_m=1.0).carried
+    assert found == (0.0, pytest.approx(1.5))
+    assert places([3.0 * k for k in range(15)], step_m=1.0).carried is None
+    assert places([3.0 * k for k in range(40)], step_m=3.0).carried is None
+
+
+def test_precise_positions_err_for_long_and_coarse_ones_by_more():
+    assert places([3.0 * k for k in range(10)], variance_m2=1.0).carried is None
+    assert places([3.0 * k for k in range(11)], variance_m2=100.0).carried is None
+    # Without a deviation 10 m are assumed: 4 of them are 56.6 m.
+    assert places([3.0 * k for k in range(19)], variance_m2=np.nan).carried is None
+    assert places([3.0 * k for k in range(20)], variance_m2=np.nan).carried is not None
+
+
+@pytest.mark.parametrize(
+    "east_m",
+    [
+        [0.0, 1.0, 0.0, 1.0, 0.0, 60.0, 61.0, 60.0, 61.0],
+        [0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 30.0],
+        [0.0, 30.0],
+    ],
+)
+def test_a_jump_is_none(east_m):
+    assert places(east_m).carried is None
+
+
+def test_positions_too_near_in_time_held_or_old_do_not_count():
+    held = Places()
+    for time_s in np.arange(0.0, 60.0, 2.0):
+        held = held.after(time_s, GnssFix(5.0, 0.0, 25.0, 25.0, 0.0), 0.0)
+    assert len(held.rows) == 1
+    quick = places([0.1 * k for k in range(100)], every_s=0.1)
+    assert [row.time_s for row in quick.rows] == pytest.approx(np.arange(0.0, 9.95, 2.0))
+    assert len(places(range(100)).rows) == 31
+    nowhere = Places().after(0.0, GnssFix(np.nan, 0.0, 1.0, 1.0, 0.0), 2.0)
+    assert nowhere == Places((), 2.0)
+
+
+TOWN = Town.of(1)
+AREA = TOWN.area()
+
+
+def given(seed, steps, levels):
+    """Return a walk with a position of 5 m each second; ``steps`` of its middle are as counted."""
+    log = slowed(walk_log(TOWN, seed, 900.0, levels=levels))
+    rng = np.random.default_rng((seed, 3))
+    time_s = np.arange(0.0, log.truth["time_s"].iloc[-1])
+    east_m, north_m = (np.interp(time_s, log.truth["time_s"], log.truth[name])
+                       for name in ("east_m", "north_m"))  # fmt: skip
+    fixes = pd.DataFrame(
+        {"time_s": time_s, "east_m": east_m + rng.normal(0, 5, time_s.size),
+         "north_m": north_m + rng.normal(0, 5, time_s.size),
+         "var_east_m2": 25.0, "var_north_m2": 25.0, "cov_east_north_m2": 0.0}
+    )  # fmt: skip
+    moved = log.motion.assign(step_m=log.motion["step_m"])
+    middle = (moved["time_s"] > 300) & (moved["time_s"] <= 420)
+    moved.loc[middle, "step_m"] *= steps
+    return make_log(
+        CRS, motion=moved, radio=log.radio, gnss=fixes, truth=log.truth, start_utc_s=1.7e9
+    )
+
+
+@cache
+def found(seed, steps, levels=True):
+    log = given(seed, steps, levels)
+    estimate = locate(log, BayesFilter().over_area(AREA), np.random.default_rng(5)).estimate
+    east_m, north_m = (np.interp(estimate.time_s, log.truth["time_s"], log.truth[name])
+                       for name in ("east_m", "north_m"))  # fmt: skip
+    error_m = np.hypot(estimate.east_m - east_m, estimate.north_m - north_m)
+    claimed = np.array([one in (Status.TRACKING, Status.CONVERGED) for one in estimate.status])
+    return estimate, error_m, claimed
+
+
+@pytest.mark.parametrize("steps", [0.0, 0.2])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_who_is_carried_on_among_positions_is_followed(seed, steps):
+    estimate, error_m, claimed = found(seed, steps)
+    during = (estimate.time_s > 300) & (estimate.time_s < 450)
+    assert not (claimed & (error_m > 50)).any()
+    assert np.median(error_m[during]) < 15
+    why = {one.reason for one in estimate.unused if one.kind == "motion"}
+    assert Reason.MOTION_STUCK in why
+
+
+def test_positions_say_so_within_their_errors_only():
+    estimate, error_m, _ = found(0, 1.0)
+    assert not any(one.reason is Reason.MOTION_STUCK for one in estimate.unused)
+    assert error_m[estimate.time_s > 300].max() < 25
