@@ -1,5 +1,6 @@
 """Positions that show a phone to be carried on while steps are fewer than usual."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -7,11 +8,12 @@ import pandas as pd
 import pytest
 from made_town import CRS, Town, slowed, walk_log
 
-from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import GnssFix
+from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.sensors.places import Places
+from mapfilter.positioning.sensors.watch import SensorWatch, watched
 from mapfilter.tracks.log import make_log
 
 
@@ -70,6 +72,29 @@ def test_positions_too_near_in_time_held_or_old_do_not_count():
     assert len(places(range(100)).rows) == 31
     nowhere = Places().after(0.0, GnssFix(np.nan, 0.0, 1.0, 1.0, 0.0), 2.0)
     assert nowhere == Places((), 2.0)
+
+
+def stands_after_a_ride(watch, fixes):
+    """Return the watch of a phone without steps that rides for 40 s, and then stands."""
+    for time_s in range(1, 200):
+        ahead_m = 5.0 * min(max(time_s - 30, 0), 40)
+        fix = GnssFix(ahead_m, 0.0, 25.0, 25.0, 0.0) if time_s < fixes else None
+        fix = fix and replace(fix, north_m=0.1 * (time_s % 7))
+        step = MotionStep(1.4 if time_s <= 20 else 0.0, 0.0)
+        watch, _, (why, _) = watched(watch, Epoch(float(time_s), (step,), fix=fix))
+        yield time_s, watch, why
+
+
+def test_a_ride_ends_where_positions_show_it():
+    told = {time_s: why for time_s, _, why in stands_after_a_ride(SensorWatch(), 200)}
+    assert all(told[time_s] is Reason.USED for time_s in range(1, 35))
+    assert all(told[time_s] is Reason.MOTION_STUCK for time_s in range(45, 75))
+    assert all(told[time_s] is Reason.USED for time_s in range(135, 200))
+
+
+def test_without_positions_it_may_go_on():
+    told = {time_s: why for time_s, _, why in stands_after_a_ride(SensorWatch(), 60)}
+    assert all(told[time_s] is Reason.MOTION_STUCK for time_s in range(45, 200))
 
 
 TOWN = Town.of(1)

@@ -19,8 +19,9 @@ _APART_S, _LASTS_S = 2.0, 60.0
 _DEVIATIONS, _LEAST_SD_M, _USUAL_SD_M = 4.0, 5.0, 10.0
 """Deviations of the distance of two positions beyond which it is one; the least deviation of a
 position, whose errors last, and that of one that states none."""
-_LEAST_INTERVALS, _LEAST_S = 4, 8.0
-"""The least that shows a way: intervals between positions, and time."""
+_LEAST_INTERVALS, _LEAST_S, _ENOUGH_S = 4, 8.0, 40.0
+"""The least that shows a way: intervals between positions, and time; time in which those of a walk
+show it."""
 _MOST_OF_ONE, _LEAST_OF_HALVES = 0.5, 0.3
 """Largest share of one interval in the way; least share by which the middles of both halves are
 apart, which for a steady one is a half."""
@@ -70,6 +71,13 @@ class Places:
         sd_m = sqrt(variance_m2) if 0 < variance_m2 < inf else _USUAL_SD_M
         place = Place(time_s, way_m, fix.east_m, fix.north_m, max(sd_m, _LEAST_SD_M))
         return Places((*rows, place), way_m)
+
+    @property
+    def are_enough(self) -> bool:
+        """Whether they would show a way at a walk's speed."""
+        return len(self.rows) > _LEAST_INTERVALS and (
+            self.rows[-1].time_s - self.rows[0].time_s >= _ENOUGH_S
+        )
 
     @property
     def carried(self) -> Carried | None:

@@ -167,8 +167,11 @@ def _followed(
         watch = watch._moving(time_s)
     places = watch.places.after(time_s, epoch.fix, step_unit_m * going.gone_m)
     found = places.carried if places is not watch.places else None
-    watch = watch._replace(places=places)
     was_shown = watch.rest is not None and watch.rest.carried_mps > 0
+    if was_shown and found is None and places is not watch.places and places.are_enough:
+        # The ride has ended.
+        watch, was_shown = watch._moving(time_s), False
+    watch = watch._replace(places=places)
     if going.moves and found is None and not was_shown:
         return watch._moving(time_s), epoch, Reason.USED
     rest = watch.rest or Rest(
@@ -225,7 +228,9 @@ def _after_a_pause(
     """Add the way of a pause of the recording before an epoch's own motion."""
     to_s = watch.unmeasured_s + paused_s
     step = unmeasured_step(speed_mps, watch.unmeasured_s, to_s)
-    watch = watch._moving(epoch.time_s)._replace(moved_m=watch.moved_m + step.step_m)
+    # What was gone in it is in no position's way.
+    moved_m = watch.moved_m + step.step_m
+    watch = watch._moving(epoch.time_s)._replace(moved_m=moved_m, places=Places())
     if not going.measured:
         # The way may go on, with the direction that it has.
         watch = watch._replace(moving_s=epoch.time_s - to_s, unmeasured_s=to_s)
