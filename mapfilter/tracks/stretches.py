@@ -71,6 +71,16 @@ class Stretches:
         mean = _means(np.interp(self.time_s, time_s, total), self.group)
         return np.asarray(mean[self.first + 2] - mean[self.first])
 
+    def with_known(self, time_s: Floats, values: Floats) -> Stretches:
+        """Return the pairs along which every value of motion is known.
+
+        Parameters
+        ----------
+        time_s, values : (K,) array
+        """
+        unknown = np.cumsum(~np.isfinite(values), dtype=np.float64)
+        return self.where(np.abs(self.grown(time_s, unknown)) == 0)
+
     def turned_by(self, time_s: Floats, reckoned_m: Complexes) -> Floats:
         """Return the change of course at the middle by positions of motion's own.
 
@@ -83,6 +93,23 @@ class Stretches:
         mean = _means(np.interp(self.time_s, time_s, reckoned_m), self.group)
         before_m, after_m = (np.diff(mean)[self.first + i] for i in (0, 1))
         return np.asarray(np.angle(after_m * np.conj(before_m)))
+
+
+def reckoned_m(step_m: Floats, turn_rad: Floats) -> Complexes:
+    """Return positions by dead reckoning from steps and turns, in a frame of their own.
+
+    Parameters
+    ----------
+    step_m, turn_rad : (K,) array
+        A step goes into the direction at the middle of its turn.
+
+    Returns
+    -------
+    (K,) array of complex128
+        Ahead at first, and to the left as the imaginary part.
+    """
+    heading_rad = np.cumsum(turn_rad)
+    return np.asarray(np.cumsum(step_m * np.exp(1j * (heading_rad - turn_rad / 2))))
 
 
 def known_places(places: pd.DataFrame) -> tuple[Floats, Floats, Floats]:

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from mapfilter.tracks.stretches import motion_values, steady_values, stretches
+from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.stretches import (
+    motion_values,
+    reckoned_m,
+    steady_values,
+    stretches,
+)
 
 _DEVIATIONS = 3.0
 _LEAST_RADPS = float(np.radians(0.3))
@@ -39,14 +45,11 @@ def turn_drift_radps(motion: pd.DataFrame, places: pd.DataFrame) -> float:
     corners = stretches(places, time_s, np.cumsum(np.abs(step_m)))
     if corners is None:
         return 0.0
-    unknown = np.cumsum(~np.isfinite(motion_values(motion, "turn_rad")), dtype=np.float64)
-    corners = corners.where(np.abs(corners.grown(time_s, unknown)) == 0)
+    corners = corners.with_known(time_s, motion_values(motion, "turn_rad"))
     if not len(corners):
         return 0.0
-    turn_rad = steady_values(motion, "turn_rad")
-    heading_rad = np.cumsum(turn_rad)
-    reckoned_m = np.cumsum(step_m * np.exp(1j * (heading_rad - turn_rad / 2)))
-    off_rad = np.angle(np.exp(1j * (corners.turned_by(time_s, reckoned_m) - corners.turned_rad)))
+    reckoned = reckoned_m(step_m, steady_values(motion, "turn_rad"))
+    off_rad = wrap_rad(corners.turned_by(time_s, reckoned) - corners.turned_rad)
     # From the middle of one line to that of the next.
     rates_radps = off_rad / (corners.lasted_s / 2)
     usual_radps = float(np.median(rates_radps))

@@ -8,7 +8,13 @@ import pandas as pd
 from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.motion_fault import MotionFault
-from mapfilter.tracks.stretches import Stretches, motion_values, steady_values, stretches
+from mapfilter.tracks.stretches import (
+    Stretches,
+    motion_values,
+    reckoned_m,
+    steady_values,
+    stretches,
+)
 
 _FEWEST = 6
 _CORNER_RAD, _BACK_RAD = np.deg2rad(30.0), np.deg2rad(150.0)
@@ -58,9 +64,7 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
     corners = stretches(places, time_s, np.cumsum(np.abs(step_m)))
     if corners is None:
         return None
-    unknown = np.cumsum(~np.isfinite(turn_rad), dtype=np.float64)
-    corners = corners.where(_is_corner(corners.turned_rad))
-    corners = corners.where(np.abs(corners.grown(time_s, unknown)) == 0)
+    corners = corners.where(_is_corner(corners.turned_rad)).with_known(time_s, turn_rad)
     if len(corners) < _FEWEST_CORNERS:
         return None
     turn_rad = steady_values(motion, "turn_rad")
@@ -96,13 +100,11 @@ def _is_corner(turned_rad: Floats) -> Bools:
 
 def _agreement(corners: Stretches, time_s: Floats, step_m: Floats, turn_rad: Floats) -> float:
     """Return the share of corners that dead reckoning by steps and turns has, too."""
-    heading_rad = np.cumsum(turn_rad)
-    reckoned_m = np.cumsum(step_m * np.exp(1j * (heading_rad - turn_rad / 2)))
-    turned_rad = corners.turned_by(time_s, reckoned_m)
+    turned_rad = corners.turned_by(time_s, reckoned_m(step_m, turn_rad))
     both = _is_corner(turned_rad)
     if both.sum() < max(_FEWEST_CORNERS, _BOTH * both.size):
         return 0.0
     # Five times a right angle has the same course, and is a whole turn more.
-    more_rad = corners.grown(time_s, heading_rad).real - corners.turned_rad
+    more_rad = corners.grown(time_s, np.cumsum(turn_rad)).real - corners.turned_rad
     near = np.abs(wrap_rad(turned_rad - corners.turned_rad)) <= _AGREED_RAD
     return float(np.mean((near & (np.abs(more_rad) <= np.pi))[both]))

@@ -12,7 +12,9 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.filter import locate
+from mapfilter.positioning.gnss.fixes import FixTerm, RejectedFixTerm
 from mapfilter.positioning.sensors.places import Places
+from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
 from mapfilter.tracks.log import make_log
 
@@ -74,27 +76,82 @@ def test_positions_too_near_in_time_held_or_old_do_not_count():
     assert nowhere == Places((), 2.0)
 
 
-def stands_after_a_ride(watch, fixes):
-    """Return the watch of a phone without steps that rides for 40 s, and then stands."""
-    for time_s in range(1, 200):
-        ahead_m = 5.0 * min(max(time_s - 30, 0), 40)
-        fix = GnssFix(ahead_m, 0.0, 25.0, 25.0, 0.0) if time_s < fixes else None
-        fix = fix and replace(fix, north_m=0.1 * (time_s % 7))
-        step = MotionStep(1.4 if time_s <= 20 else 0.0, 0.0)
-        watch, _, (why, _) = watched(watch, Epoch(float(time_s), (step,), fix=fix))
-        yield time_s, watch, why
+def reasons(places_m, *, walk_mps=1.4, every_s=1.0, sd_m=5.0, watch=None, carried_s=None):
+    """Return, by the second, what motion is of a phone that stops after 20 s.
+
+    Its positions are given by a function of the time, and come each so many seconds.
+    """
+    watch, told, variance_m2 = watch or SensorWatch(), {}, sd_m**2
+    for time_s in range(1, 300):
+        fix = None
+        if time_s % every_s == 0 and places_m(time_s) is not None:
+            # No receiver that measures gives the same position twice.
+            fix = GnssFix(places_m(time_s), 0.1 * (time_s % 7), variance_m2, variance_m2, 0.0)
+        step = MotionStep(walk_mps if time_s <= 20 else 0.0, 0.0)
+        watch, _, (told[time_s], _) = watched(watch, Epoch(float(time_s), (step,), fix=fix))
+        watch = watch.carried() if time_s == carried_s else watch
+    return told
 
 
-def test_a_ride_ends_where_positions_show_it():
-    told = {time_s: why for time_s, _, why in stands_after_a_ride(SensorWatch(), 200)}
-    assert all(told[time_s] is Reason.USED for time_s in range(1, 35))
-    assert all(told[time_s] is Reason.MOTION_STUCK for time_s in range(45, 75))
-    assert all(told[time_s] is Reason.USED for time_s in range(135, 200))
+def ride(time_s):
+    """40 s at 5 m/s from 30 s on, and standing after it."""
+    return 5.0 * min(max(time_s - 30, 0), 40)
 
 
-def test_without_positions_it_may_go_on():
-    told = {time_s: why for time_s, _, why in stands_after_a_ride(SensorWatch(), 60)}
-    assert all(told[time_s] is Reason.MOTION_STUCK for time_s in range(45, 200))
+def are(told, reason, first_s, last_s):
+    return all(told[time_s] is reason for time_s in range(first_s, last_s))
+
+
+@pytest.mark.parametrize(("every_s", "ends_s"), [(1, 115), (3, 118), (15, 135)])
+def test_a_ride_ends_where_positions_stand(every_s, ends_s):
+    def sparse_at_rest(time_s):
+        return ride(time_s) if time_s < 72 or time_s % every_s == 0 else None
+
+    told = reasons(sparse_at_rest)
+    assert are(told, Reason.USED, 1, 35)
+    assert are(told, Reason.MOTION_STUCK, 45, 105)
+    assert are(told, Reason.USED, ends_s, 300)
+
+
+def test_one_that_levels_have_shown_ends_there_too():
+    """As does one that a Kalman-type filter found by its own rule."""
+    told = reasons(lambda _: 0.0, carried_s=60)
+    assert are(told, Reason.USED, 1, 60)
+    assert told[61] is Reason.MOTION_STUCK
+    assert are(told, Reason.USED, 104, 300)
+
+
+@pytest.mark.parametrize(
+    ("places_m", "sd_m"),
+    [
+        # No position any more; a walk after the ride, which coarse positions could not show.
+        (lambda time_s: ride(time_s) if time_s < 60 else None, 5.0),
+        (lambda time_s: 20.0 * min(max(time_s - 30, 0), 20) + 1.4 * max(time_s - 50, 0), 20.0),
+    ],
+)
+def test_where_positions_cannot_show_a_stand_it_may_go_on(places_m, sd_m):
+    assert are(reasons(places_m, sd_m=sd_m), Reason.MOTION_STUCK, 60, 300)
+
+
+@pytest.mark.parametrize(("drift_mps", "stuck"), [(0.8, False), (3.0, True)])
+def test_slow_positions_do_not_show_that_wheels_are_dead(drift_mps, stuck):
+    told = reasons(lambda time_s: drift_mps * time_s, walk_mps=10.0)
+    assert are(told, Reason.MOTION_STUCK if stuck else Reason.USED, 80, 300)
+
+
+@pytest.mark.parametrize(("heard", "may"), [({"A": (-70.0, 1)}, False), ({}, True)])
+def test_levels_that_end_show_no_stand(heard, may):
+    rest = Rest(0.0, left_nats=-6.0, present=heard, pace_mps=1.4)
+    assert rest.may_be_carried_at(1.0) is may
+    assert replace(rest, left_nats=-4.0).may_be_carried_at(1.0)
+
+
+def test_the_more_a_rejected_fix_repeats_the_one_before_the_less_rivals_gain():
+    fix = FixTerm(GnssFix(0.0, 0.0, 25.0, 25.0, 0.0), (0.0, 0.0))
+    state = np.zeros((5, 3), dtype=np.float32)
+    state[0] = [0.0, 15.0, 40.0]
+    gained = RejectedFixTerm(fix, 9.0, 0.1).log_likelihood(state)
+    assert gained == pytest.approx([0.9, 0.45, 0.0])
 
 
 TOWN = Town.of(1)

@@ -52,15 +52,17 @@ class FixTerm:
 class RejectedFixTerm:
     """Log-likelihood of a fix that the belief has rejected, for its rivals: beyond its gate.
 
-    Hypotheses that the fix contradicts as well gain nothing by it, and lose nothing.
+    Hypotheses that the fix contradicts as well gain nothing by it, and lose nothing. ``share`` is
+    that of the fix which is new: fixes in a row repeat the same error.
     """
 
     term: FixTerm
     gate: float
+    share: float = 1.0
 
     def log_likelihood(self, state: Floats32) -> Floats:
         """Return the log-likelihood of each hypothesis, over that of the belief at its gate."""
-        return np.maximum(self.term.log_likelihood(state) + self.gate, 0.0)
+        return self.share * np.maximum(self.term.log_likelihood(state) + self.gate, 0.0)
 
 
 def refutation(fix: GnssFix, total: float, area_m2: float) -> float:

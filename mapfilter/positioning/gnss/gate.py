@@ -168,7 +168,8 @@ class GnssGate:
                 return found.without("gnss", [""], why, state=state, compared=True)
         gone_m = travelled_m - state.fix_used_at_m
         times = max(options.fix_memory_m / max(gone_m, _MIN_MOVED_M), 1.0)
-        # It adds little where its error is that of the one before. Its error is as stated.
+        # What it adds is little where its error is that of the one before, and less where fixes are
+        # less precise than they state. Neither makes one that is far away agree.
         wide = widened(fix, times * state.understated)
         term, as_stated = FixTerm(wide, self.origin_m), FixTerm(fix, self.origin_m)
         total, fits = (_total(belief, one) for one in (term, as_stated))
@@ -176,7 +177,7 @@ class GnssGate:
             # Whether it is trusted again stays as it was.
             state = self.rejected(found.state, time_s)
             why = Reason.REJECTED_BY_EVIDENCE
-            rival = RejectedFixTerm(as_stated, 1.0 + self._gate(belief))
+            rival = RejectedFixTerm(as_stated, 1.0 + self._gate(belief), 1.0 / times)
             found = found._replace(rival_terms=(rival,), unexplained=True)
             return found.without("gnss", [""], why, state=state, compared=True)
         squared = squared_distance(belief, widened(fix, 1.0), self.origin_m) / 2

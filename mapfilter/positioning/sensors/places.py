@@ -19,9 +19,11 @@ _APART_S, _LASTS_S = 2.0, 60.0
 _DEVIATIONS, _LEAST_SD_M, _USUAL_SD_M = 4.0, 5.0, 10.0
 """Deviations of the distance of two positions beyond which it is one; the least deviation of a
 position, whose errors last, and that of one that states none."""
-_LEAST_INTERVALS, _LEAST_S, _ENOUGH_S = 4, 8.0, 40.0
-"""The least that shows a way: intervals between positions, and time; time in which those of a walk
-show it."""
+_LEAST_INTERVALS, _LEAST_S = 4, 8.0
+"""The least that shows a way: intervals between positions, and time."""
+_STANDS_S, _SLOWEST_MPS = 40.0, 1.0
+"""Time after which positions near each other show that one stands, and the speed of a way that
+leaves their errors by then."""
 _MOST_OF_ONE, _LEAST_OF_HALVES = 0.5, 0.3
 """Largest share of one interval in the way; least share by which the middles of both halves are
 apart, which for a steady one is a half."""
@@ -73,11 +75,16 @@ class Places:
         return Places((*rows, place), way_m)
 
     @property
-    def are_enough(self) -> bool:
-        """Whether they would show a way at a walk's speed."""
-        return len(self.rows) > _LEAST_INTERVALS and (
-            self.rows[-1].time_s - self.rows[0].time_s >= _ENOUGH_S
-        )
+    def standing(self) -> Places | None:
+        """The last of them where they show that one stands: near each other, as on no way."""
+        for first in range(len(self.rows) - 2, -1, -1):
+            start, end = self.rows[first], self.rows[-1]
+            error_m = _error_m(start, end)
+            if _apart_m(start, end) >= error_m:
+                return None
+            if end.time_s - start.time_s >= max(_STANDS_S, error_m / _SLOWEST_MPS):
+                return Places(self.rows[first:], self.way_m)
+        return None
 
     @property
     def carried(self) -> Carried | None:
@@ -89,19 +96,25 @@ class Places:
             lasted_s = end.time_s - start.time_s
             if lasted_s < _LEAST_S:
                 continue
-            gone_m = hypot(end.east_m - start.east_m, end.north_m - start.north_m)
+            gone_m = _apart_m(start, end)
             missed_m = gone_m - (end.way_m - start.way_m)
-            if missed_m >= _DEVIATIONS * hypot(start.sd_m, end.sd_m) and _goes_on(some, gone_m):
+            if missed_m >= _error_m(start, end) and _goes_on(some, gone_m):
                 return Carried(start.time_s, gone_m / lasted_s)
         return None
 
 
+def _apart_m(one: Place, other: Place) -> float:
+    return hypot(other.east_m - one.east_m, other.north_m - one.north_m)
+
+
+def _error_m(one: Place, other: Place) -> float:
+    """Return the distance of two positions that is none of their errors."""
+    return _DEVIATIONS * hypot(one.sd_m, other.sd_m)
+
+
 def _goes_on(rows: tuple[Place, ...], whole_m: float) -> bool:
     """Return whether a way between positions is one, and no jump."""
-    most_m = max(
-        hypot(after.east_m - row.east_m, after.north_m - row.north_m)
-        for row, after in pairwise(rows)
-    )
+    most_m = max(_apart_m(row, after) for row, after in pairwise(rows))
     half = len(rows) // 2
     apart_m = hypot(
         sum(row.east_m for row in rows[-half:]) - sum(row.east_m for row in rows[:half]),

@@ -48,6 +48,8 @@ _STROLL_SHARE = 0.5
 """Share of that variance which a way as measured explains, where it is compared with being
 elsewhere: with all of it, the two could hardly be told apart after 30 m."""
 _LEFT_M, _SHOWABLE_NATS = 45.0, -2.5
+_DRIFT_MPS = 1.5
+"""Slower positions of a vehicle whose wheels stand drift by their errors."""
 _BRAKES_MPS2 = 5.0
 """Beyond usual braking."""
 _CORNER_RAD, _CORNER_S = radians(45.0), 10.0
@@ -190,10 +192,14 @@ class Rest:
         """Return the rest as one that is none; positions may show its speed."""
         return replace(self, carried_nats=_CARRIED_NATS, is_doubtful=False, carried_mps=speed_mps)
 
-    @property
-    def is_shown(self) -> bool:
-        """Whether levels show that the phone stands."""
-        return self.left_nats <= _SHOWN_AGAIN_NATS
+    def may_be_carried_at(self, speed_mps: float) -> bool:
+        """Return whether it may be carried on at a speed that positions show.
+
+        Not where levels of now show that it stands. Nor are wheels dead because positions drift.
+        """
+        is_shown = self.left_nats <= _SHOWN_AGAIN_NATS and bool(self.present)
+        drifts = self.pace_mps > WALKERS_MPS and speed_mps < _DRIFT_MPS
+        return not (is_shown or drifts)
 
     def missed_mps(self, gone_s: float) -> float:
         """Return the pace before less what was measured, over a time since it began."""

@@ -87,8 +87,13 @@ class SensorWatch(NamedTuple):
         return self._moving(time_s)
 
     def carried(self) -> SensorWatch:
-        """Return the watch of what goes on though no step is counted, as positions have shown."""
-        return self if self.rest is None else self._replace(rest=self.rest.carried())
+        """Return the watch of what goes on though no step is counted, as positions have shown.
+
+        Those before do not show that it stands.
+        """
+        if self.rest is None:
+            return self
+        return self._replace(rest=self.rest.carried(), places=Places())
 
     def _moving(self, time_s: float) -> SensorWatch:
         """Return the watch after a measured way to a time."""
@@ -167,11 +172,11 @@ def _followed(
         watch = watch._moving(time_s)
     places = watch.places.after(time_s, epoch.fix, step_unit_m * going.gone_m)
     found = places.carried if places is not watch.places else None
-    was_shown = watch.rest is not None and watch.rest.carried_mps > 0
-    if was_shown and found is None and places is not watch.places and places.are_enough:
+    if watch.rest is not None and watch.rest.is_carried and (standing := places.standing):
         # The ride has ended.
-        watch, was_shown = watch._moving(time_s), False
+        watch, places, found = watch._moving(time_s), standing, None
     watch = watch._replace(places=places)
+    was_shown = watch.rest is not None and watch.rest.carried_mps > 0
     if going.moves and found is None and not was_shown:
         return watch._moving(time_s), epoch, Reason.USED
     rest = watch.rest or Rest(
@@ -179,7 +184,7 @@ def _followed(
         pace_mps=step_unit_m * pace.speed_mps,
         braked_mps2=known.braked_mps2(time_s) if going.measured else 0.0,
     )
-    if found is not None and not rest.is_shown:
+    if found is not None and rest.may_be_carried_at(found.speed_mps):
         if not rest.is_carried:
             # The way is measured up to where it began.
             watch = watch._replace(moving_s=found.since_s, known_s=found.since_s, unmeasured_s=0.0)
@@ -187,6 +192,8 @@ def _followed(
         rest = rest.carried(found.speed_mps)
     was_carried = rest.is_carried
     rest = rest.heard(time_s, epoch.radio, step_unit_m * going.gone_m).turned(time_s, steps)
+    if rest.is_carried and not was_carried:
+        watch = watch._replace(places=Places())
     why = Reason.USED
     if steps and not going.measured:
         why = Reason.NO_STEP
