@@ -80,7 +80,7 @@ def read_log(
         ],
     )
     faults = Faults()
-    check_factors(factors or {}, faults)
+    check_factors(factors or {}, "factors", faults)
     faults.raise_if_any(ConfigError)
     given, true = _several("paths", paths), _several("truth", truth)
     if not given:

@@ -35,7 +35,7 @@ def with_right_motion(
         factor; or a factor has no column.
     """
     faults = Faults()
-    check_factors(factors, faults)
+    check_factors(factors, "factors", faults)
     faults.raise_if_any(ConfigError)
     if isinstance(log, TrackLog):
         where, log = "log", scaled_log(log, factors, "log")

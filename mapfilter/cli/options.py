@@ -179,7 +179,7 @@ def motion_factors(texts: list[str] | None) -> dict[str, float]:
     found = {
         name: (numbers(text, 1, f"--factor {name}") or [0.0])[0] for name, text in pairs.items()
     }
-    check_factors(found, faults)
+    check_factors(found, "--factor", faults)
     faults.raise_if_any(ConfigError)
     return found
 

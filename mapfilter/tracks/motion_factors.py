@@ -15,13 +15,16 @@ from mapfilter.tracks.motion_fault import MOTION_COLUMNS, fault_notes
 from mapfilter.tracks.schema import TABLES
 
 
-def check_factors(factors: Mapping[str, float], faults: Faults) -> None:
-    """Note columns that have no factor, and factors that are 0 or no number."""
+def check_factors(factors: Mapping[str, float], where: str, faults: Faults) -> None:
+    """Note columns that have no factor, and factors that are 0 or no number.
+
+    ``where`` is the option or argument that gives them.
+    """
     for column, factor in factors.items():
         if column not in MOTION_COLUMNS:
-            faults.add("--factor", f"one of {', '.join(MOTION_COLUMNS)}", column)
+            faults.add(where, f"one of {', '.join(MOTION_COLUMNS)}", column)
         elif not isfinite(factor) or factor == 0:
-            faults.add(f"--factor {column}", "a number other than 0", f"{factor:g}")
+            faults.add(f"{where} {column}", "a number other than 0", f"{factor:g}")
 
 
 def scaled_motion(
