@@ -81,7 +81,7 @@ def test_the_front_door_refuses_what_replay_does(drive, replay, tmp_path):
         assert mf.score(mended, log.truth).error_95_m < 20
         kept = mf.locate(given, filter="ekf", factors={"turn_rad": 1})
         assert mf.score(kept, log.truth).error_95_m > 100
-    with pytest.raises(ConfigError, match="^factors: expected one of heading_rad"):
+    with pytest.raises(ConfigError, match=r"^factors: expected one of heading_rad"):
         mf.locate(log, filter="ekf", factors={"turn": -1})
     with pytest.raises(ConfigError, match="locate, factors"):
         mf.locate(log, filter="ekf", factors=-1)
@@ -155,7 +155,7 @@ def test_factors_that_are_none(replay, drive, text, told):
 def test_a_factor_of_motion_that_is_not_there(drive, replay, tmp_path):
     outcome = replay(drive, "--factor", "heading_rad=-1")
     assert_refused(outcome, "expected motion with heading_rad, found none")
-    with pytest.raises(ConfigError, match="^factors turn_rad: expected a number other than 0"):
+    with pytest.raises(ConfigError, match=r"^factors turn_rad: expected a number other than 0"):
         mf.read_log(tmp_path / "fixes.csv", factors={"turn_rad": 0})
 
 
