@@ -40,6 +40,7 @@ from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail, TrailFix
+from mapfilter.positioning.gnss.wander import FixWander, Stated, WanderFix
 from mapfilter.positioning.integrity import SampleTail
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.pauses import RowTimes
@@ -48,7 +49,7 @@ from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 
-FORMAT, VERSION = "mapfilter session", 14
+FORMAT, VERSION = "mapfilter session", 15
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -65,6 +66,7 @@ _CLASSES: dict[str, type] = {
         DeadReckoning,
         Fix,
         FixTrail,
+        FixWander,
         GnssFix,
         GnssState,
         HeldOtherwise,
@@ -87,10 +89,12 @@ _CLASSES: dict[str, type] = {
         RowTimes,
         SampleTail,
         SensorWatch,
+        Stated,
         StepOutput,
         TimingState,
         TrailFix,
         UnusedReading,
+        WanderFix,
     )
 }
 _ENUMS: dict[str, type[Enum]] = {one.__name__: one for one in (Reason, Status)}

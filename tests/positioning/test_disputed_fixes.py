@@ -153,10 +153,10 @@ def test_fixes_that_state_too_little_are_believed_less():
         steps, way = straight(rng, 300)
         fixes = [fix_at(one, 3.0) for one in way + errors(rng, 300, 12.0)]
         places, radii_m, _, _, state = followed(fixes, steps)
-        assert state.fixes.record.understated > 3.0
+        assert state.fixes.understated > 3.0
         held.append((np.abs(places - way) <= radii_m)[60:].mean())
         exact = [fix_at(one, 12.0) for one in way + errors(rng, 300, 12.0)]
-        plain.append(followed(exact, steps)[4].fixes.record.understated)
+        plain.append(followed(exact, steps)[4].fixes.understated)
         widest.append(np.median(radii_m[60:]))
     assert np.mean(held) > 0.9
     assert max(widest) < 40.0

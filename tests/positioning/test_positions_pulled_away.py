@@ -346,15 +346,17 @@ def located(seed, away_per_m, *, trusting=False):
 
 @pytest.mark.parametrize("away_per_m", [0.1, 0.2])
 def test_positions_that_lead_away_are_hardly_ever_followed(away_per_m):
-    wrong, right = {True: 0, False: 0}, 0
+    wrong, right, rejecting = {True: 0, False: 0}, 0, 0
     for seed in WALKS:
         for trusting in (True, False):
             found, error_m, claimed = located(seed, away_per_m, trusting=trusting)
             wrong[trusting] += int((claimed & (error_m > 50)).sum())
-        assert Reason.REJECTED_BY_EVIDENCE in {one.reason for one in found.unused}
+        rejecting += Reason.REJECTED_BY_EVIDENCE in {one.reason for one in found.unused}
         # Where positions are more than 50 m off.
         led = np.arange(len(error_m)) > 80 + 10 / away_per_m
         right += int((claimed & (error_m <= 50) & led).sum())
+    # Where they are believed less than they ask for none may be rejected.
+    assert rejecting >= 2
     # 200 and 120 of the 300 positions of a walk lead more than 50 m away.
     assert wrong[True] > 0.7 * led.sum() * len(WALKS)
     assert wrong[False] < 0.4 * wrong[True]

@@ -1,5 +1,6 @@
 """Dead reckoning and the path of the last metres, by hand."""
 
+from dataclasses import replace
 from math import cos, hypot, nan, pi, radians, sin
 
 import numpy as np
@@ -25,10 +26,11 @@ def test_steps_add_up():
     assert (here.east_m, here.north_m) == pytest.approx((3.0, 3.0))
     assert here.sampling_m2 == pytest.approx(0.25 + 0.04)
     assert here.moved(MotionStep(0.0, 1.0, sampling_sd_m=9.0)) is here
-    assert here.moved(MotionStep(nan, 1.0)) is here
+    assert here.gaps == 0
+    assert here.moved(MotionStep(nan, 1.0)) == replace(here, gaps=1)
     blind = here.moved(MotionStep(-2.0, nan, sampling_sd_m=9.0))
     assert (blind.travelled_m, blind.east_m, blind.north_m) == (10.0, here.east_m, here.north_m)
-    assert blind.sampling_m2 == here.sampling_m2
+    assert (blind.sampling_m2, blind.gaps) == (here.sampling_m2, 1)
 
 
 def test_points_lie_a_leg_apart_and_the_last_eleven_are_kept():

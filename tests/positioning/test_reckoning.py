@@ -212,7 +212,7 @@ def test_a_way_without_headings_is_straight_for_a_while():
     assert gone_m2 == pytest.approx(way_spread_m2(100.0))
     assert gone_m2 > 100 * 30.0
     assert made.moved(MotionStep(1.0, 0.0), 1.0, OPTIONS, np.zeros(3))[0].headless_m == 0.0
-    fixed, _ = made.fixed(7.0, GnssFix(EAST, NORTH), np.eye(2), KNOWN, OPTIONS)
+    fixed, _ = made.fixed(7.0, GnssFix(EAST, NORTH), np.eye(2), KNOWN, (0.0, 30.0))
     # One that is rejected says nothing.
     assert (fixed.headless_m, fixed.fixed_s) == (100.0, -inf)
     fixed = fixed.positioned(7.0)

@@ -25,26 +25,32 @@ distinctive."""
 class DeadReckoning:
     """Distance and displacement since the start, in the frame of the headings.
 
-    ``sampling_m2`` is the sum of the variances that steps have by their sampling.
+    ``sampling_m2`` is the sum of the variances that steps have by their sampling, ``gaps`` how
+    often the direction or the length of a way was not measured.
     """
 
     travelled_m: float = 0.0
     east_m: float = 0.0
     north_m: float = 0.0
     sampling_m2: float = 0.0
+    gaps: int = 0
 
     def moved(self, step: MotionStep) -> DeadReckoning:
         """Add a step; without a heading the displacement stays, at rest all of it."""
-        if not isfinite(step.step_m) or step.step_m == 0:
+        if step.step_m == 0 and not isfinite(step.spread_m):
             return self
+        if not isfinite(step.step_m):
+            return replace(self, gaps=self.gaps + 1)
         if not isfinite(step.heading_rad):
-            return replace(self, travelled_m=self.travelled_m + abs(step.step_m))
+            travelled_m = self.travelled_m + abs(step.step_m)
+            return replace(self, travelled_m=travelled_m, gaps=self.gaps + 1)
         heading, sampling_m2 = step.heading_rad, self.sampling_m2 + step.sampling_sd_m**2
         return DeadReckoning(
             self.travelled_m + abs(step.step_m),
             self.east_m + step.step_m * cos(heading),
             self.north_m + step.step_m * sin(heading),
             sampling_m2,
+            self.gaps,
         )
 
 

@@ -34,6 +34,7 @@ from mapfilter.positioning.gnss.receiver import (
 from mapfilter.positioning.gnss.sky import Sky, range_sigma_m, sky_over
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail
+from mapfilter.positioning.gnss.wander import Way
 from mapfilter.tracks.schema import Kind
 
 _FIRST_SPACING_M = 10.0
@@ -131,8 +132,8 @@ class GnssSource(EvidenceSource):
     def beside_other(self, state: GnssState) -> GnssState:
         """Return the state with a receiver and a trail that begin anew."""
         receiver = state.receiver
-        if state.trail.rows:
-            state = replace(state, trail=FixTrail())
+        if state.trail.rows or state.wander.rows:
+            state = replace(state, trail=FixTrail(), wander=state.wander.broken_off())
         if receiver is None:
             return state
         return replace(state, receiver=begun_anew(self.options, receiver))
@@ -196,14 +197,23 @@ class GnssSource(EvidenceSource):
     def _followed(
         self, found: GnssComparison, fix: GnssFix, time_s: float, state: BayesState
     ) -> GnssState:
-        """Return the state with a fix in its trail."""
+        """Return the state with a fix in its trail, and beside the steps of one that moves."""
         own, rejected = found.state, found.unexplained
         if time_s < state.sources[self.name].probation_until_s:
             # It was not compared: it may agree with the belief.
             rejected = not agrees_with(found.belief, widened(fix, 1.0), self.gate.origin_m)
         least_s = self.options.dispute_s
         trail = own.trail.after(time_s, fix, state.reckoning, least_s, rejected=rejected)
-        return replace(own, trail=trail)
+        wander = own.wander
+        if state.watch.rest is not None:
+            # Fixes that leave a rest may be right.
+            wander = wander.broken_off()
+        elif not rejected:
+            wide, gone = widened(fix, 1.0), state.reckoning
+            way = Way(gone.east_m, gone.north_m, gone.gaps)
+            variance_m2 = (wide.var_east_m2 + wide.var_north_m2) / 2
+            wander = wander.at_fix(time_s, way, (fix.east_m, fix.north_m), variance_m2)
+        return replace(own, trail=trail, wander=wander)
 
     def _supported(
         self,

@@ -8,6 +8,7 @@ from math import inf, isfinite, nan
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.gnss.trail import FixTrail
+from mapfilter.positioning.gnss.wander import FixWander
 
 _MEMORY_M, _MOST_OF_ONE = 100.0, 0.05
 """Way over which the precision of fixes is followed, and the largest share of one of them."""
@@ -41,6 +42,8 @@ class GnssState:
     excess : float
         Times that the squared distances of fixes from the belief have been larger than their
         variances say, of late.
+    wander : FixWander
+        How far they have wandered beside dead reckoning.
     """
 
     receiver: Receiver | None = None
@@ -53,6 +56,7 @@ class GnssState:
     agrees_from_m: float = nan
     trail: FixTrail = field(default_factory=FixTrail)
     excess: float = 1.0
+    wander: FixWander = field(default_factory=FixWander)
 
     def due(self, options: GnssOptions, time_s: float, travelled_m: float) -> bool:
         """Return whether to compare again where no radio report asks for it."""
@@ -84,7 +88,8 @@ class GnssState:
     @property
     def understated(self) -> float:
         """Times that variances of fixes are taken for larger than stated."""
-        return self.excess if self.excess >= _SHOWN else 1.0
+        by_one = self.excess if self.excess >= _SHOWN else 1.0
+        return max(by_one, self.wander.before.understated)
 
     def after_fix(self, squared: float, travelled_m: float) -> GnssState:
         """Return the state after a fix that is used.

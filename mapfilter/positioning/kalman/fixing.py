@@ -13,12 +13,13 @@ from mapfilter.filters.gaussian import Method
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import GnssFix
+from mapfilter.positioning.gnss.wander import FixWander, Way
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.disputed import ComparedFix, FixRecord, FixVerdict, Ruling
 from mapfilter.positioning.kalman.lasting import Motion, fix_layout, rescaled, white_part
 from mapfilter.positioning.kalman.models import KalmanOptions, compiled
 from mapfilter.positioning.kalman.readings import fix_covariance_m2
-from mapfilter.positioning.kalman.reckoning import at_rest
+from mapfilter.positioning.kalman.reckoning import RATE, at_rest
 
 _RECKONED_S, _MOVING_S = 30.0, 5.0
 """Time after which fixes that contradict a belief show it to be wrong: one with dead reckoning, and
@@ -38,11 +39,27 @@ class FixErrors(NamedTuple):
         How well fixes have agreed with the belief.
     fixed_s : float
         Time of the last fix; NaN before the first.
+    wander : FixWander
+        How far fixes have wandered beside dead reckoning.
+    way : Way
+        Where that has led, by headings as they were measured.
     """
 
     lasting_m: float = 0.0
     record: FixRecord = FixRecord()
     fixed_s: float = nan
+    wander: FixWander = FixWander()
+    way: Way = Way()
+
+    @property
+    def understated(self) -> float:
+        """Times that variances of fixes are taken for larger than stated."""
+        return max(self.record.understated, self.wander.now.understated)
+
+    def moved(self, east_m: float, north_m: float, gaps: int) -> FixErrors:
+        """Return them after dead reckoning, of which rows may have no direction or length."""
+        east_m, north_m = self.way.east_m + east_m, self.way.north_m + north_m
+        return self._replace(way=Way(east_m, north_m, self.way.gaps + gaps))
 
     def at_time(self, time_s: float) -> FixErrors:
         """Return them at a later time."""
@@ -51,7 +68,20 @@ class FixErrors(NamedTuple):
 
     def after_a_jump(self) -> FixErrors:
         """Return them where what contradicted the belief has led it elsewhere."""
-        return self._replace(record=replace(self.record, rows=()))
+        record = replace(self.record, rows=())
+        return self._replace(record=record, wander=self.wander.broken_off())
+
+    def after_fix(self, lasting_m: float, record: FixRecord, time_s: float) -> FixErrors:
+        """Return them after a fix."""
+        return self._replace(lasting_m=lasting_m, record=record, fixed_s=time_s)
+
+    def wandered(
+        self, fix: GnssFix, variance_m2: float, time_s: float, rate_radps: float
+    ) -> FixErrors:
+        """Return them after a fix that agreed, by what is known of the rate of turns."""
+        place = fix.east_m, fix.north_m
+        wander = self.wander.at_fix(time_s, self.way, place, variance_m2, rate_radps)
+        return self._replace(wander=wander)
 
 
 class WeighedFix(NamedTuple):
@@ -130,11 +160,12 @@ class FixWeighing:
         """
         own, record = self.own, errors.record
         stated = fix_covariance_m2(fix, self.options.fix_sd_m)
-        noise = stated * record.understated
+        noise = stated * errors.understated
         motion, layout, white, lasting_m = at_rest(self.layout), self.layout, noise, 0.0
         wanted_m = 0.0
         if self._lasts:
             wanted_m = self.options.lasting_fix_m(float(np.trace(noise)) / 2)
+            wanted_m = max(wanted_m, errors.wander.now.lasting_m(float(np.trace(stated)) / 2))
             lasting_m = self._lasting_m(errors, wanted_m, time_s)
             motion = rescaled(own, self.layout.size, errors.lasting_m, lasting_m)
             belief, white = belief.predict(*motion), white_part(noise, lasting_m)
@@ -161,10 +192,11 @@ class FixWeighing:
                 back_m = off_m / 2 if found.ruling is Ruling.EITHER else np.zeros(2)
                 white = white + np.outer(back_m, back_m)
                 motion = self._begun((fix.east_m, fix.north_m) - back_m, white, wanted_m)
-                errors = FixErrors(wanted_m, record, time_s)
+                # What was learnt beside a belief that was wrong is no more than that.
+                errors = errors.after_fix(wanted_m, record, time_s)._replace(wander=FixWander())
                 return WeighedFix(belief.predict(*motion), errors, motion, found.ruling, nan, True)
             if found.ruling is Ruling.OUTLIER and own is not MOVING:
-                errors = FixErrors(lasting_m, record, time_s)
+                errors = errors.after_fix(lasting_m, record, time_s)
                 return WeighedFix(belief, errors, motion, found.ruling, nan, False)
             white = white + (found.larger - 1) * noise
         model = compiled(position_fix(layout, white))
@@ -172,7 +204,15 @@ class FixWeighing:
         belief, info = belief.update(model, place, self.method, self.compared)
         found = found or FixVerdict(Ruling.AGREES, info.nis / 2)
         nis = found.squared if info.used and found.ruling is Ruling.AGREES else nan
-        errors = FixErrors(lasting_m, record, time_s)
+        errors = errors.after_fix(lasting_m, record, time_s)
+        if own is not MOVING:
+            rate_radps = float(belief.moments.mean[RATE])
+            # Fixes that leave a rest may be right.
+            errors = (
+                errors._replace(wander=errors.wander.broken_off())
+                if rests
+                else errors.wandered(fix, float(np.trace(stated)) / 2, time_s, rate_radps)
+            )
         return WeighedFix(belief, errors, motion, found.ruling, nis, info.used)
 
     def _lasting_m(self, errors: FixErrors, wanted_m: float, time_s: float) -> float:

@@ -40,7 +40,7 @@ RECKONED = StateLayout(5, 0, 1)
 the rate of turns in rad/s."""
 ERRORS = slice(2, 5)
 """Components that are errors of dead reckoning."""
-_TURNED, _SCALE, _RATE, _LEAST = 2, 3, 4, 1e-6
+TURNED, _SCALE, RATE, _LEAST = 2, 3, 4, 1e-6
 _TURNS_SD_RAD = radians(2.0)
 """White error of headings that turns add up to, at most: a compass is read again and again, among
 iron."""
@@ -179,17 +179,17 @@ class Reckoning:
         by_rate = by_turns and (step.step_m != 0 or step.turn_rad != 0)
         alignment, step = self.alignment.headed(step)
         if by_rate and isfinite(self.turned_s) and alignment.known:
-            transition[_TURNED, _RATE] = turned_s - self.turned_s
+            transition[TURNED, RATE] = turned_s - self.turned_s
         # Nobody turns the gyroscope of a vehicle in the hand: what contradicts it is no jump.
         driven = by_turns and self.watch.pace.speed_mps > WALKERS_MPS
-        by_rate_rad = float(transition[_TURNED, _RATE] * errors[2])
+        by_rate_rad = float(transition[TURNED, RATE] * errors[2])
         recent = RecentWay() if driven else self.recent.moved(step, by_rate_rad)
         after = replace(self, alignment=alignment, turned_s=turned_s, recent=recent)
         if not isfinite(step.step_m):
             return after, (transition, noise, shift), Reason.NO_STEP
         drift_deg = options.turn_drift_deg_per_sqrt_m if by_turns else options.drift_deg_per_sqrt_m
         drift_rad = radians(drift_deg)
-        noise[_TURNED, _TURNED] = drift_rad**2 * abs(step.step_m)
+        noise[TURNED, TURNED] = drift_rad**2 * abs(step.step_m)
         if not isfinite(step.heading_rad):
             why = Reason.USED
             if not isfinite(step.spread_m):
@@ -197,13 +197,13 @@ class Reckoning:
                 after = replace(after, headless_m=self.headless_m + abs(step.step_m))
             noise[:2, :2] = step.all_sides_m**2 / 2 * np.eye(2)
             if alignment.known:
-                noise[_TURNED, _TURNED] += step.turned_sd_rad**2
+                noise[TURNED, TURNED] += step.turned_sd_rad**2
             return after, (transition, noise, shift), why
-        turned_rad, scale = float(transition[_TURNED, 2:] @ errors), float(errors[1])
+        turned_rad, scale = float(transition[TURNED, 2:] @ errors), float(errors[1])
         heading_rad, length_m = step.heading_rad + turned_rad, step.step_m * (1 + scale)
         along = np.array([cos(heading_rad), sin(heading_rad)])
         across = np.array([-along[1], along[0]])
-        transition[:2, 2:] = np.outer(length_m * across, transition[_TURNED, 2:])
+        transition[:2, 2:] = np.outer(length_m * across, transition[TURNED, 2:])
         transition[:2, _SCALE] = step.step_m * along
         shift[:2] = length_m * along - transition[:2, 2:] @ errors
         white_rad = radians(options.heading_sd_deg)
@@ -220,13 +220,13 @@ class Reckoning:
         fix: GnssFix,
         covariance_m2: Floats,
         belief: Gaussian,
-        options: KalmanOptions,
+        lasting: tuple[float, float],
     ) -> tuple[Reckoning, Direction | Turn | None]:
         """Return it with a fix of a covariance, used or not, and what that has found of headings.
 
         It is the direction of turns, or the jump of headings by which the belief is off. Of errors
-        that last those of ``fix_lasting_m`` count: with what lasts of a usual fix a phone that was
-        turned would be found half a minute later, and false jumps would be as many.
+        that last those beyond a usual fix count: with what lasts of that a phone that was turned
+        would be found half a minute later, and false jumps would be as many.
 
         Parameters
         ----------
@@ -236,17 +236,14 @@ class Reckoning:
             Of the fix.
         belief : Gaussian
             Moments of the belief before it, in the layout :data:`RECKONED` and what is behind it.
-        options : KalmanOptions
+        lasting : (float, float)
+            Deviation along one axis and time of these.
         """
         variance_m2 = float(np.trace(covariance_m2)) / 2
         alignment, found = self.alignment.at_fix(fix.east_m, fix.north_m, sqrt(variance_m2))
-        turned = float(belief.mean[_TURNED]), float(belief.covariance[_TURNED, _TURNED])
-        recent, jump = self.recent.at_fix(
-            time_s,
-            (fix.east_m, fix.north_m, variance_m2),
-            turned,
-            (options.fix_lasting_m, options.fix_lasting_s),
-        )
+        turned = float(belief.mean[TURNED]), float(belief.covariance[TURNED, TURNED])
+        place = fix.east_m, fix.north_m, variance_m2
+        recent, jump = self.recent.at_fix(time_s, place, turned, lasting)
         after = replace(
             self,
             alignment=alignment,
@@ -277,7 +274,7 @@ def jump_to(turn: Turn, layout: StateLayout, lasting_m: float | None) -> Motion:
         transition[place, place] = 0.0
         shift[place] = turn.east_m, turn.north_m
         cause[place, [0, 1]] = 1.0
-    transition[_TURNED, _TURNED], shift[_TURNED], cause[_TURNED, 2] = 0.0, turn.turned_rad, 1.0
+    transition[TURNED, TURNED], shift[TURNED], cause[TURNED, 2] = 0.0, turn.turned_rad, 1.0
     known = np.diag([turn.sd_m**2, turn.sd_m**2, turn.sd_rad**2])
     known[:2, 2] = known[2, :2] = turn.shared_m_rad
     noise = cause @ known @ cause.T
@@ -293,14 +290,14 @@ def turns_in_doubt(layout: StateLayout) -> Motion:
     until it begins anew; with what it had of their errors it would be led away again.
     """
     transition, noise, shift = at_rest(layout)
-    noise[_TURNED, _TURNED], noise[_RATE, _RATE] = _ASTRAY_RAD**2, _ASTRAY_RADPS**2
+    noise[TURNED, TURNED], noise[RATE, RATE] = _ASTRAY_RAD**2, _ASTRAY_RADPS**2
     return transition, noise, shift
 
 
 def turned_to(belief: SumBelief, direction: Direction) -> SumBelief:
     """Return a belief with the heading error that turns have, on the ground."""
     means, covariances = belief.means.copy(), belief.covariances.copy()
-    means[:, _TURNED] = direction.turned_rad
-    covariances[:, _TURNED] = covariances[:, :, _TURNED] = 0.0
-    covariances[:, _TURNED, _TURNED] = direction.sd_rad**2
+    means[:, TURNED] = direction.turned_rad
+    covariances[:, TURNED] = covariances[:, :, TURNED] = 0.0
+    covariances[:, TURNED, TURNED] = direction.sd_rad**2
     return replace(belief, means=means, covariances=covariances)

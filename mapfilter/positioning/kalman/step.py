@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cmath import exp
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, isfinite, nan
@@ -37,6 +38,7 @@ from mapfilter.positioning.kalman.readings import (
 from mapfilter.positioning.kalman.reckoning import (
     ERRORS,
     RECKONED,
+    TURNED,
     Reckoning,
     after_each_other,
     at_rest,
@@ -181,13 +183,21 @@ class KalmanStep:
             moving = constant_velocity(elapsed_s, root, noise="continuous")
             return (moving.transition, moving.noise, motion[2]), self._speed_mps() * elapsed_s
         motion[1][self.where, self.where] = self.options.drift_m_per_sqrt_s**2 * elapsed_s
-        errors, options = self.belief.moments.mean[ERRORS], self.options
+        mean, options, gaps = self.belief.moments.mean, self.options, 0
         for step in epoch.motion:
-            self.reckoning, moved, why = self.reckoning.moved(step, epoch.time_s, options, errors)
+            self.reckoning, own, why = self.reckoning.moved(
+                step, epoch.time_s, options, mean[ERRORS]
+            )
             if why is not Reason.USED:
                 self._label(epoch, (step,), why)
-            motion = after_each_other(motion, moved)
+            gaps += isfinite(step.spread_m) or (why is not Reason.USED and step.step_m != 0)
+            motion = after_each_other(motion, own)
             moved_m += abs(step.step_m) if isfinite(step.step_m) else 0.0
+        if epoch.motion:
+            mean = mean[: self.own.size]
+            after = motion[0] @ mean + motion[2]
+            gone = complex(*(after - mean)[self.where]) * exp(-1j * after[TURNED])
+            self.fixes = self.fixes.moved(gone.real, gone.imag, gaps)
         return motion, moved_m
 
     def _speed_mps(self) -> float:
@@ -251,8 +261,10 @@ class KalmanStep:
             raise AssertionError("started before it measures")
         noise, layout = fix_covariance_m2(fix, self.options.fix_sd_m), self.layout
         if self.own is RECKONED:
-            moments = self.belief.moments
-            self.reckoning, found = self.reckoning.fixed(time_s, fix, noise, moments, self.options)
+            moments, options = self.belief.moments, self.options
+            beyond_m = self.fixes.wander.before.beyond_m(float(np.trace(noise)) / 2)
+            lasting = max(options.fix_lasting_m, beyond_m), options.fix_lasting_s
+            self.reckoning, found = self.reckoning.fixed(time_s, fix, noise, moments, lasting)
             if isinstance(found, Turn):
                 self.reckoning = self.reckoning.positioned(time_s)
                 self._jump(jump_to(found, layout, self.fixes.lasting_m if self.lasts else None))
