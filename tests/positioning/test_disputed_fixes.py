@@ -8,13 +8,14 @@ import pytest
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.models.state import MOVING
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
-from mapfilter.positioning.kalman.disputed import ComparedFix, FixRecord, Ruling
+from mapfilter.positioning.kalman.disputed import ComparedFix, FixRecord, Patience, Ruling
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.lasting import extended_layout, rescaled
 from mapfilter.positioning.kalman.reckoning import RECKONED
 from mapfilter.radio.cells import CellPlan
 
 EAST, NORTH = 500_000.0, 4_600_000.0
+WAITS = Patience(30.0, 120.0)
 
 
 def fix_at(place, stated_m=5.0):
@@ -79,16 +80,33 @@ def test_a_burst_that_ends_the_fixes_is_forgotten():
     assert (np.abs(places - way) <= radii_m)[166:].all()
 
 
-def test_fixes_that_go_on_elsewhere_are_right():
-    """As after a ride that no step counted: for half a minute it is LOST, then it begins anew."""
+@pytest.mark.parametrize(
+    ("jump_m", "at", "waits_s"), [(400.0, 100, 120), (40.0, 100, 30), (400.0, 25, 30)]
+)
+def test_fixes_that_go_on_elsewhere_are_right(jump_m, at, waits_s):
+    """For half a minute it is LOST, then it begins anew; where fixes jump that long agreed, later.
+
+    So far steps do not lead astray at once: a spoofer puts positions there.
+    """
     rng = np.random.default_rng(6)
     steps, way = straight(rng, 300)
-    way[100:] += 400.0
+    way[at:] += jump_m
     places, _, statuses, _, _ = followed([fix_at(one) for one in way + errors(rng, 300)], steps)
     off_m = np.abs(places - way)
-    assert set(statuses[102:130]) == {Status.LOST}
-    assert off_m[131:].max() < 15.0
-    assert set(statuses[131:]) == {Status.TRACKING}
+    assert set(statuses[at + 2 : at + waits_s]) == {Status.LOST}
+    assert off_m[at + waits_s + 2 :].max() < 15.0
+    assert set(statuses[at + waits_s + 2 :]) == {Status.TRACKING}
+
+
+def test_a_minute_of_positions_put_elsewhere_is_not_followed():
+    """They were, after half a minute, and the true ones after them were outliers."""
+    rng = np.random.default_rng(14)
+    steps, way = straight(rng, 400)
+    seen = way + errors(rng, 400)
+    seen[150:210] += 300.0 + 150.0j
+    places, _, statuses, _, _ = followed([fix_at(one) for one in seen], steps)
+    assert np.abs(places - way).max() < 20.0
+    assert Status.LOST not in statuses[:152] + statuses[212:]
 
 
 def test_fixes_that_scatter_are_no_place_to_begin_anew():
@@ -182,7 +200,7 @@ def test_what_fixes_mean_by_hand():
 
     def given(record, off_m, time_s=0.0, *, rests=False):
         place = np.array([off_m, 0.0])
-        return record.at_fix(ComparedFix(time_s, place, 4.0 * one, 12.0 * one, rests), 30.0)
+        return record.at_fix(ComparedFix(time_s, place, 4.0 * one, 12.0 * one, rests), WAITS)
 
     record, found = given(FixRecord(), 8.0)
     assert (found.ruling, found.squared, found.larger) == (Ruling.AGREES, 2.0, 1.0)
@@ -221,7 +239,7 @@ def test_fixes_on_a_line_while_one_stands():
         for k in range(count):
             off_m = np.array([40.0 + speed_mps * every_s * k, 0.0])
             given = ComparedFix(every_s * k, off_m, np.eye(2), np.eye(2), rests)
-            record, found = record.at_fix(given, 30.0)
+            record, found = record.at_fix(given, WAITS)
         return found.ruling
 
     assert ruled(4.0, rests=True) is Ruling.CARRIED
@@ -295,7 +313,7 @@ def test_a_belief_is_settled_after_ten_fixes_that_agree():
     one, record = np.eye(2), FixRecord(begun=2)
     for k in range(10):
         assert record.is_lost
-        record, _ = record.at_fix(ComparedFix(float(k), np.zeros(2), one, one), 30.0)
+        record, _ = record.at_fix(ComparedFix(float(k), np.zeros(2), one, one), WAITS)
     assert (record.begun, record.is_lost) == (0, False)
 
 

@@ -16,12 +16,13 @@ from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanTracker
 from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.reckoning import RECKONED, Reckoning, jump_to
-from mapfilter.positioning.kalman.turned import RecentWay, Turn, _Stretches
+from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn, _Stretches
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.radio.cells import Cell, CellPlan
 
 EAST, NORTH = 500_000.0, 4_600_000.0
+NONE_LASTS = Lasting(0.0, 0.0, 30.0)
 PLAN = CellPlan("EPSG:32629", (
     Cell("A", "A", EAST, NORTH + 900.0, 30.0, None, 50.0, 1800.0, "omni"),
 ))  # fmt: skip
@@ -172,7 +173,7 @@ def test_the_ratio_is_that_of_sums_of_squares(off_deg):
 
 
 def test_a_way_is_broken_off_where_its_direction_or_length_is_not_known():
-    fix, known, white = (EAST, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0)
+    fix, known, white = (EAST, NORTH, 25.0), (0.0, 0.01), NONE_LASTS
     way, _ = RecentWay().at_fix(0.0, fix, known, white)
     gone = way.moved(MotionStep(6.0, 0.0), 0.0)
     assert (gone.east_m, gone.north_m, len(gone.rows)) == (6.0, 0.0, 1)
@@ -188,35 +189,36 @@ def test_a_way_is_broken_off_where_its_direction_or_length_is_not_known():
 
 
 def test_a_jump_is_done_with_once_all_fixes_lie_on_one_way():
-    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0))
+    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.0, 0.01), NONE_LASTS)
     way = replace(way, is_turning=True)
     for k in range(1, 8):
         off_m = 300.0 if k == 6 else 0.0
         way = way.moved(MotionStep(6.0, 0.0), 0.0)
         fix = (EAST + 6.0 * k, NORTH + off_m, 25.0)
-        way, turn = way.at_fix(5.0 * k, fix, (0.0, 0.01), (0.0, 30.0))
+        way, turn = way.at_fix(5.0 * k, fix, (0.0, 0.01), NONE_LASTS)
         assert turn is None
         # Too few fixes tell nothing, and of one far off it is not known yet what it tells.
         assert way.is_turning is (k < 5)
     far = replace(way, is_turning=True, rows=way.rows[:7])
     far, _ = far.moved(MotionStep(6.0, 0.0), 0.0).at_fix(
-        50.0, (EAST + 48.0, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0)
+        50.0, (EAST + 48.0, NORTH, 25.0), (0.0, 0.01), NONE_LASTS
     )
     assert far.is_turning
 
 
 def test_what_a_rate_adds_is_in_the_way_and_not_in_the_error():
-    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.1, 0.01), (0.0, 30.0))
+    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.1, 0.01), NONE_LASTS)
     way = way.moved(MotionStep(0.0, nan), 0.2).moved(MotionStep(6.0, 0.3), 0.1)
     assert complex(way.east_m, way.north_m) == pytest.approx(6.0 * np.exp(0.6j))
-    way, _ = way.at_fix(5.0, (EAST + 6.0, NORTH, 25.0), (0.5, 0.02), (0.0, 30.0))
+    way, _ = way.at_fix(5.0, (EAST + 6.0, NORTH, 25.0), (0.5, 0.02), NONE_LASTS)
     assert way.rows[-1].turned_rad == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(
     ("variance_m2", "lasting", "after_s", "expected_m2"),
-    [(25.0, (0.0, 30.0), 5.0, 7.5**2), (400.0, (0.0, 30.0), 5.0, 400.0),
-     (100.0, (6.0, 30.0), 5.0, 100.0 + 2 * 36 * 30 / 5.0), (25.0, (0.0, 30.0), 0.5, 7.5**2)],
+    [(25.0, NONE_LASTS, 5.0, 7.5**2), (400.0, NONE_LASTS, 5.0, 400.0),
+     (100.0, Lasting(0.0, 6.0, 30.0), 5.0, 100.0 + 2 * 36 * 30 / 5.0),
+     (100.0, Lasting(6.0, 0.0, 30.0), 5.0, 100.0), (25.0, NONE_LASTS, 0.5, 7.5**2)],
 )  # fmt: skip
 def test_errors_that_last_count_once_and_fixes_may_be_late(
     variance_m2, lasting, after_s, expected_m2
@@ -227,6 +229,31 @@ def test_errors_that_last_count_once_and_fixes_may_be_late(
     way, _ = gone.at_fix(after_s, (EAST + 6.0, NORTH, variance_m2), (0.0, 0.01), lasting)
     late_m2 = (2 * 6.0 / after_s) ** 2
     assert way.rows[1].variance_m2 == pytest.approx(expected_m2 + late_m2)
+    usual_m2 = 2 * lasting.usual_m**2 * 30 / after_s
+    assert way.rows[1].lasting_m2 == pytest.approx(usual_m2)
+
+
+def test_what_usually_lasts_counts_once_a_jump_is_found():
+    """It is found by the same fix, and known less well."""
+    found = {}
+    for usual_m in (0.0, 5.0):
+        rng, way = np.random.default_rng(4), RecentWay()
+        for k in range(12):
+            fix = fix_at(6.0j * k, 5.0, rng)
+            place = fix.east_m, fix.north_m, 25.0
+            way, turn = way.at_fix(6.0 * k, place, (0.0, 0.01), Lasting(usual_m, 0.0, 30.0))
+            if turn is not None:
+                found[usual_m] = k, turn
+                break
+            way = way.moved(MotionStep(6.0, 0.0), 0.0)
+    assert found[0.0][0] == found[5.0][0]
+    plain, lasting = found[0.0][1], found[5.0][1]
+    assert plain.turned_rad == lasting.turned_rad == pytest.approx(np.pi / 2, abs=0.4)
+    # 7.5 m and the way of two seconds, and what counts once in 30 s but for the first fix.
+    last = found[0.0][0]
+    larger = 1 + 2 * 25.0 * 30 / 6.0 * last / (last + 1) / (7.5**2 + 4.0)
+    assert lasting.sd_m / plain.sd_m == pytest.approx(np.sqrt(larger), rel=0.05)
+    assert lasting.sd_rad > 1.5 * plain.sd_rad
 
 
 @pytest.mark.parametrize("rate_deg_per_s", [0.3, 1.0])
@@ -281,9 +308,9 @@ def test_a_jump_is_no_loss():
 
 @pytest.mark.parametrize(("speed_mps", "kept"), [(1.4, 2), (9.0, 0)])
 def test_the_gyroscope_of_a_vehicle_is_not_turned_in_the_hand(speed_mps, kept):
-    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0))
+    way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.0, 0.01), NONE_LASTS)
     way, _ = way.moved(MotionStep(9.0, 0.0), 0.0).at_fix(
-        5.0, (EAST + 9.0, NORTH, 25.0), (0.0, 0.01), (0.0, 30.0)
+        5.0, (EAST + 9.0, NORTH, 25.0), (0.0, 0.01), NONE_LASTS
     )
     watch = SensorWatch(Pace(speed_mps=speed_mps))
     made = Reckoning(watch, alignment=Alignment(0.1, known=True), turned_s=4.0, recent=way)

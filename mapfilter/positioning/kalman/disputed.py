@@ -37,6 +37,8 @@ until it is, as steps are wrong, and fixes that agree after which it is settled.
 _FORGOTTEN_S, _BURST_S, _TRUSTED = 60.0, 15.0, 30
 """Time without a further fix after which those that contradicted it are taken for outliers, for how
 long they may have done so, and how many have to have agreed before."""
+_FAR = 55.0
+"""Squared distance in deviations from which on a fix has jumped."""
 _LEAST_ROWS, _FEWEST_ROWS = 5, 3
 """Fixes that show a belief to be wrong, and those that do where they are far apart in time."""
 _MOVING_S, _MOVING_MPS, _SLOW_S, _SLOW_MPS = 5.0, 3.0, 10.0, 1.5
@@ -82,6 +84,21 @@ class FixVerdict(NamedTuple):
     larger: float = 1.0
 
 
+class Patience(NamedTuple):
+    """Time after which fixes that contradict a belief show it to be wrong.
+
+    Parameters
+    ----------
+    usual_s : float
+    jumped_s : float
+        Where they had long agreed and then jumped: motion does not lead astray at once, as a
+        spoofer or a wall does.
+    """
+
+    usual_s: float
+    jumped_s: float
+
+
 class ComparedFix(NamedTuple):
     """A fix beside the prediction.
 
@@ -111,6 +128,11 @@ class _Row(NamedTuple):
     off_east_m: float
     off_north_m: float
     variance_m2: float
+
+    @property
+    def has_jumped(self) -> bool:
+        """Whether it is farther away than steps can have led astray since the fix before."""
+        return hypot(self.off_east_m, self.off_north_m) ** 2 >= _FAR * self.variance_m2
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,15 +178,14 @@ class FixRecord:
         # They still count where the next fix contradicts the belief, too.
         return replace(self, is_over=True) if is_burst and self.agreed >= _TRUSTED else self
 
-    def at_fix(self, fix: ComparedFix, patience_s: float) -> tuple[FixRecord, FixVerdict]:
+    def at_fix(self, fix: ComparedFix, patience: Patience) -> tuple[FixRecord, FixVerdict]:
         """Return it after a fix, and what the fix means.
 
         Parameters
         ----------
         fix : ComparedFix
-        patience_s : float
-            Time after which fixes that contradict a belief show it to be wrong; one that has begun
-            anew before is given up sooner.
+        patience : Patience
+            A belief that has begun anew before is given up sooner.
         """
         time_s, off_m, predicted_m2, stated_m2, *_ = fix
         noise_m2 = self.understated * stated_m2
@@ -183,6 +204,8 @@ class FixRecord:
             return self._anew(), FixVerdict(Ruling.EITHER, squared / 2)
         variance_m2 = max(float(np.trace(noise_m2)) / 2, _LEAST_SD_M**2)
         rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2))
+        jumped = self.agreed >= _TRUSTED and rows[0].has_jumped
+        patience_s = patience.jumped_s if jumped else patience.usual_s
         while time_s - rows[0].time_s > 2 * patience_s and len(rows) > _LEAST_ROWS:
             rows = rows[1:]
         patience_s /= 1 + min(self.begun, _LOST_AFTER)

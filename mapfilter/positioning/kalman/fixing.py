@@ -15,15 +15,21 @@ from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.wander import FixWander, Way
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.disputed import ComparedFix, FixRecord, FixVerdict, Ruling
+from mapfilter.positioning.kalman.disputed import (
+    ComparedFix,
+    FixRecord,
+    FixVerdict,
+    Patience,
+    Ruling,
+)
 from mapfilter.positioning.kalman.lasting import Motion, fix_layout, rescaled, white_part
 from mapfilter.positioning.kalman.models import KalmanOptions, compiled
 from mapfilter.positioning.kalman.readings import fix_covariance_m2
 from mapfilter.positioning.kalman.reckoning import RATE, at_rest
+from mapfilter.positioning.kalman.turned import Lasting
 
-_RECKONED_S, _MOVING_S = 30.0, 5.0
-"""Time after which fixes that contradict a belief show it to be wrong: one with dead reckoning, and
-one that knows but its velocity."""
+_RECKONED, _MOVING = Patience(30.0, 120.0), Patience(5.0, 5.0)
+"""With dead reckoning, and where but a velocity is known."""
 _UNSEEN_S = 20.0
 """Time without a fix after which one that contradicts the belief is as likely to be right."""
 
@@ -65,6 +71,12 @@ class FixErrors(NamedTuple):
         """Return them at a later time."""
         record = self.record.at_time(time_s)
         return self if record is self.record else self._replace(record=record)
+
+    def lasting(self, variance_m2: float, options: KalmanOptions) -> Lasting:
+        """Return what lasts of the error of a fix with a variance along one axis."""
+        beyond_m = max(self.wander.before.beyond_m(variance_m2), options.fix_lasting_m)
+        usual_m = 0.0 if options.fix_lasting_m else options.lasting_fix_m(variance_m2)
+        return Lasting(usual_m, beyond_m, options.fix_lasting_s)
 
     def after_a_jump(self) -> FixErrors:
         """Return them where what contradicted the belief has led it elsewhere."""
@@ -184,7 +196,7 @@ class FixWeighing:
                     rests,
                     is_doubted or time_s - errors.fixed_s > _UNSEEN_S,
                 ),
-                _MOVING_S if own is MOVING else _RECKONED_S,
+                _MOVING if own is MOVING else _RECKONED,
             )
             if found.ruling.begins:
                 white = white_part(noise, wanted_m) if self._lasts else noise

@@ -30,7 +30,7 @@ from mapfilter.positioning.kalman.alignment import Alignment, Direction
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
-from mapfilter.positioning.kalman.turned import RecentWay, Turn
+from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.positioning.sensors.unmeasured import headless_step, missed_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
@@ -220,13 +220,11 @@ class Reckoning:
         fix: GnssFix,
         covariance_m2: Floats,
         belief: Gaussian,
-        lasting: tuple[float, float],
+        lasting: Lasting,
     ) -> tuple[Reckoning, Direction | Turn | None]:
         """Return it with a fix of a covariance, used or not, and what that has found of headings.
 
-        It is the direction of turns, or the jump of headings by which the belief is off. Of errors
-        that last those beyond a usual fix count: with what lasts of that a phone that was turned
-        would be found half a minute later, and false jumps would be as many.
+        It is the direction of turns, or the jump of headings by which the belief is off.
 
         Parameters
         ----------
@@ -236,8 +234,8 @@ class Reckoning:
             Of the fix.
         belief : Gaussian
             Moments of the belief before it, in the layout :data:`RECKONED` and what is behind it.
-        lasting : (float, float)
-            Deviation along one axis and time of these.
+        lasting : Lasting
+            What lasts of its error.
         """
         variance_m2 = float(np.trace(covariance_m2)) / 2
         alignment, found = self.alignment.at_fix(fix.east_m, fix.north_m, sqrt(variance_m2))

@@ -262,8 +262,7 @@ class KalmanStep:
         noise, layout = fix_covariance_m2(fix, self.options.fix_sd_m), self.layout
         if self.own is RECKONED:
             moments, options = self.belief.moments, self.options
-            beyond_m = self.fixes.wander.before.beyond_m(float(np.trace(noise)) / 2)
-            lasting = max(options.fix_lasting_m, beyond_m), options.fix_lasting_s
+            lasting = self.fixes.lasting(float(np.trace(noise)) / 2, options)
             self.reckoning, found = self.reckoning.fixed(time_s, fix, noise, moments, lasting)
             if isinstance(found, Turn):
                 self.reckoning = self.reckoning.positioned(time_s)

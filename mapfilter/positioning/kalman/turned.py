@@ -57,11 +57,32 @@ class Turn(NamedTuple):
     is_new: bool = True
 
 
+class Lasting(NamedTuple):
+    """Parts of a fix's error that last for a time; what several share in it counts once.
+
+    Parameters
+    ----------
+    usual_m, beyond_m : float
+        Deviations along one axis: of a usual fix, and of what is known to last beyond that.
+    memory_s : float
+    """
+
+    usual_m: float
+    beyond_m: float
+    memory_s: float
+
+    def variances_m2(self, since_s: float) -> tuple[float, float]:
+        """Return what both add to a fix's variance, so long after the one before."""
+        times = 2 * self.memory_s / since_s
+        return times * self.usual_m**2, times * self.beyond_m**2
+
+
 class _Row(NamedTuple):
     """A fix, where steps have led at its time, and what the belief had.
 
-    ``variance_m2`` is that of the fix along one axis, ``turned_rad`` the belief's heading error
-    less what a rate of turns has added since the first fix, and ``turned_rad2`` its variance.
+    ``variance_m2`` is that of the fix along one axis without what usually lasts, ``lasting_m2``
+    that. ``turned_rad`` is the belief's heading error less what a rate of turns has added since the
+    first fix, and ``turned_rad2`` its variance.
     """
 
     time_s: float
@@ -70,6 +91,7 @@ class _Row(NamedTuple):
     east_m: float
     north_m: float
     variance_m2: float
+    lasting_m2: float
     turned_rad: float
     turned_rad2: float
 
@@ -117,9 +139,12 @@ class RecentWay:
         time_s: float,
         place: tuple[float, float, float],
         turned: tuple[float, float],
-        lasting: tuple[float, float],
+        lasting: Lasting,
     ) -> tuple[RecentWay, Turn | None]:
         """Return it after a fix, and the turn of a jump that the fix has shown.
+
+        What usually lasts does not count until a jump is found: with it that would be half a minute
+        later, and false ones as many. It counts for what is known of it then.
 
         Parameters
         ----------
@@ -128,12 +153,11 @@ class RecentWay:
             East and north of the fix in m, and its variance along one axis.
         turned : (float, float)
             The heading error that the belief has, and its variance.
-        lasting : (float, float)
-            Deviation and time of the part of its error that lasts: what several fixes share in that
-            time counts once.
+        lasting : Lasting
+            What lasts of its error.
         """
         east_m, north_m, variance_m2 = place
-        gone_m = mps = 0.0
+        gone_m = mps = lasting_m2 = 0.0
         if self.rows:
             last = self.rows[-1]
             gone_m = hypot(self.east_m - last.way_east_m, self.north_m - last.way_north_m)
@@ -141,11 +165,12 @@ class RecentWay:
                 return self, None
             since_s = max(time_s - last.time_s, 1e-3)
             mps = gone_m / since_s
-            variance_m2 += 2 * lasting[0] ** 2 * lasting[1] / since_s
+            lasting_m2, beyond_m2 = lasting.variances_m2(since_s)
+            variance_m2 += beyond_m2
         variance_m2 = max(variance_m2, _LEAST_FIX_SD_M**2) + (_LATE_S * mps) ** 2
         now_rad = turned[0] - self.by_rate_rad
         row = _Row(
-            *(time_s, self.east_m, self.north_m, east_m, north_m, variance_m2),
+            *(time_s, self.east_m, self.north_m, east_m, north_m, variance_m2, lasting_m2),
             *(now_rad, turned[1]),
         )
         rows = (*self.rows, row)[-_MOST_ROWS:]
@@ -167,7 +192,7 @@ class RecentWay:
         left_m2 = np.where(found.fits, found.residual_m2 + _followed_m2(given), np.inf)
         best = int(np.argmin(left_m2))
         turn = found.turn(best, complex(self.east_m, self.north_m), len(rows) - best)
-        is_found = turn.sd_rad <= _FOUND_RAD
+        is_found = float(found.sd_rad[best]) <= _FOUND_RAD
         if is_found:
             # What the belief had before is no longer compared with.
             told = {"turned_rad": turn.turned_rad, "turned_rad2": turn.sd_rad**2}
@@ -187,8 +212,8 @@ class _Stretches(NamedTuple):
     mean_way, mean_fix : (N,) complex array
     spread_m2 : (N,) array
         Sum of squares of the way about its mean.
-    variance_m2 : (N,) array
-        Mean variance of fixes.
+    variance_m2, lasting_m2 : (N,) array
+        Mean variance of fixes, without and with what usually lasts.
     residual_m2 : (N,) array
         Sum of squares of what is left of the fixes.
     fits : (N,) bool array
@@ -200,6 +225,7 @@ class _Stretches(NamedTuple):
     mean_fix: np.ndarray
     spread_m2: Floats
     variance_m2: Floats
+    lasting_m2: Floats
     residual_m2: Floats
     fits: np.ndarray
 
@@ -215,12 +241,14 @@ class _Stretches(NamedTuple):
         spread = np.maximum(spread, 1e-6)
         cross = _sums(np.conj(way) * fix) - count * np.conj(mean_way) * mean_fix
         variance, factor = _sums(rows[:, 5]) / count, cross / spread
+        lasting = variance + _sums(rows[:, 6]) / count
         residual = _sums(np.abs(fix) ** 2) - count * np.abs(mean_fix) ** 2
         residual -= np.abs(cross) ** 2 / spread
         fits = residual <= _MOST_MISFIT * variance * np.maximum(2 * count - 4, 1.0)
         fits &= (np.abs(factor) >= _SHORTEST) & (np.abs(factor) <= _LONGEST)
         fits &= count >= _LEAST_ROWS
-        return cls(factor, mean_way + last[0], mean_fix + last[1], spread, variance, residual, fits)
+        means = mean_way + last[0], mean_fix + last[1]
+        return cls(factor, *means, spread, variance, lasting, residual, fits)
 
     @property
     def sd_rad(self) -> Floats:
@@ -243,14 +271,16 @@ class _Stretches(NamedTuple):
         off = here - self.mean_way[index]
         place = self.mean_fix[index] + self.factor[index] * off
         share = 1 / count + abs(off) ** 2 / self.spread_m2[index]
+        variance_m2 = float(self.lasting_m2[index])
+        sd_rad = float(self.sd_rad[index]) * sqrt(variance_m2 / float(self.variance_m2[index]))
         # By the angle alone, a place off the middle moves across the way to it.
-        shared = 1j * self.factor[index] * off * self.sd_rad[index] ** 2
+        shared = 1j * self.factor[index] * off * sd_rad**2
         return Turn(
             float(np.angle(self.factor[index])),
-            hypot(float(self.sd_rad[index]), _LEAST_SD_RAD),
+            hypot(sd_rad, _LEAST_SD_RAD),
             float(place.real),
             float(place.imag),
-            sqrt(float(self.variance_m2[index] * share)),
+            sqrt(variance_m2 * share),
             (float(shared.real), float(shared.imag)),
         )
 
@@ -258,7 +288,7 @@ class _Stretches(NamedTuple):
 def _followed_m2(rows: Floats) -> Floats:
     """Return what is left of the fixes before each, as the belief had headings at the first."""
     off = rows[:, 3] + 1j * rows[:, 4] - (rows[0, 3] + 1j * rows[0, 4])
-    off -= np.exp(1j * rows[0, 6]) * (rows[:, 1] + 1j * rows[:, 2] - complex(*rows[0, 1:3]))
+    off -= np.exp(1j * rows[0, 7]) * (rows[:, 1] + 1j * rows[:, 2] - complex(*rows[0, 1:3]))
     sums, squares = np.cumsum(off), np.cumsum(np.abs(off) ** 2)
     left = squares - np.abs(sums) ** 2 / np.arange(1.0, len(rows) + 1)
     return np.concatenate([[0.0], left[:-1]])
