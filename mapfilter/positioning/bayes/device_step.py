@@ -93,7 +93,7 @@ class DeviceStep:
         return moved, weighed
 
     def weigh(self, cloud: Cloud, log_weight: Any, reading: RadioReading) -> tuple[Cloud, Reason]:
-        """Add the log-likelihood of a reading in place, as :meth:`BayesModel.weigh` does.
+        """Add the log-likelihood of a reading in place, as :meth:`EvidenceModel.weigh` does.
 
         Terms of other sources are computed by the processor, for the states of all hypotheses.
         """
