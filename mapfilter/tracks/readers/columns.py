@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, good_lines, parsed
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.times import (
     parse_times,
     seconds_of_day,

@@ -18,7 +18,8 @@ from mapfilter.tracks.readers.columns import (
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.stale import repeated_readings
 from mapfilter.tracks.readers.text import Text
 

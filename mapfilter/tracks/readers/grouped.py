@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.columns import Columns, line_columns
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 
 Groups = dict[str, tuple[list[bytes], list[int]]]
 

@@ -17,7 +17,8 @@ from mapfilter.tracks.readers.columns import (
     likely_separator,
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.text import Text, read_text
 from mapfilter.tracks.readers.times import unix_seconds
 
