@@ -17,6 +17,7 @@ from mapfilter._words import number_of
 from mapfilter.errors import listed
 from mapfilter.tracks.cut_times import cut_times
 from mapfilter.tracks.readers.held_positions import own_positions
+from mapfilter.tracks.readers.recorded_field import Field
 from mapfilter.tracks.readers.recorded_values import (
     checked_values,
     duplicates,
@@ -25,7 +26,7 @@ from mapfilter.tracks.readers.recorded_values import (
     reordered,
 )
 from mapfilter.tracks.readers.recording import Clock, Recording
-from mapfilter.tracks.readers.tables import RECORDED, Field
+from mapfilter.tracks.readers.tables import RECORDED
 from mapfilter.tracks.readers.tallies import Tallies
 from mapfilter.tracks.readers.unusable import Unusable, nothing_usable
 from mapfilter.tracks.schema import NEIGHBOUR
