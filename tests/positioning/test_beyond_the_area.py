@@ -8,8 +8,8 @@ import small_area
 from made_town import CRS, PIXEL_M, SIDE_M, SOUTH_M, WEST_M, Town, slowed, walk_log
 from small_area import BANDS, HEIGHT_M, OPTIONS, WIDTH_M, make_area
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Status
-from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import Lattice
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MapWeights, MotionErrors

@@ -19,9 +19,9 @@ from mapfilter._kernels import draw_key
 from mapfilter._types import Ints32
 from mapfilter.filters import cuda_copies
 from mapfilter.filters.array_resampling import normalise_arrays, systematic_arrays
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.copies import array_of
-from mapfilter.filters.particle import Cloud
 from mapfilter.models import cuda_motion, cuda_reports, fingerprint
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import LevelTerms, Prediction

@@ -14,9 +14,9 @@ import numpy as np
 
 from mapfilter._threads import ONE, Call, Threads
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.copies import columns_of
-from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import log_sum
 from mapfilter.models import fingerprint
 from mapfilter.models.ageing import Ageing, age, as_it_is

@@ -16,9 +16,9 @@ import numpy as np
 
 from mapfilter._threads import Call
 from mapfilter._types import Floats, Floats32
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
-from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import (
     BIAS,
