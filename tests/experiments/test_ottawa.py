@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.experiments.benchmarks.ottawa import (

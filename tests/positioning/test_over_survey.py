@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter.database.build import build
 from mapfilter.database.measured import (
     Deviations,
