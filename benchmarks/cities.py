@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from mapfilter._io import read_sealed
+from mapfilter._json_files import read_sealed
 from mapfilter.evaluation.accuracy import RADII
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.results import CaseResult, summarise

@@ -19,7 +19,8 @@ from pathlib import Path
 from mapfilter._alone import writing_alone
 from mapfilter._code import code_digest
 from mapfilter._inputs import read_input
-from mapfilter._io import ensure_writable_folder, read_json, write_json
+from mapfilter._io import ensure_writable_folder
+from mapfilter._json_files import read_json, write_json
 from mapfilter.errors import ConfigError, InputError, OutputError, Stopped, fail
 
 _CODE = "code_sha256"

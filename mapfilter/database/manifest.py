@@ -22,7 +22,8 @@ from pydantic import (
 )
 
 from mapfilter._inputs import read_input
-from mapfilter._io import check_replaceable, check_seal, check_version, parse_json, sha256_file
+from mapfilter._io import sha256_file
+from mapfilter._json_files import check_replaceable, check_seal, check_version, parse_json
 from mapfilter.database.checked import BLOCK_BYTES, checksums
 from mapfilter.database.checked import MANIFEST as MANIFEST
 from mapfilter.errors import Fault, Faults, StoreError, fail

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from mapfilter._io import write_sealed
+from mapfilter._json_files import write_sealed
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.database.manifest import (

@@ -15,7 +15,8 @@ from typing import Any, Literal
 import pyarrow as pa
 
 from mapfilter._arguments import Setting, check_arguments, path_argument
-from mapfilter._io import check_part, left_aside
+from mapfilter._io import left_aside
+from mapfilter._json_files import check_part
 from mapfilter.database.checked import Part, generation_of, part_named
 from mapfilter.database.manifest import CELLS, MANIFEST, POINTS, read_manifest
 from mapfilter.database.parquet import Source, check_extent, count_rows, read_columns, write_columns

@@ -20,17 +20,11 @@ from numpy.typing import NDArray
 from mapfilter._device import PROCESSOR, Device, arrays_of, on_host
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.array_summary import summarise_arrays
+from mapfilter.filters.belief_models import Cloud, PriorT, ReadingT, WeighingModel
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.grid_transport import shifted, taps, turned
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
-from mapfilter.filters.particle import (
-    Cloud,
-    ParticleOptions,
-    PriorT,
-    ReadingT,
-    WeighingModel,
-    switched,
-)
+from mapfilter.filters.particle import ParticleOptions, switched
 
 _LEAST_MASS = 1e-9
 _NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite, nan
-from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Annotated, Any, Generic
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
@@ -20,6 +20,7 @@ from mapfilter._kernels import draw_key
 from mapfilter._threads import ONE, Threads
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults
+from mapfilter.filters.belief_models import Cloud, ParticleModel, PriorT, ReadingT
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.copies import MADE_WHEN_READ, Copies, Kept, copies_of
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
@@ -34,8 +35,6 @@ from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 _LEAST_WEIGHT = np.finfo(np.float32).tiny
 _Count = Annotated[int, Ge(1)]
-PriorT = TypeVar("PriorT", contravariant=True)
-ReadingT = TypeVar("ReadingT", contravariant=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,56 +113,6 @@ def switched(
     return (Status.CONVERGED if held else Status.SEARCHING), since_m
 
 
-class Cloud(NamedTuple):
-    """Hypotheses as a model weighs them.
-
-    Parameters
-    ----------
-    state : ndarray of float32, shape (R, N)
-        The first two rows are east and north in the model's frame.
-    kept : ndarray of float32, shape (W, N), or Copies of that shape
-        What each hypothesis keeps besides, such as errors that are summed out; W may be 0.
-    shared : object
-        What all of them share.
-    withheld : float
-        Log evidence of the last reading that is not in the weights.
-    """
-
-    state: Floats32
-    kept: Floats32 | Copies
-    shared: Any = None
-    withheld: float = 0.0
-
-
-class WeighingModel(Protocol[ReadingT]):
-    """Map and measurements, as particle and grid filters need them."""
-
-    @property
-    def bins(self) -> Bins:
-        """The area, in bins."""
-
-    def weigh(self, cloud: Cloud, log_weight: Floats, reading: ReadingT) -> tuple[Cloud, Reason]:
-        """Add a reading's log-likelihood to the log weights, in place.
-
-        Returns the hypotheses with what they keep afterwards, and why nothing was added, if so.
-        """
-
-    def can_converge(self, summary: BeliefSummary, reading: ReadingT) -> bool:
-        """Return whether a belief may count as having converged, if it agrees on a place."""
-
-
-class ParticleModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
-    """Motion, map and measurements, as a particle filter needs them."""
-
-    def start(self, prior: PriorT, most: int, rng: np.random.Generator) -> tuple[Cloud, Floats]:
-        """Return the first particles, and their log weights, shape (N,)."""
-
-    def move(
-        self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
-    ) -> tuple[Floats32, Floats]:
-        """Return particles and log weights after a step of finite length."""
-
-
 @dataclass(frozen=True, eq=False)
 class ParticleBelief:
     """Particles, their weights, and the status of the filter.
@@ -177,9 +126,10 @@ class ParticleBelief:
     bins : Bins
         The area.
     kept : ndarray of float32, shape (W, N)
-        As in :class:`Cloud`; copies are made when it is first read.
+        As in :class:`~mapfilter.filters.belief_models.Cloud`; copies are made when it is first
+        read.
     shared : object
-        As in :class:`Cloud`.
+        As in :class:`~mapfilter.filters.belief_models.Cloud`.
     travelled_m : float
         By dead reckoning since the start.
     log_evidence : float

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from mapfilter._inputs import json_value, read_input
-from mapfilter._io import atomic_file, check_version
+from mapfilter._io import atomic_file
+from mapfilter._json_files import check_version
 from mapfilter.errors import StoreError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import BeliefSummary, Bins

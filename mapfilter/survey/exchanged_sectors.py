@@ -16,15 +16,9 @@ from mapfilter._types import Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.survey.cell_model import (
-    EXPONENT,
-    Covariate,
-    DistanceLoss,
-    Prior,
-    Shadowing,
-    fit_trend,
-)
+from mapfilter.survey.level_trend import EXPONENT, Covariate, DistanceLoss, Prior, fit_trend
 from mapfilter.survey.measured_points import Points
+from mapfilter.survey.residual_field import Shadowing
 
 CALIBRATION = {"slope": 1.0, "slope_deviation": 0.2}
 """Prior of the slope of levels over those that were predicted."""

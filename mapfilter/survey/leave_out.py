@@ -11,9 +11,7 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.cell_model import (
-    Covariate,
-)
+from mapfilter.survey.level_trend import Covariate
 from mapfilter.survey.measured_map import Survey, fit_survey
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SurveyOptions

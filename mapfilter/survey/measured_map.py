@@ -19,25 +19,27 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.cell_model import (
+from mapfilter.survey.exchanged_sectors import CALIBRATION
+from mapfilter.survey.level_trend import (
     Covariate,
     DistanceLoss,
-    GaussianField,
-    NeighbourField,
     Prior,
-    ResidualField,
-    Shadowing,
     Trend,
-    TrendField,
     fit_trend,
-    learn_shadowing,
     locate_antenna,
-    most_telling,
 )
-from mapfilter.survey.exchanged_sectors import CALIBRATION
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SurveyOptions
+from mapfilter.survey.residual_field import (
+    GaussianField,
+    NeighbourField,
+    ResidualField,
+    Shadowing,
+    TrendField,
+    learn_shadowing,
+    most_telling,
+)
 from mapfilter.survey.weakest_reported import WeakestReported, weakest_reported
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ import numpy as np
 from mapfilter._words import number_of
 from mapfilter.errors import listed
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.cell_model import OFFSET_DEVIATION_DB, Covariate
 from mapfilter.survey.exchanged_sectors import Exchange, exchanged_sectors
+from mapfilter.survey.level_trend import OFFSET_DEVIATION_DB, Covariate
 from mapfilter.survey.measured_map import Survey
 from mapfilter.survey.measured_points import Points
 

@@ -19,7 +19,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.survey.cell_model import Covariate
+from mapfilter.survey.level_trend import Covariate
 from mapfilter.survey.measured_map import Survey, SurveyedCell
 from mapfilter.survey.measurement_rows import Identity
 from mapfilter.survey.weakest_reported import WeakestReported, mean_below, scale_of

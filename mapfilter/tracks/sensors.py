@@ -16,7 +16,8 @@ import pyarrow.parquet as pq
 
 from mapfilter._arrow import open_parquet
 from mapfilter._inputs import open_input
-from mapfilter._io import read_json, sha256_file, sha256_of
+from mapfilter._io import sha256_file, sha256_of
+from mapfilter._json_files import read_json
 from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.tracks.table_files import SEPARATORS, as_frame

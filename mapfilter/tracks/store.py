@@ -20,13 +20,12 @@ import pyarrow.parquet as pq
 
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments
 from mapfilter._inputs import shown
-from mapfilter._io import (
-    atomic_dir,
+from mapfilter._io import atomic_dir, sha256_file
+from mapfilter._json_files import (
     check_part,
     check_replaceable,
     check_version,
     read_json,
-    sha256_file,
     write_json,
 )
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail

@@ -5,8 +5,8 @@ runner-up, or all of the alternative. The likelihood of an epoch's readings unde
 likelihood of its particles, by their weights; readings are taken one after another, each given
 those before it, so that their log-likelihoods add up to that of the epoch, and the differences of
 two hypotheses to the change of their log odds. All likelihoods are those of the filter's model
-(:meth:`~mapfilter.positioning.bayes.model.BayesModel.weigh`), asked for the first one, two, three
-readings and so on.
+(:meth:`~mapfilter.positioning.bayes.evidence_model.EvidenceModel.weigh`), asked for the
+first one, two, three readings and so on.
 """
 
 from __future__ import annotations

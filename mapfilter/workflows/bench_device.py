@@ -15,7 +15,8 @@ from mapfilter._device import Device, on_host
 from mapfilter._kernels import draw_key
 from mapfilter._types import Floats
 from mapfilter.database.store import open_database
-from mapfilter.filters.particle import Cloud, ParticleBelief
+from mapfilter.filters.belief_models import Cloud
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter

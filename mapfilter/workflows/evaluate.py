@@ -9,7 +9,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from mapfilter._io import ensure_writable_folder, write_json
+from mapfilter._io import ensure_writable_folder
+from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mapfilter._io import write_json
+from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress, part_of
 from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.workflows.evaluate import TABLE, check_names, main_figures, run_global_positioning

@@ -10,7 +10,8 @@ from typing import get_args
 
 import numpy as np
 
-from mapfilter._io import atomic_dir, ensure_writable_folder, write_json
+from mapfilter._io import atomic_dir, ensure_writable_folder
+from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.config.load import given_keys

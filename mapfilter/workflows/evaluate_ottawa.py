@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, sha256_file, write_json
+from mapfilter._io import ensure_writable_folder, sha256_file
+from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results
 from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.config.sections import Config

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from mapfilter._io import atomic_dir, ensure_writable_folder, sha256_file, write_json
+from mapfilter._io import atomic_dir, ensure_writable_folder, sha256_file
+from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results, part_of
 from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.errors import ConfigError, InputError, fail

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, write_json
+from mapfilter._io import ensure_writable_folder
+from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, fail
 from mapfilter.experiments.benchmarks.ottawa import PARTS

@@ -22,9 +22,9 @@ from mapfilter.tracks.open_log import list_journeys, open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.readers import plain_csv
-from mapfilter.tracks.readers.columns import header_names, likely_separator
 from mapfilter.tracks.readers.csv_fields import FIELDS
 from mapfilter.tracks.readers.formats import find_format, format_of
+from mapfilter.tracks.readers.separated_values import header_names, likely_separator
 from mapfilter.tracks.readers.text import read_text
 from mapfilter.tracks.store import is_log
 

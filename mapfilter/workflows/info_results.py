@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from mapfilter._io import read_json
+from mapfilter._json_files import read_json
 from mapfilter.errors import StoreError
 from mapfilter.workflows.results import (
     ESTIMATES,

@@ -20,9 +20,9 @@ import numpy as np
 from mapfilter._kernels import draw_key
 from mapfilter._parallel import begun, spare_processes
 from mapfilter._types import Floats, Floats32
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import flattened, summarise
-from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import BoundReading, weigh_by_bound

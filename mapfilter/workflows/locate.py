@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._io import atomic_file, ensure_writable_folder, write_json
+from mapfilter._io import atomic_file, ensure_writable_folder
+from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
 from mapfilter._types import Floats

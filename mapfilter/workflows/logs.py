@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mapfilter.config.sections import Config, Track
+from mapfilter.config.sections import Config
+from mapfilter.config.track import Track
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.open_log import OpenedLog, list_journeys, open_log

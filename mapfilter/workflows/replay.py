@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from mapfilter._inputs import shown
-from mapfilter._io import atomic_file, replaced_files, write_json
+from mapfilter._io import atomic_file, replaced_files
+from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress, SerialExecutor
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from mapfilter._io import read_json
+from mapfilter._json_files import read_json
 from mapfilter.errors import OutputError, StoreError, fail
 
 ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")

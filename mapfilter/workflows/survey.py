@@ -20,8 +20,8 @@ from mapfilter.radio.cells import CellPlan, write_cell_plan
 from mapfilter.rasters.geotiff import READINGS_TAG
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.survey.cell_model import Covariate
 from mapfilter.survey.leave_out import Validation, leave_out
+from mapfilter.survey.level_trend import Covariate
 from mapfilter.survey.measured_map import Survey, fit_survey
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SurveyOptions

@@ -13,7 +13,8 @@ import numpy as np
 
 from mapfilter._types import Floats32
 from mapfilter.config.axes import vary
-from mapfilter.config.sections import Config, FilterSection, ReadingSection
+from mapfilter.config.sections import Config, FilterSection
+from mapfilter.config.sweep import ReadingSection
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail

@@ -220,7 +220,8 @@ from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.table_files import read_table as read_log_table
 from mapfilter.workflows.info import run_info
-from mapfilter._io import read_json, sha256_file
+from mapfilter._io import sha256_file
+from mapfilter._json_files import read_json
 """
 
 

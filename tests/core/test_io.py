@@ -10,15 +10,8 @@ import sys
 import pytest
 
 from mapfilter import _replace
-from mapfilter._io import (
-    atomic_dir,
-    atomic_file,
-    ensure_writable_folder,
-    left_aside,
-    read_json,
-    sha256_file,
-    write_json,
-)
+from mapfilter._io import atomic_dir, atomic_file, ensure_writable_folder, left_aside, sha256_file
+from mapfilter._json_files import read_json, write_json
 from mapfilter.errors import OutputError, StoreError
 
 

@@ -11,14 +11,8 @@ from pathlib import Path
 import pytest
 
 from mapfilter import _io, _replace
-from mapfilter._io import (
-    atomic_dir,
-    atomic_file,
-    check_replaceable,
-    check_version,
-    replaced_files,
-    sealed,
-)
+from mapfilter._io import atomic_dir, atomic_file, replaced_files
+from mapfilter._json_files import check_replaceable, check_version, sealed
 from mapfilter.errors import OutputError, StoreError
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import mapfilter
 from mapfilter._inputs import first_foreign_byte, json_value
-from mapfilter._io import read_json, write_sealed
+from mapfilter._json_files import read_json, write_sealed
 from mapfilter.errors import MapfilterError, StoreError
 from mapfilter.radio.tables import read_table as read_plan_table
 from mapfilter.survey.measurement_files import DIALECTS, read_csv

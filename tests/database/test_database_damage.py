@@ -7,7 +7,7 @@ import pyarrow.parquet
 import pytest
 from small_world import IDS, make_database, make_world
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import levels_folders
 from mapfilter.database.store import open_database

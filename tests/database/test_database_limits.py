@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 from small_world import CRS, LATTICE, make_database, make_world
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter.database.build import check_parameters
 from mapfilter.database.manifest import (
     InputFile,

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_database, make_plan, make_world
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import apart, levels_folders
 from mapfilter.database.store import info, open_database, read_cells, write_cells

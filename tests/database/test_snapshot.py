@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 from small_world import FLOOR_DBM, IDS, make_database, make_world
 
-from mapfilter._io import atomic_dir, sealed
+from mapfilter._io import atomic_dir
+from mapfilter._json_files import sealed
 from mapfilter.database import checked
 from mapfilter.database.build import build
 from mapfilter.database.checked import Part, checksums, generation_of

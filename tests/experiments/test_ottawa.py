@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.experiments.benchmarks.ottawa import (
@@ -27,7 +27,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     step_factor_of,
 )
 from mapfilter.experiments.benchmarks.ottawa_table import read_left_out
-from mapfilter.filters.particle import Cloud
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics

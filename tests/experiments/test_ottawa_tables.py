@@ -7,7 +7,7 @@ from math import isnan, nan, radians
 import numpy as np
 import pytest
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter.errors import StoreError
 from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.ottawa import (

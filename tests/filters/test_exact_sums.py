@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import scalar_oracle as oracle
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins, flattened
 from mapfilter.filters.kalman import smooth
-from mapfilter.filters.particle import Cloud, ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 
 PRIOR = np.array([0.5, 0.3, 0.2])
 CHANGE = np.array([[0.7, 0.2, 0.1], [0.1, 0.6, 0.3], [0.25, 0.05, 0.7]])

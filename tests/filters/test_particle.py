@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins
-from mapfilter.filters.particle import Cloud, ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 
 PRIOR_SD, STEP_SD, FIX_SD = 20.0, 3.0, 8.0
 PLAIN = ParticleOptions(

@@ -7,10 +7,11 @@ from math import log, nan
 import numpy as np
 import pytest
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.copies import Copies
 from mapfilter.filters.hypotheses import Bins
-from mapfilter.filters.particle import Cloud, ParticleBelief, ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from math import nan
 import numpy as np
 from small_area import BANDS, COLS, OPTIONS, PIXEL_M, ROWS, make_area
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Reason
-from mapfilter.filters.particle import Cloud
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.radio import RadioSource

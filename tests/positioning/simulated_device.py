@@ -18,9 +18,9 @@ from small_area import HEIGHT_M, SOUTH_M, WEST_M, WIDTH_M, make_area
 from mapfilter import _cuda
 from mapfilter._device import PROCESSOR, Device
 from mapfilter._kernels import draw_key
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.grid import GridFilter as BeliefGrid
-from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport

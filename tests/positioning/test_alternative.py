@@ -11,18 +11,20 @@ from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.alternative import (
-    TRANSITIONS,
     AlternativeHypothesis,
     AlternativeRules,
     NullHypothesis,
+)
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.hold import Hold
+from mapfilter.positioning.bayes.transitions import (
+    TRANSITIONS,
     Outcome,
     doubted,
     judge,
     report,
     resolve_alternative,
 )
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.hold import Hold
 
 RULES = AlternativeRules(
     start_log_odds=-3.0, search_threshold=4.0, lost_threshold=10.0, converge_log_odds=-5.0,

@@ -54,7 +54,7 @@ def positioner(area, *, grid, count=100_000):
     # What a report counts must not depend on the number of particles.
     levels = LevelErrors(white_db=6.0)
     evidence = EvidenceOptions(levels=levels, spacing_m=4.0, beside_db=0.0)
-    model = BayesModel(area, ERRORS, MapWeights(), evidence, remember=False)
+    model = BayesModel(area, ERRORS, MapWeights(), evidence=evidence, remember=False)
     options = ParticleOptions(
         max_particles=count,
         min_search_particles=count,

@@ -8,8 +8,8 @@ import small_area
 from made_town import CRS, PIXEL_M, SIDE_M, SOUTH_M, WEST_M, Town, slowed, walk_log
 from small_area import BANDS, HEIGHT_M, OPTIONS, WIDTH_M, make_area
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Status
-from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import Lattice
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MapWeights, MotionErrors
@@ -25,7 +25,7 @@ STILL = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0,
     disturbances_per_m=0.0, rate_share=0.0, scale_sd=0.0, stretch_sd=0.0,
 )  # fmt: skip
-MODEL = BayesModel(make_area(), STILL, MapWeights(), OPTIONS)
+MODEL = BayesModel(make_area(), STILL, MapWeights(), evidence=OPTIONS)
 REPORT = LevelReport(
     np.array([BANDS["A"], BANDS["B"]], dtype=np.int32), np.array([-75, -83], dtype=np.float32),
     np.zeros(0, dtype=np.int32), -110.0, 0.0,

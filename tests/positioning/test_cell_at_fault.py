@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_area import BANDS, LEVEL_DBM, OPTIONS, PIXEL_M, ROWS, make_area
 
-from mapfilter.filters.particle import Cloud
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.evidence import RadioReading

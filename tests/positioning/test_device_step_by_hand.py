@@ -9,8 +9,8 @@ import pytest
 from made_kernels import Placed, noted_kernels
 from small_area import HEIGHT_M, OPTIONS, PIXEL_M, WIDTH_M, make_area
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.filters.particle import Cloud
 from mapfilter.models import level_memory
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import MapWeights

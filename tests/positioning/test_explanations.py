@@ -10,8 +10,8 @@ import pytest
 from made_town import NAMES, SOUTH_M, WEST_M, Town, walk_log
 from scipy.special import logsumexp
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Status
-from mapfilter.filters.particle import Cloud
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
 from mapfilter.positioning.bayes.model import BayesModel

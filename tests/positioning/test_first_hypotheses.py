@@ -57,7 +57,7 @@ EXACT = MotionErrors(
 WEIGHTS = MapWeights(
     sd_m=6.0, weight_per_m=0.08, off_cost_per_m=0.06, leave_per_m=4e-3, return_per_m=0.03
 )
-MODEL = BayesModel(AREA, ERRORS, WEIGHTS, OPTIONS)
+MODEL = BayesModel(AREA, ERRORS, WEIGHTS, evidence=OPTIONS)
 COUNT = 20_000
 BAND = BANDS["B"]
 

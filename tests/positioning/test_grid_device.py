@@ -12,8 +12,8 @@ from small_area import make_area
 from mapfilter import _device
 from mapfilter._device import PROCESSOR, Device, on_host
 from mapfilter.errors import ConfigError
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.grid import GridBelief
-from mapfilter.filters.particle import Cloud
 from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.options import GridFilter, open_area
 from mapfilter.positioning.epochs import epochs

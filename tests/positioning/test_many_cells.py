@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scalar_oracle as oracle
 
-from mapfilter.filters.particle import Cloud
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.geodesy import Lattice
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.level_memory import SLOTS

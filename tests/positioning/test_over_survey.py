@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter.database.build import build
 from mapfilter.database.measured import (
     Deviations,
@@ -19,7 +19,7 @@ from mapfilter.database.measured import (
 from mapfilter.database.merge import merge
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
-from mapfilter.filters.particle import Cloud
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.geodesy import Lattice
 from mapfilter.models.measured_map import MeasuredMapOptions
 from mapfilter.models.street_motion import EAST, NORTH, STATES

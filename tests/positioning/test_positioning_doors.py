@@ -15,20 +15,22 @@ from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.alternative import (
-    TRANSITIONS,
     AlternativeHypothesis,
     AlternativeRules,
     NullHypothesis,
-    Outcome,
-    judge,
-    report,
-    resolve_alternative,
 )
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.bayes.timing import TimingState
+from mapfilter.positioning.bayes.transitions import (
+    TRANSITIONS,
+    Outcome,
+    judge,
+    report,
+    resolve_alternative,
+)
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.state import GnssState

@@ -32,8 +32,8 @@ from small_area import (
     WEST_M,
 )
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.filters.particle import Cloud
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.epochs import Epoch, GnssFix

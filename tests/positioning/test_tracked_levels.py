@@ -7,8 +7,9 @@ import pytest
 from scipy.special import logsumexp
 from small_area import BANDS, COLS, OPTIONS, PIXEL_M, ROWS, make_area
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Status
-from mapfilter.filters.particle import Cloud, ParticleBelief, ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.evidence import FixedTerm
 from mapfilter.positioning.bayes.model import BayesModel

@@ -7,19 +7,13 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.shadowing import correlated_field
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.survey.cell_model import (
-    DistanceLoss,
-    GaussianField,
-    Prior,
-    Shadowing,
-    fit_trend,
-    learn_shadowing,
-)
 from mapfilter.survey.leave_out import leave_out
+from mapfilter.survey.level_trend import DistanceLoss, Prior, fit_trend
 from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SurveyOptions
+from mapfilter.survey.residual_field import GaussianField, Shadowing, learn_shadowing
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_673_000.0, 5.0, 160, 160)

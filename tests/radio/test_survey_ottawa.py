@@ -12,11 +12,11 @@ from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.route_points import route_lattice
 from mapfilter.roads.ways import Ways
 from mapfilter.survey import measured_map
-from mapfilter.survey.cell_model import learn_shadowing
 from mapfilter.survey.leave_out import leave_out
 from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.read_measurements import read_measurements
+from mapfilter.survey.residual_field import learn_shadowing
 from mapfilter.survey.survey_rasters import surveyed_plan, write_survey
 
 

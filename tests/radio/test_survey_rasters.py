@@ -14,7 +14,7 @@ from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import check_against_plan
-from mapfilter.survey.cell_model import DistanceLoss
+from mapfilter.survey.level_trend import DistanceLoss
 from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey

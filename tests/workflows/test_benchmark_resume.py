@@ -5,7 +5,7 @@ import json
 import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 
 GIVEN = ["--filter", "candidate", "--case", "cell-6", "--runs", 1, "--workers", 1, "--json"]
 

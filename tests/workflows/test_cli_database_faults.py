@@ -10,7 +10,7 @@ import sys
 import pytest
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 
 KILLED_WHILE_WRITING = """
 import os, signal, sys

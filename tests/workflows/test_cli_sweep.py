@@ -9,7 +9,7 @@ import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
 from killed_worker import KillsOneWorker
 
-from mapfilter._io import sealed
+from mapfilter._json_files import sealed
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
 from mapfilter.config.load import load_config
 from mapfilter.errors import ConfigError, MapfilterError, StoreError

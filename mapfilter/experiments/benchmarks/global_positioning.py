@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from mapfilter._io import read_sealed, write_sealed
+from mapfilter._json_files import read_sealed, write_sealed
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.errors import StoreError

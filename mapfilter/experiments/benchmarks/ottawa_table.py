@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._io import read_sealed, write_sealed
+from mapfilter._json_files import read_sealed, write_sealed
 from mapfilter._types import Floats
 from mapfilter.errors import StoreError, fail
 from mapfilter.experiments.accuracy_row import (

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import read_sealed, write_sealed
+from mapfilter._json_files import read_sealed, write_sealed
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.recorded.benchmark import Journey, Judged, Task

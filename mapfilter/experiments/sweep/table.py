@@ -13,7 +13,8 @@ import pyarrow.parquet as pq
 
 from mapfilter._arrow import open_parquet
 from mapfilter._inputs import open_input
-from mapfilter._io import atomic_file, read_json, sha256_file, sha256_of, write_json
+from mapfilter._io import atomic_file, sha256_file, sha256_of
+from mapfilter._json_files import read_json, write_json
 from mapfilter._resume import load_part, save_part
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import Accuracy

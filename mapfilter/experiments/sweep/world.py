@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._io import atomic_dir, read_json, sha256_file, write_json
+from mapfilter._io import atomic_dir, sha256_file
+from mapfilter._json_files import read_json, write_json
 from mapfilter._types import Floats32
 from mapfilter.database.store import open_database, read_cells, write_cells
 from mapfilter.errors import InputError, StoreError, fail

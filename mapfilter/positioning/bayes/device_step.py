@@ -19,9 +19,9 @@ from mapfilter._kernels import draw_key
 from mapfilter._types import Ints32
 from mapfilter.filters import cuda_copies
 from mapfilter.filters.array_resampling import normalise_arrays, systematic_arrays
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.copies import array_of
-from mapfilter.filters.particle import Cloud
 from mapfilter.models import cuda_motion, cuda_reports, fingerprint
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import LevelTerms, Prediction
@@ -93,7 +93,7 @@ class DeviceStep:
         return moved, weighed
 
     def weigh(self, cloud: Cloud, log_weight: Any, reading: RadioReading) -> tuple[Cloud, Reason]:
-        """Add the log-likelihood of a reading in place, as :meth:`BayesModel.weigh` does.
+        """Add the log-likelihood of a reading in place, as :meth:`EvidenceModel.weigh` does.
 
         Terms of other sources are computed by the processor, for the states of all hypotheses.
         """

@@ -18,10 +18,7 @@ from mapfilter._device import PROCESSOR, Device
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.positioning.bayes.alternative import (
-    AlternativeRules,
-    report,
-)
+from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
@@ -39,6 +36,7 @@ from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesState, check_state, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
+from mapfilter.positioning.bayes.transitions import report
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import check_epoch

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from mapfilter._device import PROCESSOR, Device, arrays_of
 from mapfilter._types import Floats, Floats32
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.grid import Transport
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
-from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
 from mapfilter.positioning.bayes.evidence import RadioReading

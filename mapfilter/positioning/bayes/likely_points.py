@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mapfilter._types import Floats32
-from mapfilter.filters.particle import Cloud
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.evidence import RadioReading
 

@@ -268,7 +268,7 @@ class BayesFilter(Options):
         rules = replace(rules, claimed_from=min(rules.claimed_from, self.switch_mass))
         positioned, carriageways = None, None
         threads = Threads(self.threads)
-        model = BayesModel(area, motion, weights, evidence, threads=threads)
+        model = BayesModel(area, motion, weights, evidence=evidence, threads=threads)
         if not area.cell_ids:
             positioned = particles, rules
             rules = replace(

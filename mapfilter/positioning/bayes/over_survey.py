@@ -91,9 +91,9 @@ def over_survey(
         area,
         bound.model.motion,
         bound.model.weights,
-        replace(evidence, serving=weights, levels=levels),
-        bound.model.remember,
-        bound.model.threads,
+        evidence=replace(evidence, serving=weights, levels=levels),
+        remember=bound.model.remember,
+        threads=bound.model.threads,
         serving_model=_statistics(measured, area, database, serving_map),
         level_sd_db=_known(sd_db, options.unmeasured_db),
     )

@@ -16,9 +16,6 @@ from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     MapBelief,
     NullHypothesis,
-    Resolution,
-    doubted,
-    resolve_alternative,
 )
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
@@ -43,6 +40,11 @@ from mapfilter.positioning.bayes.step_units import (
     is_unit_open,
     log_odds_of_unit,
     unit_of_next_m,
+)
+from mapfilter.positioning.bayes.transitions import (
+    Resolution,
+    doubted,
+    resolve_alternative,
 )
 from mapfilter.positioning.bayes.unaided import beside_alternative, searching_alone
 from mapfilter.positioning.epochs import Epoch

@@ -15,7 +15,8 @@ from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio
 from mapfilter.tracks.readers.lines import blocks, line_texts
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.text import Text
 
 _NUMBER = r'\bNAME=\s*"?(?P<value>-?\d{1,12}(?:\.\d+)?)"?\s*(?:,|$)'

@@ -11,16 +11,12 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.radio.asu import UNKNOWN_ASU
 from mapfilter.radio.identities import technology
-from mapfilter.tracks.readers.columns import (
-    Columns,
-    header_columns,
-    header_names,
-    likely_separator,
-    only,
-)
+from mapfilter.tracks.readers.columns import Columns, only
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
 from mapfilter.tracks.readers.text import Text
 
 _UNAVAILABLE = 1e9

@@ -1,9 +1,7 @@
-"""Columns of separated values, read fast; a bad line loses nothing but itself."""
+"""Columns of texts, read as numbers, times and words; what is none is taken for missing."""
 
 from __future__ import annotations
 
-import csv
-import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -14,8 +12,7 @@ import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, good_lines, parsed
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.times import (
     parse_times,
     seconds_of_day,
@@ -23,7 +20,6 @@ from mapfilter.tracks.readers.times import (
     utc_from_local_s,
 )
 
-SEPARATORS = ",;\t|"
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
 _FIRST_ROWS = 1000
@@ -242,96 +238,9 @@ def _plain_times(column: pa.ChunkedArray, zone: str, layout: str) -> tuple[Float
     return None
 
 
-def header_columns(
-    data: bytes, reading: Reading, first_line: int = 1, *, ragged: int = 0
-) -> Columns:
-    """Read lines of which the first that is not blank names the columns.
-
-    ``ragged`` is the least number of fields of a line whose last fields may be absent; 0 where
-    every line has all fields.
-    """
-    start = 0
-    while start < len(data):
-        end = data.find(b"\n", start)
-        end = len(data) if end < 0 else end
-        header = data[start:end].decode("utf-8", "replace").strip("\n")
-        start, first_line = end + 1, first_line + 1
-        if header.strip():
-            separator = likely_separator(header)
-            names = header_names(header, separator)
-            return value_columns(
-                memoryview(data)[start:], reading, names, separator, first_line, ragged=ragged
-            )
-    return Columns(reading, (), np.zeros(0, dtype=np.int64))
-
-
 def only(columns: Mapping[str, Any], lines: Ints, rows: Bools) -> tuple[dict[str, Any], Ints]:
     """Return some rows of arrays, and their lines; the arrays themselves where all are kept."""
     if rows.all():
         return dict(columns), lines
     kept = {name: v[rows] if np.ndim(v) else v for name, v in columns.items()}
     return kept, lines[rows]
-
-
-def likely_separator(header: str) -> str:
-    """Return the separator that a header line has most often."""
-    return max(SEPARATORS, key=header.count)
-
-
-def header_names(header: str, separator: str) -> tuple[str, ...]:
-    """Return the names in a header line, in lower case."""
-    fields = next(csv.reader([header[:LONGEST_LINE]], delimiter=separator), [])
-    return tuple(name.strip().lower() for name in fields)
-
-
-def line_columns(
-    lines: Sequence[bytes],
-    numbers: Sequence[int] | Ints,
-    reading: Reading,
-    names: Sequence[str],
-    separator: str,
-    *,
-    ragged: int = 0,
-) -> Columns:
-    """Read lines picked from a file; ``numbers`` are theirs there."""
-    data = b"\n".join(lines)
-    columns = value_columns(memoryview(data), reading, names, separator, 1, ragged=ragged)
-    places = np.asarray(numbers, dtype=np.int64)
-    columns.line = places[columns.line - 1] if len(places) else columns.line
-    return columns
-
-
-def value_columns(
-    data: memoryview,
-    reading: Reading,
-    names: Sequence[str],
-    separator: str,
-    first_line: int = 1,
-    *,
-    ragged: int = 0,
-) -> Columns:
-    """Read lines of values under known names."""
-    named = tuple(names)
-    lines: list[Ints] = []
-    tables: list[pa.Table] = []
-    for block, line in blocks(data, first_line):
-        good, rows = good_lines(block, line, len(named), separator, reading, ragged or len(named))
-        if rows.size:
-            tables.append(parsed(good, len(named), separator))
-            lines.append(rows)
-    found = Columns(reading, named, np.concatenate(lines) if lines else np.zeros(0, dtype=np.int64))
-    found.decimal_comma = separator != ","
-    if tables:
-        table = pa.concat_tables(tables)
-        found._columns.update(enumerate(table.columns))
-    return found
-
-
-def split_blanks(data: bytes) -> bytes:
-    """Return a text in which runs of blanks and tabs are one blank, none at a line's ends."""
-    if b"\t" in data or b"  " in data:
-        # Single blanks are no match: a list of every blank would be larger than the text.
-        data = re.sub(rb"[ \t]{2,}|\t", b" ", data)
-    if b"\n " in data or b" \n" in data or data[:1] == b" " or data[-1:] == b" ":
-        data = re.sub(rb"^ | $", b"", data, flags=re.MULTILINE)
-    return data

@@ -9,7 +9,7 @@ from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import only
 from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.readers.identities import add_radio, parse_identities
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 
 
 def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:

@@ -16,7 +16,7 @@ from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields
 from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.identities import available
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 
 DATE = "date"
 _AZIMUTHS = ("azimuth", "compass", "compass_azimuth")

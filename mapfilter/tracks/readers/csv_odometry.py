@@ -8,7 +8,7 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
 
 _KMH = 1 / 3.6

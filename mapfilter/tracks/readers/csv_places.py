@@ -14,7 +14,7 @@ from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.csv_odometry import speeds_of
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 
 _HEMISPHERES = {"lat_deg": ("N", "S"), "lon_deg": ("E", "W")}
 _NAMED = re.compile(

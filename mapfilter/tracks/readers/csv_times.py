@@ -14,7 +14,8 @@ from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
 from mapfilter.tracks.readers.csv_weeks import over_weeks, week_column, weeks_of
 from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.times import (
     DAY_S,
     parse_times,

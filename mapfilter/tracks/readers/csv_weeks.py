@@ -8,7 +8,7 @@ from mapfilter._types import Floats
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.csv_mapped import Mapped
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 
 _NAMES = ("gps_week", "gpsweek", "gps week", "week_number", "week", "wn")
 _TURN, _LATEST = 1024, 4096

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, line_texts
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.times import seconds_of_day, without_midnights
 
 _ID = re.compile(r"#?[A-Z][A-Z0-9_]{0,30}")

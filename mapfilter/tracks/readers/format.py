@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.text import Text
 
 

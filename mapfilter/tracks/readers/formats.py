@@ -27,11 +27,12 @@ from mapfilter.tracks.readers import (
     smartloc,
     tems,
 )
-from mapfilter.tracks.readers.columns import header_names, likely_separator
 from mapfilter.tracks.readers.csv_fields import by_unit, usual_fields
 from mapfilter.tracks.readers.csv_headers import likely_fields, stated_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.recording import Reading, Recording
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.readers.separated_values import header_names, likely_separator
 from mapfilter.tracks.readers.text import Text, parts_of, read_text
 
 FORMATS: tuple[Format, ...] = (

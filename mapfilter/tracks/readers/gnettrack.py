@@ -10,15 +10,12 @@ import pandas as pd
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.radio.identities import technology
-from mapfilter.tracks.readers.columns import (
-    Columns,
-    header_columns,
-    header_names,
-    likely_separator,
-)
+from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
 from mapfilter.tracks.readers.stale import repeated_readings
 from mapfilter.tracks.readers.text import Text
 

@@ -9,10 +9,12 @@ import numpy as np
 from mapfilter._types import Ints
 from mapfilter._words import number_of
 from mapfilter.gnss.almanacs import WEEK_S
-from mapfilter.tracks.readers.columns import Columns, line_columns
+from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import line_columns
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import unix_seconds, utc_from_gps_s
 

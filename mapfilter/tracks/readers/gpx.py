@@ -18,7 +18,8 @@ from mapfilter.errors import InputError, fail
 from mapfilter.tracks.position_units import UERE_M
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.text import Text
 
 _POINTS = ("trkpt", "wpt", "rtept")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mapfilter._words import number_of
-from mapfilter.tracks.readers.columns import Columns, line_columns
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.separated_values import line_columns
 
 Groups = dict[str, tuple[list[bytes], list[int]]]
 

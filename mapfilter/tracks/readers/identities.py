@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.radio.identities import LIMITS, parse_cgi
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 
 _UNAVAILABLE = (-1, 2**31 - 1, 2**63 - 1)
 _NO_CELL = (2**28 - 1, 2**36 - 1)

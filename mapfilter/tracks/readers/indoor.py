@@ -8,7 +8,8 @@ from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.grouped import Groups, columns_of, group_lines
 from mapfilter.tracks.readers.identities import add_radio
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import unix_seconds
 

@@ -18,7 +18,7 @@ from pyarrow import csv as arrow_csv
 
 from mapfilter._arrow import arrow_bytes
 from mapfilter._types import Bools, Ints
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 
 _DECIMAL = re.compile(r"\A\s*[-+]?\d+,\d+\s*")
 _THOUSANDS = re.compile(r"\A\s*[-+]?[1-9]\d{0,2}(,\d{3})+\s*")

@@ -48,7 +48,8 @@ from mapfilter.tracks.readers.nemo_identities import (
     nothing_known,
     of_systems,
 )
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import utc_from_local_s
 

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.position_units import RADIUS_68, UERE_M
-from mapfilter.tracks.readers.columns import Columns, line_columns
+from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import line_columns
 from mapfilter.tracks.readers.text import Text
 
 _SENTENCE = re.compile(rb"(?:NMEA,)?[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")

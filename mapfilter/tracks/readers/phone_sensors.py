@@ -10,14 +10,11 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.tracks.readers.columns import (
-    Columns,
-    header_columns,
-    header_names,
-    likely_separator,
-)
+from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
 from mapfilter.tracks.readers.text import Text, read_text
 from mapfilter.tracks.readers.times import unix_seconds
 

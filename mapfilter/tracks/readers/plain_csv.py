@@ -8,11 +8,6 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import listed
-from mapfilter.tracks.readers.columns import (
-    header_columns,
-    header_names,
-    likely_separator,
-)
 from mapfilter.tracks.readers.csv_cells import add_cells
 from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
 from mapfilter.tracks.readers.csv_headers import stated_fields
@@ -23,7 +18,8 @@ from mapfilter.tracks.readers.csv_times import times_of
 from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
 from mapfilter.tracks.readers.csv_weeks import week_column
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
 from mapfilter.tracks.readers.text import Text
 
 _SPEEDS = ("speed_mps", "speed_kmh")

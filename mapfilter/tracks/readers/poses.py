@@ -11,10 +11,12 @@ import numpy as np
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import MapfilterError
-from mapfilter.tracks.readers.columns import Columns, split_blanks, value_columns
+from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import split_blanks, value_columns
 from mapfilter.tracks.readers.text import Text, read_text
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)

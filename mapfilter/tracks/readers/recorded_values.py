@@ -10,7 +10,7 @@ import pandas as pd
 from pandas.api.types import union_categoricals
 
 from mapfilter._types import Bools, Ints
-from mapfilter.tracks.readers.tables import Field
+from mapfilter.tracks.readers.recorded_field import Field
 
 _MANY_ROWS = 10_000
 _LATE_S, _LATE_SHARE, _DAY_S = 30.0, 0.1, 86_400.0

@@ -13,7 +13,8 @@ import numpy as np
 
 from mapfilter.gnss.broadcast import GPS_EPOCH_UTC_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.rinex2_epochs import read_epochs2
 from mapfilter.tracks.readers.rinex_epochs import Observations, Wanted, read_epochs
 from mapfilter.tracks.readers.text import Text

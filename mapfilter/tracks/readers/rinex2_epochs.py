@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from mapfilter.gnss.broadcast import GPS_EPOCH_UTC_S
 from mapfilter.tracks.readers.lines import blocks, line_texts
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.rinex_epochs import Observations, Records, Wanted, observed
 
 _DATE = re.compile(

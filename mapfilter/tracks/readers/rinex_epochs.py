@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.gnss.broadcast import GPS_EPOCH_UTC_S
 from mapfilter.tracks.readers.lines import blocks, line_texts
-from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.reading import Reading
 
 _DATE = (
     r"^\s*(?P<year>\d{4})\s+(?P<month>\d{1,2})\s+(?P<day>\d{1,2})\s+(?P<hour>\d{1,2})"

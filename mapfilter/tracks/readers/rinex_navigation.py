@@ -10,7 +10,8 @@ import numpy as np
 
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.rinex import (
     Lines,
     fixed_number,

@@ -12,7 +12,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs
 from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
-from mapfilter.tracks.readers.tables import Field
+from mapfilter.tracks.readers.recorded_field import Field
 from mapfilter.tracks.readers.wound import Winding
 
 _MOSTLY = 0.5

@@ -31,16 +31,12 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
-from mapfilter.tracks.readers.columns import (
-    Columns,
-    header_columns,
-    header_names,
-    likely_separator,
-    only,
-)
+from mapfilter.tracks.readers.columns import Columns, only
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
-from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import without_midnights
 
