@@ -111,6 +111,16 @@ def test_what_steps_do_not_tell_breaks_it_off():
     assert left.now.understated == 1.0
 
 
+def test_a_rest_breaks_it_off_and_rows_some_seconds_apart_are_none():
+    """A phone may write its steps each four seconds: no step since then is no rest yet."""
+    rng = np.random.default_rng(10)
+    way = streets(rng, 40)
+    begun = after(way, way)
+    assert begun.rested(43.9, 39.9) is begun
+    assert begun.rested(50.0, 39.9).rows == ()
+    assert begun.rested(50.0, 39.9).now == begun.now
+
+
 def test_who_stays_in_one_place_learns_nothing():
     rng = np.random.default_rng(6)
     fixes = white(rng, COUNT, 30.0)

@@ -204,10 +204,9 @@ class GnssSource(EvidenceSource):
             rejected = not agrees_with(found.belief, widened(fix, 1.0), self.gate.origin_m)
         least_s = self.options.dispute_s
         trail = own.trail.after(time_s, fix, state.reckoning, least_s, rejected=rejected)
-        wander = own.wander
-        if state.watch.rest is not None:
-            # Fixes that leave a rest may be right.
-            wander = wander.broken_off()
+        wander, rest = own.wander, state.watch.rest
+        if rest is not None:
+            wander = wander.rested(time_s, rest.since_s)
         elif not rejected:
             wide, gone = widened(fix, 1.0), state.reckoning
             way = Way(gone.east_m, gone.north_m, gone.gaps)

@@ -29,6 +29,8 @@ looked at, at least."""
 _LEAST_WAY_M = 20.0
 """Way from the first to the farthest of them, at least: what goes on while steps rest may be
 right."""
+_RESTS_S = 10.0
+"""Time without a step from which on one rests."""
 _LASTS_S = 30.0
 """Time after which the correlation of the error that lasts is 1/e."""
 _MEMORY_S, _PRIOR_S = 180.0, 120.0
@@ -119,6 +121,13 @@ class FixWander:
     def broken_off(self) -> FixWander:
         """Return it where steps may not tell the way from one fix to the next."""
         return replace(self, rows=()) if self.rows else self
+
+    def rested(self, time_s: float, since_s: float) -> FixWander:
+        """Return it at a fix while no step has been counted since a time.
+
+        Rows of steps may be some seconds apart. Fixes that leave a rest may be right.
+        """
+        return self.broken_off() if time_s - since_s > _RESTS_S else self
 
     def at_fix(
         self,

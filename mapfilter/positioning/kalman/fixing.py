@@ -154,7 +154,7 @@ class FixWeighing:
         fix: GnssFix,
         time_s: float,
         *,
-        rests: bool = False,
+        rests_since_s: float = nan,
         is_doubted: bool = False,
     ) -> WeighedFix:
         """Return what a fix leads to.
@@ -165,12 +165,12 @@ class FixWeighing:
         errors : FixErrors
         fix : GnssFix
         time_s : float
-        rests : bool
-            Whether steps say that one stands.
+        rests_since_s : float
+            Time since which steps say that one stands; NaN where they do not.
         is_doubted : bool
             Whether the belief may be wrong by what is known before the fix.
         """
-        own, record = self.own, errors.record
+        own, record, rests = self.own, errors.record, isfinite(rests_since_s)
         stated = fix_covariance_m2(fix, self.options.fix_sd_m)
         noise = stated * errors.understated
         motion, layout, white, lasting_m = at_rest(self.layout), self.layout, noise, 0.0
@@ -217,14 +217,11 @@ class FixWeighing:
         found = found or FixVerdict(Ruling.AGREES, info.nis / 2)
         nis = found.squared if info.used and found.ruling is Ruling.AGREES else nan
         errors = errors.after_fix(lasting_m, record, time_s)
-        if own is not MOVING:
+        if rests:
+            errors = errors._replace(wander=errors.wander.rested(time_s, rests_since_s))
+        elif own is not MOVING:
             rate_radps = float(belief.moments.mean[RATE])
-            # Fixes that leave a rest may be right.
-            errors = (
-                errors._replace(wander=errors.wander.broken_off())
-                if rests
-                else errors.wandered(fix, float(np.trace(stated)) / 2, time_s, rate_radps)
-            )
+            errors = errors.wandered(fix, float(np.trace(stated)) / 2, time_s, rate_radps)
         return WeighedFix(belief, errors, motion, found.ruling, nis, info.used)
 
     def _lasting_m(self, errors: FixErrors, wanted_m: float, time_s: float) -> float:

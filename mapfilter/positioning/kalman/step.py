@@ -270,11 +270,14 @@ class KalmanStep:
                 if found.is_new:
                     self.unused.append(UnusedReading(time_s, "motion", "", Reason.PHONE_TURNED))
                 return Reason.USED
-        rest = self.reckoning.watch.rest
-        rests = self.own is RECKONED and rest is not None and not rest.is_carried
+        rest, since_s = self.reckoning.watch.rest, nan
+        if self.own is RECKONED and rest is not None and not rest.is_carried:
+            since_s = rest.since_s
         how = FixWeighing(self.options, self.own, layout, self.method, self.compared)
         doubted = self.own is RECKONED and self.reckoning.may_have_left
-        after = how.weighed(self.belief, self.fixes, fix, time_s, rests=rests, is_doubted=doubted)
+        after = how.weighed(
+            self.belief, self.fixes, fix, time_s, rests_since_s=since_s, is_doubted=doubted
+        )
         self.belief, self.fixes = after.belief, after.errors
         motion = after.motion
         # One fix that contradicts a belief may be an outlier; steps that are wrong do so again.
