@@ -18,7 +18,8 @@ from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.positioning.kalman.reckoning import RECKONED
 from mapfilter.positioning.kalman.start import first_belief
-from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
+from mapfilter.positioning.kalman.state import KalmanState
+from mapfilter.positioning.kalman.step import KalmanStep
 from mapfilter.positioning.sensors.unmeasured import way_spread_m2
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -15,7 +15,8 @@ from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.place import belief_tail, place_of
 from mapfilter.positioning.kalman.reckoning import RECKONED
-from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
+from mapfilter.positioning.kalman.state import KalmanState
+from mapfilter.positioning.kalman.step import KalmanStep
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS, EAST, NORTH = "EPSG:32629", 500_000.0, 4_600_000.0

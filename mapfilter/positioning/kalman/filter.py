@@ -26,7 +26,8 @@ from mapfilter.positioning.kalman.level_errors import MOST_CELLS, CellSlots, wit
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.place import place_of
 from mapfilter.positioning.kalman.reckoning import RECKONED
-from mapfilter.positioning.kalman.step import KalmanState, KalmanStep
+from mapfilter.positioning.kalman.state import KalmanState
+from mapfilter.positioning.kalman.step import KalmanStep
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from cmath import exp
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from math import inf, isfinite, nan
+from dataclasses import replace
+from math import isfinite, nan
 
 import numpy as np
 
@@ -14,18 +14,16 @@ from mapfilter.filters.gaussian import Method
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.signal_strength import with_errors
-from mapfilter.models.state import MOVING, StateLayout
+from mapfilter.models.state import MOVING
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.kalman.alignment import Direction
-from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.disputed import Ruling
-from mapfilter.positioning.kalman.fixing import FixErrors, FixWeighing
+from mapfilter.positioning.kalman.fixing import FixWeighing
 from mapfilter.positioning.kalman.lasting import Motion, extended_belief, extended_motion
 from mapfilter.positioning.kalman.level_errors import (
     LEAST_MOVED_M,
-    CellSlots,
     with_own_spread,
 )
 from mapfilter.positioning.kalman.models import SiteModels, compiled
@@ -39,7 +37,6 @@ from mapfilter.positioning.kalman.reckoning import (
     ERRORS,
     RECKONED,
     TURNED,
-    Reckoning,
     after_each_other,
     at_rest,
     jump_to,
@@ -47,52 +44,11 @@ from mapfilter.positioning.kalman.reckoning import (
     turns_in_doubt,
 )
 from mapfilter.positioning.kalman.start import first_belief
+from mapfilter.positioning.kalman.state import KalmanState
 from mapfilter.positioning.kalman.turned import Turn
 
 _LOST_NIS, _WINDOW = 5.0, 10
 _WALK_MPS = 1.5
-
-
-@dataclass(frozen=True, eq=False)
-class KalmanState:
-    """State of a journey.
-
-    Parameters
-    ----------
-    layout : StateLayout
-        Position and errors of dead reckoning where there is some, else position and velocity; with
-        the place that fixes are of, where their errors last, and behind them the errors of levels.
-    belief : SumBelief or None
-        None before the first measurement that it can start from.
-    time_s : float
-        Time of the last epoch.
-    moved_m : float
-        Distance travelled since levels or timing advances were last used.
-    recent_nis : tuple of float
-        Normalised innovations squared of the last measurements, per component.
-    motion : tuple of arrays or None
-        Transition, noise and shift that led to the last epoch.
-    last_fix : GnssFix or None
-        The last one with a position.
-    fixes : FixErrors
-        Errors of fixes.
-    slots : CellSlots
-        Cells whose errors of levels are in the state.
-    reckoning : Reckoning
-        What is known of the sensors.
-    """
-
-    layout: StateLayout
-    belief: SumBelief | None = None
-    time_s: float = nan
-    moved_m: float = inf
-    status: Status = Status.SEARCHING
-    recent_nis: tuple[float, ...] = ()
-    motion: Motion | None = None
-    last_fix: GnssFix | None = None
-    fixes: FixErrors = field(default_factory=FixErrors)
-    slots: CellSlots = field(default_factory=lambda: CellSlots.empty(0))
-    reckoning: Reckoning = field(default_factory=Reckoning)
 
 
 class KalmanStep:
