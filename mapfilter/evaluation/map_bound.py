@@ -31,7 +31,7 @@ from mapfilter.evaluation.radio_map import (
     radio_map,
     received_cells,
 )
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.geotiff import new_geotiff
 
 COMPARED = 500

@@ -25,7 +25,8 @@ from mapfilter._gdal import open_raster
 from mapfilter._io import atomic_file
 from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, MapfilterError, OutputError, fail
-from mapfilter.geodesy import Lattice, projected_crs, same_crs
+from mapfilter.geodesy import projected_crs, same_crs
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, without_nodata
 

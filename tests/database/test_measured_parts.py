@@ -26,7 +26,7 @@ from mapfilter.database.measured import (
 )
 from mapfilter.database.parquet import write_columns
 from mapfilter.errors import InputError, StoreError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 

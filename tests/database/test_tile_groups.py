@@ -6,7 +6,7 @@ import numpy as np
 
 from mapfilter.database.build_job import BuildJob
 from mapfilter.database.tiles import grouped, tile_windows
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters

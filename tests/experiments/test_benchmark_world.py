@@ -13,7 +13,7 @@ from mapfilter.errors import StoreError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildings
 from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_world
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.database.build import build
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.learning.patterns import Patterns
 from mapfilter.learning.visits import Visits
 from mapfilter.radio.cells import Cell, CellPlan

@@ -16,7 +16,7 @@ from mapfilter.database.sources import LayerRoutes
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.mirrored import MirroredTwin, MirrorRules, mirrored_step
 from mapfilter.positioning.bayes.options import BayesFilter, open_area

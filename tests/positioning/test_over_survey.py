@@ -20,7 +20,7 @@ from mapfilter.database.merge import merge
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
 from mapfilter.filters.belief_models import Cloud
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.measured_map import MeasuredMapOptions
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.measured_model import MeasuredMapModel

@@ -16,9 +16,9 @@ from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels
 from mapfilter.errors import StoreError
-from mapfilter.geodesy import Lattice
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time
+from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES
 from mapfilter.models.way_map import interpolate

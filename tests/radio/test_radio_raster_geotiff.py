@@ -9,7 +9,7 @@ from rasterio import Affine
 
 from mapfilter._gdal import check_blocks
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters import geotiff
 from mapfilter.rasters.geotiff import (
     QUANTITY_TAG,

@@ -9,7 +9,7 @@ import pytest
 import rasterio
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.geotiff import (
     is_as_written,
     new_geotiff,

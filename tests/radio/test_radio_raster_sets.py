@@ -13,7 +13,7 @@ from raster_files import write_ascii, write_bil
 
 from mapfilter._io import sha256_file
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import OutputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters import geotiff as raster_writer
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.opening import open_rasters

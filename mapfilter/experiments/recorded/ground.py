@@ -11,7 +11,7 @@ import pandas as pd
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LayerRoutes
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.radio.cells import CellPlan
