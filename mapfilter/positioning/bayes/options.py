@@ -16,7 +16,8 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.level_errors import LevelErrors
-from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.models.street_motion import MotionErrors
+from mapfilter.models.way_map import MapWeights
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_frame import AreaFrame
