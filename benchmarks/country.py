@@ -42,7 +42,7 @@ from mapfilter.database.store import open_database
 from mapfilter.database.tiles import get_ready_to_read
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.index import HALF_WIDTH_M
 from mapfilter.roads.route_points import RouteSource

@@ -32,7 +32,7 @@ from mapfilter.evaluation.radio_map import (
     received_cells,
 )
 from mapfilter.lattice import Lattice
-from mapfilter.rasters.geotiff import new_geotiff
+from mapfilter.rasters.geotiff_writer import new_geotiff
 
 COMPARED = 500
 

@@ -33,7 +33,7 @@ from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reflections import NlosModel

@@ -28,7 +28,7 @@ from mapfilter.database.store import info
 from mapfilter.database.tiles import z_order
 from mapfilter.errors import InputError, OutputError
 from mapfilter.lattice import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 

@@ -10,7 +10,7 @@ from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import info
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Squares, Ways

@@ -9,7 +9,7 @@ from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_wo
 
 from mapfilter.database.build import build
 from mapfilter.lattice import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.sampling import levels_at
 

@@ -26,7 +26,7 @@ from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, OutputError, StoreError
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 

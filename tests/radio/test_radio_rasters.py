@@ -17,7 +17,7 @@ from rasterio.errors import NotGeoreferencedWarning
 from mapfilter.errors import InputError, OutputError
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import check_against_plan
 

@@ -11,7 +11,7 @@ from test_survey_fit import ANTENNA, CRS, LATTICE, law, measured, shadowed, some
 from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.survey.level_trend import DistanceLoss

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from mapfilter.errors import InputError, OutputError
 from mapfilter.lattice import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLACK, save

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.lattice import Lattice
 from mapfilter.radio.rxlev import resolve_neighbours
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.simulation.reports import (
     ReportModel,
