@@ -19,7 +19,8 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.mirrored import MirroredTwin, MirrorRules, mirrored_step
-from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.gnss.source import GnssSource
