@@ -40,9 +40,9 @@ from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import get_ready_to_read
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.index import HALF_WIDTH_M
 from mapfilter.roads.route_points import RouteSource

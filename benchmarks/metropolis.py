@@ -31,7 +31,7 @@ from mapfilter.database.tiles import TileRows, places_table, received_levels, ti
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.success import wilson_interval
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.tiled_area import TiledArea

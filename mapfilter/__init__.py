@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from mapfilter.database.store import open_database as open_database
     from mapfilter.errors import MapfilterError as MapfilterError
     from mapfilter.filters.contract import Status as Status
-    from mapfilter.geodesy import Lattice as Lattice
+    from mapfilter.lattice import Lattice as Lattice
     from mapfilter.positioning.bayes.options import BayesFilter as BayesFilter
     from mapfilter.positioning.bayes.options import GridFilter as GridFilter
     from mapfilter.positioning.candidate import CandidateFilter as CandidateFilter
@@ -81,7 +81,7 @@ _NAMES = {
     "database.store": "open_database",
     "errors": "MapfilterError",
     "filters.contract": "Status",
-    "geodesy": "Lattice",
+    "lattice": "Lattice",
     "positioning.bayes.options": "BayesFilter GridFilter",
     "positioning.candidate": "CandidateFilter",
     "positioning.epochs": "Epoch epochs",

@@ -71,6 +71,12 @@ def open_raster(path: Path, *, quiet: bool = True) -> Iterator[Any]:
         raise RasterioError(f"names or notes in no UTF-8 ({error.reason})") from error
 
 
+def reason_of(error: Exception) -> str:
+    """Return the first line of GDAL's message."""
+    text = str(error.__cause__ or error).strip()
+    return text.splitlines()[0] if text else type(error).__name__
+
+
 @contextmanager
 def _unreadable_messages_unheard() -> Iterator[None]:
     """Let nothing be printed where GDAL complains in bytes that are no text.

@@ -40,6 +40,12 @@ class NoProcessError(MapfilterError):
     """The system starts no process beside this one."""
 
 
+def worker_died(got: str) -> MapfilterError:
+    """Return the error for a worker process that ended; ``got`` is what was found."""
+    hint = "too many workers or too large a tile_px; finished work is kept for --resume"
+    return fail(MapfilterError, "worker processes", "all of them running", got, hint)
+
+
 class LocalWorkers(ProcessPoolExecutor):
     """A pool of local processes.
 

@@ -1,15 +1,13 @@
-"""Coordinate reference systems, the lattice, and the two ways of counting angles.
+"""Coordinate reference systems, and the two ways of counting angles.
 
-Positions are east/north metres in a projected CRS. Lattice row 0 is the northern edge; a lattice
-point is a pixel's centre, the lattice's corner is a pixel's corner, as in GDAL. Planners' azimuths
-are compass degrees clockwise from *true* north; headings are radians counter-clockwise from *grid*
-east. The angle between true and grid north is the grid convergence.
+Positions are east/north metres in a projected CRS. Planners' azimuths are compass degrees clockwise
+from *true* north; headings are radians counter-clockwise from *grid* east. The angle between true
+and grid north is the grid convergence.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
 from math import pi
 from typing import Any
@@ -249,135 +247,6 @@ def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> 
     elif west >= east or south >= north:
         faults.add(where, "west < east and south < north", bbox, "corners swapped")
     faults.raise_if_any(InputError)
-
-
-@dataclass(frozen=True, slots=True)
-class Lattice:
-    """A regular grid of square pixels in a projected CRS.
-
-    Parameters
-    ----------
-    crs : str
-        Projected, in metres, as :func:`projected_crs` returns it.
-    west_m, north_m : float
-        Outer corner of pixel (0, 0).
-    resolution_m : float
-        Side of a pixel.
-    rows, cols : int
-        Size; row 0 is the northern edge.
-
-    Examples
-    --------
-    >>> lattice = Lattice("EPSG:32629", 500000.0, 4500010.0, 5.0, 2, 3)
-    >>> lattice.east_north(0, 0)
-    (500002.5, 4500007.5)
-    >>> lattice.row_col(500002.5, 4500007.5)
-    (0, 0)
-    >>> print(lattice)
-    2 x 3 pixels of 5 m (0.015 x 0.01 km), EPSG:32629
-    """
-
-    crs: str
-    west_m: float
-    north_m: float
-    resolution_m: float
-    rows: int
-    cols: int
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        if not np.isfinite([self.west_m, self.north_m]).all():
-            faults.add("lattice corner", "finite metres", (self.west_m, self.north_m))
-        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0):
-            faults.add("lattice resolution", "metres > 0", self.resolution_m)
-        if self.rows < 1 or self.cols < 1:
-            faults.add("lattice size", "at least one pixel", f"{self.rows} x {self.cols}")
-        faults.raise_if_any(InputError)
-
-    def __str__(self) -> str:
-        """Return size, resolution and CRS in a few words."""
-        width_km, height_km = (n * self.resolution_m / 1000 for n in (self.cols, self.rows))
-        size = f"{self.rows} x {self.cols} pixels of {self.resolution_m:g} m"
-        return f"{size} ({width_km:.3g} x {height_km:.3g} km), {short_crs(self.crs)}"
-
-    @classmethod
-    def covering(
-        cls, crs: str, bounds_m: tuple[float, float, float, float], resolution_m: float
-    ) -> Lattice:
-        """Return the lattice over west, south, east, north (m), snapped out to the resolution."""
-        west, south, east, north = bounds_m
-        if not (np.isfinite([*bounds_m, resolution_m]).all() and resolution_m > 0):
-            got = f"{bounds_m} m at {resolution_m} m"
-            raise fail(InputError, "lattice", "finite bounds and a resolution > 0", got)
-        first_col, last_col = np.floor(west / resolution_m), np.ceil(east / resolution_m)
-        first_row, last_row = np.floor(south / resolution_m), np.ceil(north / resolution_m)
-        return cls(
-            crs,
-            float(first_col * resolution_m),
-            float(last_row * resolution_m),
-            float(resolution_m),
-            int(last_row - first_row),
-            int(last_col - first_col),
-        )
-
-    @property
-    def bounds_m(self) -> tuple[float, float, float, float]:
-        """West, south, east, north of the outer edges."""
-        return (
-            self.west_m,
-            self.north_m - self.rows * self.resolution_m,
-            self.west_m + self.cols * self.resolution_m,
-            self.north_m,
-        )
-
-    @property
-    def gdal_transform(self) -> tuple[float, float, float, float, float, float]:
-        """Six numbers in GDAL's order: west, pixel width, 0, north, 0, -pixel height."""
-        return (self.west_m, self.resolution_m, 0.0, self.north_m, 0.0, -self.resolution_m)
-
-    def east_north(self, row: Any, col: Any) -> Any:
-        """Return the centres of pixels as (east_m, north_m), scalars or arrays."""
-        return (
-            self.west_m + (col + 0.5) * self.resolution_m,
-            self.north_m - (row + 0.5) * self.resolution_m,
-        )
-
-    def row_col(self, east_m: Any, north_m: Any) -> Any:
-        """Return the pixels that hold positions as integer (row, col); they may lie outside."""
-        row = np.floor((self.north_m - np.asarray(north_m)) / self.resolution_m).astype(np.int64)
-        col = np.floor((np.asarray(east_m) - self.west_m) / self.resolution_m).astype(np.int64)
-        return (int(row), int(col)) if row.ndim == 0 else (row, col)
-
-    def contains(self, row: Any, col: Any) -> Any:
-        """Return which pixels lie on the lattice."""
-        return (row >= 0) & (row < self.rows) & (col >= 0) & (col < self.cols)
-
-    def window(self, row: int, col: int, rows: int, cols: int) -> Lattice:
-        """Return the part of this lattice that starts at (row, col), clipped to it."""
-        rows, cols = min(rows, self.rows - row), min(cols, self.cols - col)
-        west = self.west_m + col * self.resolution_m
-        north = self.north_m - row * self.resolution_m
-        return Lattice(self.crs, west, north, self.resolution_m, rows, cols)
-
-    def tiles(self, size_px: int) -> list[tuple[int, int, int, int]]:
-        """Return (row, col, rows, cols) of square tiles that cover the lattice, row by row."""
-        return [
-            (row, col, min(size_px, self.rows - row), min(size_px, self.cols - col))
-            for row in range(0, self.rows, size_px)
-            for col in range(0, self.cols, size_px)
-        ]
-
-    def aligned_with(self, other: Lattice) -> bool:
-        """Return whether both are the same lattice to within a thousandth of a pixel."""
-        tolerance_m = 1e-3 * self.resolution_m
-        return (
-            (self.rows, self.cols) == (other.rows, other.cols)
-            and abs(self.resolution_m - other.resolution_m) * max(self.rows, self.cols)
-            <= tolerance_m
-            and abs(self.west_m - other.west_m) <= tolerance_m
-            and abs(self.north_m - other.north_m) <= tolerance_m
-            and same_crs(self.crs, other.crs)
-        )
 
 
 @lru_cache(maxsize=16)

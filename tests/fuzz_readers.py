@@ -17,12 +17,12 @@ from made_maps import CRS as MAP_CRS
 from made_recordings import MADE
 
 from mapfilter.config.load import load_config
-from mapfilter.geodesy import Lattice
 from mapfilter.gnss.almanacs import read_yuma
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
 from mapfilter.radio.msi import read_msi
 from mapfilter.radio.plan_files import read_cell_plan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.layers import read_layer_roads

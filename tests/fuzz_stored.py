@@ -30,7 +30,7 @@ from mapfilter.experiments.recorded.worst_report import (
 )
 from mapfilter.experiments.sweep.table import SCHEMA, read_runs
 from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_world
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.learning.patch import Change, Patch, read_patch, write_patch
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import epochs

@@ -14,7 +14,7 @@ from mapfilter._types import Floats32
 from mapfilter.check.findings import Findings
 from mapfilter.check.samples import RasterSample, sample_raster
 from mapfilter.errors import Fault, InputError, listed
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.files import check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters, in_other_case

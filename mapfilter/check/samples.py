@@ -8,12 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats, Floats32
-from mapfilter.geodesy import (
-    Lattice,
-    azimuth_from_heading_deg,
-    grid_convergence_rad,
-    unproject,
-)
+from mapfilter.geodesy import azimuth_from_heading_deg, grid_convergence_rad, unproject
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.resampling import read_on

@@ -12,7 +12,7 @@ from mapfilter.database.parquet import Window
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, cut_by_tile, overlap
 from mapfilter.database.tiles import TileRows, TileTask, grouped, read_tiles, tile_windows
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan

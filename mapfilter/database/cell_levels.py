@@ -13,7 +13,7 @@ from mapfilter.database.parquet import Window, WindowReader, opened, part_ranges
 from mapfilter.database.points import way_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import StoreError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 _POINT_COLUMNS = (
     "row",

@@ -22,7 +22,7 @@ from mapfilter.database.points import Points
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.tiles import tile_windows
 from mapfilter.errors import InputError, OutputError, fail
-from mapfilter.rasters.geotiff import new_geotiff
+from mapfilter.rasters.geotiff_writer import new_geotiff
 
 BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
 CELLS_TAG = "CELLS"

@@ -23,7 +23,7 @@ from mapfilter.database.checked import HeldPart
 from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS, describe_part
 from mapfilter.database.parquet import Source, dictionary, read_columns, text_codes, write_columns
 from mapfilter.errors import InputError, StoreError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.raster_set import RxLevRasters
 
 _READINGS = {

@@ -29,7 +29,7 @@ from mapfilter.database.tiles import (
     z_order,
 )
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 
 _PLACE = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 
 @dataclass(frozen=True, slots=True, eq=False)

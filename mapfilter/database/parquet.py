@@ -19,7 +19,8 @@ from mapfilter._inputs import json_value
 from mapfilter._types import Floats, Ints32
 from mapfilter.database.checked import HeldPart, Part
 from mapfilter.errors import MapfilterError, StoreError, fail
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import same_crs
+from mapfilter.lattice import Lattice
 
 # A damaged footer or page header can ask for absurd amounts of memory or name other columns.
 DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)

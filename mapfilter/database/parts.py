@@ -38,7 +38,7 @@ from mapfilter.database.parquet import (
 )
 from mapfilter.database.store import write_cells
 from mapfilter.database.tiles import TileLevels, TileRows
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 
 LevelsRows = dict[str, NDArray[Any]]

@@ -12,7 +12,7 @@ from mapfilter._types import Bools, Floats32, Ints, Ints32
 from mapfilter.database.checked import Part
 from mapfilter.database.parquet import check_places, read_columns, text_codes
 from mapfilter.errors import InputError, StoreError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.ways import half_width_of
 

@@ -20,7 +20,7 @@ from mapfilter.database.measured import MeasuredParts, read_measured
 from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.database.points import Points, read_points, way_columns
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.ways import Bounds
 

@@ -18,7 +18,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels, tile_windows
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.lattice import RouteLattice
 

@@ -16,7 +16,8 @@ from shapely import STRtree
 
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import same_crs
+from mapfilter.lattice import Lattice
 from mapfilter.roads.index import WayIndex
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.route_points import RouteSource, areas_near

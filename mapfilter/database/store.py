@@ -22,7 +22,7 @@ from mapfilter.database.manifest import CELLS, MANIFEST, POINTS, read_manifest
 from mapfilter.database.parquet import Source, check_extent, count_rows, read_columns, write_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, MapfilterError, StoreError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cell_layouts import SELDOM
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -14,7 +14,7 @@ from mapfilter._code import code_digest
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.sampling import Places, levels_at

@@ -31,8 +31,8 @@ from mapfilter.evaluation.radio_map import (
     radio_map,
     received_cells,
 )
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import new_geotiff
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff_writer import new_geotiff
 
 COMPARED = 500
 

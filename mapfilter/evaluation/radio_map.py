@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt
 from mapfilter._types import Bools, Floats32, Ints
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.options import Below1, Options, Positive
 
 MOST_RECEIVED = 7

@@ -16,7 +16,7 @@ from mapfilter.database.manifest import InputFile
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.rewrite import levels_of, rewrite, routes_of
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.learning.patch import Change, Patch, accepted, check_patch
 from mapfilter.learning.patterns import Patterns
 from mapfilter.radio.cells import Cell, CellPlan

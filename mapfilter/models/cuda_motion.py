@@ -14,7 +14,8 @@ from numba import cuda
 
 from mapfilter import _cuda
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
-from mapfilter.models.street_motion import MapFactors, MotionErrors, noise_of_step
+from mapfilter.models.street_motion import MotionErrors, noise_of_step
+from mapfilter.models.way_map import MapFactors
 
 _F = np.float32
 _ZERO, _ONE = _F(0.0), _F(1.0)

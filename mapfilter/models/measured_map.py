@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 _CLIP_SD = 4.0
 

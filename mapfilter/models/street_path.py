@@ -1,8 +1,9 @@
 """How well a path of dead reckoning fits the streets that it would end on.
 
 From an unknown start, a path of some tens of metres is laid through every place of the map, in
-every direction. Each time it is weighed by the same map as hypotheses are
-(:mod:`mapfilter.models.street_motion`), leg by leg, including that of being off the map.
+every direction. Each time it is weighed, leg by leg, by the map of ways that hypotheses are
+weighed by (:mod:`mapfilter.models.way_map`), including the probability of being off it, which is
+carried from one leg to the next.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from numba import njit
 
 from mapfilter._kernels import log32
 from mapfilter._types import Floats32
-from mapfilter.models.street_motion import MapFactors
+from mapfilter.models.way_map import MapFactors
 
 _F = np.float32
 
@@ -42,7 +43,7 @@ def weigh_path(
         Angle that is added to the headings of dead reckoning.
     on_map : ndarray of float32, shape (rows, cols)
         Likelihood of one leg on the map: the exponential of
-        :func:`~mapfilter.models.street_motion.map_log_likelihood` times the factors' exponent.
+        :func:`~mapfilter.models.way_map.map_log_likelihood` times the factors' exponent.
     resolution_m : float
         Side of its pixels; each point takes the value of the pixel that holds it.
     factors : MapFactors

@@ -9,7 +9,8 @@ import numpy as np
 
 from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice, unproject
+from mapfilter.geodesy import unproject
+from mapfilter.lattice import Lattice
 from mapfilter.tracks.misplaced import misplaced_by, outside_m
 
 START_REACH_M, START_REACH_SD = 500.0, 5.0

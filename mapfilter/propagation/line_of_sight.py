@@ -7,7 +7,7 @@ from numba import njit
 
 from mapfilter._types import Bools, Floats32
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 _STEP_PX = 0.5
 _SAME_ROOF_M = 0.5

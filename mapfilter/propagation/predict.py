@@ -14,7 +14,7 @@ import numpy as np
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.shadowing import correlated_field, named_rng, site_shadowing
 from mapfilter.propagation.surroundings import Antennas, Surroundings

@@ -7,7 +7,7 @@ from collections import defaultdict
 import numpy as np
 
 from mapfilter.errors import listed
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import (
     PredictionModel,
     outside_published_range,

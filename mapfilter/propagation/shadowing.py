@@ -15,7 +15,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 
 _PAD_LENGTHS = 10.0

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mapfilter._inputs import open_input
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.files import Declared
 from mapfilter.rasters.plain_grids import NODATA, GridHeader, PlainGrid, file_beside, grid_crs
 

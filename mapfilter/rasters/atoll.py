@@ -18,7 +18,7 @@ import numpy as np
 from mapfilter._inputs import open_input
 from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.radio.tables import Table, read_table
 

@@ -13,7 +13,7 @@ import numpy as np
 from mapfilter._inputs import open_input
 from mapfilter._types import Bools, Floats32
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 Window = tuple[int, int, int, int]
 """Row, column, rows, columns."""

@@ -27,7 +27,8 @@ from pyproj.exceptions import CRSError
 from mapfilter._inputs import read_input
 from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, known_crs, projected_crs, same_crs
+from mapfilter.geodesy import known_crs, projected_crs, same_crs
+from mapfilter.lattice import Lattice
 from mapfilter.radio.tables import number
 from mapfilter.rasters.files import RasterFile, Window, without_nodata
 

@@ -16,7 +16,7 @@ import numpy as np
 from mapfilter._io import sha256_file
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError, fail, listed
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.files import (
     Quantity,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.files import Declared
 from mapfilter.rasters.plain_grids import WEST_KEYS, GridHeader, PlainGrid, file_beside, grid_crs
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail, listed
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import same_crs
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.files import RasterFile, Window
 
 Resampling = Literal["nearest", "bilinear"]

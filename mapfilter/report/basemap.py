@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.report.canvas import BLACK, GREY, STREET, Look, figure_of, new_figure
 from mapfilter.report.ground import BaseMap as BaseMap
 from mapfilter.report.ground import Bounds as Bounds

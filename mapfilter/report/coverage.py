@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.report.basemap import (
     OVER_RASTER,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.report.basemap import (
     OVER_RASTER,
     BaseMap,

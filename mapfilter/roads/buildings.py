@@ -14,7 +14,7 @@ from rasterio.transform import Affine
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.defaults import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
 from mapfilter.roads.elements import Query
 from mapfilter.roads.maps import read_elements

@@ -14,7 +14,7 @@ from shapely import STRtree
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.ways import Geometries, Ways
 
 HALF_WIDTH_M = 6.0

@@ -23,7 +23,8 @@ from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, projected_crs, same_crs
+from mapfilter.geodesy import projected_crs, same_crs
+from mapfilter.lattice import Lattice
 
 _COLOUR = ("r", "g", "b")
 _LARGEST_WINDOW_PX = 1 << 24

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -22,7 +22,8 @@ from rasterio.windows import Window
 from mapfilter._gdal import open_raster
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, projected_crs, same_crs
+from mapfilter.geodesy import projected_crs, same_crs
+from mapfilter.lattice import Lattice
 from mapfilter.roads.ways import Bounds, Ways
 
 LARGEST_RASTER_PX = 1_000_000_000

@@ -13,7 +13,8 @@ from shapely import STRtree
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import same_crs
+from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import burn
 from mapfilter.roads.index import HALF_WIDTH_M, WayIndex, note_half_widths
 from mapfilter.roads.lattice import RouteLattice

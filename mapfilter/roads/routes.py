@@ -17,7 +17,7 @@ from geopandas import GeoDataFrame
 from mapfilter._annotations import Words
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.index import HALF_WIDTH_M
 from mapfilter.roads.landuse import read_landuse

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice, project
+from mapfilter.geodesy import project
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.known_start import ELSEWHERE, MOST_SD_M, check_place

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch

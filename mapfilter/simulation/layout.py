@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.line_of_sight import check_heights
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 _ARRIVED_CELLS = 2.0
 _LEAST_TARGETS_M = 50.0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import ConfigError, Faults, InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.options import NotNegative, Options, Positive
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rxlev import quantise_level_dbm

@@ -12,7 +12,7 @@ from shapely.geometry import LineString
 
 from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.osm import DRIVING_CLASSES
 from mapfilter.roads.ways import (
     Bounds,

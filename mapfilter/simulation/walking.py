@@ -11,7 +11,7 @@ import numpy as np
 from annotated_types import Ge, Le
 
 from mapfilter._types import Bools, Floats, Floats32
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.options import NotNegative, Options
 from mapfilter.simulation.routes import Route
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.level_trend import Covariate
 from mapfilter.survey.measured_map import Survey, SurveyedCell

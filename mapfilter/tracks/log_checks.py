@@ -10,7 +10,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.tracks.clock_notes import week_fault
 from mapfilter.tracks.misplaced import FAR_M, misplaced_by
 

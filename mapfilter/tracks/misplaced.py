@@ -9,7 +9,8 @@ from pyproj.exceptions import ProjError
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
-from mapfilter.geodesy import Lattice, project, unproject
+from mapfilter.geodesy import project, unproject
+from mapfilter.lattice import Lattice
 
 AWAY_M = 5000.0
 """Positions all of which lie farther outside of an area are those of another one."""

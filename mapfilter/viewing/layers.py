@@ -11,7 +11,7 @@ import shapely
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Floats32
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.ways import Buildings
 from mapfilter.viewing.arrays import packed, starts
 from mapfilter.viewing.ground import ViewFrame

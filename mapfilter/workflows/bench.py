@@ -22,9 +22,9 @@ from mapfilter.database.build_job import BuildJob
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice

@@ -18,7 +18,8 @@ from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
 from mapfilter.experiments.papers.khalaf_allah_2007 import MAP_SETTINGS, plans
 from mapfilter.experiments.sweep.run import sweep
-from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import locate
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench import build_made, made_rasters

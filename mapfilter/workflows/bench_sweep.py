@@ -12,7 +12,8 @@ from functools import partial
 from pathlib import Path
 from statistics import median
 
-from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
+from mapfilter._cluster import cluster_executor
+from mapfilter._parallel import SerialExecutor, local_executor
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.papers.khalaf_allah_2007 import MAP_SETTINGS, ONE_SIGMA_TRANS_M, plans

@@ -19,7 +19,7 @@ from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, MapfilterError, listed
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.remarks import off_frequency
 from mapfilter.radio.arrange_cells import UNUSED_COLUMNS
 from mapfilter.radio.cell_rules import ANTENNAS

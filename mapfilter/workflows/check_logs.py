@@ -8,7 +8,8 @@ from mapfilter._words import number_of
 from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
-from mapfilter.geodesy import Lattice, same_crs, short_crs
+from mapfilter.geodesy import same_crs, short_crs
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan

@@ -13,15 +13,8 @@ from mapfilter.check.findings import Findings
 from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, listed
-from mapfilter.geodesy import (
-    Lattice,
-    project,
-    projected_crs,
-    same_crs,
-    unproject,
-    utm_zone,
-    utm_zone_crs,
-)
+from mapfilter.geodesy import project, projected_crs, same_crs, unproject, utm_zone, utm_zone_crs
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg

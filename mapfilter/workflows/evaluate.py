@@ -33,10 +33,11 @@ from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.network import street_network
-from mapfilter.simulation.satellites import NlosModel, ReceptionModel
+from mapfilter.simulation.reflections import NlosModel
+from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.workflows.evaluate_recorded import ALL
 from mapfilter.workflows.evaluate_recorded import NAMES as RECORDED
 from mapfilter.workflows.evaluate_runs import run_cases, street_base

@@ -35,7 +35,7 @@ from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.roads.route_points import inside_areas

@@ -24,7 +24,7 @@ from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import flattened, summarise
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import STATES

@@ -16,7 +16,7 @@ from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.fingerprints.located import LocatedReports, figures_of
 from mapfilter.positioning.fingerprints.locating import (
     ReportLocator,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 
 def pixels_on(

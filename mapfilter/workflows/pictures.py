@@ -14,7 +14,7 @@ from mapfilter._io import ensure_writable_folder
 from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import OutputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLUE, ORANGE, Drawn, save

@@ -7,7 +7,8 @@ from dataclasses import replace
 from mapfilter.config.inputs import Cells
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice, short_crs
+from mapfilter.geodesy import short_crs
+from mapfilter.lattice import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.msi import read_antennas

@@ -19,7 +19,7 @@ from mapfilter.propagation.predict import predict, simulate_ground_truth
 from mapfilter.propagation.remarks import off_frequency, outside_validity
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.plan_notes import carrier_notes
-from mapfilter.rasters.geotiff import is_as_written, write_rasters
+from mapfilter.rasters.geotiff_writer import is_as_written, write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.apart import check_no_input_replaced

@@ -12,7 +12,8 @@ import numpy as np
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, listed
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.geodesy import Lattice, same_crs, short_crs
+from mapfilter.geodesy import same_crs, short_crs
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.log_lacks import NO_MOTION, lack_of_log
 from mapfilter.tracks.log import TrackLog

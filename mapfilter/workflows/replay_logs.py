@@ -9,7 +9,7 @@ from mapfilter._inputs import path_fault, shown
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.kalman.siteless import needs_sites
 from mapfilter.tracks.log import leave_out
 from mapfilter.tracks.motion_fault import MotionFault

@@ -13,7 +13,8 @@ from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.database.parquet import WindowReader
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import same_crs
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.ground import BaseMap
 from mapfilter.workflows.on_lattice import pixels_on

@@ -15,7 +15,7 @@ from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
 from mapfilter.database.manifest import InputRole
 from mapfilter.errors import ConfigError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.corridors import Positions, corridors
 from mapfilter.roads.landuse import LandUse, read_landuse

@@ -9,7 +9,8 @@ import numpy as np
 from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, InputError, fail, listed
-from mapfilter.geodesy import Lattice, projected_crs
+from mapfilter.geodesy import projected_crs
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.measurements import Measurements, named_after

@@ -30,7 +30,7 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.experiments.sweep.world import SweepWorld, all_levels_dbm
 from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import GroundTruthErrors
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan

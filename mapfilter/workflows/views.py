@@ -14,7 +14,8 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.evaluation.map_bound import BANDS
-from mapfilter.geodesy import Lattice, same_crs, short_crs
+from mapfilter.geodesy import same_crs, short_crs
+from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.viewing.bundle import database_bundle
 from mapfilter.viewing.layers import frame_of, with_bound, with_buildings

@@ -13,7 +13,8 @@ from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice, projected_crs, same_crs, short_crs, unproject
+from mapfilter.geodesy import projected_crs, same_crs, short_crs, unproject
+from mapfilter.lattice import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_files import read_cell_plan

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import mapfilter
-from mapfilter._parallel import cluster_executor, ordered_results
+from mapfilter._cluster import cluster_executor
+from mapfilter._parallel import ordered_results
 from mapfilter.errors import MapfilterError
 
 PATIENCE_S = 120.0

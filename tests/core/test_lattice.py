@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 CRS = "EPSG:32629"
 LATTICE = Lattice(CRS, 531_000.0, 4_556_000.0, 5.0, 40, 50)

@@ -27,8 +27,8 @@ from mapfilter.database.estimate import dry_run
 from mapfilter.database.store import info
 from mapfilter.database.tiles import z_order
 from mapfilter.errors import InputError, OutputError
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 

@@ -8,9 +8,9 @@ from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import info
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Squares, Ways

@@ -8,8 +8,8 @@ from mapfilter.database import estimate
 from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.store import info
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 

@@ -8,8 +8,8 @@ import pytest
 from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
 
 from mapfilter.database.build import build
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.sampling import levels_at
 

@@ -14,7 +14,7 @@ from mapfilter.database.build import build
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import InputFile
 from mapfilter.errors import OutputError
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 

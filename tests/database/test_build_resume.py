@@ -15,7 +15,8 @@ import shapely
 from killed_worker import KillsOneWorker
 from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
 
-from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
+from mapfilter._cluster import cluster_executor
+from mapfilter._parallel import SerialExecutor, local_executor
 from mapfilter.database import store
 from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run
@@ -152,7 +153,7 @@ def test_a_dask_worker_killed_in_mid_build_loses_nothing(world, whole, tmp_path)
 @pytest.mark.parametrize("address", ["local:0", "local:many", "tcp://127.0.0.1:9", "nonsense://"])
 @pytest.mark.filterwarnings("default")
 def test_a_cluster_that_is_not_there(address, monkeypatch):
-    monkeypatch.setattr("mapfilter._parallel._CONNECT_S", 0.5)
+    monkeypatch.setattr("mapfilter._cluster._CONNECT_S", 0.5)
     with pytest.raises(MapfilterError, match="cluster"), cluster_executor(address):
         pass
 

@@ -16,7 +16,7 @@ from mapfilter.database.sources import (
     note_misaligned,
 )
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import Buildings
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.route_points import RouteSource

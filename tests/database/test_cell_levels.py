@@ -13,7 +13,7 @@ from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels
 from mapfilter.errors import StoreError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import half_width_of
 

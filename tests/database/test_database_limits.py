@@ -22,7 +22,7 @@ from mapfilter.database.radioroutes import fill_field
 from mapfilter.database.sources import check_aligned, overlap, pixels_between
 from mapfilter.database.tiles import TileLevels, TileRows, received_levels, tile_windows, z_order
 from mapfilter.errors import InputError, StoreError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 NAN = np.nan
 

@@ -11,7 +11,7 @@ from small_world import CRS
 from mapfilter.database.parquet import WindowReader, count_rows, read_columns, write_columns
 from mapfilter.database.tiles import z_order
 from mapfilter.errors import StoreError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 
 def grouped(path, rows_in_a_group=4, cols=6):

@@ -17,7 +17,7 @@ from mapfilter._resume import FinishedParts
 from mapfilter.database.build import build, work_key
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes
 from mapfilter.errors import InputError, OutputError
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.buildings import Buildings
 from mapfilter.roads.osm import Water

@@ -26,8 +26,8 @@ from mapfilter.database.measured import (
 )
 from mapfilter.database.parquet import write_columns
 from mapfilter.errors import InputError, StoreError
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 LATTICE = Lattice(CRS, 1000.0, 2000.0, 10.0, 5, 7)

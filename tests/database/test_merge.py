@@ -24,9 +24,9 @@ from mapfilter.database.export import export_cog
 from mapfilter.database.merge import merge
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, OutputError, StoreError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 

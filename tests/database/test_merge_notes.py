@@ -11,7 +11,7 @@ from mapfilter.database.build import build
 from mapfilter.database.merge import merge
 from mapfilter.database.merge_notes import merge_notes, names_apart
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 

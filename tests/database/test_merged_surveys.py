@@ -7,7 +7,7 @@ from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, ma
 from mapfilter.database.build import build
 from mapfilter.database.measured import Readings
 from mapfilter.database.merge import merge
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 WINDOWS = {"west": (0, 0, 40, 22), "east": (4, 22, 36, 28)}

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 LATTICE = Lattice("EPSG:32629", 531_000.0, 4_556_000.0, 5.0, 12, 15)
 

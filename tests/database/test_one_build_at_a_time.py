@@ -14,7 +14,7 @@ from mapfilter._alone import writing_alone
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, OutputError
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 TOLD = (

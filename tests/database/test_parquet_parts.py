@@ -27,7 +27,7 @@ from mapfilter.database.parquet import (
     write_columns,
 )
 from mapfilter.errors import StoreError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 LATTICE = Lattice(CRS, 1000.0, 2000.0, 5.0, 4, 6)
 ROW = np.array([0, 0, 1, 2, 3, 3], dtype=np.int32)

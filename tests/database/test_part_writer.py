@@ -12,7 +12,7 @@ from mapfilter.database import parts
 from mapfilter.database.parquet import point_geometry
 from mapfilter.database.parts import PartWriter, levels_table, points_table, write_parts
 from mapfilter.database.tiles import TileRows, received_levels
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 LATTICE = Lattice(CRS, 1000.0, 2000.0, 5.0, 6, 8)
 IDS = ("A", "b", "B")

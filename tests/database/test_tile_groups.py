@@ -6,9 +6,9 @@ import numpy as np
 
 from mapfilter.database.build_job import BuildJob
 from mapfilter.database.tiles import grouped, tile_windows
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 WHOLE = Lattice("EPSG:32632", 400_000.0, 5_600_000.0, 5.0, 64, 64)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mapfilter.evaluation.radio_map import RadioMap
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 FLOOR_DBM = -110.0
 

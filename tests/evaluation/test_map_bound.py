@@ -8,7 +8,7 @@ from mapfilter.evaluation.first_fix import FirstFixOptions, first_fix, starts
 from mapfilter.evaluation.map_bound import BANDS, distinctness, map_bound
 from mapfilter.evaluation.position_bound import position_bound
 from mapfilter.evaluation.radio_map import ErrorModel, RadioMap, distance_squared, received_cells
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 FLOOR_DBM = -110.0
 

@@ -12,7 +12,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix, starts
 from mapfilter.evaluation.map_bound import BANDS, MapBound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel, radio_map
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 
 def fake_database():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.roads.network import StreetNetwork
 

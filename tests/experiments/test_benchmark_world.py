@@ -13,13 +13,13 @@ from mapfilter.errors import StoreError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildings
 from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_world
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings

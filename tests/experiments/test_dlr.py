@@ -10,7 +10,7 @@ from mapfilter._parallel import SerialExecutor
 from mapfilter.experiments.papers.dlr import experiment as dlr
 from mapfilter.experiments.papers.dlr import filters, scene
 from mapfilter.experiments.papers.dlr import paper as dlr_table
-from mapfilter.experiments.papers.dlr.paper import over_threshold
+from mapfilter.experiments.papers.dlr.pictures import over_threshold
 from mapfilter.experiments.papers.dlr.scene import ASSUMPTIONS
 from mapfilter.experiments.papers.paper import PaperSettings
 from mapfilter.models.state import POSITION_CLOCK_3D

@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 
 from mapfilter.experiments.benchmarks.world import without_ways
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Ways
 

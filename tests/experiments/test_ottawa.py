@@ -28,7 +28,8 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
 )
 from mapfilter.experiments.benchmarks.ottawa_table import read_left_out
 from mapfilter.filters.belief_models import Cloud
-from mapfilter.geodesy import Lattice, unproject
+from mapfilter.geodesy import unproject
+from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 from mapfilter.models.street_motion import STATES

@@ -10,7 +10,8 @@ from mapfilter.experiments.benchmarks import journeys as satellites
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.journeys import SPOOFED_S, Walk, spoofer_of, with_satellites
 from mapfilter.gnss.sky import Skyline
-from mapfilter.simulation.satellites import NlosModel, ReceptionModel
+from mapfilter.simulation.reflections import NlosModel
+from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.tracks.log import make_log
 from mapfilter.workflows.evaluate import check_cases
 

@@ -27,7 +27,8 @@ from mapfilter.filters.contract import (
     Status,
     UpdateInfo,
 )
-from mapfilter.geodesy import Lattice, wrap_rad
+from mapfilter.geodesy import wrap_rad
+from mapfilter.lattice import Lattice
 
 LATTICE = Lattice("EPSG:32629", 5_000.0, 8_000.0, 5.0, 60, 70)
 

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.database.build import build
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.learning.patterns import Patterns
 from mapfilter.learning.visits import Visits
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.tracks.log import make_log

@@ -9,7 +9,7 @@ import shapely
 from learning_world import CRS, EAST, NORTH
 
 from mapfilter.database.radioroutes import RadioField
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.learning.missing_ways import LEAST_JOURNEYS, missing_ways
 from mapfilter.learning.phone import phone_noise
 from mapfilter.learning.tracks import JourneyTrack

@@ -7,7 +7,7 @@ import pytest
 from learning_world import CRS, EAST, NORTH
 
 from mapfilter.database.radioroutes import RadioField
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.learning.learn import unlisted_cells
 from mapfilter.learning.visits import Placed, predicted_dbm, visits_of
 from mapfilter.positioning.epochs import Epoch, ReportRow

@@ -27,8 +27,8 @@ from mapfilter import _cuda
 from mapfilter.models import cuda_motion, cuda_reports, fingerprint
 from mapfilter.models.fingerprint import BoundReading, bound_table
 from mapfilter.models.level_kernels import Prediction
-from mapfilter.models.street_motion import MapWeights, MotionErrors, move
-from mapfilter.models.way_map import WayMap, weigh_by_ways
+from mapfilter.models.street_motion import MotionErrors, move
+from mapfilter.models.way_map import MapWeights, WayMap, weigh_by_ways
 
 assert config.ENABLE_CUDASIM
 BLOCK, COUNT = 32, 70

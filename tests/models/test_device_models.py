@@ -7,7 +7,8 @@ from simulator import run_simulated
 
 from mapfilter.models import cuda_motion, cuda_reports
 from mapfilter.models.fingerprint import RasterFrame
-from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.models.street_motion import MotionErrors
+from mapfilter.models.way_map import MapWeights
 
 
 def test_no_hypotheses_ask_for_no_device():

@@ -28,12 +28,12 @@ from mapfilter.models.street_motion import (
     STATES,
     STRETCH,
     TURN,
-    MapWeights,
     MotionErrors,
     move,
     remounted,
 )
 from mapfilter.models.terms import atan2_lanes, log_lanes
+from mapfilter.models.way_map import MapWeights
 
 
 def log_cdf(x):

@@ -5,7 +5,7 @@ from math import exp, log, pi, sqrt
 import numpy as np
 import pytest
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 
 NAN = float("nan")

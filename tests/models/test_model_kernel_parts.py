@@ -19,8 +19,8 @@ from mapfilter.models.level_kernels import (
     weigh_by_absence,
     weigh_by_levels,
 )
-from mapfilter.models.street_motion import STATES, MapWeights, MotionErrors, moving
-from mapfilter.models.way_map import WayMap, weigh_by_ways
+from mapfilter.models.street_motion import STATES, MotionErrors, moving
+from mapfilter.models.way_map import MapWeights, WayMap, weigh_by_ways
 
 ROWS, COLS, BANDS, SLOTS, PIXEL_M = 12, 9, 6, 4, 5.0
 WIDTH = 3 * SLOTS + 1

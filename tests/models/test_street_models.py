@@ -18,13 +18,11 @@ from mapfilter.models.street_motion import (
     STATES,
     STRETCH,
     TURN,
-    MapWeights,
     MotionErrors,
-    map_log_likelihood,
     move,
     moved_back,
 )
-from mapfilter.models.way_map import interpolate, weigh_by_map
+from mapfilter.models.way_map import MapWeights, interpolate, map_log_likelihood, weigh_by_map
 
 EXACT = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0,

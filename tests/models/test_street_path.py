@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mapfilter.models.street_motion import MapFactors
 from mapfilter.models.street_path import weigh_path
+from mapfilter.models.way_map import MapFactors
 
 FACTORS = MapFactors(0.4, 0.6, 0.02, 0.05)
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mapfilter.models.street_motion import OFF, STATES, MapWeights
+from mapfilter.models.street_motion import OFF, STATES
 from mapfilter.models.way_map import (
+    MapWeights,
     WayMap,
     all_inside,
     interpolate,

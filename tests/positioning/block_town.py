@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from mapfilter.geodesy import Lattice, wrap_rad
+from mapfilter.geodesy import wrap_rad
+from mapfilter.lattice import Lattice
 from mapfilter.roads.ways import Ways
 from mapfilter.tracks.log import make_log
 

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.database.build import build
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.tracks.log import make_log

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.database.radioroutes import RadioField
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_area import FLOOR_DBM, LEVEL_DBM, make_area
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_frame import AreaFrame, carriers_of, sites_of
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.database.radioroutes import RadioField
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.radio.cells import CellPlan
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.database.cell_levels import CellLevels, NearestPoints, PartExtents
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes import area_tiles as tested
 from mapfilter.positioning.bayes.area_tiles import AreaTiles
 

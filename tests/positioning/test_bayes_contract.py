@@ -18,7 +18,8 @@ from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.estimate import UnusedReading

@@ -9,10 +9,11 @@ from cross_world import CRS, WALK, make_database, make_plan, truth
 
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.level_errors import LevelErrors
-from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.models.street_motion import MotionErrors
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.options import open_area
+from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.epochs import epochs
 from mapfilter.tracks.log import make_log

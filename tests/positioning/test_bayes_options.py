@@ -10,6 +10,7 @@ from made_town import Town
 from small_area import FLOOR_DBM, LATTICE, make_area
 
 from mapfilter.errors import ConfigError
+from mapfilter.positioning.bayes import opened_area
 from mapfilter.positioning.bayes import options as tested
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
@@ -195,15 +196,15 @@ def test_which_areas_are_held_by_tiles(monkeypatch, rows, cells, whole, tiled):
     database = SimpleNamespace(
         lattice=lattice, field=lambda: "field", plan="plan", floor_dbm=FLOOR_DBM
     )
-    monkeypatch.setattr(tested, "received_cells", lambda _: ("A", "B", "C")[:cells])
+    monkeypatch.setattr(opened_area, "received_cells", lambda _: ("A", "B", "C")[:cells])
     by_tiles = SimpleNamespace(of_database=lambda one: ("tiles", one))
-    monkeypatch.setattr(tested, "TiledArea", by_tiles)
+    monkeypatch.setattr(opened_area, "TiledArea", by_tiles)
     held = SimpleNamespace(of_field=lambda *given: given)
-    monkeypatch.setattr(tested, "AreaMap", held)
+    monkeypatch.setattr(opened_area, "AreaMap", held)
     expected = ("tiles", database) if tiled else ("field", "plan", FLOOR_DBM)
-    assert tested.open_area(database, whole=whole) == expected
+    assert opened_area.open_area(database, whole=whole) == expected
     if not whole:
-        assert tested.open_area(database) == expected
+        assert opened_area.open_area(database) == expected
     # So it is at the front door; an exact grid needs the whole of it.
     given = SimpleNamespace(**vars(database), measured=lambda: None)
     opened = []

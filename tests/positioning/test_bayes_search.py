@@ -11,7 +11,8 @@ from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes.alternative import AlternativeRules, NullHypothesis
-from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.estimate import UnusedReading

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.positioning.bayes import tile_search

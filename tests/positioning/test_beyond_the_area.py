@@ -10,9 +10,10 @@ from small_area import BANDS, HEIGHT_M, OPTIONS, WIDTH_M, make_area
 
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Status
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MapWeights, MotionErrors
+from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MotionErrors
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.beyond_edge import beyond_edge
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start

@@ -13,7 +13,7 @@ from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.models import level_memory
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.models.street_motion import MapWeights
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes import device_step
 from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.evidence import FixedTerm, RadioReading

@@ -15,7 +15,8 @@ from mapfilter.positioning.bayes.likely_points import (
     likelihoods,
     likelihoods_on_ways,
 )
-from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.filter import locate

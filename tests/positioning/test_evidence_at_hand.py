@@ -10,7 +10,8 @@ from small_area import make_area
 from mapfilter._threads import ONE, Threads
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief, ParticleOptions
-from mapfilter.models.street_motion import BIAS, EAST, NORTH, STATES, MapWeights, MotionErrors
+from mapfilter.models.street_motion import BIAS, EAST, NORTH, STATES, MotionErrors
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters, carriageway_filters

@@ -35,9 +35,9 @@ from mapfilter.models.street_motion import (
     STATES,
     STRETCH,
     TURN,
-    MapWeights,
     MotionErrors,
 )
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel

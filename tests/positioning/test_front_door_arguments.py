@@ -11,7 +11,7 @@ from cross_world import LATTICE, make_database, walk_log
 
 import mapfilter as mf
 from mapfilter._arguments import Argument, check_arguments
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.maps import resolve_map
 
 

@@ -5,7 +5,7 @@ import pytest
 import scalar_oracle as oracle
 
 from mapfilter.filters.belief_models import Cloud
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.level_memory import SLOTS
 from mapfilter.models.street_motion import STATES

@@ -16,10 +16,11 @@ from mapfilter.database.sources import LayerRoutes
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.mirrored import MirroredTwin, MirrorRules, mirrored_step
-from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.gnss.source import GnssSource

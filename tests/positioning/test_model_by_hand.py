@@ -9,7 +9,7 @@ from made_radio import AREA, MODEL, at_places, gain_of, named, read, serving
 from small_area import HEIGHT_M, OPTIONS, WIDTH_M
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.models.street_motion import MapWeights
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.evidence import FixedTerm, RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
 

@@ -20,7 +20,7 @@ from mapfilter.database.merge import merge
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
 from mapfilter.filters.belief_models import Cloud
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.measured_map import MeasuredMapOptions
 from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
@@ -36,7 +36,7 @@ from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.fingerprints.locating import fit_locator
 from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.tracks.schema import SERVING

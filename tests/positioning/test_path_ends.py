@@ -9,7 +9,7 @@ import scalar_oracle as oracle
 from small_area import COLS, DISTANCE_M, PIXEL_M, POINTS, ROWS, make_area
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.models.street_motion import MapWeights
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.path_start import ends_of_path, possible_turns_rad
 

@@ -27,8 +27,8 @@ from mapfilter.positioning.bayes.held import (
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
@@ -373,8 +373,9 @@ def test_beliefs_that_a_reading_leaves_no_hypothesis_of_are_dropped():
     searching = replace(state.belief, status=Status.SEARCHING)
     state = replace(state, belief=searching, twin=MirroredTwin(searching, 0.0))
     for own, kept in ((used, True), (unused, False)):
-        weighing = Weighing(SimpleNamespace(filter_of=lambda _, own=own: own), None, ())
-        assert (weighing._twin_of(state, object(), RadioReading(), rng, False) is not None) == kept
+        new_beliefs = NewBeliefs(SimpleNamespace(filter_of=lambda _, own=own: own), ())
+        twin = new_beliefs.twin(state, object(), RadioReading(), rng, False)
+        assert (twin is not None) == kept
 
 
 def test_a_state_with_such_beliefs_can_be_saved_and_goes_on():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.experiments.recorded.ground import open_ground, predicted
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
 from mapfilter.positioning.fingerprints.planned import (
     LTE_STEP_M,

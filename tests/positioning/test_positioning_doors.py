@@ -13,7 +13,8 @@ from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.level_errors import LevelErrors
-from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.models.street_motion import MotionErrors
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     AlternativeRules,

@@ -15,7 +15,8 @@ from mapfilter.filters.contract import MotionStep
 from mapfilter.models.motion import random_walk
 from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
-from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.models.street_motion import MotionErrors
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel

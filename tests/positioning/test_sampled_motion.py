@@ -14,7 +14,8 @@ from mapfilter.models.street_motion import STATES, MotionErrors, move
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, epoch_columns, epochs, headed, make_epoch
 from mapfilter.positioning.kalman.filter import KalmanFilter

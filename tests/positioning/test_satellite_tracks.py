@@ -13,7 +13,8 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.held import HeldOtherwise
 from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, epochs
 from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.positioning.gnss.receiver import carried

@@ -16,18 +16,19 @@ from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import TileRows, places_table, received_levels
 from mapfilter.errors import StoreError
-from mapfilter.geodesy import Lattice
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time
+from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES
 from mapfilter.models.way_map import interpolate
-from mapfilter.positioning.bayes import options
+from mapfilter.positioning.bayes import opened_area
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.area_tiles import HELD_BYTES
 from mapfilter.positioning.bayes.bounded_cache import BoundedCache
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.bayes.tile_search import (
     SearchedTiles,
     points_everywhere,
@@ -568,9 +569,9 @@ def test_a_walk_is_found_from_a_search_of_some_tiles(tmp_path):
 def test_large_areas_are_held_by_tiles(database, monkeypatch):
     values = database.lattice.rows * database.lattice.cols * (len(NAMES) + 2)
     assert isinstance(open_area(database), AreaMap)
-    monkeypatch.setattr(options, "WHOLE_VALUES", values)
+    monkeypatch.setattr(opened_area, "WHOLE_VALUES", values)
     assert isinstance(open_area(database), AreaMap)
-    monkeypatch.setattr(options, "WHOLE_VALUES", values - 1)
+    monkeypatch.setattr(opened_area, "WHOLE_VALUES", values - 1)
     assert isinstance(open_area(database), TiledArea)
     assert isinstance(BayesFilter().over(database).area, TiledArea)
     # The exact filter needs every pixel, and a database of roads alone every street.
@@ -583,7 +584,7 @@ def test_a_large_database_whose_cells_are_received_nowhere_is_held_whole(databas
     quiet = replace(database)
     quiet.__dict__["level_parts"] = {}
     assert quiet.cell_ids
-    monkeypatch.setattr(options, "WHOLE_VALUES", 1)
+    monkeypatch.setattr(opened_area, "WHOLE_VALUES", 1)
     area = open_area(quiet)
     assert isinstance(area, AreaMap)
     assert area.cell_ids == ()

@@ -10,7 +10,8 @@ from cross_world import CRS, LATTICE, make_database, walk_log
 
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate
-from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.timing import TimingSource, TimingState
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
 from mapfilter.positioning.filter import locate

@@ -29,8 +29,8 @@ from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm, RadioReading
 from mapfilter.positioning.bayes.held import HeldOtherwise
 from mapfilter.positioning.bayes.hold import Hold
+from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.path import RecentPath
-from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epochs import Epoch
 
 
@@ -278,9 +278,9 @@ def test_at_the_edge_and_beyond(edge, inside):
 
 def started_by(path=None, own="started"):
     beliefs, source = Beliefs(), Source(own=own)
-    weighing = Weighing(beliefs, None, (source,))
+    new_beliefs = NewBeliefs(beliefs, (source,))
     updates = [EvidenceUpdate(None, (TERM,), path=path)]
-    found = weighing.started(updates, STATE, Epoch(9.0), np.random.default_rng(1))
+    found = new_beliefs.from_evidence(updates, STATE, Epoch(9.0), np.random.default_rng(1))
     return beliefs.filter.priors, found
 
 
@@ -290,7 +290,7 @@ def test_a_belief_starts_by_the_evidence_of_all_sources():
     assert (prior.reading.terms, prior.compass, prior.path) == ((TERM,), True, path)
     assert sources == {"one": "started"}
     assert started_by(own=None)[1][1] == {}
-    nothing = Weighing(Beliefs(), None, ()).started(
+    nothing = NewBeliefs(Beliefs(), ()).from_evidence(
         [EvidenceUpdate(None)], STATE, Epoch(9.0), np.random.default_rng(1)
     )
     assert nothing is None

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import mapfilter as mf
 from mapfilter.errors import ConfigError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.options import Options
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.roads.osm import read_ways

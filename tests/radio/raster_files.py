@@ -5,7 +5,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 HDR = """NROWS {rows}
 NCOLS {cols}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation import predict as module
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict, simulate_ground_truth

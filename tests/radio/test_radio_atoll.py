@@ -9,7 +9,7 @@ import rasterio
 from raster_files import HDR, INDEX_HEADER, index_row, write_bil
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from raster_files import HDR, write_ascii, write_bil
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 

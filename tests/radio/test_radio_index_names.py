@@ -4,7 +4,7 @@ import pytest
 from raster_files import INDEX_HEADER, index_row
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.atoll import read_index
 
 LATTICE = Lattice("EPSG:32635", 385000.0, 6673000.0, 5.0, 12, 9)

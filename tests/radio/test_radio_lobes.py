@@ -14,7 +14,8 @@ from mapfilter.check.raster_checks import (
     above_free_space_db,
     falls_with_distance,
 )
-from mapfilter.geodesy import Lattice, heading_from_azimuth_rad
+from mapfilter.geodesy import heading_from_azimuth_rad
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import simulate_ground_truth
 from mapfilter.radio.antenna import sector_gain_db

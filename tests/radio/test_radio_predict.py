@@ -9,7 +9,8 @@ from one_cell import predict_cell, predict_steep_cell
 from pyproj import Geod
 
 from mapfilter.errors import ConfigError, InputError
-from mapfilter.geodesy import Lattice, project, unproject
+from mapfilter.geodesy import project, unproject
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.empirical import cost231_hata_db, cost231_walfisch_ikegami_db
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict, simulate_ground_truth

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from one_cell import predict_cell, predict_steep_cell
 
 from mapfilter.errors import ConfigError, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.empirical import friis_db, log_distance_db, okumura_hata_db
 from mapfilter.propagation.line_of_sight import line_of_sight
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel

@@ -10,8 +10,8 @@ from fuzz import fuzz
 from raster_files import INDEX_HEADER, index_row, write_ascii, write_bil
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 CRS = "EPSG:32635"

@@ -9,15 +9,10 @@ from rasterio import Affine
 
 from mapfilter._gdal import check_blocks
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters import geotiff
-from mapfilter.rasters.geotiff import (
-    QUANTITY_TAG,
-    _check_extent_of_file,
-    _lattice,
-    _quantity,
-    write_rasters,
-)
+from mapfilter.rasters.geotiff import QUANTITY_TAG, _check_extent_of_file, _lattice, _quantity
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 CRS = "EPSG:32635"

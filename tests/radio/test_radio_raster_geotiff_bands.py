@@ -9,14 +9,9 @@ import pytest
 import rasterio
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import (
-    is_as_written,
-    new_geotiff,
-    open_geotiff,
-    tag_of,
-    write_rasters,
-)
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff import open_geotiff, tag_of
+from mapfilter.rasters.geotiff_writer import is_as_written, new_geotiff, write_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)

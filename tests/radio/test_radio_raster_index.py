@@ -7,7 +7,7 @@ import pytest
 from raster_files import INDEX_HEADER, write_bil
 
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.atoll import IndexRow, find_index, read_index
 from mapfilter.rasters.plain_grids import GridHeader
 

@@ -5,7 +5,7 @@ import pytest
 from raster_files import write_ascii, write_bil
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.ascii_grids import open_ascii_grid
 from mapfilter.rasters.files import Declared, check_plausible, without_nodata
 from mapfilter.rasters.opening import open_rasters

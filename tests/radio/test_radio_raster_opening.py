@@ -8,7 +8,7 @@ import rasterio
 from raster_files import INDEX_HEADER, index_row, write_ascii, write_bil
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.opening import is_raster_folder, open_rasters
 
 CRS = "EPSG:32635"

@@ -5,7 +5,7 @@ import pyproj
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.ascii_grids import open_ascii_grid
 from mapfilter.rasters.files import Declared
 from mapfilter.rasters.plain_grids import GridHeader, grid_crs

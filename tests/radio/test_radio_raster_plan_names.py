@@ -9,7 +9,7 @@ import pytest
 from mapfilter.check.findings import Findings
 from mapfilter.check.raster_checks import check_ids
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.files import Declared
 from mapfilter.rasters.raw_grids import open_raw_grid
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 
 CRS = "EPSG:32635"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters import resampling as _resampling
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.resampling import common_lattice, read_on

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters import sampling
 from mapfilter.rasters.raster_set import RxLevRasters

@@ -13,8 +13,8 @@ from raster_files import write_ascii, write_bil
 
 from mapfilter._io import sha256_file
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 CRS = "EPSG:32635"

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import OutputError
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters import geotiff as raster_writer
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.lattice import Lattice
+from mapfilter.rasters import geotiff_writer as raster_writer
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
 LATTICE = Lattice("EPSG:32629", 531_000.0, 4_556_000.0, 5.0, 512, 512)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.shadowing import correlated_field, site_shadowing
 from mapfilter.radio.cells import Cell, CellPlan
 

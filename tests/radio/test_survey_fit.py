@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError, InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.shadowing import correlated_field
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.survey.leave_out import leave_out

@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from mapfilter.database.build import build
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.route_points import route_lattice
 from mapfilter.roads.ways import Ways

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.shadowing import correlated_field
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan

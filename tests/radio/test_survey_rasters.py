@@ -9,9 +9,9 @@ from scipy.stats import truncnorm
 from test_survey_fit import ANTENNA, CRS, LATTICE, law, measured, shadowed, somewhere
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.survey.level_trend import DistanceLoss

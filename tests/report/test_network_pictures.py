@@ -9,9 +9,9 @@ from matplotlib.image import imread
 
 from mapfilter.database.build import build
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.report import basemap
 from mapfilter.report.basemap import BaseMap, draw_base, largest

@@ -14,7 +14,8 @@ from matplotlib.image import imread
 from mapfilter.errors import InputError, OutputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.geodesy import Lattice, grid_convergence_rad, unproject
+from mapfilter.geodesy import grid_convergence_rad, unproject
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.radio.cells import Cell, CellPlan

@@ -6,8 +6,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from mapfilter.errors import InputError, OutputError
-from mapfilter.geodesy import Lattice
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.lattice import Lattice
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLACK, save

@@ -6,7 +6,7 @@ import shapely
 from made_maps import AREA, write_pbf
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
 from mapfilter.roads.ways import Buildings
 

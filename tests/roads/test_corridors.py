@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.corridors import Positions, corridors
 from mapfilter.roads.network import street_network
 from mapfilter.roads.route_points import route_lattice

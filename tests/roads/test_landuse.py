@@ -7,7 +7,7 @@ import pytest
 import rasterio
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.landuse import read_landuse
 
 CRS = "EPSG:32629"

@@ -9,7 +9,7 @@ import shapely
 from made_maps import AREA, CRS, ORIGIN, write_pbf
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.osm import read_water
 from mapfilter.roads.route_points import route_lattice

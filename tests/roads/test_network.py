@@ -6,7 +6,7 @@ import shapely
 from scipy.sparse.csgraph import dijkstra
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.network import street_network
 from mapfilter.roads.osm import read_ways

@@ -15,9 +15,9 @@ from mapfilter.database.build import build, build_roads
 from mapfilter.database.rewrite import routes_of
 from mapfilter.database.sources import LatticeRoutes
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.corridors import Positions, corridors

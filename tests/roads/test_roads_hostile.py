@@ -11,7 +11,7 @@ import shapely
 from fuzz import fuzz
 from made_maps import AREA, CRS, ORIGIN, write_pbf, write_xml
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.osm import read_squares, read_water, read_ways

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice, project
+from mapfilter.geodesy import project
+from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.osm import read_squares, read_ways

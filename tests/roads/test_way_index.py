@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from test_route_lattice import CRS, LATTICE, boxes, lines, same, ways_of
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.index import WayIndex
 from mapfilter.roads.route_points import RouteSource, route_lattice
 from mapfilter.roads.ways import Water

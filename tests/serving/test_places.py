@@ -6,7 +6,8 @@ import pytest
 from asking import SERVING, ask, service
 from positioning.cross_world import CROSSING, CRS, LATTICE
 
-from mapfilter.geodesy import Lattice, project, unproject
+from mapfilter.geodesy import project, unproject
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.serving.places import check_fixes

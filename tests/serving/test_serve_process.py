@@ -18,7 +18,7 @@ import pytest
 from positioning.cross_world import LATTICE, levels_dbm, make_plan, make_routes
 
 from mapfilter.database.build import build
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.serving.store import LOCK
 

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from mapfilter.errors import ConfigError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.roads.network import street_network
 from mapfilter.roads.route_points import route_lattice
 from mapfilter.simulation.synthetic_city import manhattan, synthetic_city

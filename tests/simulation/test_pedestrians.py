@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.simulation.pedestrians import GasGround, gas_walk
 
 CRS = "EPSG:32632"

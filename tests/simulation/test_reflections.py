@@ -10,14 +10,8 @@ from mapfilter.geodesy import unproject
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time
 from mapfilter.gnss.sky import Skyline, ecef_from_lonlat
-from mapfilter.simulation.satellites import (
-    NlosModel,
-    ReceptionModel,
-    Spoofer,
-    draw_reflections,
-    held_along,
-    receive,
-)
+from mapfilter.simulation.reflections import NlosModel, draw_reflections, held_along
+from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 
 CRS, START = "EPSG:32629", 1_700_000_000.0
 ALMANAC = nominal_gps(gps_time(START)[0])

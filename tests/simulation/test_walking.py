@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.simulation.journeys import JourneyPlan, journey
 from mapfilter.simulation.routes import Route
 from mapfilter.simulation.walking import WalkerModel, inside_buildings, path_beside, with_stops

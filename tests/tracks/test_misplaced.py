@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import Faults
-from mapfilter.geodesy import Lattice, project
+from mapfilter.geodesy import project
+from mapfilter.lattice import Lattice
 from mapfilter.tracks.misplaced import check_near, degrees_for_metres, misplaced_by
 
 CRS = "EPSG:32631"

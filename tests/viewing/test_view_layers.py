@@ -12,7 +12,7 @@ from positioning.cross_world import make_plan, walk_log
 from mapfilter.errors import InputError
 from mapfilter.evaluation.map_bound import BANDS, write_bound
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.radio.cells import CellPlan

@@ -8,7 +8,8 @@ import numpy as np
 import rasterio
 from rasterio.transform import Affine
 
-from mapfilter.geodesy import Lattice, unproject
+from mapfilter.geodesy import unproject
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.radio.cells import Cell, CellPlan

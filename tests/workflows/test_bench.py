@@ -4,7 +4,7 @@ import pytest
 from command_line import assert_refused, mapfilter
 
 from mapfilter.errors import ConfigError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.workflows.bench import CRS, made_routes, run_bench
 
 

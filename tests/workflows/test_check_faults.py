@@ -10,7 +10,7 @@ from rasterio.transform import Affine
 from mapfilter.check import place_fits as places
 from mapfilter.check import site_checks as check_peaks
 from mapfilter.check.place_fits import place_fits
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,8 @@
 import numpy as np
 
 from mapfilter.check.findings import Findings
-from mapfilter.geodesy import Lattice, project, utm_crs
+from mapfilter.geodesy import project, utm_crs
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.workflows.check_places import check_sites
 

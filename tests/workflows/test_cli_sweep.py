@@ -9,8 +9,9 @@ import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
 from killed_worker import KillsOneWorker
 
+from mapfilter._cluster import cluster_executor
 from mapfilter._json_files import sealed
-from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
+from mapfilter._parallel import SerialExecutor, local_executor
 from mapfilter.config.load import load_config
 from mapfilter.errors import ConfigError, MapfilterError, StoreError
 from mapfilter.experiments.sweep.run import sweep

@@ -7,7 +7,7 @@ import pytest
 import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.tracks.misplaced import outside_m
 

@@ -28,7 +28,7 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.tracks.imu_noise import ImuNoise

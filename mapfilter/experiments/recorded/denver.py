@@ -25,7 +25,8 @@ from mapfilter.experiments.recorded.ground import roads_alone
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.street_graph import StreetGraph, match_points, read_graph
-from mapfilter.geodesy import Lattice, project, utm_crs
+from mapfilter.geodesy import project, utm_crs
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.route_points import RouteSource

@@ -11,11 +11,11 @@ import pandas as pd
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LayerRoutes
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.corridors import CORRIDOR_HALF_WIDTH_M, Positions, corridors
 from mapfilter.roads.lattice import RouteLattice

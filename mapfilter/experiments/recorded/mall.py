@@ -46,7 +46,7 @@ from mapfilter.experiments.recorded.oracles import (
 from mapfilter.experiments.recorded.outages import errors_at
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.fingerprints.lasting import LastingError, lasting_error
 from mapfilter.positioning.fingerprints.located import LocatedReports

@@ -15,7 +15,7 @@ from mapfilter._json_files import read_json, write_json
 from mapfilter._types import Floats32
 from mapfilter.database.store import open_database, read_cells, write_cells
 from mapfilter.errors import InputError, StoreError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.way_map import all_inside, places_beyond, weight_inside
 from mapfilter.radio.cells import CellPlan

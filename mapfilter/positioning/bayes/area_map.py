@@ -11,9 +11,9 @@ from numba import njit
 
 from mapfilter._types import Bools, Bytes, Floats32, Ints, Ints32
 from mapfilter.database.radioroutes import RadioField
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import roughness
-from mapfilter.models.street_motion import map_log_likelihood
+from mapfilter.models.way_map import map_log_likelihood
 from mapfilter.positioning.bayes.area_frame import (
     BELOW_FLOOR_DB,
     AreaFrame,

@@ -27,8 +27,8 @@ from mapfilter.database.cell_levels import (
 from mapfilter.database.parquet import read_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.level_errors import roughness_px
-from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.models.tile_kernels import level_ranges, levels_at_points, tenths_of_roughness
+from mapfilter.models.way_map import map_log_likelihood
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.positioning.bayes.bounded_cache import BoundedCache
 

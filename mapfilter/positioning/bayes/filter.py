@@ -188,7 +188,7 @@ class BayesPositioner(Filter[BayesState]):
         if radio is not Reason.USED:
             reason = radio
         if state.belief is None:
-            started = weighing.started(updates, state, epoch, rng)
+            started = weighing.new_beliefs.from_evidence(updates, state, epoch, rng)
             if started is not None:
                 belief, sources = started
                 state = replace(state, belief=belief, sources={**state.sources, **sources})

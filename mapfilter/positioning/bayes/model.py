@@ -20,16 +20,8 @@ from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.geodesy import wrap_rad
-from mapfilter.models.street_motion import (
-    BIAS,
-    NORTH,
-    OFF,
-    MapWeights,
-    MotionErrors,
-    move,
-    moving,
-)
-from mapfilter.models.way_map import WayMap, weigh_by_ways, weighed_at_places
+from mapfilter.models.street_motion import BIAS, NORTH, OFF, MotionErrors, move, moving
+from mapfilter.models.way_map import MapWeights, WayMap, weigh_by_ways, weighed_at_places
 from mapfilter.positioning.bayes.beyond_edge import BEYOND_COST_PER_M
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.evidence_model import EvidenceModel

@@ -11,12 +11,12 @@ from annotated_types import Ge, Gt, Le
 
 from mapfilter._device import DeviceName, open_device
 from mapfilter._threads import Threads
-from mapfilter.database.cell_levels import received_cells
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.level_errors import LevelErrors
-from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.models.street_motion import MotionErrors
+from mapfilter.models.way_map import MapWeights
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_frame import AreaFrame
@@ -25,6 +25,7 @@ from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.over_survey import (
     SURVEYED,
     SURVEYED_WAYS,
@@ -32,7 +33,6 @@ from mapfilter.positioning.bayes.over_survey import (
     over_survey,
 )
 from mapfilter.positioning.bayes.radio import EvidenceOptions
-from mapfilter.positioning.bayes.tiled_area import TiledArea
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 _SLOW, _FAST, _WHITE = 7.0, 4.0, 3.3
@@ -62,23 +62,6 @@ _CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
 of the switch rule; largest log odds of the null hypothesis, its cost of a metre."""
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
-
-
-WHOLE_VALUES = 100_000_000
-"""Most levels of an area that is held whole: rows times columns times received cells and two."""
-
-
-def open_area(database: RadioRouteDatabase, *, whole: bool = False) -> AreaFrame:
-    """Return the map that the filter looks up: of a whole database, or of a large one by tiles.
-
-    Larger areas than :data:`WHOLE_VALUES` are held by tiles unless they have to be ``whole``, or
-    no cell has a level anywhere.
-    """
-    lattice, received = database.lattice, len(received_cells(database))
-    values = lattice.rows * lattice.cols * (received + 2)
-    if received and values > WHOLE_VALUES and not whole:
-        return TiledArea.of_database(database)
-    return AreaMap.of_field(database.field(), database.plan, database.floor_dbm)
 
 
 @dataclass(frozen=True, slots=True)

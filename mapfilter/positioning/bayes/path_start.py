@@ -13,8 +13,8 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.filters.resampling import systematic
-from mapfilter.models.street_motion import MapWeights
 from mapfilter.models.street_path import weigh_path
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.path import LEG_M, RecentPath
 

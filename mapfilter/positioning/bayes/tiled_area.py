@@ -12,7 +12,7 @@ from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
 from mapfilter.database.cell_levels import received_cells
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import StoreError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.level_kernels import Prediction
 from mapfilter.models.tile_kernels import (

@@ -1,26 +1,22 @@
-"""The evidence of an epoch: collected from its sources, then beliefs started or weighed by it."""
+"""The evidence of an epoch: collected from its sources, then beliefs are weighed by it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.grid import GridBelief
-from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import (
-    AlternativeHypothesis,
     MapBelief,
     NullHypothesis,
 )
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
-from mapfilter.positioning.bayes.contradicted import hold_of_next, misreads
+from mapfilter.positioning.bayes.contradicted import misreads
 from mapfilter.positioning.bayes.evidence import (
     Context,
     EvidenceSource,
@@ -28,9 +24,7 @@ from mapfilter.positioning.bayes.evidence import (
     RadioReading,
     joined,
 )
-from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import own_rng
-from mapfilter.positioning.bayes.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.rivals import Rivals, challenged, for_belief
 from mapfilter.positioning.bayes.state import BayesState
@@ -38,20 +32,14 @@ from mapfilter.positioning.bayes.step_units import (
     asks_for_unit,
     hold_after_takeover,
     is_unit_open,
-    log_odds_of_unit,
-    unit_of_next_m,
 )
 from mapfilter.positioning.bayes.transitions import (
     Resolution,
     doubted,
     resolve_alternative,
 )
-from mapfilter.positioning.bayes.unaided import beside_alternative, searching_alone
+from mapfilter.positioning.bayes.unaided import beside_alternative
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.gnss.trail import Contradiction
-
-_ALONE = 8
-"""Salt of the draws of a belief that begins without positions."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +58,11 @@ class Weighing:
     beliefs: BeliefFilters
     radio: RadioSource
     sources: tuple[EvidenceSource, ...]
+
+    @cached_property
+    def new_beliefs(self) -> NewBeliefs:
+        """What starts further beliefs, and the first one."""
+        return NewBeliefs(self.beliefs, self.sources)
 
     @cached_property
     def _rivals(self) -> Rivals:
@@ -99,27 +92,6 @@ class Weighing:
         if states:
             state = replace(state, sources={**state.sources, **states})
         return state, updates
-
-    def started(
-        self,
-        updates: list[EvidenceUpdate],
-        state: BayesState,
-        epoch: Epoch,
-        rng: np.random.Generator,
-    ) -> tuple[MapBelief, dict[str, Any]] | None:
-        """Start a belief from evidence; also return the states of sources that depend on it."""
-        reading = joined(updates)
-        if reading is None:
-            return None
-        path = next((one.path for one in updates if one.path is not None), None)
-        prior = Start(reading, state.compass, path=path)
-        belief = self.beliefs.moving_filter(state, compass=state.compass).init(prior, rng)
-        states = {}
-        for source in self.sources:
-            belief, own = source.start(belief, epoch, state.reckoning.travelled_m)
-            if own is not None:
-                states[source.name] = own
-        return belief, states
 
     def weighed(
         self,
@@ -192,7 +164,7 @@ class Weighing:
             and now.status is not Status.CONVERGED
             and (disputed or beliefs.is_contested(state))
         ):
-            alternative = self._alternative(state, now.belief, epoch, contradiction, rng)
+            alternative = self.new_beliefs.alternative(state, now.belief, epoch, contradiction, rng)
         after = BayesState(
             belief=now.belief,
             status=now.status,
@@ -221,13 +193,14 @@ class Weighing:
             area=state.area,
         )
         if lanes is not None or state.twin is not None:
-            after = replace(after, twin=self._twin_of(after, lanes, reading, rng, now.taken_over))
+            twin = self.new_beliefs.twin(after, lanes, reading, rng, now.taken_over)
+            after = replace(after, twin=twin)
         more = tuple(term for one in updates for term in one.rival_terms)
         shared = replace(evidence, terms=(*evidence.terms, *more)) if more else evidence
         after = self._rivals.turned(after, shared, epoch.time_s, measured=measured)
         after = self._rivals.unaided(after, updates, epoch.time_s, measured=measured)
         if beliefs.asks_for_proof(after):
-            after = self._asked_for_proof(after, epoch)
+            after = self.new_beliefs.asked_for_proof(after, epoch)
         return after, Reason.USED
 
     def _proven(self, state: BayesState, now: Resolution, before: MapBelief) -> bool:
@@ -237,72 +210,6 @@ class Weighing:
             return False
         found = now.status is Status.CONVERGED and not self.beliefs.used_positions(state)
         return state.proven or found
-
-    def _asked_for_proof(self, state: BayesState, epoch: Epoch) -> BayesState:
-        """Start a belief from this epoch's report alone, without positions."""
-        updates = [one.first_after(state, epoch) for one in self.sources if not one.is_position]
-        reading, main = joined(updates), state.belief
-        if reading is None or not isinstance(main, ParticleBelief):
-            return state
-        filter_ = self.beliefs.filter_of(state)
-        begun = filter_.init(Start(reading, state.compass), own_rng(epoch.time_s, _ALONE))
-        pulls, gone_m = self.beliefs.pulls, state.reckoning.travelled_m
-        one = searching_alone(pulls, main, begun, state.hold, gone_m)
-        return replace(state, unaided=(*state.unaided, one))
-
-    def _twin_of(
-        self,
-        state: BayesState,
-        lanes: CarriagewayFilters | None,
-        reading: RadioReading,
-        rng: np.random.Generator,
-        taken_over: bool,
-    ) -> MirroredTwin | None:
-        """Return the twin after a reading: started where one is needed, None where none is."""
-        main, twin = state.belief, state.twin
-        if lanes is None or main is None or main.status is not Status.SEARCHING:
-            return None
-        if twin is None or taken_over:
-            if not state.path.whole:
-                return None
-            prior = Start(None, compass=False, path=state.path.mirrored)
-            belief = self.beliefs.filter_of(state).init(prior, rng)
-            return MirroredTwin.beside(main, belief, lanes.places)
-        belief, info = self.beliefs.filter_of(state).update(
-            twin.belief, replace(reading, doubted=True), rng
-        )
-        return replace(twin, belief=belief) if info.reason is Reason.USED else None
-
-    def _alternative(
-        self,
-        state: BayesState,
-        main: MapBelief,
-        epoch: Epoch,
-        contradiction: Contradiction | None,
-        rng: np.random.Generator,
-    ) -> AlternativeHypothesis | None:
-        """Start an alternative from this epoch's evidence alone, as if it were the first."""
-        updates = [source.first_after(state, epoch) for source in self.sources]
-        started = self.started(updates, state, epoch, rng)
-        if started is None:
-            return None
-        belief, sources = started
-        null = NullHypothesis()
-        if self.beliefs.by_map_alone(state):
-            # Many alternatives may follow each other, and each begins with the streets that fit
-            # best: what speaks for a position off the map must not be forgotten with each.
-            null = NullHypothesis(max(state.null.log_odds, null.log_odds))
-        unit_m = unit_of_next_m(state, main, self.beliefs.other_unit_m(state))
-        return AlternativeHypothesis(
-            belief,
-            state.reckoning.travelled_m,
-            main.log_evidence + log_odds_of_unit(unit_m),
-            epoch.time_s,
-            sources,
-            null=null,
-            hold=hold_of_next(state, unit_m, contradiction),
-            gnss_log_bayes_factor=0.0 if contradiction is None else contradiction.nats,
-        )
 
 
 def weighed_by(

@@ -14,7 +14,7 @@ import numpy as np
 
 from mapfilter._types import Floats32
 from mapfilter.errors import ConfigError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Bools, Floats
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 
 @dataclass(frozen=True, eq=False)

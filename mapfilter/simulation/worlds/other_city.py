@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from mapfilter._types import Floats32
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.worlds.open_ground import OpenGround

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mapfilter._types import Floats, Floats32
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 
 _LIGHT_MPS = 299_792_458.0
 _SHORTEST_M = 10.0

@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.simulation.worlds.itinerary import STEP_M, Itinerary, resampled
 from mapfilter.simulation.worlds.open_ground import OpenGround
 from mapfilter.simulation.worlds.street_lines import OFF_MARGIN_M, StreetLines

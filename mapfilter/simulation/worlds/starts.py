@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapfilter._types import Bools, Floats
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.simulation.worlds.itinerary import Itinerary, resampled
 from mapfilter.simulation.worlds.open_ground import OpenGround
 from mapfilter.simulation.worlds.sinusoids import gauss_markov

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.worlds.open_ground import OpenGround

@@ -7,7 +7,7 @@ import pytest
 from blocks_town import LATTICE, plan
 
 from mapfilter.errors import ConfigError
-from mapfilter.geodesy import Lattice
+from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.simulation.worlds.faults import FAULTS, District, GivenInputs, given_inputs

@@ -1,0 +1,25 @@
+"""The area of a database, opened as a whole, or by tiles where it is large."""
+
+from __future__ import annotations
+
+from mapfilter.database.cell_levels import received_cells
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.positioning.bayes.area_frame import AreaFrame
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.tiled_area import TiledArea
+
+WHOLE_VALUES = 100_000_000
+"""Most levels of an area that is held whole: rows times columns times received cells and two."""
+
+
+def open_area(database: RadioRouteDatabase, *, whole: bool = False) -> AreaFrame:
+    """Return the map that the filter looks up: of a whole database, or of a large one by tiles.
+
+    Larger areas than :data:`WHOLE_VALUES` are held by tiles unless they have to be ``whole``, or
+    no cell has a level anywhere.
+    """
+    lattice, received = database.lattice, len(received_cells(database))
+    values = lattice.rows * lattice.cols * (received + 2)
+    if received and values > WHOLE_VALUES and not whole:
+        return TiledArea.of_database(database)
+    return AreaMap.of_field(database.field(), database.plan, database.floor_dbm)
