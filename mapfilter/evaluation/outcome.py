@@ -8,9 +8,14 @@ from math import nan
 
 import numpy as np
 
+from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import TrackEstimate
+
+_PAUSE_S, _PAUSE_TIMES = 30.0, 10.0
+"""Time between two epochs from which on nothing is located in between, also in times of the usual
+one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +43,9 @@ class Outcome:
     radius_95_last_m : float
         That of the last position.
     seconds_by_status : dict
-        How long each status lasted that occurs, from its epochs to the next ones.
+        How long each status lasted that occurs, from its epochs to the next ones, without pauses.
+    seconds_without_epochs : float
+        How long all pauses lasted (:func:`pauses_s`).
     unused : dict
         How many readings were not used, by reason.
     unknown_cells : dict
@@ -56,6 +63,7 @@ class Outcome:
     radius_95_median_m: float
     radius_95_last_m: float
     seconds_by_status: dict[str, float]
+    seconds_without_epochs: float
     unused: dict[str, int]
     unknown_cells: dict[str, int]
 
@@ -87,13 +95,27 @@ def outcome(estimate: TrackEstimate) -> Outcome:
         float(np.median(radius_m)) if radius_m.size else nan,
         float(estimate.radii_m[located[0], -1]) if located.size else nan,
         _seconds_by_status(estimate),
+        float(np.diff(pauses_s(estimate)).sum()),
         dict(sorted(unused.items())),
         dict(sorted(unknown.items(), key=lambda one: (-one[1], one[0]))),
     )
 
 
+def pauses_s(estimate: TrackEstimate) -> Floats:
+    """Return begins and ends of pauses without an epoch, shape (P, 2).
+
+    There was neither motion nor anything measured. One is longer than 30 s and than ten times the
+    usual time between two epochs, their median.
+    """
+    lasted_s = np.diff(estimate.time_s)
+    usual_s = float(np.median(lasted_s)) if lasted_s.size else 0.0
+    begin = np.flatnonzero(lasted_s > max(_PAUSE_S, _PAUSE_TIMES * usual_s))
+    return np.stack([estimate.time_s[begin], estimate.time_s[begin + 1]], axis=1)
+
+
 def _seconds_by_status(estimate: TrackEstimate) -> dict[str, float]:
     lasted_s = np.diff(estimate.time_s, append=estimate.time_s[-1:])
+    lasted_s[np.isin(estimate.time_s, pauses_s(estimate)[:, 0])] = 0.0
     statuses = np.array([str(status) for status in estimate.status])
     return {
         str(status): float(lasted_s[statuses == str(status)].sum())

@@ -43,7 +43,7 @@ from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.planned_cells import cells_beside_log, plan_antennas
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
-from mapfilter.workflows.replay_lacks import early_end_note, fixes_note, lack_of
+from mapfilter.workflows.replay_lacks import early_end_note, fixes_note, lack_of, pause_note
 from mapfilter.workflows.replay_logs import ReplayLogs
 from mapfilter.workflows.replayed import (
     ReplayedLog,
@@ -194,7 +194,8 @@ def run_replay(
             log = replace(log, notes=(*log.notes, *truth_notes(track.estimate, truth)))
         fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
         ends = early_end_note(opened, track.estimate, over_map=database is not None)
-        log = replace(log, notes=(*log.notes, *fixes, *ends))
+        pauses = pause_note(track.estimate)
+        log = replace(log, notes=(*log.notes, *fixes, *pauses, *ends))
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)
         if recorder is not None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, listed
+from mapfilter.evaluation.outcome import pauses_s
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import same_crs, short_crs
 from mapfilter.lattice import Lattice
@@ -140,6 +141,18 @@ def fixes_note(
     text = f"gnss: {len(log.gnss) - unused} of {len(log.gnss)} positions of {names} used as GNSS "
     text += "fixes; --without gnss leaves them out"
     return (text if len(log.truth) else f"{text}, --truth {placed[0].path.name} scores by them",)
+
+
+def pause_note(estimate: TrackEstimate) -> tuple[str, ...]:
+    """Return a note where nothing is located for a while as there is no row; else none."""
+    pauses = pauses_s(estimate)
+    if not len(pauses):
+        return ()
+    begin_s, end_s = pauses[np.argmax(np.diff(pauses, axis=1))].tolist()
+    which = f"from {begin_s:.0f} to {end_s:.0f} s"
+    if len(pauses) > 1:
+        which = f"in {len(pauses)} pauses, the longest {which}"
+    return (f"no position {which}: there are neither motion nor measurements",)
 
 
 def early_end_note(

@@ -152,6 +152,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
         "switched": sum(outcome.switched for outcome in outcomes),
         "final_statuses": _sum({o.final_status: 1} for o in outcomes if o.final_status),
         "seconds_by_status": _seconds_by_status(outcomes),
+        "seconds_without_epochs": sum(outcome.seconds_without_epochs for outcome in outcomes),
         "unused": _sum(outcome.unused for outcome in outcomes),
         "unknown_cells": _most_frequent(outcome.unknown_cells for outcome in outcomes),
         "logs_with_unknown_cells": [log.name for log in result.logs if log.outcome.unknown_cells],

@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from mapfilter.evaluation.outcome import outcome
+from mapfilter.evaluation.outcome import outcome, pauses_s
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading
@@ -54,6 +54,22 @@ def test_a_track_that_is_found_and_lost():
     assert found.seconds_by_status == {
         "SEARCHING": 1.0, "CONVERGED": 1.0, "TRACKING": 1.0, "LOST": 0.0,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("every_s", "pause_s", "missing_s"), [(1.0, 31.0, 31.0), (1.0, 30.0, 0.0), (20.0, 150.0, 0.0),
+                                          (20.0, 201.0, 201.0)]
+)  # fmt: skip
+def test_pauses_belong_to_no_status(every_s, pause_s, missing_s):
+    """They were counted for the status before them."""
+    track = estimate(*((Status.TRACKING, 0.0, 0.0) for _ in range(9)))
+    track.time_s[:] = np.arange(9.0) * every_s + np.where(np.arange(9) >= 5, pause_s - every_s, 0)
+    found = outcome(track)
+    whole_s = float(np.ptp(track.time_s))
+    assert found.seconds_without_epochs == missing_s
+    assert found.seconds_by_status == {"TRACKING": whole_s - missing_s}
+    assert len(pauses_s(track)) == (missing_s > 0)
+    assert pauses_s(track).sum() == (missing_s > 0) * (2 * 4 * every_s + pause_s)
 
 
 def test_radii_are_those_of_located_epochs_and_of_the_last_position():
