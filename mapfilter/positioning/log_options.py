@@ -14,12 +14,15 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.options import Options
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.kalman.models import KalmanOptions
+from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.speeds import FASTEST_MPS, speed_fault
 from mapfilter.tracks.turn_drift import turn_drift_radps
+from mapfilter.tracks.turn_noise import turns_at_standstill
 
 STREETS_ALONE = "no cells in the log: located by streets, and by positions where it has some"
 
@@ -110,6 +113,15 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         )
         notes.append(f"errors of motion as the log states them: {shown}")
         changes |= measured
+    standing = {
+        name: value
+        for name, value in _standing_errors(log).items()
+        if has_default(options, name) and value != default[name]
+    }
+    if standing:
+        shown = ", ".join(f"{name} = {value:.3g}" for name, value in standing.items())
+        notes.append(f"errors of turns as they are at standstill: {shown}")
+        changes |= standing
     drift_deg_per_s = _turn_drift_deg_per_s(options, log)
     if drift_deg_per_s > changes.get("turn_rate_sd_deg_per_s", 0.0):
         changes["turn_rate_sd_deg_per_s"] = drift_deg_per_s
@@ -208,6 +220,26 @@ def _motion_errors(log: TrackLog) -> dict[str, float]:
         if imu.turns == "gyro":
             found["turn_drift_deg_per_sqrt_m"] = found["drift_deg_per_sqrt_m"]
     return found
+
+
+def _standing_errors(log: TrackLog) -> dict[str, float]:
+    """Return the errors of a vehicle's turns as they are at standstill, where the log states none.
+
+    The bias there is what the rate is assumed to be off by at least; it is not taken out.
+    """
+    usual_mps = _usual_mps(log)
+    has_headings = bool(log.motion["heading_rad"].notna().any())
+    if log.imu is not None or has_headings or usual_mps <= WALKERS_MPS:
+        return {}
+    found = turns_at_standstill(log.motion)
+    if found is None:
+        return {}
+    rate_deg_per_s = abs(float(np.degrees(found.bias_radps)))
+    walk_deg = float(np.degrees(found.walk_rad_per_sqrt_s))
+    return {
+        "turn_drift_deg_per_sqrt_m": walk_deg / usual_mps**0.5,
+        "turn_rate_sd_deg_per_s": max(rate_deg_per_s, KalmanOptions().turn_rate_sd_deg_per_s),
+    }
 
 
 def _turn_drift_deg_per_s(options: Any, log: TrackLog) -> float:
