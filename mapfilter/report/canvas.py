@@ -189,6 +189,9 @@ def _laid_out(figure: Figure) -> Iterator[None]:
         return
     figure.set_dpi(DPI)
     engine.execute(figure)
+    if any(axes.get_aspect() != "auto" for axes in figure.axes):
+        # The first time the room for a title is that over axes whose shape is not fitted yet.
+        engine.execute(figure)
     figure.set_layout_engine(None)
     try:
         yield

@@ -1,17 +1,20 @@
 """Titles fit into pictures of any shape, and do not run into each other."""
 
+from io import BytesIO
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import imread
 
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.basemap import BaseMap
+from mapfilter.report.canvas import png_of
 from mapfilter.report.snapshots import plot_belief, plot_candidates
 from mapfilter.report.track import plot_track
 
@@ -62,6 +65,32 @@ def test_the_title_of_a_track_is_whole(size_m, width_in):
     words = " ".join(drawn.get_title().split())
     assert words.startswith("my_package.filters:CarefulFilter filter: converged after 1234 s, ")
     assert words.endswith("lost at the end")
+
+
+def corner(size_m, count=100):
+    """A way to the east and then to the north."""
+    share = np.linspace(0, 2, count)
+    east_m, north_m = np.minimum(share, 1) * size_m[0], np.maximum(share - 1, 0) * size_m[1]
+    fixes = [
+        Fix(
+            float(k), *place, np.full((2, 2), np.nan), np.full(3, np.nan), Status.TRACKING,
+            1, np.nan, 0, np.nan, Reason.USED,
+        )
+        for k, place in enumerate(zip(east_m, north_m, strict=True))
+    ]  # fmt: skip
+    return TrackEstimate.of_fixes("EPSG:32635", "ekf", fixes)
+
+
+@pytest.mark.parametrize("height_m", [300.0, 380.0, 450.0])
+def test_the_title_over_a_square_map_is_not_cut_off(height_m):
+    """With a legend of two rows, as the layout first leaves room over axes of another shape."""
+    found = corner((400.0, height_m))
+    true = Truth(found.time_s, found.east_m + 4.0, found.north_m)
+    fixes_m = np.column_stack([found.east_m, found.north_m])[::3]
+    drawn = plot_track(found, true, None, fixes_m=fixes_m, title="A title")
+    shown = imread(BytesIO(png_of(drawn)))
+    assert (shown[:3, :, :3] == 1.0).all()
+    assert (shown[3:40, :, :3] < 0.5).any()
 
 
 def snapshots(size_m, count):
