@@ -73,24 +73,27 @@ def corner(size_m, count=100):
     east_m, north_m = np.minimum(share, 1) * size_m[0], np.maximum(share - 1, 0) * size_m[1]
     fixes = [
         Fix(
-            float(k), *place, np.full((2, 2), np.nan), np.full(3, np.nan), Status.TRACKING,
-            1, np.nan, 0, np.nan, Reason.USED,
+            float(k), *place, np.full((2, 2), np.nan), np.full(3, np.nan),
+            Status.TRACKING if k else Status.CONVERGED, 1, np.nan, 0, np.nan, Reason.USED,
         )
         for k, place in enumerate(zip(east_m, north_m, strict=True))
     ]  # fmt: skip
     return TrackEstimate.of_fixes("EPSG:32635", "ekf", fixes)
 
 
-@pytest.mark.parametrize("height_m", [300.0, 380.0, 450.0])
+@pytest.mark.parametrize("height_m", [300.0, 380.0])
 def test_the_title_over_a_square_map_is_not_cut_off(height_m):
     """With a legend of two rows, as the layout first leaves room over axes of another shape."""
     found = corner((400.0, height_m))
     true = Truth(found.time_s, found.east_m + 4.0, found.north_m)
     fixes_m = np.column_stack([found.east_m, found.north_m])[::3]
     drawn = plot_track(found, true, None, fixes_m=fixes_m, title="A title")
-    shown = imread(BytesIO(png_of(drawn)))
-    assert (shown[:3, :, :3] == 1.0).all()
-    assert (shown[3:40, :, :3] < 0.5).any()
+    inked = (imread(BytesIO(png_of(drawn)))[:, :, :3] < 0.8).any(axis=2)
+    frame = int(np.argmax(inked.mean(axis=1) > 0.8))
+    rows = np.flatnonzero(inked[:frame].any(axis=1))
+    assert rows[0] >= 3
+    # Letters of 14 points, at 150 pixels an inch.
+    assert np.ptp(rows) > 15
 
 
 def snapshots(size_m, count):
