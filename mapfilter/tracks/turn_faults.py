@@ -24,6 +24,7 @@ _FEWEST_CORNERS, _BOTH, _AGREED, _LEAST_GAIN = 3, 2 / 3, 0.85, 0.25
 _A_SECOND = 1.2
 _UNITS = {
     "degrees": np.pi / 180,
+    "radians taken for degrees (rad/s for deg/s)": 180 / np.pi,
     "counted twice": 0.5,
     "half as large as they should be": 2.0,
     "revolutions per minute": 2 * np.pi / 60,

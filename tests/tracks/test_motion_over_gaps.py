@@ -74,7 +74,8 @@ GAPS = [[LONG], HALVES, [(0, 300), (650, 660)], [(at, at + 40) for at in range(5
 
 @pytest.mark.parametrize("gaps_s", GAPS)
 @pytest.mark.parametrize(
-    ("column", "factor"), [("turn_rad", -1.0), ("step_m", 1 / 3.6), ("step_m", 3.6)]
+    ("column", "factor"),
+    [("turn_rad", -1.0), ("turn_rad", np.pi / 180), ("step_m", 1 / 3.6), ("step_m", 3.6)],
 )
 def test_faults_of_a_drive_are_found_on_both_sides_of_gaps(column, factor, gaps_s):
     for seed in range(5):
@@ -112,7 +113,7 @@ def test_lines_are_as_fine_as_without_a_gap_and_none_leads_over_it(share):
     gap_s = 1000 * (1 - share), 1000 * (1 + share)
     found = stretches(without(truth, gap_s), time_s, 10 * time_s)
     for line_m in (found.before_m, found.after_m):
-        assert 25.0 <= np.abs(line_m).min()
+        assert np.abs(line_m).min() >= 25.0
         assert np.abs(line_m).max() <= 60.0
     assert len(found) > (1 - share) * 20_000 / 60 - 4
 
@@ -133,3 +134,13 @@ def test_two_corners_are_too_few_to_blame_turns():
     motion, places = drive(3, turns_s=(100, 200, 700, 800))
     wrong = motion.assign(turn_rad=-motion["turn_rad"])
     assert set(motion_faults(wrong, places)) == {"turn_rad"}
+
+
+def test_a_gyroscope_that_is_dead_is_none_in_radians():
+    """Its noise, 57 times as large, turns everywhere."""
+    rng = np.random.default_rng(8)
+    for seed in range(40):
+        motion, places = drive(seed)
+        noise = np.radians(rng.uniform(-0.2, 0.2) + rng.normal(0, 0.3, COUNT))
+        for dead in (noise, np.zeros(COUNT)):
+            assert motion_faults(motion.assign(turn_rad=dead), without(places, LONG)) == {}
