@@ -10,6 +10,8 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.headings import are_mirrored
+from mapfilter.tracks.mirrored import mirrored_by
 from mapfilter.tracks.motion_faults import motion_faults
 from mapfilter.tracks.stretches import stretches
 from mapfilter.tracks.turn_drift import turn_drift_radps
@@ -43,7 +45,7 @@ def drive(seed, turns_s=(100, 190, 280, 480, 640, 730, 820), bias_degps=0.1):
     return pd.DataFrame({"time_s": time_s, **turn_m}), pd.DataFrame({"time_s": time_s, **places})
 
 
-def walk(seed, leg_s=90, rests_s=(200, 550)):
+def walk(seed, leg_s=90, rests_s=(200, 550), fix_sd_m=3.0):
     """Return motion by steps and a compass, and a fix each second; two rests of 40 s."""
     rng = np.random.default_rng(seed)
     sides = rng.choice([-1, 1], COUNT // leg_s)
@@ -54,7 +56,8 @@ def walk(seed, leg_s=90, rests_s=(200, 550)):
     east, north = (np.cumsum(speed * f(course)) for f in (np.cos, np.sin))
     off_deg = 4 + lasting(rng, 6.0, 60.0) + rng.normal(0, 4, COUNT)
     heading = np.angle(np.exp(1j * (course + np.radians(off_deg))))
-    places = {"east_m": east + lasting(rng, 3.0), "north_m": north + lasting(rng, 3.0)}
+    off_m = [lasting(rng, fix_sd_m) for _ in range(2)]
+    places = {"east_m": east + off_m[0], "north_m": north + off_m[1]}
     time_s = np.arange(float(COUNT))
     motion = {"step_m": speed, "heading_rad": heading, "turn_rad": np.nan}
     return pd.DataFrame({"time_s": time_s, **motion}), pd.DataFrame({"time_s": time_s, **places})
@@ -144,3 +147,52 @@ def test_a_gyroscope_that_is_dead_is_none_in_radians():
         noise = np.radians(rng.uniform(-0.2, 0.2) + rng.normal(0, 0.3, COUNT))
         for dead in (noise, np.zeros(COUNT)):
             assert motion_faults(motion.assign(turn_rad=dead), without(places, LONG)) == {}
+
+
+def degrees(places):
+    """Return places as longitude and latitude."""
+    lon_deg, lat_deg = 13.0 + places["east_m"] / 67_000, 52.5 + places["north_m"] / 111_000
+    return places[["time_s"]].assign(lon_deg=lon_deg, lat_deg=lat_deg)
+
+
+@pytest.mark.parametrize("gaps_s", [*GAPS, []])
+def test_azimuths_counter_clockwise_are_found_on_both_sides_of_gaps(gaps_s):
+    for seed in range(5):
+        motion, places = walk(seed)
+        places = without(places, *gaps_s)
+        assert mirrored_by(motion, degrees(places)) == ""
+        assert not are_mirrored(motion, places)
+        mirrored = motion.assign(heading_rad=np.pi - motion["heading_rad"])
+        assert mirrored_by(mirrored, degrees(places)) == "a lost sign of longitude"
+        assert are_mirrored(mirrored, places)
+
+
+@pytest.mark.parametrize("gaps_s", [*GAPS, []])
+def test_headings_that_count_from_north_are_found_on_both_sides_of_gaps(gaps_s):
+    for seed in range(5):
+        motion, places = walk(seed, fix_sd_m=1.0)
+        wrong = motion.assign(heading_rad=np.pi / 2 - motion["heading_rad"])
+        found = motion_faults(wrong, without(places, *gaps_s))
+        assert found["heading_rad"].option == "--column compass_deg=COLUMN"
+
+
+@pytest.mark.parametrize("turned_deg", [90.0, 180.0, -120.0])
+def test_a_phone_that_is_turned_is_not_mirrored(turned_deg):
+    for seed in range(50, 60):
+        motion, places = walk(seed)
+        at_s = np.random.default_rng(seed).integers(0, COUNT, 2)
+        turned = np.radians(turned_deg) * (motion["time_s"].to_numpy()[:, None] >= at_s).sum(1)
+        held = motion.assign(heading_rad=motion["heading_rad"] + turned)
+        for gaps_s in ([], [LONG]):
+            assert not are_mirrored(held, without(places, *gaps_s))
+
+
+def test_a_phone_that_is_turned_at_the_only_corner_is_not_surely_mirrored():
+    """Back to front on the first leg, it tells the same as a mirror image."""
+    time_s = np.arange(200.0)
+    course = np.where(time_s < 100, 0.0, np.pi / 2)
+    east, north = (np.cumsum(1.3 * f(course)) for f in (np.cos, np.sin))
+    places = pd.DataFrame({"time_s": time_s, "east_m": east, "north_m": north})
+    motion = pd.DataFrame({"time_s": time_s, "step_m": 1.3, "heading_rad": np.pi - course})
+    assert mirrored_by(motion, degrees(places)) == "a lost sign of longitude"
+    assert not are_mirrored(motion, places)
