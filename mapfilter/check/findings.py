@@ -63,6 +63,8 @@ REMEDIES = {
     "compass azimuth in radians; mapfilter convert reads a column of degrees as compass_deg. "
     "track.factors.heading_rad = 1 takes them as they are.",
     "log-invalid": "Correct the log or recording, or its settings in [track].",
+    "log-mirrored": "Correct the sign or the order of latitude and longitude, or give azimuths "
+    "clockwise from north. track.factors.heading_rad = 1 takes them as they are.",
     "log-outside-area": "Take a log of this area, or the area of this log.",
     "log-ranges": "Give differences in metres, how much farther the cell is than the other one, "
     "and timing advances in steps, with the technology.",

@@ -8,13 +8,14 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.motion_fault import MotionFault
+from mapfilter.tracks.moved import long_gaps
 from mapfilter.tracks.stretches import known_places
 
 _EXPECTED, _COMPASS = "counter-clockwise from east", "--column compass_deg=COLUMN"
 _LEAST_M = 2.0
 _FEWEST = 20
 _CONSTANT = 0.9
-_LEAST_GAIN = 0.3
+_LEAST_GAIN, _MIRRORED = 0.3, 0.85
 _OFF_RAD = np.deg2rad(45.0)
 _WALKED_M = 100.0
 _TURNED = np.pi / 2
@@ -70,6 +71,37 @@ def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | N
     return None
 
 
+def are_mirrored(motion: pd.DataFrame, places: pd.DataFrame) -> bool:
+    """Return whether headings are surely a mirror image of the course of the positions.
+
+    About any axis; a phone that is turned once, as at the only corner of a walk, does not explain
+    it.
+
+    Parameters
+    ----------
+    motion, places : pandas.DataFrame
+        As of :func:`heading_fault`.
+
+    Examples
+    --------
+    >>> course = np.repeat([0.0, 1.6, 0.0, -1.6], 50)
+    >>> east, north = (np.cumsum(np.append(0.0, 3 * f(course))) for f in (np.cos, np.sin))
+    >>> truth = pd.DataFrame({"time_s": np.arange(201.0), "east_m": east, "north_m": north})
+    >>> steps = pd.DataFrame({"time_s": np.arange(1.0, 201.0), "step_m": 3.0})
+    >>> are_mirrored(steps.assign(heading_rad=np.pi - course), truth)
+    True
+    >>> are_mirrored(steps.assign(heading_rad=course), truth)
+    False
+    """
+    heading, course = headings_and_courses(motion, places)
+    if heading.size < _FEWEST:
+        return False
+    sums = np.cumsum(np.exp(1j * (course - heading)))
+    turned_once = float((np.abs(sums) + np.abs(sums[-1] - sums)).max()) / heading.size
+    mirrored = float(abs(np.mean(np.exp(1j * (course + heading)))))
+    return mirrored >= _MIRRORED and mirrored - turned_once >= _LEAST_GAIN
+
+
 def compass_fault(azimuth_deg: Floats, walked_m: float) -> str:
     """Return what is wrong with the unit of azimuths; an empty text for nothing.
 
@@ -111,6 +143,8 @@ def compass_fault(azimuth_deg: Floats, walked_m: float) -> str:
 def headings_and_courses(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:
     """Return headings, and the courses of the positions within the same intervals.
 
+    A gap between positions is left out: it has one course, whatever the way in it.
+
     Parameters
     ----------
     motion, places : pandas.DataFrame
@@ -124,8 +158,10 @@ def headings_and_courses(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Fl
     heading = motion["heading_rad"].to_numpy(dtype=np.float64)
     step_m = motion["step_m"].to_numpy(dtype=np.float64)
     begin_s = np.concatenate([[np.nan], end_s[:-1]])
+    gap_s = np.cumsum(np.diff(time_s, prepend=time_s[0]) * long_gaps(time_s))
     with np.errstate(invalid="ignore"):
         known = (step_m > 0) & np.isfinite(heading) & (begin_s >= time_s[0]) & (end_s <= time_s[-1])
+        known &= np.interp(end_s, time_s, gap_s) == np.interp(begin_s, time_s, gap_s)
     begin_s, end_s, heading = begin_s[known], end_s[known], heading[known]
     moved = []
     for axis_m in along:

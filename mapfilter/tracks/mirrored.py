@@ -12,6 +12,7 @@ from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.headings import headings_and_courses
 from mapfilter.tracks.journey_motion import Moved
 from mapfilter.tracks.misplaced import UNDONE
+from mapfilter.tracks.motion_fault import BY_COMPASS, MIRRORED
 from mapfilter.tracks.position_units import METRES_PER_DEGREE
 from mapfilter.tracks.readers.recording import Recording
 
@@ -39,7 +40,7 @@ def mirrored_notes(recordings: Sequence[Recording], moved: Moved) -> list[str]:
         if rows is None:
             continue
         if moved.compass and moved.rows is not None:
-            motion, by = moved.rows, "steps and compass"
+            motion, by = moved.rows, BY_COMPASS
         elif "course_deg" in rows and rows["course_deg"].notna().any():
             heading = heading_from_azimuth_rad(rows["course_deg"])
             motion, by = rows[["time_s"]].assign(step_m=1.0, heading_rad=heading), "their courses"
@@ -47,7 +48,7 @@ def mirrored_notes(recordings: Sequence[Recording], moved: Moved) -> list[str]:
             continue
         if cause := mirrored_by(motion, rows):
             other = ", or azimuths that run counter-clockwise" if moved.compass else ""
-            text = f"positions are a mirror image of the way by {by}: {cause}{other}?"
+            text = f"{MIRRORED} {by}: {cause}{other}?"
             found.append(f"{recording.path.name}: {text}")
     return found
 

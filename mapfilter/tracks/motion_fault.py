@@ -11,6 +11,10 @@ _FIRST_WORDS = {"heading_rad": "headings", "turn_rad": "turns", "step_m": "steps
 MOTION_COLUMNS = tuple(_FIRST_WORDS)
 """Columns of motion that positions can contradict."""
 
+MIRRORED = "positions are a mirror image of the way by"
+BY_COMPASS = "steps and compass"
+"""Words of a note on positions that are one; with these by headings of a compass."""
+
 
 @dataclass(frozen=True, slots=True)
 class MotionFault:

@@ -5,19 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 from mapfilter.errors import Faults
+from mapfilter.tracks.headings import are_mirrored
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.motion_fault import MOTION_COLUMNS, MotionFault, fault_notes
+from mapfilter.tracks.motion_fault import (
+    BY_COMPASS,
+    MIRRORED,
+    MOTION_COLUMNS,
+    MotionFault,
+    fault_notes,
+)
 from mapfilter.tracks.motion_faults import motion_faults
 
+_BY_COMPASS = f"{MIRRORED} {BY_COMPASS}: "
 AS_HEADING = "heading_rad as π/2 minus the azimuth in radians"
 """What mends headings of a compass in a log that was written."""
+
+
+def mirrored_notes(log: TrackLog) -> list[str]:
+    """Return the notes of a log on positions that are a mirror image of the way by a compass."""
+    return [note for note in log.notes if _BY_COMPASS in note]
 
 
 def refused_faults(log: TrackLog, given: Collection[str]) -> dict[str, MotionFault]:
     """Return the faults for which a log is not located: what fixes prove and options mend.
 
-    What ground truth alone shows is noted: filters are judged by it, also with faults that are
-    meant.
+    Headings of a compass that are a mirror image of the fixes are one, whichever of both is wrong:
+    without an option, the recording is to be mended. What ground truth alone shows is noted:
+    filters are judged by it, also with faults that are meant.
 
     Parameters
     ----------
@@ -27,10 +41,14 @@ def refused_faults(log: TrackLog, given: Collection[str]) -> dict[str, MotionFau
         Columns that a person gave a factor for.
     """
     noted = {one for one in MOTION_COLUMNS if fault_notes(log.notes, one)} - set(given)
-    if not noted:
-        return {}
-    found = motion_faults(log.motion, log.gnss)
-    return {name: fault for name, fault in found.items() if name in noted and fault.option}
+    found = motion_faults(log.motion, log.gnss) if noted else {}
+    refused = {name: fault for name, fault in found.items() if name in noted and fault.option}
+    causes = [note.rpartition(_BY_COMPASS)[2] for note in mirrored_notes(log)]
+    if causes and "heading_rad" not in given and are_mirrored(log.motion, log.gnss):
+        mirror = "headings of a compass that are their mirror image", "courses of the positions"
+        likely = causes[0].removesuffix("?")
+        refused["heading_rad"] = MotionFault("heading_rad", *mirror, otherwise=likely)
+    return refused
 
 
 def note_refused(
@@ -51,10 +69,13 @@ def note_refused(
     where : str
         What the motion is of, in messages.
     mends : callable
-        Returns what mends a fault, and what takes the column as it is, in words.
+        Returns what mends a fault by its option, and what takes the column as it is, in words.
     """
     for column, fault in refused_faults(log, given).items():
         mended, kept = mends(fault)
+        as_it_is = f"{kept} takes it as it is"
         other = f"; or {fault.otherwise}" if fault.otherwise else ""
-        hint = f"{mended}; {kept} takes it as it is{other}"
+        hint = f"{mended}; {as_it_is}{other}"
+        if not fault.option:
+            hint = f"{fault.otherwise}; {as_it_is}"
         faults.add(f"{where}, motion, {column}", fault.expected, fault.found, hint)

@@ -123,10 +123,10 @@ def known_places(places: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
 def stretches(places: pd.DataFrame, time_s: Floats, way_m: Floats) -> Stretches | None:
     """Return pairs of lines of some 40 m and more between positions; None where there are too few.
 
-    The way is parted equally, as finely as it may be with lines of 40 m or more on most of it. It
-    is that of motion, in whatever unit: the way between positions grows by their noise, and a rest
-    is none. Lines of less than 25 m (positions that stand still), of more than 300 m, and over a
-    gap are left out.
+    The way is parted equally, as finely as it may be with lines of 40 m or more on most of it but
+    for gaps between positions. It is that of motion, in whatever unit: the way between positions
+    grows by their noise, and a rest is none. Lines of less than 25 m (positions that stand still),
+    of more than 300 m, and over a gap are left out.
 
     Parameters
     ----------
@@ -160,8 +160,9 @@ def stretches(places: pd.DataFrame, time_s: Floats, way_m: Floats) -> Stretches 
         group = np.cumsum(np.diff(np.floor(parts * part), prepend=0.0) != 0)
         line_m, passed = np.diff(_means(place_m, group)), np.diff(_means(part, group).real)
         length_m = np.abs(line_m)
-        fits = (length_m <= _LONGEST_M) & (passed <= _LONGEST_TIMES * np.median(passed))
-        if passed[fits & (length_m >= _USUAL_M)].sum() >= _COVERED * passed.sum():
+        is_gap = passed > _LONGEST_TIMES * np.median(passed)
+        fits = (length_m <= _LONGEST_M) & ~is_gap
+        if passed[fits & (length_m >= _USUAL_M)].sum() >= _COVERED * passed[~is_gap].sum():
             fits &= length_m >= _SHORTEST_M
             first = np.flatnonzero(fits[:-1] & fits[1:])
             return Stretches(at_s, group, first, line_m[first], line_m[first + 1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.stretches import (
@@ -17,12 +17,14 @@ from mapfilter.tracks.stretches import (
 )
 
 _FEWEST = 6
-_CORNER_RAD, _BACK_RAD = np.deg2rad(30.0), np.deg2rad(150.0)
+_CORNER_RAD, _LEAST_RAD = np.deg2rad(30.0), np.deg2rad(20.0)
+"""Least turn of a corner by positions, and by dead reckoning."""
 _AGREED_RAD = np.deg2rad(30.0)
-_FEWEST_CORNERS, _BOTH, _AGREED, _SELDOM = 5, 2 / 3, 0.85, 0.5
+_FEWEST_CORNERS, _BOTH, _AGREED, _LEAST_GAIN = 3, 2 / 3, 0.85, 0.25
 _A_SECOND = 1.2
 _UNITS = {
     "degrees": np.pi / 180,
+    "radians taken for degrees (rad/s for deg/s)": 180 / np.pi,
     "counted twice": 0.5,
     "half as large as they should be": 2.0,
     "revolutions per minute": 2 * np.pi / 60,
@@ -35,7 +37,8 @@ def turn_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None
 
     Dead reckoning by the steps and turns has corners of its own, which are compared with those of
     the positions, between lines of some 50 m. Turns are wrong where corners of 30 to 150 degrees,
-    five or more, contradict them and fit the same turns the other way round, or in another unit.
+    three or more, contradict them and fit the same turns the other way round, or in another unit,
+    with which straight ways are straight, too.
 
     Parameters
     ----------
@@ -61,15 +64,14 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
     if np.isfinite(turn_rad[1:]).sum() < _FEWEST:
         return None
     time_s, step_m = motion_values(motion, "time_s"), steady_values(motion, "step_m")
-    corners = stretches(places, time_s, np.cumsum(np.abs(step_m)))
-    if corners is None:
+    ways = stretches(places, time_s, np.cumsum(np.abs(step_m)))
+    if ways is None:
         return None
-    corners = corners.where(_is_corner(corners.turned_rad)).with_known(time_s, turn_rad)
-    if len(corners) < _FEWEST_CORNERS:
+    ways = ways.with_known(time_s, turn_rad)
+    corners = ways.where(_is_corner(ways.turned_rad, _CORNER_RAD))
+    if _number(corners.first) < _FEWEST_CORNERS:
         return None
     turn_rad = steady_values(motion, "turn_rad")
-    if _agreement(corners, time_s, step_m, turn_rad) > _SELDOM:
-        return None
     lasted_s = np.diff(time_s, prepend=time_s[:1])
     apart_s = float(np.median(lasted_s[1:]))
     units: dict[str, Floats | float] = {"": 1.0, **_UNITS}
@@ -82,7 +84,10 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
         for sign in (1, -1)
     }
     (unit, sign), most = max(agreed.items(), key=lambda one: one[1])
-    if most < _AGREED:
+    if most < max(_AGREED, agreed["", 1] + _LEAST_GAIN):
+        return None
+    mended = ways.turned_by(time_s, reckoned_m(step_m, sign * units[unit] * turn_rad))
+    if np.mean(_is_near(mended, ways.turned_rad)) < _AGREED:
         return None
     alike = [other for other in units if other and agreed[other, sign] == most]
     words = [f"are {' or '.join(alike)}"] if unit else []
@@ -93,18 +98,29 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
     return MotionFault("turn_rad", found, "radians counter-clockwise", factor, otherwise=mirrored)
 
 
-def _is_corner(turned_rad: Floats) -> Bools:
-    """Return which turns are of 30 to 150 degrees: those back look alike both ways round."""
-    return np.asarray((np.abs(turned_rad) >= _CORNER_RAD) & (np.abs(turned_rad) <= _BACK_RAD))
+def _is_corner(turned_rad: Floats, least_rad: float) -> Bools:
+    """Return which turns are neither straight on nor back, which look alike both ways round."""
+    turned_rad = np.abs(turned_rad)
+    return np.asarray((turned_rad >= least_rad) & (turned_rad <= np.pi - least_rad))
+
+
+def _is_near(turned_rad: Floats, other_rad: Floats) -> Bools:
+    return np.asarray(np.abs(wrap_rad(turned_rad - other_rad)) <= _AGREED_RAD)
+
+
+def _number(first: Ints) -> int:
+    """Return how many corners pairs of lines show, as one corner lies in two pairs that overlap."""
+    runs = np.bincount(np.cumsum(np.diff(first, prepend=first[:1]) != 1)) if first.size else first
+    return int(((runs + 1) // 2).sum())
 
 
 def _agreement(corners: Stretches, time_s: Floats, step_m: Floats, turn_rad: Floats) -> float:
     """Return the share of corners that dead reckoning by steps and turns has, too."""
     turned_rad = corners.turned_by(time_s, reckoned_m(step_m, turn_rad))
-    both = _is_corner(turned_rad)
-    if both.sum() < max(_FEWEST_CORNERS, _BOTH * both.size):
+    both = _is_corner(turned_rad, _LEAST_RAD)
+    if _number(corners.first[both]) < _FEWEST_CORNERS or both.mean() < _BOTH:
         return 0.0
     # Five times a right angle has the same course, and is a whole turn more.
     more_rad = corners.grown(time_s, np.cumsum(turn_rad)).real - corners.turned_rad
-    near = np.abs(wrap_rad(turned_rad - corners.turned_rad)) <= _AGREED_RAD
+    near = _is_near(turned_rad, corners.turned_rad)
     return float(np.mean((near & (np.abs(more_rad) <= np.pi))[both]))

@@ -19,7 +19,7 @@ from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.range_units import range_notes
-from mapfilter.tracks.refused_motion import refused_faults
+from mapfilter.tracks.refused_motion import mirrored_notes, refused_faults
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
@@ -52,6 +52,9 @@ def check_logs(
             for note in fault_notes(opened.log.notes, column):
                 severity: Severity = "error" if column in refused else "warning"
                 findings.add(code, str(path), f"{note}.", severity)
+        for note in mirrored_notes(opened.log):
+            severity = "error" if "heading_rad" in refused else "warning"
+            findings.add("log-mirrored", str(path), note, severity)
         whose = config.filter.bayes.of(BayesFilter).vehicle, opened.log.vehicle, opened.log.imu
         # Positions say more of the lengths of steps than their speed does.
         in_doubt = all(one is None for one in whose) and not fault_notes(opened.log.notes, "step_m")

@@ -110,6 +110,36 @@ def test_a_counter_that_stands_still_is_told():
     assert "stands still in 3 rows" in notes[0]
 
 
+@pytest.mark.parametrize("apart_s", [31.0, 40.0, 60.0, 300.0])
+@pytest.mark.parametrize("rest", [0, 5])
+def test_rows_too_far_apart_for_steps_are_told_with_how_far(apart_s, rest):
+    count = np.cumsum([2, *[int(1.9 * apart_s)] * 15])
+    made = sensors(count, 90.0, time_s=apart_s * np.arange(16))
+    motion, _, notes = reckon_counted(made, EAST)
+    assert motion is None
+    assert notes[0] == (
+        f"steps are counted in rows {apart_s:g} s apart, and used in rows up to 30 s apart: "
+        "no motion"
+    )
+    # The phone lies there afterwards.
+    count = np.append(count, count[-1] + np.zeros(rest))
+    made = sensors(count, 90.0, time_s=apart_s * np.arange(16 + rest))
+    assert reckon_counted(made, EAST)[2] == notes
+
+
+def test_steps_of_rows_thirty_seconds_apart_are_used():
+    count = np.cumsum([2, *[57] * 15])
+    np.testing.assert_allclose(lengths(count, time_s=30.0 * np.arange(16)), [0, *[57] * 15])
+
+
+def test_a_counter_that_jumps_in_each_row_is_none_that_stands_still():
+    motion, _, notes = reckon_counted(sensors(1000 * np.arange(9), 90.0), EAST)
+    assert motion is None
+    assert notes[0].startswith(
+        "the step counter begins anew, or grows by more than 5 steps/s, in 8 of 9 rows: no motion"
+    )
+
+
 @pytest.mark.parametrize(("lacking", "told"), [("steps", ()), ("compass", "no compass")])
 def test_without_a_counter_or_a_compass_there_is_no_motion(lacking, told):
     kinds = sensors([0, 2], 90.0)

@@ -116,6 +116,10 @@ def test_turns_the_other_way_round_or_in_another_unit(seed, speed_mps, sd_m, clo
     assert told(np.degrees(turn)) == f"turns are degrees{more} {by} {mends}0.01745 mends it)"
     rates = f"turns are rates (rad/s) in rows 0.2 s apart{more} {by} {mends}0.2 mends it)"
     assert told(turn / 0.2) == rates
+    radians = (
+        f"turns are radians taken for degrees (rad/s for deg/s){more} {by} {mends}57.3 mends it)"
+    )
+    assert told(np.radians(turn)) == radians
     half = f"turns are half as large as they should be{more} {by} {mends}2 mends it)"
     assert told(turn / 2) == half
 

@@ -184,6 +184,25 @@ def test_notes_that_many_files_share_are_summed_up(tmp_path):
     assert "such as 'soon' in line 2" in of_times[0]
 
 
+def test_a_compass_that_runs_the_other_way_round_is_a_finding(check, laps, tmp_path):
+    log = read_log(laps)
+    lon, lat = unproject(log.crs, log.gnss["east_m"], log.gnss["north_m"])
+    heading_deg = np.degrees(np.cumsum(log.motion["turn_rad"]))
+    rows = {"time": 1.78e9 + log.motion["time_s"], "latitude": lat, "longitude": lon}
+    walk = pd.DataFrame({**rows, "step_m": 2.0, "compass_deg": (90 - heading_deg) % 360})
+    walk.to_csv(tmp_path / "walk.csv", index=False)
+    assert "log-mirrored" not in check(tmp_path / "walk.csv")
+    walk["compass_deg"] = -walk["compass_deg"] % 360
+    walk.to_csv(tmp_path / "walk.csv", index=False)
+    found = check(tmp_path / "walk.csv")["log-mirrored"]
+    assert found["severity"] == "error"
+    assert "azimuths that run counter-clockwise?" in found["evidence"]
+    assert "track.factors.heading_rad = 1" in found["remedy"]
+    factor = "track.factors.heading_rad=1"
+    found = check(tmp_path / "walk.csv", "--set", factor)["log-mirrored"]
+    assert found["severity"] == "warning"
+
+
 def test_steps_in_feet_are_a_finding(check, log):
     rows = pd.read_csv(log / "motion.csv")
     speed_mps = rows["step_m"].iloc[1:].sum() / (rows["time_s"].iloc[-1] - rows["time_s"].iloc[0])

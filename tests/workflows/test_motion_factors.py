@@ -139,6 +139,29 @@ def test_headings_by_a_compass_are_refused_with_the_column_that_mends_them(drive
     assert_refused(outcome, remedy)
 
 
+def test_azimuths_counter_clockwise_are_refused_unless_they_are_given_as_right(
+    drive, replay, tmp_path
+):
+    fixes = pd.read_csv(tmp_path / "fixes.csv")
+    fixes.drop(range(100, 240)).to_csv(tmp_path / "fixes.csv", index=False)
+    heading = np.cumsum(drive["yaw_rate_radps"])
+    azimuth_deg = 90 - np.degrees(heading)
+    right = drive[["time"]].assign(step_m=10.0, compass_deg=azimuth_deg % 360)
+    assert_done(replay(right))
+    wrong = right.assign(compass_deg=-azimuth_deg % 360)
+    told = (
+        "odometry.csv, motion, heading_rad: expected courses of the positions, found headings of a "
+        "compass that are their mirror image (likely: a lost sign of longitude, or azimuths that "
+        "run counter-clockwise; --factor heading_rad=1 takes it as it is)"
+    )
+    assert_refused(replay(wrong), told)
+    taken = assert_done(replay(wrong, "--factor", "heading_rad=1")).json
+    assert any("positions are a mirror image of the way" in note for note in taken["notes"])
+    log = mf.read_log([tmp_path / "fixes.csv", tmp_path / "odometry.csv"])
+    with pytest.raises(InputError, match=r'clockwise; factors=\{"heading_rad": 1\} takes it'):
+        mf.locate(log, filter="ekf")
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [

@@ -102,8 +102,7 @@ def reckon_counted(
     counted, how = _counted(time_s, rows["count"].to_numpy(dtype=np.float64))
     unknown = int(np.isnan(counted).sum())
     if not np.nansum(counted) > 0:
-        reason = f"the step counter stands still in {number_of(len(rows), 'row')}: no motion"
-        return None, None, (f"{reason} (steps of each row alone are given as step_m)",)
+        return None, None, (_without_steps(time_s, counted),)
     if "compass" in sensors:
         course, reason = _by_compass(time_s, counted, sensors, options, convergence_rad)
     else:
@@ -130,6 +129,23 @@ def reckon_counted(
     if without:
         notes.append(f"{course.unknown} {number_of(without, 'row')} with steps")
     return motion, _errors(motion, options, course.walk_rad), (*notes, *course.notes)
+
+
+def _without_steps(time_s: Floats, counted: Floats) -> str:
+    """Return why there is no motion where no row has a step: all stand still, or are unknown."""
+    reason, unknown = "stands still in", np.isnan(counted[1:])
+    if unknown.any():
+        apart_s = float(np.median(np.diff(time_s)[unknown]))
+        if apart_s > _PAUSE_S:
+            used = f"and used in rows up to {_PAUSE_S:g} s apart"
+            return f"steps are counted in rows {apart_s:.3g} s apart, {used}: no motion"
+        reason = (
+            f"begins anew, or grows by more than {_STEPS_PER_S:g} steps/s, in {unknown.sum()} of"
+        )
+    rows = number_of(len(counted), "row")
+    return (
+        f"the step counter {reason} {rows}: no motion (steps of each row alone are given as step_m)"
+    )
 
 
 def _by_compass(
