@@ -17,6 +17,7 @@ from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.identities import LIMITS
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
 from mapfilter.tracks.cut_times import cut_times
+from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SATELLITE, SCHEMA, SERVING, Column
 
 _LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
@@ -178,7 +179,7 @@ def _sorted_unique(
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     if "step_m" in table and (cut := cut_times(table["time_s"].to_numpy())):
         notes += (f"{where}: {cut}",)
-    duplicate = _repeated(table)
+    duplicate = repeated_readings(table, _repeated(table))
     if duplicate.any():
         notes += (f"{where}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped",)
         table = table[~duplicate]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pandas as pd
+
 from mapfilter._types import Floats
 from mapfilter.errors import listed
 from mapfilter.tracks.readers.csv_fields import FIELDS, column_options
@@ -45,6 +48,8 @@ def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
         if likely == ["compass_deg"] and "heading" in name and not _walks(mapped):
             # Beside positions alone a compass is of no use, a course is.
             likely = ["course_deg"]
+        if "step_m" in likely:
+            likely = _of_steps(mapped, name, likely)
         if len(likely) > 1 and likely[0].endswith("_mps"):
             unit = speed_unit(mapped, name, time_s)
             if unit not in _OF_SPEEDS:
@@ -63,6 +68,16 @@ def unused_note(unread: tuple[str, ...]) -> str:
     name, _, fields = guessed[:-2].rpartition(" (")
     option = column_options(fields.split(" or "), name)
     return f"columns not used: {listed(unread)} (likely: {option})"
+
+
+def _of_steps(mapped: Mapped, column: str, likely: list[str]) -> list[str]:
+    """Return the fields that a column of steps may be by its values: lengths, or a counter."""
+    number = pd.to_numeric(pd.Series(mapped.rows.texts(column)), errors="coerce").to_numpy()
+    known = number[np.isfinite(number)]
+    if not np.all(known == np.round(known)):
+        return ["step_m"]
+    grows = known.size > 1 and known[-1] > known[0] and bool(np.all(np.diff(known) >= 0))
+    return [field for field in likely if field == "steps"] if grows else likely
 
 
 def _walks(mapped: Mapped) -> bool:

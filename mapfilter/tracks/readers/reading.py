@@ -29,6 +29,7 @@ from mapfilter.tracks.readers.recording import Clock, Recording
 from mapfilter.tracks.readers.tables import RECORDED
 from mapfilter.tracks.readers.tallies import Tallies
 from mapfilter.tracks.readers.unusable import Unusable, nothing_usable
+from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import NEIGHBOUR
 
 _LINES_KEPT = 3
@@ -256,7 +257,7 @@ class Reading:
             rows = reordered(rows, np.argsort(time, kind="stable"))
             time = rows["time_s"].to_numpy()
         if (np.diff(time) == 0).any():
-            duplicate = duplicates(rows)
+            duplicate = repeated_readings(rows, duplicates(rows))
             if duplicate.any():
                 self.note(
                     f"{table}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped"
