@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,6 +49,8 @@ _JOIN_SITES = (
     "site, or name other columns in cells.columns.east and cells.columns.north"
 )
 _LONGEST_SHOWN = 80
+_MISSPELT = 0.75
+"""Least likeness of a short name that is misspelt."""
 
 
 @dataclass(slots=True)
@@ -130,7 +133,12 @@ def _meant(name: str, header: tuple[str, ...]) -> str:
     has = [field for field, names in LAYOUTS["plan"].items() if set(names) & set(header)]
     wanted = likely_names("plan", has)
     same = [field for field, names in wanted.items() if places_named([heading], field, names)]
-    field = next(iter(same or (field for _, field in resembling([heading], (), wanted))), "")
+    alike = [field for _, field in resembling([heading], (), wanted)]
+    if not (same or alike):
+        # Short names are misspelt, too: latt.
+        near = difflib.get_close_matches(name.lower(), sorted(wanted), n=1, cutoff=_MISSPELT)
+        alike = [field for field in near if field[0] == name[0].lower()]
+    field = next(iter(same or alike), "")
     unit = f", in {unit_of(field)}" if unit_of(field) else ""
     return f"{field} meant{unit}" if field else ""
 
