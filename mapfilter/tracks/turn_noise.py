@@ -53,7 +53,7 @@ def turns_at_standstill(motion: pd.DataFrame) -> StandingTurns | None:
     lasted_s = np.diff(motion["time_s"].to_numpy(dtype=np.float64), prepend=np.nan)
     stands = (step_m == 0) & np.isfinite(turn_rad) & (lasted_s > 0) & (lasted_s <= _LONGEST_S)
     turned, lasted_s = turn_rad[stands], lasted_s[stands]
-    if len(turned) < _LEAST_ROWS or lasted_s.sum() < _LEAST_S or np.median(turned != 0) < 1:
+    if len(turned) < _LEAST_ROWS or lasted_s.sum() < _LEAST_S or np.mean(turned == 0) >= 0.5:
         return None
     bias_radps = float(np.median(turned / lasted_s))
     off = (turned - bias_radps * lasted_s) / np.sqrt(lasted_s)

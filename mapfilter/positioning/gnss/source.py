@@ -132,7 +132,7 @@ class GnssSource(EvidenceSource):
     def beside_other(self, state: GnssState) -> GnssState:
         """Return the state with a receiver and a trail that begin anew."""
         receiver = state.receiver
-        if state.trail.rows or state.wander.rows:
+        if state.trail.rows or state.wander.known:
             state = replace(state, trail=FixTrail(), wander=state.wander.before_a_jump())
         if receiver is None:
             return state

@@ -161,9 +161,9 @@ class FixWeighing:
         fix: GnssFix,
         time_s: float,
         *,
+        drift_deg_per_sqrt_m: float,
         rests_since_s: float = nan,
         is_doubted: bool = False,
-        drift_deg_per_sqrt_m: float = 0.3,
     ) -> WeighedFix:
         """Return what a fix leads to.
 
@@ -173,12 +173,12 @@ class FixWeighing:
         errors : FixErrors
         fix : GnssFix
         time_s : float
+        drift_deg_per_sqrt_m : float
+            Assumed random walk of headings.
         rests_since_s : float
             Time since which steps say that one stands; NaN where they do not.
         is_doubted : bool
             Whether the belief may be wrong by what is known before the fix.
-        drift_deg_per_sqrt_m : float
-            Assumed random walk of headings.
         """
         own, record, rests = self.own, errors.record, isfinite(rests_since_s)
         stated = fix_covariance_m2(fix, self.options.fix_sd_m)

@@ -240,9 +240,9 @@ class KalmanStep:
             self.fixes,
             fix,
             time_s,
+            drift_deg_per_sqrt_m=drift_deg,
             rests_since_s=since_s,
             is_doubted=doubted,
-            drift_deg_per_sqrt_m=drift_deg,
         )
         self.belief, self.fixes = after.belief, after.errors
         motion = after.motion
