@@ -24,6 +24,9 @@ _MOST_KEPT_ROWS = 1_000_000
 _MOVED = {"motion", "odometry", "poses", "steps", "accelerometer"}
 """Tables of recordings of which motion is made."""
 
+_UNREAD, _DEGREES = ": not used: ", ("lat_deg", "lon_deg")
+"""How a note begins on rows that were left out, and the columns of positions."""
+
 
 class ReplayLogs:
     """The logs of a configuration, which are read for checks first.
@@ -93,7 +96,13 @@ class ReplayLogs:
     def check_siteless(self) -> None:
         """Refuse logs that a filter without a map can only locate by the sites of their cells."""
         for path in self.paths:
-            if needs_sites(leave_out(self.open(path).log, self.config.track.without)):
+            log = leave_out(self.open(path).log, self.config.track.without)
+            if needs_sites(log):
+                for note in log.notes:
+                    _, unread, why = note.partition(_UNREAD)
+                    if unread and any(name in why for name in _DEGREES):
+                        expected = "positions, or the sites of cells (cells.plan, or --db)"
+                        raise fail(InputError, shown(path.name), expected, f"none used of {why}")
                 hint = (
                     f"{shown(path.name)} has no positions to start from, and filters without a map "
                     "take the sites of its cells from there, or from a database (--db)"

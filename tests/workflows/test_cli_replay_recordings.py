@@ -203,6 +203,17 @@ def test_without_a_database_the_remedies_are_named(recordings, tmp_path, monkeyp
     assert_refused(mapfilter(*given, "--filter", "ekf"), "cells.plan", "has no positions", "--db")
 
 
+def test_why_positions_are_none_is_said_where_they_are_needed(tmp_path):
+    """The note that told it was lost: only a cell plan was asked for."""
+    rows = [f"{k},{525_200_000 + k},{134_000_000 + k},262-1-7-{k % 3},-80" for k in range(60)]
+    (tmp_path / "e7.csv").write_text("\n".join(["time_s,lat,lon,cell,level_dbm", *rows]))
+    given = ("replay", "--log", tmp_path / "e7.csv", "--filter", "ekf", "--out", tmp_path / "out")
+    told = (
+        "none used of 60 rows: lat_deg: not degrees in -90..90 (likely: degrees times 1e6 or 1e7)"
+    )
+    assert_refused(mapfilter(*given), "'e7.csv': expected positions", told, "cells.plan, or --db")
+
+
 def test_pseudoranges_that_no_filter_without_a_map_uses_are_said_to_be(tmp_path):
     file, text = MADE["smartloc"]
     (tmp_path / file).write_text(text)
