@@ -194,7 +194,7 @@ def _laid_out(figure: Figure) -> Iterator[None]:
     engine.execute(figure)
     if any(axes.get_aspect() != "auto" for axes in figure.axes):
         # Room for titles and labels is that around axes as they were before: of another shape.
-        before = np.inf
+        before = np.full((len(figure.axes), 4), np.inf)
         for _ in range(_MOST_LAYOUTS):
             placed = np.array([axes.get_position(original=True).bounds for axes in figure.axes])
             if np.abs(placed - before).max() < _SETTLED:

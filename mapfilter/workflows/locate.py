@@ -150,15 +150,16 @@ def _inputs(
     try:
         known, plan = read_database(database, crs, level_error_db)
     except MapfilterError as error:
-        faults.found.extend(error.faults)
+        faults.take(error)
     try:
         query = read_reports(log, known.crs if known is not None else crs, plan, columns)
     except MapfilterError as error:
-        faults.found.extend(error.faults)
+        faults.take(error)
     if known is not None and query is not None:
         _check_near(log, query[0], known, faults)
-    if known is None or query is None or faults.found:
-        raise InputError(tuple(faults.found))
+    faults.raise_if_any(InputError)
+    assert known is not None
+    assert query is not None
     return known, query
 
 

@@ -16,7 +16,7 @@ from mapfilter._parallel import Progress, SerialExecutor
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, fail, noted
 from mapfilter.evaluation.accuracy import Truth, accuracy, truth_notes
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
@@ -36,6 +36,7 @@ from mapfilter.report.ground import BaseMap
 from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
+from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.store import is_log
 from mapfilter.workflows.apart import check_out_apart
@@ -142,8 +143,7 @@ def run_replay(
     wanted, count = config.output.pictures, len(journeys.paths)
     risk = config.integrity.of(IntegrityOptions).risk
 
-    def located(index: int, path: Path, new: Path) -> ReplayedLog:
-        opened = journeys.open(path)
+    def located(index: int, opened: OpenedLog, new: Path) -> ReplayedLog:
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         log = with_range_notes(log, sites(crs)) if has_sites else without_cells(log, _SITES)
@@ -216,7 +216,9 @@ def run_replay(
     ):
         logs = []
         for index, path in enumerate(journeys.paths):
-            logs.append(located(index, path, new))
+            opened = journeys.open(path)
+            with noted(opened.log.notes):
+                logs.append(located(index, opened, new))
             if progress is not None:
                 progress(index + 1, count)
         result = ReplayResult(config.filter.name, tuple(logs), summary_of(logs), out)
