@@ -28,6 +28,7 @@ from mapfilter.radio.cell_rules import (
     assumed_fault,
     id_fault,
 )
+from mapfilter.radio.headings import Heading, places_named
 from mapfilter.radio.identities import technology
 from mapfilter.radio.tables import number, read_table
 
@@ -114,7 +115,8 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
     for name in header:
         if name not in _ALLOWED:
             absent = sorted(set(_ALLOWED) - set(header))
-            near = difflib.get_close_matches(name.lower(), absent, n=1, cutoff=0.6)
+            near = [field for field in _named(name) if field in absent]
+            near += difflib.get_close_matches(name.lower(), absent, n=1, cutoff=0.6)
             hint = "name what it holds in [cells.columns]"
             hint = f"{near[0]} meant; else {hint}" if near else hint
             faults.add(where, "known columns only", repr(name), hint)
@@ -122,6 +124,13 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
         faults.add(where, "each column once", f"{name} {header.count(name)} times")
     if {"lat", "lon"} & set(header) and {"east", "north"} & set(header):
         faults.add(where, "lat and lon, or east and north", "both")
+
+
+def _named(name: str) -> list[str]:
+    """Return the fields that a name means in lists of planning tools."""
+    heading = [Heading.of(name)]
+    fields = LAYOUTS["atoll"].items()
+    return [field for field, names in fields if places_named(heading, field, names)]
 
 
 def _check_fields(

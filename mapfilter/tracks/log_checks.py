@@ -153,7 +153,10 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     if long and np.all(growth_m >= 0) and np.mean(growth_m > 0) > 0.5:
         # A car that speeds up does not do so for long.
         got = f"steps that only grow, from {step_m[0]:g} to {step_m[-1]:g}"
-        faults.add(column, _EXPECTED, got, "distance since the start; give its differences")
+        hint = "distance since the start; give its differences"
+        if np.all(step_m % 1 == 0):
+            hint = f"a counter of steps: a column steps of a recording; or {hint}"
+        faults.add(column, _EXPECTED, got, hint)
     elif typical_mps > _FASTEST_MPS:
         hint = "centimetres or millimetres given for metres, or distance since the start"
         faults.add(column, _EXPECTED, f"{typical_mps:.0f} m/s in the median", hint)

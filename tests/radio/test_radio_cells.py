@@ -129,6 +129,7 @@ def test_small_azimuths_in_whole_degrees_are_no_radians(tmp_path: Path) -> None:
     ("header", "said"),
     [
         ("cell,lat,lon,height,eirp_dbm,frequency_mhz\n", "height_m meant"),
+        ("cell,Latitude,Longitude,height_m,eirp_dbm\n", "'Latitude' (likely: lat meant"),
         ("Zelle,lat,lon,height_m,eirp_dbm\n", "cell meant; else name what it holds in [cells.col"),
         ("cell,lat,height_m,eirp_dbm,frequency_mhz\n", "a column lon"),
         ("cell,lat,lat,lon,height_m,eirp_dbm,frequency_mhz\n", "lat 2 times"),

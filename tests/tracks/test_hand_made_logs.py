@@ -137,6 +137,7 @@ def track(length_m, seconds=100):
     ("step_m", "hint"),
     [
         (np.cumsum(np.full(100, 1.4)), "distance since the start; give its differences"),
+        (np.arange(100), "a counter of steps: a column steps of a recording"),
         (1400.0, "centimetres or millimetres given for metres"),
         (-1.4, "a sign the other way round"),
         (0.0014, "kilometres given for metres"),

@@ -10,6 +10,7 @@ from mapfilter.errors import Faults
 
 _ALIKE = 0.7
 _UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_m")
+_AXES = ("_x", "_y", "_z")
 _UNIT_WORDS = {
     "_mps": "m/s",
     "_kmh": "km/h",
@@ -98,6 +99,8 @@ MOTION_FIELDS = (
 def meant(column: str, taken: Collection[str] = ()) -> str:
     """Return the field that a column's name resembles, in the same unit; "" for none.
 
+    A misspelt name has the same first letter, and that of a sensor the same axis.
+
     Parameters
     ----------
     column : str
@@ -107,13 +110,17 @@ def meant(column: str, taken: Collection[str] = ()) -> str:
 
     Examples
     --------
-    >>> [meant(name) for name in ("stepcount", "compas", "compass_rad", "operator")]
-    ['steps', 'compass_deg', '', '']
+    >>> [meant(name) for name in ("stepcount", "compas", "compass_rad", "zelle", "mag")]
+    ['steps', 'compass_deg', '', '', '']
     """
-    names = {name: field for field, some in FIELDS.items() if field not in taken for name in some}
+    free = {field: some for field, some in FIELDS.items() if field not in taken}
+    names = {name: field for field, some in free.items() for name in some if name[0] == column[:1]}
     for near in get_close_matches(column, names, 3, _ALIKE):
+        field = names[near]
+        if field[-2:] in _AXES and not (field[-2:] in column or column[-1:] == field[-1:]):
+            continue
         if all(column.endswith(unit) == near.endswith(unit) for unit in _UNITS if unit in column):
-            return names[near]
+            return field
     return ""
 
 

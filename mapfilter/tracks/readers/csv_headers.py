@@ -16,7 +16,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "lat_deg": ("latitude", "lat", "gps latitude", "gps lat"),
     "lon_deg": ("longitude", "lon", "lng", "long", "gps longitude", "gps lon"),
     "altitude_m": ("altitude", "alt", "height", "elevation", "ele", "gps altitude"),
-    "accuracy_m": ("accuracy", "horizontal accuracy", "position accuracy", "gps accuracy"),
+    "accuracy_m": ("accuracy", "horizontal accuracy", "position accuracy", "gps accuracy", "acc"),
     "speed_mps": (
         *("speed", "velocity", "gps speed", "gnss speed", "gps velocity", "ground speed"),
         *("speed over ground", "sog", "location speed"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from mapfilter._types import Floats
 from mapfilter.errors import listed
 from mapfilter.tracks.readers.csv_fields import FIELDS, column_options
@@ -45,6 +47,11 @@ def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
         if likely == ["compass_deg"] and "heading" in name and not _walks(mapped):
             # Beside positions alone a compass is of no use, a course is.
             likely = ["course_deg"]
+        if likely == ["accuracy_m"] and not mapped.has("lat_deg", "lon_deg"):
+            # The name may mean an acceleration, too.
+            likely = []
+        if likely == ["step_m"] and _counts(mapped, name):
+            likely = [] if "steps" in found else ["steps"]
         if len(likely) > 1 and likely[0].endswith("_mps"):
             unit = speed_unit(mapped, name, time_s)
             if unit not in _OF_SPEEDS:
@@ -68,6 +75,12 @@ def unused_note(unread: tuple[str, ...]) -> str:
 def _walks(mapped: Mapped) -> bool:
     placed = mapped.has("lat_deg", "lon_deg") and not mapped.has("course_deg")
     return not placed or mapped.has("steps") or mapped.has("step_m")
+
+
+def _counts(mapped: Mapped, column: str) -> bool:
+    """Return whether a column has whole numbers only, of which some are not 0: counted steps."""
+    number = pd.to_numeric(pd.Series(mapped.rows.texts(column)), errors="coerce").dropna()
+    return bool((number % 1 == 0).all() and number.any())
 
 
 def _with_fields(name: str, fields: list[str]) -> str:
