@@ -18,6 +18,7 @@ from mapfilter.radio.identities import LIMITS
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
 from mapfilter.tracks.cut_times import cut_times
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SATELLITE, SCHEMA, SERVING, Column
+from mapfilter.tracks.unnamed_neighbours import without_other_cells
 
 _LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
 _SELDOM_S = 10.0
@@ -179,6 +180,8 @@ def _sorted_unique(
     if "step_m" in table and (cut := cut_times(table["time_s"].to_numpy())):
         notes += (f"{where}: {cut}",)
     duplicate = _repeated(table)
+    if "role" in table:
+        duplicate = without_other_cells(table, duplicate)
     if duplicate.any():
         notes += (f"{where}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped",)
         table = table[~duplicate]

@@ -30,6 +30,7 @@ from mapfilter.tracks.readers.tables import RECORDED
 from mapfilter.tracks.readers.tallies import Tallies
 from mapfilter.tracks.readers.unusable import Unusable, nothing_usable
 from mapfilter.tracks.schema import NEIGHBOUR
+from mapfilter.tracks.unnamed_neighbours import without_other_cells
 
 _LINES_KEPT = 3
 _EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
@@ -257,6 +258,8 @@ class Reading:
             time = rows["time_s"].to_numpy()
         if (np.diff(time) == 0).any():
             duplicate = duplicates(rows)
+            if table == "radio":
+                duplicate = without_other_cells(rows, duplicate)
             if duplicate.any():
                 self.note(
                     f"{table}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped"
