@@ -20,7 +20,7 @@ from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from inspect import cleandoc
 from types import NoneType
-from typing import Annotated, Any, ClassVar, cast, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, cast, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt
 
@@ -80,7 +80,8 @@ class Options:
                 object.__setattr__(self, name, as_plain(annotation, value))
             else:
                 where = f"{type(self).__name__}, {name}"
-                faults.add(where, expected(annotation), repr(value), likely(annotation, value))
+                hint = likely(annotation, value) or _choice_of(type(self), value)
+                faults.add(where, expected(annotation), repr(value), hint)
         # A field of another type may not compare with others; it is named already.
         with suppress(*((TypeError, AttributeError, KeyError) if faults.found else ())):
             self.check(faults)
@@ -99,6 +100,15 @@ def annotations_of(options: type[Options]) -> dict[str, Any]:
 def _annotations(options: Any) -> dict[str, Any]:
     hints = get_type_hints(options, include_extras=True)
     return {field.name: hints[field.name] for field in fields(options)}
+
+
+def _choice_of(options: Any, value: Any) -> str:
+    """Return the option of which a text is one of the choices, as an argument; "" for none."""
+    for name, annotation in _annotations(options).items():
+        choices = [one for one in plain_types(annotation) if get_origin(one) is Literal]
+        if isinstance(value, str) and any(fits(one, value) for one in choices):
+            return f"{name}={str(value)!r}"
+    return ""
 
 
 def describe_options(options: type[Options]) -> Iterator[OptionInfo]:

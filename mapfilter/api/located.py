@@ -43,6 +43,10 @@ if TYPE_CHECKING:
     import geopandas as gpd
     from matplotlib.axes import Axes
 
+_NO_TRUTH = (
+    "the log has no ground truth; mf.read_log(..., truth=FILE) takes that of another recording"
+)
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Track:
@@ -312,7 +316,8 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
         faults.raise_if_any(InputError)
         known = Truth.of_table(tidy)
         if known is None:
-            raise fail(InputError, "truth", "two positions or more", len(truth))
+            got, hint = (len(truth), "") if len(truth) else ("none", _NO_TRUTH)
+            raise fail(InputError, "truth", "two positions or more", got, hint)
         truth = known
     figures = asdict(accuracy(estimate, truth))
     return Score(**figures, error_m=position_errors_m(estimate, truth))

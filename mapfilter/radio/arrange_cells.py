@@ -17,6 +17,7 @@ from mapfilter.radio.cell_layouts import (
     LIKELY,
     OFFSETS,
     OPENCELLID_HEADER,
+    USUAL,
     Columns,
     Layout,
 )
@@ -161,6 +162,24 @@ def arrange(
     return Arranged(names, tuple(found), shown, notes, table.separator != ",")
 
 
+def likely_names(layout: Layout, has: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Return the names that columns of other fields than some may have, by field."""
+    there = {*has, *_NOT_RESEMBLED}
+    there |= {"east", "north"} if {"lat", "lon"} <= there else set()
+    there |= {"lat", "lon"} if {"east", "north"} <= there else set()
+    likely = {"atoll": LIKELY, "plan": USUAL}.get(layout, {})
+    wanted = {
+        field: (
+            *names,
+            *likely.get(field, ()),
+            field.rpartition("_")[0] if unit_of(field) else field,
+        )
+        for field, names in LAYOUTS[layout].items()
+        if field not in there and field not in HELPERS
+    }
+    return {field: tuple(filter(None, names)) for field, names in wanted.items()}
+
+
 def none_of(header: Sequence[str]) -> str:
     """Return what was found in place of a column: the columns that there are."""
     shown = ", ".join(header)
@@ -272,20 +291,7 @@ def _unused(
     """Return a note on columns that are ignored and resemble a field that has no column, or ""."""
     if layout == "opencellid" or (layout == "plan" and not columns):
         return ""
-    has = set(picked) | set(_NOT_RESEMBLED)
-    has |= {"east", "north"} if {"lat", "lon"} <= has else set()
-    has |= {"lat", "lon"} if {"east", "north"} <= has else set()
-    likely = LIKELY if layout == "atoll" else {}
-    wanted = {
-        field: (
-            *names,
-            *likely.get(field, ()),
-            field.rpartition("_")[0] if unit_of(field) else field,
-        )
-        for field, names in LAYOUTS[layout].items()
-        if field not in has and field not in HELPERS
-    }
-    wanted = {field: tuple(filter(None, names)) for field, names in wanted.items()}
+    wanted = likely_names(layout, picked)
     used = {at for places in picked.values() for at in places}
     found = resembling([Heading.of(name) for name in header], used, wanted)
     named = ", ".join(f"{name!r} ({field})" for name, field in found)

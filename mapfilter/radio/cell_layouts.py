@@ -70,6 +70,15 @@ LIKELY: Columns = {
     "frequency_mhz": ("band",),
 }
 """Names that a planning tool's heading may hold if it means a field, and that may mean others."""
+USUAL: Columns = {
+    "cell": ("cell name", "cellname", "cell id"),
+    "site": ("site name", "sitename", "site id", "siteid"),
+    "lat": ("latitude",),
+    "lon": ("longitude", "lng", "long"),
+    "east": ("easting", "x"),
+    "north": ("northing", "y"),
+}
+"""Names by which other tables know fields that every plan needs."""
 OPENCELLID: Columns = {
     "technology": ("radio",),
     "lat": ("lat",),

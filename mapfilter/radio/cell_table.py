@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from pyproj import CRS
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.geodesy import degree_fault, project, projected_crs, unproject
-from mapfilter.radio.arrange_cells import Arranged, arrange, none_of, recognised
+from mapfilter.radio.arrange_cells import Arranged, arrange, likely_names, none_of, recognised
 from mapfilter.radio.cell_layouts import ALIASES, ATOLL, COLUMNS, LAYOUTS, OFFSETS, Layout
 from mapfilter.radio.cell_rules import (
     ANTENNAS,
@@ -28,7 +27,7 @@ from mapfilter.radio.cell_rules import (
     assumed_fault,
     id_fault,
 )
-from mapfilter.radio.headings import Heading, places_named
+from mapfilter.radio.headings import Heading, places_named, resembling, unit_of
 from mapfilter.radio.identities import technology
 from mapfilter.radio.tables import number, read_table
 
@@ -114,11 +113,8 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
     """Check the columns of mapfilter's own layout, in which none has another meaning."""
     for name in header:
         if name not in _ALLOWED:
-            absent = sorted(set(_ALLOWED) - set(header))
-            near = [field for field in _named(name) if field in absent]
-            near += difflib.get_close_matches(name.lower(), absent, n=1, cutoff=0.6)
             hint = "name what it holds in [cells.columns]"
-            hint = f"{near[0]} meant; else {hint}" if near else hint
+            hint = f"{meant}; else {hint}" if (meant := _meant(name, header)) else hint
             faults.add(where, "known columns only", repr(name), hint)
     for name in sorted({name for name in header if header.count(name) > 1}):
         faults.add(where, "each column once", f"{name} {header.count(name)} times")
@@ -126,11 +122,17 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
         faults.add(where, "lat and lon, or east and north", "both")
 
 
-def _named(name: str) -> list[str]:
-    """Return the fields that a name means in lists of planning tools."""
-    heading = [Heading.of(name)]
-    fields = LAYOUTS["atoll"].items()
-    return [field for field, names in fields if places_named(heading, field, names)]
+def _meant(name: str, header: tuple[str, ...]) -> str:
+    """Return the absent column that an unknown one resembles, with its unit; "" for none."""
+    if name.lower() in _ALLOWED - set(header):
+        return f"{name.lower()} meant"
+    heading = Heading.of(name)
+    has = [field for field, names in LAYOUTS["plan"].items() if set(names) & set(header)]
+    wanted = likely_names("plan", has)
+    same = [field for field, names in wanted.items() if places_named([heading], field, names)]
+    field = next(iter(same or (field for _, field in resembling([heading], (), wanted))), "")
+    unit = f", in {unit_of(field)}" if unit_of(field) else ""
+    return f"{field} meant{unit}" if field else ""
 
 
 def _check_fields(

@@ -216,8 +216,11 @@ def _likeness(heading: str, name: str) -> float:
         return 0.0
     if len(name) >= _SHORTEST_WORD and set(name.split()) <= set(heading.split()):
         return len(name) / len(heading)
-    if len(name) <= _SHORTEST_WORD:
+    # A misspelling keeps the first letter: an altitude is no latitude.
+    if len(name) <= _SHORTEST_WORD or heading[0] != name[0]:
         return 0.0
+    if len(heading) > _SHORTEST_WORD and " " not in name and name.startswith(heading):
+        return len(heading) / len(name)
     matcher = difflib.SequenceMatcher(None, heading, name)
     # The last of them takes most of the time.
     bounds = matcher.real_quick_ratio, matcher.quick_ratio, matcher.ratio

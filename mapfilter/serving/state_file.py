@@ -41,7 +41,7 @@ from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail, TrailFix
-from mapfilter.positioning.gnss.wander import FixWander, Stated, WanderFix
+from mapfilter.positioning.gnss.wander import FixWander, FoundErrors, WanderFix
 from mapfilter.positioning.integrity import SampleTail
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.pauses import RowTimes
@@ -90,7 +90,7 @@ _CLASSES: dict[str, type] = {
         RowTimes,
         SampleTail,
         SensorWatch,
-        Stated,
+        FoundErrors,
         StepOutput,
         TimingState,
         TrailFix,

@@ -34,6 +34,11 @@ _KILO = (100.0, 1200.0)
 _FASTEST_KMPS = 0.1
 _AREA_M = 100.0
 _EXPECTED = "metres moved in each interval"
+_SINCE_START = "distance since the start; give its differences"
+_COUNTER = (
+    "a counter of steps, --column steps=COLUMN of a CSV; or distance since the start, then give "
+    "its differences"
+)
 
 
 def check_clocks(
@@ -153,10 +158,8 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     if long and np.all(growth_m >= 0) and np.mean(growth_m > 0) > 0.5:
         # A car that speeds up does not do so for long.
         got = f"steps that only grow, from {step_m[0]:g} to {step_m[-1]:g}"
-        hint = "distance since the start; give its differences"
-        if np.all(step_m % 1 == 0):
-            hint = f"a counter of steps: a column steps of a recording; or {hint}"
-        faults.add(column, _EXPECTED, got, hint)
+        is_count = bool(np.all(step_m == np.round(step_m)))
+        faults.add(column, _EXPECTED, got, _COUNTER if is_count else _SINCE_START)
     elif typical_mps > _FASTEST_MPS:
         hint = "centimetres or millimetres given for metres, or distance since the start"
         faults.add(column, _EXPECTED, f"{typical_mps:.0f} m/s in the median", hint)

@@ -17,8 +17,8 @@ from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.identities import LIMITS
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
 from mapfilter.tracks.cut_times import cut_times
+from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SATELLITE, SCHEMA, SERVING, Column
-from mapfilter.tracks.unnamed_neighbours import without_other_cells
 
 _LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
 _SELDOM_S = 10.0
@@ -179,9 +179,7 @@ def _sorted_unique(
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     if "step_m" in table and (cut := cut_times(table["time_s"].to_numpy())):
         notes += (f"{where}: {cut}",)
-    duplicate = _repeated(table)
-    if "role" in table:
-        duplicate = without_other_cells(table, duplicate)
+    duplicate = repeated_readings(table, _repeated(table))
     if duplicate.any():
         notes += (f"{where}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped",)
         table = table[~duplicate]

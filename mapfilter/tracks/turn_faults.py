@@ -19,7 +19,7 @@ from mapfilter.tracks.stretches import (
 _FEWEST = 6
 _CORNER_RAD, _LEAST_RAD = np.deg2rad(30.0), np.deg2rad(20.0)
 """Least turn of a corner by positions, and by dead reckoning."""
-_AGREED_RAD = np.deg2rad(30.0)
+_AGREED_RAD, _STRAIGHT_RAD = np.deg2rad(30.0), np.deg2rad(20.0)
 _FEWEST_CORNERS, _BOTH, _AGREED, _LEAST_GAIN = 3, 2 / 3, 0.85, 0.25
 _A_SECOND = 1.2
 _UNITS = {
@@ -86,8 +86,8 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
     (unit, sign), most = max(agreed.items(), key=lambda one: one[1])
     if most < max(_AGREED, agreed["", 1] + _LEAST_GAIN):
         return None
-    mended = ways.turned_by(time_s, reckoned_m(step_m, sign * units[unit] * turn_rad))
-    if np.mean(_is_near(mended, ways.turned_rad)) < _AGREED:
+    mended = _off_rad(ways, time_s, step_m, sign * units[unit] * turn_rad)
+    if np.mean(mended <= _STRAIGHT_RAD) < _AGREED:
         return None
     alike = [other for other in units if other and agreed[other, sign] == most]
     words = [f"are {' or '.join(alike)}"] if unit else []
@@ -104,10 +104,6 @@ def _is_corner(turned_rad: Floats, least_rad: float) -> Bools:
     return np.asarray((turned_rad >= least_rad) & (turned_rad <= np.pi - least_rad))
 
 
-def _is_near(turned_rad: Floats, other_rad: Floats) -> Bools:
-    return np.asarray(np.abs(wrap_rad(turned_rad - other_rad)) <= _AGREED_RAD)
-
-
 def _number(first: Ints) -> int:
     """Return how many corners pairs of lines show, as one corner lies in two pairs that overlap."""
     runs = np.bincount(np.cumsum(np.diff(first, prepend=first[:1]) != 1)) if first.size else first
@@ -122,5 +118,11 @@ def _agreement(corners: Stretches, time_s: Floats, step_m: Floats, turn_rad: Flo
         return 0.0
     # Five times a right angle has the same course, and is a whole turn more.
     more_rad = corners.grown(time_s, np.cumsum(turn_rad)).real - corners.turned_rad
-    near = _is_near(turned_rad, corners.turned_rad)
+    near = np.abs(wrap_rad(turned_rad - corners.turned_rad)) <= _AGREED_RAD
     return float(np.mean((near & (np.abs(more_rad) <= np.pi))[both]))
+
+
+def _off_rad(ways: Stretches, time_s: Floats, step_m: Floats, turn_rad: Floats) -> Floats:
+    """Return how far off changes of course are by dead reckoning by steps and turns."""
+    turned_rad = ways.turned_by(time_s, reckoned_m(step_m, turn_rad))
+    return np.asarray(np.abs(wrap_rad(turned_rad - ways.turned_rad)))

@@ -30,7 +30,9 @@ class StandingTurns(NamedTuple):
 
 
 def turns_at_standstill(motion: pd.DataFrame) -> StandingTurns | None:
-    """Return what turns of a vehicle that stands show; None where they are too few, or all zero.
+    """Return what turns of a vehicle that stands show; None where they are too few.
+
+    So it is where half of them are zero or more: they are held at standstill, or rounded.
 
     Parameters
     ----------
@@ -51,9 +53,11 @@ def turns_at_standstill(motion: pd.DataFrame) -> StandingTurns | None:
     lasted_s = np.diff(motion["time_s"].to_numpy(dtype=np.float64), prepend=np.nan)
     stands = (step_m == 0) & np.isfinite(turn_rad) & (lasted_s > 0) & (lasted_s <= _LONGEST_S)
     turned, lasted_s = turn_rad[stands], lasted_s[stands]
-    if len(turned) < _LEAST_ROWS or lasted_s.sum() < _LEAST_S or not turned.any():
+    if len(turned) < _LEAST_ROWS or lasted_s.sum() < _LEAST_S or np.median(turned != 0) < 1:
         return None
     bias_radps = float(np.median(turned / lasted_s))
     off = (turned - bias_radps * lasted_s) / np.sqrt(lasted_s)
     noise = MAD_TO_SD * float(np.median(np.abs(off)))
+    if noise == 0:
+        return None
     return StandingTurns(bias_radps, float(np.hypot(WALK_RAD_PER_SQRT_S, noise)))

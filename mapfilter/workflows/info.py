@@ -78,11 +78,18 @@ def run_info(path: Path) -> dict[str, Any]:
         try:
             return raster_info(path)
         except InputError as error:
-            if len(error.faults) > 1 or any((path / name).is_dir() for name in inner):
+            if _is_mixed(path, error) or any((path / name).is_dir() for name in inner):
                 expected = "rasters of one set, or a single thing"
                 raise fail(InputError, str(path), expected, "several", hint) from error
             raise
     raise fail(InputError, str(path), f"{MANIFEST}, a log, or logs", "none", hint)
+
+
+def _is_mixed(folder: Path, error: InputError) -> bool:
+    """Return whether rasters of a folder do not go together, rather than share one fault."""
+    kinds = {(fault.expected, fault.hint) for fault in error.faults}
+    clashes = [fault for fault in error.faults if fault.where == str(folder)]
+    return len(kinds) > 1 or len(clashes) > 1
 
 
 def _file_info(path: Path) -> dict[str, Any]:

@@ -19,9 +19,13 @@ from mapfilter._ogr import VectorSource, sealed_gdal, vector_source
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import short_crs
 from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 
 _MOST_VALUES = 20
 _SAMPLED_PX = 4_000_000
+_ANY: dict[str, Any] = {"crs": "EPSG:3857", "quantity": "level"}
+_UNSTATED = ((), ("quantity",), ("crs",), ("crs", "quantity"))
+"""Options that the files of a set may not state, the fewest first."""
 
 
 def layers_info(path: Path) -> dict[str, Any]:
@@ -119,19 +123,39 @@ def _values_of(path: Path) -> list[int]:
 
 
 def raster_info(path: Path) -> dict[str, Any]:
-    """Describe a set of rasters of levels or losses."""
-    rasters = open_rasters(path)
+    """Describe a set of rasters of levels or losses; CRS and quantity are "none" where unstated."""
+    rasters, unstated = _open_as_stated(path)
     lattice = rasters.lattice
+    keys = " and ".join(f"rasters.{name}" for name in unstated)
+    use = {"use": f"rasters.path, with {keys}, which the files do not state"} if keys else {}
     return {
         "kind": "rasters",
         "cells": len(rasters.cell_ids),
         "cell_ids": list(rasters.cell_ids),
-        "quantity": rasters.quantity,
-        "crs": lattice.crs,
+        "quantity": "none" if "quantity" in unstated else rasters.quantity,
+        "crs": "none" if "crs" in unstated else lattice.crs,
         "bounds_m": list(lattice.bounds_m),
         "resolution_m": lattice.resolution_m,
         "rows": lattice.rows,
         "cols": lattice.cols,
         "bytes": sum(part.stat().st_size for part in rasters.parts),
         "notes": list(rasters.notes),
+        **use,
     }
+
+
+def _open_as_stated(path: Path) -> tuple[RxLevRasters, tuple[str, ...]]:
+    """Open a set of rasters, and return it with the options that its files do not state.
+
+    Any value of these opens the set then; what is wrong beyond them is an error as ever.
+    """
+    faults = InputError(())
+    for unstated in _UNSTATED:
+        given = {name: _ANY[name] for name in unstated}
+        try:
+            return open_rasters(path, **given), unstated
+        except InputError as error:
+            # Where a value itself is in the way, as degrees are, it is none of the user's.
+            made_up = any(value in f.expected for value in given.values() for f in error.faults)
+            faults = faults if made_up else error
+    raise faults

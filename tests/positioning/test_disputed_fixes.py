@@ -81,10 +81,11 @@ def test_a_burst_that_ends_the_fixes_is_forgotten():
 
 
 @pytest.mark.parametrize(
-    ("jump_m", "at", "waits_s"), [(400.0, 100, 120), (40.0, 100, 30), (400.0, 25, 30)]
+    ("jump_m", "at", "waits_s"),
+    [(400.0, 150, 120), (400.0, 100, 100), (40.0, 100, 30), (400.0, 25, 30)],
 )
 def test_fixes_that_go_on_elsewhere_are_right(jump_m, at, waits_s):
-    """For half a minute it is LOST, then it begins anew; where fixes jump that long agreed, later.
+    """For half a minute it is LOST, then it begins anew; after a jump for as long as they agreed.
 
     So far steps do not lead astray at once: a spoofer puts positions there.
     """
@@ -96,6 +97,24 @@ def test_fixes_that_go_on_elsewhere_are_right(jump_m, at, waits_s):
     assert set(statuses[at + 2 : at + waits_s]) == {Status.LOST}
     assert off_m[at + waits_s + 2 :].max() < 15.0
     assert set(statuses[at + waits_s + 2 :]) == {Status.TRACKING}
+
+
+@pytest.mark.parametrize(
+    ("gone_m", "agreed_s", "waits_s"),
+    [(0.0, 300.0, 120.0), (0.0, 80.0, 80.0), (0.0, 20.0, 30.0), (70.0, 300.0, 120.0),
+     (73.0, 300.0, 30.0), (140.0, 300.0, 30.0)],
+)  # fmt: skip
+def test_what_wrong_headings_may_have_led_to_is_no_jump(gone_m, agreed_s, waits_s):
+    """A car whose gyroscope misses a turn is off by twice the way between two fixes at most."""
+    one, record = np.eye(2), FixRecord(agreed=60, agreed_from_s=1000.0 - agreed_s)
+    for k in range(140):
+        # 55.6 m are far for a deviation of 5 m, which counts as 7.5 m.
+        off_m = np.array([200.0, 0.0])
+        fix = ComparedFix(1000.0 + k, off_m, one, 25.0 * one, gone_m=gone_m)
+        record, found = record.at_fix(fix, WAITS)
+        if found.ruling is Ruling.ANEW:
+            break
+    assert k == waits_s
 
 
 def test_a_minute_of_positions_put_elsewhere_is_not_followed():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.positioning.gnss.state import GnssState
-from mapfilter.positioning.gnss.wander import FixWander, Stated, Way
+from mapfilter.positioning.gnss.wander import FixWander, FoundErrors, Way
 
 COUNT = 200
 
@@ -31,14 +31,16 @@ def white(rng, count, sd_m):
     return rng.normal(0, sd_m, count) + 1j * rng.normal(0, sd_m, count)
 
 
-def after(way, fixes, sd_m=5.0, *, wander=None, every_s=1, first_s=0.0, gaps=None, rate=0.0):
+def after(
+    way, fixes, sd_m=5.0, *, wander=None, every_s=1, first_s=0.0, gaps=None, rate=0.0, drift=0.0
+):
     """The record after fixes of places in a far country, beside a way from elsewhere."""
     wander = wander or FixWander()
     for k in range(0, len(way), every_s):
         gap = 0 if gaps is None else int(gaps[k])
         east, north = 500_000 + fixes[k].real, 5_400_000 + fixes[k].imag
         place = Way(way[k].real, way[k].imag, gap)
-        wander = wander.at_fix(first_s + k, place, (east, north), sd_m**2, rate)
+        wander = wander.at_fix(first_s + k, place, (east, north), sd_m**2, rate, drift)
     return wander
 
 
@@ -124,18 +126,18 @@ def test_a_rest_breaks_it_off_and_rows_some_seconds_apart_are_none():
 def test_who_stays_in_one_place_learns_nothing():
     rng = np.random.default_rng(6)
     fixes = white(rng, COUNT, 30.0)
-    assert after(0.05 * streets(rng, COUNT), fixes).now == Stated()
-    assert after(streets(rng, COUNT), fixes).now != Stated()
+    assert after(0.05 * streets(rng, COUNT), fixes).now == FoundErrors()
+    assert after(streets(rng, COUNT), fixes).now != FoundErrors()
 
 
 def test_few_fixes_or_a_short_time_say_nothing():
     rng = np.random.default_rng(7)
     way = streets(rng, COUNT)
     fixes = way + white(rng, COUNT, 30.0)
-    assert after(way[:60], fixes[:60]).now == Stated()
-    assert after(way[:62], fixes[:62]).now != Stated()
+    assert after(way[:60], fixes[:60]).now == FoundErrors()
+    assert after(way[:62], fixes[:62]).now != FoundErrors()
     # Seven in two minutes.
-    assert after(way, fixes, every_s=20).now == Stated()
+    assert after(way, fixes, every_s=20).now == FoundErrors()
 
 
 def test_what_was_known_before_is_two_minutes_old():
@@ -150,6 +152,39 @@ def test_what_was_known_before_is_two_minutes_old():
     assert after(way, led).before.understated > 1.0
 
 
+def test_a_break_brings_nothing_of_the_last_two_minutes():
+    """What was known before a rest, or a row without a direction, counts as it did."""
+    rng = np.random.default_rng(8)
+    way = streets(rng, 400)
+    led = way + white(rng, 400, 3.0) + 3j * np.maximum(np.arange(400) - 200, 0)
+    early = after(way[:300], led[:300])
+    rested = after(way[300:340], led[300:340], wander=early.broken_off(), first_s=300.0)
+    assert early.now.understated > 2.0
+    assert early.before.understated == rested.before.understated == 1.0
+    jumped = early.before_a_jump()
+    assert (jumped.rows, jumped.now, jumped.before) == ((), early.before, early.before)
+    later = after(way[300:340], led[300:340], wander=jumped, first_s=300.0)
+    assert later.before == early.before
+
+
+def test_a_random_walk_of_headings_is_no_error_of_fixes():
+    """As far as it is assumed: a vehicle's turns of 0.6° per root metre."""
+    found = {}
+    for assumed_deg in (0.0, 0.6):
+        excess = []
+        for seed in range(10):
+            rng = np.random.default_rng(seed)
+            way = streets(rng, COUNT, mps=10.0)
+            walk = np.cumsum(np.radians(0.6) * 10**0.5 * rng.standard_normal(COUNT))
+            seen = np.cumsum(np.diff(way, prepend=0) * np.exp(1j * walk))
+            fixes = way + white(rng, COUNT, 2.5) + lasting(rng, COUNT, 4.3)
+            drift = np.radians(assumed_deg)
+            excess.append(sum(after(seen, fixes, drift=drift).now))
+        found[assumed_deg] = np.mean(excess)
+    assert found[0.0] > 2.5
+    assert found[0.6] < 0.7 * found[0.0]
+
+
 def test_errors_that_are_exact_divide_by_nothing():
     way = streets(np.random.default_rng(9), COUNT)
     found = after(way, way)
@@ -158,23 +193,23 @@ def test_errors_that_are_exact_divide_by_nothing():
 
 
 def test_stated_by_hand():
-    assert Stated() == (1.0, 0.0)
-    assert Stated(0.5, 0.9).understated == 1.0
-    assert Stated(0.5, 1.0).understated == 1.5
-    assert Stated(0.5, 0.9).lasting_m(25.0) == 0.0
-    assert Stated(0.5, 4.0).lasting_m(25.0) == 10.0
-    assert Stated(0.5, 2.0).beyond_m(25.0) == 5.0
-    assert Stated(3.0, 0.9).beyond_m(25.0) == 0.0
-    assert Stated(1.0, 0.0).towards(3.0, 1.0, 0.5) == (2.0, 0.5)
+    assert FoundErrors() == (1.0, 0.0)
+    assert FoundErrors(0.5, 0.9).understated == 1.0
+    assert FoundErrors(0.5, 1.0).understated == 1.5
+    assert FoundErrors(0.5, 0.9).lasting_m(25.0) == 0.0
+    assert FoundErrors(0.5, 4.0).lasting_m(25.0) == 10.0
+    assert FoundErrors(0.5, 2.0).beyond_m(25.0) == 5.0
+    assert FoundErrors(3.0, 0.9).beyond_m(25.0) == 0.0
+    assert FoundErrors(1.0, 0.0).towards(3.0, 1.0, 0.5) == (2.0, 0.5)
     # Nine times at most.
-    assert Stated(1.0, 0.0).towards(6.0, 12.0, 1.0) == (3.0, 6.0)
+    assert FoundErrors(1.0, 0.0).towards(6.0, 12.0, 1.0) == (3.0, 6.0)
 
 
 def test_what_either_shows_counts():
     """What a fix after the other is off by, or how far they wander."""
     state = GnssState()
     assert state.understated == 1.0
-    known = replace(state, wander=FixWander(before=Stated(1.0, 3.0)))
+    known = replace(state, wander=FixWander(before=FoundErrors(1.0, 3.0)))
     assert known.understated == 4.0
     assert replace(known, excess=5.0).understated == 5.0
-    assert replace(state, wander=FixWander(now=Stated(1.0, 3.0))).understated == 1.0
+    assert replace(state, wander=FixWander(now=FoundErrors(1.0, 3.0))).understated == 1.0

@@ -174,6 +174,9 @@ def test_what_is_no_ground_truth_is_refused(track):
         mf.score(track, pd.DataFrame({"x": [1.0]}))
     with pytest.raises(mf.MapfilterError, match="two positions or more, found 1"):
         mf.score(track, walk_log().truth.iloc[:1])
+    blind = mf.make_log(walk_log().crs, motion=walk_log().motion)
+    with pytest.raises(mf.MapfilterError, match="the log has no ground truth"):
+        mf.score(track, blind.truth)
 
 
 def test_an_unknown_filter_is_refused(database):

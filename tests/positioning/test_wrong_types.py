@@ -188,3 +188,13 @@ def test_options_hold_values_of_python_for_those_of_numpy():
     with pytest.raises(ConfigError) as caught:
         Some(np.zeros(3), np.int64(1), np.str_("c"))
     assert len(caught.value.faults) == 3
+
+
+def test_a_choice_of_another_option_is_named():
+    with pytest.raises(ConfigError, match=r"level_error_db: .*'ukf' \(likely: method='ukf'\)"):
+        mf.KalmanFilter("ukf")
+    with pytest.raises(ConfigError, match=r"at_threshold='stall'"):
+        mf.CandidateFilter(np.str_("stall"))
+    with pytest.raises(ConfigError) as caught:
+        mf.KalmanFilter("kf")
+    assert "likely" not in str(caught.value)

@@ -129,8 +129,13 @@ def test_small_azimuths_in_whole_degrees_are_no_radians(tmp_path: Path) -> None:
     ("header", "said"),
     [
         ("cell,lat,lon,height,eirp_dbm,frequency_mhz\n", "height_m meant"),
-        ("cell,Latitude,Longitude,height_m,eirp_dbm\n", "'Latitude' (likely: lat meant"),
-        ("Zelle,lat,lon,height_m,eirp_dbm\n", "cell meant; else name what it holds in [cells.col"),
+        ("Cells,lat,lon,height_m,eirp_dbm\n", "cell meant; else name what it holds in [cells.col"),
+        ("cell,Latitude,lon,height_m,eirp_dbm\n", "'Latitude' (likely: lat meant, in degrees;"),
+        ("cell,lat,Long,height_m,eirp_dbm\n", "'Long' (likely: lon meant, in degrees;"),
+        ("cell,X,north,height_m,eirp_dbm\n", "'X' (likely: east meant, in metres;"),
+        ("cell,lat,lon,Height (ft),eirp_dbm\n", "height_m meant, in metres;"),
+        ("CellName,lat,lon,height_m,eirp_dbm\n", "cell meant;"),
+        ("cell,lat,lon,height_m,eirp_dbm,PCI\n", "pci meant;"),
         ("cell,lat,height_m,eirp_dbm,frequency_mhz\n", "a column lon"),
         ("cell,lat,lat,lon,height_m,eirp_dbm,frequency_mhz\n", "lat 2 times"),
         ("cell,lat,lon,east,north,height_m,eirp_dbm,frequency_mhz\n", "found both"),
@@ -145,6 +150,16 @@ def test_a_column_that_is_there_is_not_what_another_one_meant(tmp_path: Path) ->
         tmp_path, "cell,site,breite,lon,height_m,eirp_dbm,frequency_mhz\nA,1,2,3,4,5,6\n"
     )
     assert "found 'breite' (likely: name what it holds in [cells.columns])" in said
+
+
+@pytest.mark.parametrize(
+    "name", ["Vendor", "Region", "RAT", "RAC", "state", "call", "bandwidth_mhz", "Altitude", "X"]
+)
+def test_a_column_of_something_else_resembles_no_column(tmp_path: Path, name: str) -> None:
+    lacking = "lat" if name != "X" else "site"
+    header = ",".join(one for one in ("cell", "site", "lat", "lon") if one != lacking)
+    said = _complaint(tmp_path, f"{header},{name}\nA,1,2,3\n")
+    assert f"found {name!r} (likely: name what it holds in [cells.columns])" in said
 
 
 @pytest.mark.parametrize(

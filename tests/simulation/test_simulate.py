@@ -44,6 +44,17 @@ def test_names_tables_and_times(town, levels, plan):
         assert set(log.truth["way_id"]) <= set(town.way_id.tolist())
 
 
+def test_equal_levels_of_neighbours_without_carriers_stay_in_the_log(town, levels, plan):
+    cells = tuple(replace(cell, arfcn=None, bsic=None) for cell in plan.cells)
+    unnamed = replace(plan, cells=cells)
+    settings = replace(SETTINGS, reports=ReportModel(radio="as_predicted", sensitivity_dbm=-150))
+    for log in made(town, levels, unnamed, settings).values():
+        neighbours = log.radio[log.radio["role"] == "neighbour"]
+        assert neighbours.duplicated().any()
+        assert (neighbours.groupby("time_s").size() == 6).all()
+        assert log.notes == ()
+
+
 def test_draws_share_the_route_and_differ_in_noise(town, levels, plan):
     first, second, other, _ = made(town, levels, plan).values()
     assert_same(first, second, ["truth"])

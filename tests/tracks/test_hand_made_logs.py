@@ -136,8 +136,8 @@ def track(length_m, seconds=100):
 @pytest.mark.parametrize(
     ("step_m", "hint"),
     [
-        (np.cumsum(np.full(100, 1.4)), "distance since the start; give its differences"),
-        (np.arange(100), "a counter of steps: a column steps of a recording"),
+        (np.cumsum(np.full(100, 1.4)), "(likely: distance since the start; give its differences"),
+        (np.arange(2.0, 202.0, 2.0), "(likely: a counter of steps, --column steps=COLUMN"),
         (1400.0, "centimetres or millimetres given for metres"),
         (-1.4, "a sign the other way round"),
         (0.0014, "kilometres given for metres"),

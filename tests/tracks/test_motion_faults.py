@@ -86,6 +86,16 @@ def test_errors_of_sensors_and_receivers_are_no_faults(
     assert motion_faults(motion, fixes(truth, sd_m, seed) if sd_m else truth) == {}
 
 
+@pytest.mark.parametrize("drift_degps", [-2.5, -1.7, -1.2, 1.2, 1.7, 2.5])
+def test_turns_of_a_gyroscope_with_a_large_bias_are_not_counted_twice(drift_degps):
+    """Half of them would fit corners to one side, but no straight way."""
+    blamed = 0
+    for seed in range(200, 240):
+        motion, truth = drive(seed, speed_mps=1.3, row_s=1.0, corners=6, drift_degps=drift_degps)
+        blamed += turn_fault(motion, fixes(truth, 3.0, seed)) is not None
+    assert blamed <= 1
+
+
 @settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 10_000),

@@ -25,7 +25,9 @@ def test_an_unknown_table_names_its_columns_and_options_for_them(tmp_path):
     assert fault.hint.endswith(such)
     fault = refused(tmp_path, "zeit,v\n1,2\n")
     assert fault.hint.startswith("a CSV without a column of times; a CSV with other names of ")
-    assert fault.hint.endswith("such as wheel_speed_mps=SPEED for m/s and time=COLUMN")
+    assert fault.hint.endswith("such as lat_deg=LATITUDE and lon_deg=LONGITUDE and time=COLUMN")
+    fault = refused(tmp_path, "Zeit;Lat;Lon;Zelle;RSRP\n1;2;3;4;5\n")
+    assert fault.hint.endswith("such as time=COLUMN")
 
 
 @pytest.mark.parametrize("name", ["track.json", "track.xlsx"])

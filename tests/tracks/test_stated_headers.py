@@ -109,10 +109,6 @@ def test_a_column_that_is_named_or_usual_goes_first(tmp_path):
         ("heading", "heading (course_deg?)"),
         ("engine speed [rpm]", "engine speed [rpm]"),
         ("level [dB]", "level [db]"),
-        # A short name resembles those of sensors, "Zelle" an elevation.
-        ("acc", "acc (accuracy_m?)"),
-        ("mag", "mag"),
-        ("Zelle", "zelle"),
     ],
 )
 def test_what_is_ambiguous_is_named_and_not_used(tmp_path, column, likely):
@@ -123,23 +119,6 @@ def test_what_is_ambiguous_is_named_and_not_used(tmp_path, column, likely):
         option = f"{likely.split('(')[1].split(' or ')[0].rstrip('?)')}={column}"
         assert f"(likely: --column {option}" in note or f"(likely: --column '{option}'" in note
         assert (" for m/s, or " in note or " for rad/s, or " in note) == (" or " in likely)
-
-
-@pytest.mark.parametrize(
-    ("steps", "likely"),
-    [
-        (np.arange(40) * 2, "step (steps?)"),
-        (np.arange(40) % 2, "step (steps?)"),
-        (np.full(40, 0.75), "step (step_m?)"),
-    ],
-)
-def test_a_column_step_may_be_a_counter_or_a_length(tmp_path, steps, likely):
-    assert read(tmp_path, {"time": TIME_S, **PLACES, "step": steps}).unread == (likely,)
-
-
-def test_acc_beside_no_positions_is_not_taken_for_an_accuracy(tmp_path):
-    found = read(tmp_path, {"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "acc": 1.0})
-    assert found.unread == ("acc",)
 
 
 def test_fields_that_are_of_no_use_beside_the_others_are_named(tmp_path):

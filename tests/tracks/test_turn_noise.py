@@ -50,6 +50,13 @@ def test_few_rows_a_short_time_pauses_and_gated_turns_show_nothing():
     rows = drive()
     gated = rows.assign(turn_rad=rows["turn_rad"].where(rows["step_m"] > 0, 0.0))
     assert turns_at_standstill(gated) is None
+    # So do those that are held now and then, or rounded: they would show no noise at all.
+    held = rows.assign(turn_rad=rows["turn_rad"].where(rows.index % 5 < 2, 0.0))
+    assert turns_at_standstill(held) is None
+    rounded = rows.assign(turn_rad=(rows["turn_rad"] / 0.1).round() * 0.1)
+    assert turns_at_standstill(rounded) is None
+    offset = rows.assign(turn_rad=(rows["turn_rad"] / 0.1).round() * 0.1 + 0.01)
+    assert turns_at_standstill(offset) is None
     assert turns_at_standstill(rows.assign(turn_rad=np.nan)) is None
     assert turns_at_standstill(rows[rows["step_m"] > 0]) is None
     # A turn of the vehicle on a turntable, and one row that is wrong, are few.

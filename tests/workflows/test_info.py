@@ -13,6 +13,7 @@ import rasterio
 import shapely
 from command_line import assert_done, assert_refused, mapfilter
 from made_recordings import MADE
+from pyproj import CRS
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import Reason, Status
@@ -55,9 +56,60 @@ def test_a_raster_of_roads_is_no_raster_of_levels(tmp_path):
     assert (found["kind"], found["values"]) == ("classes", [0, 1, 7])
     assert found["bounds_m"] == [100.0, 840.0, 180.0, 900.0]
     assert "roads.raster" in found["use"]
-    # Levels without a unit keep their own fault: they may be losses.
+    # Levels without a unit may be losses.
     write_raster(tmp_path / "HD1.tif", np.full((3, 3), -80.0, dtype=np.float32))
-    assert_refused(mapfilter("info", tmp_path / "HD1.tif"), "set quantity = level or loss")
+    found = info(tmp_path / "HD1.tif")
+    assert (found["kind"], found["quantity"], found["crs"]) == ("rasters", "none", "EPSG:32632")
+    assert found["use"] == "rasters.path, with rasters.quantity, which the files do not state"
+
+
+def write_plain_grids(folder, ids=("K1", "K2", "K3"), west="385410"):
+    folder.mkdir()
+    index = ["TX_NAME;FILE_NAME;RESOLUTION;AREA_XMIN;AREA_XMAX;AREA_YMIN;AREA_YMAX;NBITS"]
+    for cell_id in ids:
+        (folder / f"{cell_id}.bil").write_bytes(np.full((4, 6), 1600, "<i2").tobytes())
+        (folder / f"{cell_id}.hdr").write_text(
+            f"NROWS 4\nNCOLS 6\nNBITS 16\nBYTEORDER I\nULXMAP {west}\nULYMAP 6671475\n"
+            "XDIM 5\nYDIM 5\nNODATA -9999\n"
+        )
+        index.append(f"{cell_id};{cell_id}.bil;5;385407.5;385437.5;6671457.5;6671477.5;16")
+    return index
+
+
+@pytest.mark.parametrize("indexed", [True, False])
+def test_rasters_that_state_neither_system_nor_quantity_are_described(tmp_path, indexed):
+    folder = tmp_path / "planner"
+    index = write_plain_grids(folder)
+    if indexed:
+        (folder / "index.txt").write_text("\n".join(index) + "\n")
+    found = info(folder)
+    assert (found["kind"], found["cell_ids"]) == ("rasters", ["K1", "K2", "K3"])
+    assert (found["crs"], found["quantity"]) == ("none", "none")
+    assert (found["rows"], found["cols"], found["resolution_m"]) == (4, 6, 5)
+    assert found["bounds_m"] == [385407.5, 6671457.5, 385437.5, 6671477.5]
+    assert "with rasters.crs and rasters.quantity" in found["use"]
+    assert info(folder / "K1.bil")["cell_ids"] == ["K1"]
+    # What one option supplies is described with the other one missing.
+    for name in ("K1", "K2", "K3"):
+        (folder / f"{name}.prj").write_text(CRS.from_epsg(32635).to_wkt("WKT1_ESRI"))
+    found = info(folder)
+    assert (found["crs"], found["quantity"]) == ("EPSG:32635", "none")
+
+
+def test_one_fault_of_all_rasters_is_not_several_sets(tmp_path):
+    write_plain_grids(tmp_path / "cut", west="")
+    told = mapfilter("info", tmp_path / "cut")
+    assert_refused(told, "K1.hdr: expected XLLCORNER")
+    assert "rasters of one set" not in told.err
+    two = tmp_path / "two"
+    two.mkdir()
+    for name in ("a", "b"):
+        with rasterio.open(
+            two / f"{name}.tif", "w", driver="GTiff", height=3, width=3, count=2, dtype="float32",
+            crs="EPSG:32632", transform=rasterio.Affine(2, 0, 100, 0, -2, 900),
+        ) as target:  # fmt: skip
+            target.descriptions = ("A", "B")
+    assert_refused(mapfilter("info", two), "rasters of one set")
 
 
 def test_layers(tmp_path):

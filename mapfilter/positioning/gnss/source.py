@@ -133,7 +133,7 @@ class GnssSource(EvidenceSource):
         """Return the state with a receiver and a trail that begin anew."""
         receiver = state.receiver
         if state.trail.rows or state.wander.rows:
-            state = replace(state, trail=FixTrail(), wander=state.wander.broken_off())
+            state = replace(state, trail=FixTrail(), wander=state.wander.before_a_jump())
         if receiver is None:
             return state
         return replace(state, receiver=begun_anew(self.options, receiver))

@@ -8,15 +8,15 @@ where steps have led, q, moved, turned, drawn out and bent by least squares, as 
     z = p + a q + c ∫ t dq + w + b,
 
 with white noise w and a first-order Gauss-Markov process b of 30 s; c is a lasting error of the
-rate of turns. The sums of squares of what is
-left, and of its second differences, are linear in the variances of w and b; the two equations give
-both (estimation by moments).
+rate of turns. The sums of squares of what is left, and of its second differences, are linear in the
+variances of w and b and in that of a random walk of headings, which is assumed; the two equations
+give both (estimation by moments).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import hypot, sqrt
+from math import hypot, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +35,10 @@ _LASTS_S = 30.0
 """Time after which the correlation of the error that lasts is 1/e."""
 _MEMORY_S, _PRIOR_S = 180.0, 120.0
 """Time over which the variances are followed, and that for which stated ones count before."""
+_LEAST_M2 = 1.0
+"""Least variance of a fix that is compared: no receiver states less of what lasts."""
+_DRIFT_RAD = radians(0.3)
+"""Random walk of headings per root metre, where none is given."""
 _SHOWN, _MOST = 1.5, 9.0
 """Times that variances are larger than stated from which on they are raised, and the most by which
 they are."""
@@ -51,7 +55,7 @@ class Way(NamedTuple):
     gaps: int = 0
 
 
-class Stated(NamedTuple):
+class FoundErrors(NamedTuple):
     """Variances of errors of fixes, in times of what fixes state of all of them."""
 
     white: float = 1.0
@@ -77,15 +81,15 @@ class Stated(NamedTuple):
         """Return the deviation of what lasts beyond all that a fix states."""
         return sqrt(max(self.lasting - 1.0, 0.0) * variance_m2)
 
-    def towards(self, white: float, lasting: float, share: float) -> Stated:
+    def towards(self, white: float, lasting: float, share: float) -> FoundErrors:
         """Return them after others were found, which count by a share."""
-        most = share * min(_MOST / max(white + lasting, _MOST), 1.0)
+        most = share * _MOST / max(white + lasting, _MOST)
         kept = 1 - share
-        return Stated(kept * self.white + most * white, kept * self.lasting + most * lasting)
+        return FoundErrors(kept * self.white + most * white, kept * self.lasting + most * lasting)
 
 
 class WanderFix(NamedTuple):
-    """A fix, where steps had led, and what was known of errors before; ``sd_m`` is as stated."""
+    """A fix, and where steps had led; ``sd_m`` is as stated."""
 
     time_s: float
     way_east_m: float
@@ -94,8 +98,6 @@ class WanderFix(NamedTuple):
     east_m: float
     north_m: float
     sd_m: float
-    white: float
-    lasting: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,21 +108,28 @@ class FixWander:
     ----------
     rows : tuple of WanderFix
         The last ones.
-    now, before : Stated
-        What is known of errors, and what was known before the first of these: what may be a jump
-        of headings, or positions that begin to lead away, is not in it.
+    now, before : FoundErrors
+        What is known of errors, and what was two minutes ago, before a jump of headings, or
+        positions that began to lead away, could be in it.
+    known : tuple of (float, float, float)
+        What was known in between: time, and both variances.
     seen_s : float
         For how long that was looked at.
     """
 
     rows: tuple[WanderFix, ...] = ()
-    now: Stated = field(default_factory=Stated)
-    before: Stated = field(default_factory=Stated)
+    now: FoundErrors = field(default_factory=FoundErrors)
+    before: FoundErrors = field(default_factory=FoundErrors)
+    known: tuple[tuple[float, float, float], ...] = ()
     seen_s: float = 0.0
 
     def broken_off(self) -> FixWander:
         """Return it where steps may not tell the way from one fix to the next."""
         return replace(self, rows=()) if self.rows else self
+
+    def before_a_jump(self) -> FixWander:
+        """Return it where headings have jumped: what was learnt since may be of the jump."""
+        return replace(self, rows=(), now=self.before, known=())
 
     def rested(self, time_s: float, since_s: float) -> FixWander:
         """Return it at a fix while no step has been counted since a time.
@@ -136,6 +145,7 @@ class FixWander:
         place_m: tuple[float, float],
         variance_m2: float,
         rate_radps: float = 0.0,
+        drift_rad_per_sqrt_m: float = _DRIFT_RAD,
     ) -> FixWander:
         """Return it after a fix.
 
@@ -150,16 +160,18 @@ class FixWander:
             That the fix states, along one axis.
         rate_radps : float
             Lasting error of the rate of turns by which steps lead, as far as it is known.
+        drift_rad_per_sqrt_m : float
+            Assumed random walk of headings.
         """
         since_s = time_s - self.rows[-1].time_s if self.rows else 0.0
         if self.rows and since_s < _APART_S:
             return self
-        row = WanderFix(time_s, *way, *place_m, max(variance_m2, 1.0) ** 0.5, *self.now)
+        row = WanderFix(time_s, *way, *place_m, sqrt(max(variance_m2, _LEAST_M2)))
         begin_s = time_s - _WINDOW_S
         kept = (one for one in self.rows if one.time_s >= begin_s and one.gaps == way.gaps)
         rows = (*kept, row)
-        first, span_s = rows[0], time_s - rows[0].time_s
-        after = replace(self, rows=rows, before=Stated(first.white, first.lasting))
+        span_s = time_s - rows[0].time_s
+        after = replace(self._known_at(time_s), rows=rows)
         if span_s < _LEAST_S or len(rows) < _LEAST_ROWS:
             return after
         away_m = (hypot(way.east_m - one.way_east_m, way.north_m - one.way_north_m) for one in rows)
@@ -168,11 +180,20 @@ class FixWander:
         new_s = since_s if self.seen_s > 0 else span_s
         seen_s = self.seen_s + new_s
         share = new_s / min(seen_s + _PRIOR_S, _MEMORY_S)
-        now = self.now.towards(*_times_stated(np.array(rows), rate_radps), share)
-        return replace(after, now=now, seen_s=seen_s)
+        found = _times_stated(np.array(rows), rate_radps, drift_rad_per_sqrt_m)
+        return replace(after, now=self.now.towards(*found, share), seen_s=seen_s)
+
+    def _known_at(self, time_s: float) -> FixWander:
+        """Return it with what was known two minutes before a time."""
+        old = [one for one in self.known if one[0] <= time_s - _WINDOW_S]
+        before = FoundErrors(*old[-1][1:]) if old else self.before
+        known = (*self.known[len(old) :], (time_s, *self.now))
+        return replace(self, before=before, known=known)
 
 
-def _times_stated(rows: Floats, rate_radps: float) -> tuple[float, float]:
+def _times_stated(
+    rows: Floats, rate_radps: float, drift_rad_per_sqrt_m: float
+) -> tuple[float, float]:
     """Return the variances of white and of lasting errors by what has been stated of both.
 
     Columns are those of :class:`WanderFix`.
@@ -188,10 +209,15 @@ def _times_stated(rows: Floats, rate_radps: float) -> tuple[float, float]:
     beside = np.eye(len(rows)) - known @ known.conj().T
     bent = np.diff(beside, n=2, axis=0)
     lasting = np.exp(-np.abs(time_s[:, None] - time_s) / _LASTS_S)
+    # What a change of headings between two rows moves those after it, across the way.
+    changed = np.tril(way[:, None] - way) * np.sqrt(np.abs(gone)) * drift_rad_per_sqrt_m
+    changed /= sd_m[:, None]
     left, wanted = [], []
     for shape in (beside, bent):
         # Of both axes.
-        left.append(float((np.abs(shape @ (fix / sd_m)) ** 2).sum()) / 2)
+        by_headings = (np.abs(shape @ changed) ** 2).sum()
+        both = (np.abs(shape @ (fix / sd_m)) ** 2).sum() - by_headings
+        left.append(max(float(both), 0.0) / 2)
         seen = shape.conj().T @ shape
         wanted.append([float(np.trace(seen).real), float((seen * lasting.T).sum().real)])
     white, slow = np.linalg.solve(np.array(wanted), np.array(left))

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import hypot
+from math import hypot, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +38,8 @@ _FORGOTTEN_S, _BURST_S, _TRUSTED = 60.0, 15.0, 30
 """Time without a further fix after which those that contradicted it are taken for outliers, for how
 long they may have done so, and how many have to have agreed before."""
 _FAR = 55.0
-"""Squared distance in deviations from which on a fix has jumped."""
+"""Squared distance beyond all that motion may have led astray, in deviations of the fix, from which
+on it has jumped."""
 _LEAST_ROWS, _FEWEST_ROWS = 5, 3
 """Fixes that show a belief to be wrong, and those that do where they are far apart in time."""
 _MOVING_S, _MOVING_MPS, _SLOW_S, _SLOW_MPS = 5.0, 3.0, 10.0, 1.5
@@ -91,8 +92,8 @@ class Patience(NamedTuple):
     ----------
     usual_s : float
     jumped_s : float
-        Where they had long agreed and then jumped: motion does not lead astray at once, as a
-        spoofer or a wall does.
+        Where they had agreed for so long and then jumped: motion does not lead astray at once, as a
+        spoofer or a wall does. Where they had agreed for less, so long.
     """
 
     usual_s: float
@@ -113,6 +114,8 @@ class ComparedFix(NamedTuple):
         Whether steps say that one stands.
     is_doubted : bool
         Whether the prediction is in doubt anyway.
+    gone_m : float
+        How far motion has led since the fix before.
     """
 
     time_s: float
@@ -121,6 +124,7 @@ class ComparedFix(NamedTuple):
     stated_m2: Floats
     rests: bool = False
     is_doubted: bool = False
+    gone_m: float = 0.0
 
 
 class _Row(NamedTuple):
@@ -128,11 +132,16 @@ class _Row(NamedTuple):
     off_east_m: float
     off_north_m: float
     variance_m2: float
+    gone_m: float
 
     @property
     def has_jumped(self) -> bool:
-        """Whether it is farther away than steps can have led astray since the fix before."""
-        return hypot(self.off_east_m, self.off_north_m) ** 2 >= _FAR * self.variance_m2
+        """Whether it is farther away than motion can have led astray since the fix before.
+
+        That is twice its length, where headings are wrong by half a circle.
+        """
+        jump_m = hypot(self.off_east_m, self.off_north_m) - 2 * self.gone_m
+        return jump_m >= sqrt(_FAR * self.variance_m2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +154,8 @@ class FixRecord:
         Times that their squared distances have been larger than stated, of late.
     agreed : int
         Fixes that agreed since the belief began.
+    agreed_from_s : float
+        Time of the first of them.
     begun : int
         How often it has begun anew since ten fixes in a row agreed with it.
     rows : tuple of _Row
@@ -155,6 +166,7 @@ class FixRecord:
 
     excess: float = 1.0
     agreed: int = 0
+    agreed_from_s: float = nan
     begun: int = 0
     rows: tuple[_Row, ...] = ()
     is_over: bool = False
@@ -187,7 +199,7 @@ class FixRecord:
         patience : Patience
             A belief that has begun anew before is given up sooner.
         """
-        time_s, off_m, predicted_m2, stated_m2, *_ = fix
+        time_s, off_m, predicted_m2, stated_m2, *_, gone_m = fix
         noise_m2 = self.understated * stated_m2
         squared = float(off_m @ np.linalg.solve(predicted_m2 + noise_m2, off_m))
         if squared <= _LIMIT:
@@ -197,15 +209,18 @@ class FixRecord:
             excess = min(excess, self.excess) if fix.rests else excess
             agreed = self.agreed + 1
             begun = self.begun if agreed < _SETTLED else 0
-            return FixRecord(excess, agreed, begun), FixVerdict(Ruling.AGREES, squared / 2)
+            from_s = self.agreed_from_s if self.agreed else time_s
+            return FixRecord(excess, agreed, from_s, begun), FixVerdict(Ruling.AGREES, squared / 2)
         if fix.is_doubted:
             return replace(self, agreed=0, rows=()), FixVerdict(Ruling.EITHER, squared / 2)
         if self.agreed < _YOUNG:
             return self._anew(), FixVerdict(Ruling.EITHER, squared / 2)
         variance_m2 = max(float(np.trace(noise_m2)) / 2, _LEAST_SD_M**2)
-        rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2))
-        jumped = self.agreed >= _TRUSTED and rows[0].has_jumped
-        patience_s = patience.jumped_s if jumped else patience.usual_s
+        rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2, gone_m))
+        patience_s = patience.usual_s
+        if rows[0].has_jumped:
+            agreed_s = rows[0].time_s - self.agreed_from_s
+            patience_s = max(patience_s, min(agreed_s, patience.jumped_s))
         while time_s - rows[0].time_s > 2 * patience_s and len(rows) > _LEAST_ROWS:
             rows = rows[1:]
         patience_s /= 1 + min(self.begun, _LOST_AFTER)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp, isfinite, nan, sqrt
+from math import exp, hypot, isfinite, nan, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -47,8 +47,8 @@ class FixErrors(NamedTuple):
         Time of the last fix; NaN before the first.
     wander : FixWander
         How far fixes have wandered beside dead reckoning.
-    way : Way
-        Where that has led, by headings as they were measured.
+    way, fixed_way : Way
+        Where that has led, by headings as they were measured: now, and at the last fix.
     """
 
     lasting_m: float = 0.0
@@ -56,11 +56,18 @@ class FixErrors(NamedTuple):
     fixed_s: float = nan
     wander: FixWander = FixWander()
     way: Way = Way()
+    fixed_way: Way = Way()
 
     @property
     def understated(self) -> float:
         """Times that variances of fixes are taken for larger than stated."""
         return max(self.record.understated, self.wander.now.understated)
+
+    @property
+    def gone_m(self) -> float:
+        """How far dead reckoning has led since the last fix."""
+        before = self.fixed_way
+        return hypot(self.way.east_m - before.east_m, self.way.north_m - before.north_m)
 
     def moved(self, east_m: float, north_m: float, gaps: int) -> FixErrors:
         """Return them after dead reckoning, of which rows may have no direction or length."""
@@ -81,18 +88,18 @@ class FixErrors(NamedTuple):
     def after_a_jump(self) -> FixErrors:
         """Return them where what contradicted the belief has led it elsewhere."""
         record = replace(self.record, rows=())
-        return self._replace(record=record, wander=self.wander.broken_off())
+        return self._replace(record=record, wander=self.wander.before_a_jump())
 
     def after_fix(self, lasting_m: float, record: FixRecord, time_s: float) -> FixErrors:
         """Return them after a fix."""
-        return self._replace(lasting_m=lasting_m, record=record, fixed_s=time_s)
+        return self._replace(lasting_m=lasting_m, record=record, fixed_s=time_s, fixed_way=self.way)
 
     def wandered(
-        self, fix: GnssFix, variance_m2: float, time_s: float, rate_radps: float
+        self, fix: GnssFix, variance_m2: float, time_s: float, turns: tuple[float, float]
     ) -> FixErrors:
-        """Return them after a fix that agreed, by what is known of the rate of turns."""
+        """Return them after a fix that agreed, by the lasting error and the drift of turns."""
         place = fix.east_m, fix.north_m
-        wander = self.wander.at_fix(time_s, self.way, place, variance_m2, rate_radps)
+        wander = self.wander.at_fix(time_s, self.way, place, variance_m2, *turns)
         return self._replace(wander=wander)
 
 
@@ -156,6 +163,7 @@ class FixWeighing:
         *,
         rests_since_s: float = nan,
         is_doubted: bool = False,
+        drift_deg_per_sqrt_m: float = 0.3,
     ) -> WeighedFix:
         """Return what a fix leads to.
 
@@ -169,6 +177,8 @@ class FixWeighing:
             Time since which steps say that one stands; NaN where they do not.
         is_doubted : bool
             Whether the belief may be wrong by what is known before the fix.
+        drift_deg_per_sqrt_m : float
+            Assumed random walk of headings.
         """
         own, record, rests = self.own, errors.record, isfinite(rests_since_s)
         stated = fix_covariance_m2(fix, self.options.fix_sd_m)
@@ -195,6 +205,7 @@ class FixWeighing:
                     stated,
                     rests,
                     is_doubted or time_s - errors.fixed_s > _UNSEEN_S,
+                    errors.gone_m,
                 ),
                 _MOVING if own is MOVING else _RECKONED,
             )
@@ -220,8 +231,8 @@ class FixWeighing:
         if rests:
             errors = errors._replace(wander=errors.wander.rested(time_s, rests_since_s))
         elif own is not MOVING:
-            rate_radps = float(belief.moments.mean[RATE])
-            errors = errors.wandered(fix, float(np.trace(stated)) / 2, time_s, rate_radps)
+            turns = float(belief.moments.mean[RATE]), radians(drift_deg_per_sqrt_m)
+            errors = errors.wandered(fix, float(np.trace(stated)) / 2, time_s, turns)
         return WeighedFix(belief, errors, motion, found.ruling, nis, info.used)
 
     def _lasting_m(self, errors: FixErrors, wanted_m: float, time_s: float) -> float:

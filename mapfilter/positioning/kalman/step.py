@@ -231,8 +231,18 @@ class KalmanStep:
             since_s = rest.since_s
         how = FixWeighing(self.options, self.own, layout, self.method, self.compared)
         doubted = self.own is RECKONED and self.reckoning.may_have_left
+        turns = isfinite(self.reckoning.turned_s)
+        drift_deg = (
+            self.options.turn_drift_deg_per_sqrt_m if turns else self.options.drift_deg_per_sqrt_m
+        )
         after = how.weighed(
-            self.belief, self.fixes, fix, time_s, rests_since_s=since_s, is_doubted=doubted
+            self.belief,
+            self.fixes,
+            fix,
+            time_s,
+            rests_since_s=since_s,
+            is_doubted=doubted,
+            drift_deg_per_sqrt_m=drift_deg,
         )
         self.belief, self.fixes = after.belief, after.errors
         motion = after.motion

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Collection, Mapping, Sequence
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 
+from mapfilter._header_units import parted_unit
 from mapfilter.errors import Faults
 
-_ALIKE = 0.7
+_ALIKE, _ALIKE_SHORT = 0.8, 0.85
+_SHORT = 4
+"""Names of so many letters resemble others that differ in one; shorter ones by chance only."""
 _UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_m")
-_AXES = ("_x", "_y", "_z")
 _UNIT_WORDS = {
     "_mps": "m/s",
     "_kmh": "km/h",
@@ -18,6 +20,8 @@ _UNIT_WORDS = {
     "_degps": "deg/s",
     "_rad": "radians",
     "_deg": "degrees",
+    "step_m": "metres each",
+    "steps": "a counter",
 }
 """Units of fields by their endings, in words."""
 FIELDS: Mapping[str, tuple[str, ...]] = {
@@ -99,7 +103,7 @@ MOTION_FIELDS = (
 def meant(column: str, taken: Collection[str] = ()) -> str:
     """Return the field that a column's name resembles, in the same unit; "" for none.
 
-    A misspelt name has the same first letter, and that of a sensor the same axis.
+    A misspelling keeps the first letter, adds no word, and leaves the axis of a sensor.
 
     Parameters
     ----------
@@ -110,18 +114,39 @@ def meant(column: str, taken: Collection[str] = ()) -> str:
 
     Examples
     --------
-    >>> [meant(name) for name in ("stepcount", "compas", "compass_rad", "zelle", "mag")]
-    ['steps', 'compass_deg', '', '', '']
+    >>> [meant(name) for name in ("stepcount", "compas", "compass_rad", "operator")]
+    ['steps', 'compass_deg', '', '']
     """
-    free = {field: some for field, some in FIELDS.items() if field not in taken}
-    names = {name: field for field, some in free.items() for name in some if name[0] == column[:1]}
-    for near in get_close_matches(column, names, 3, _ALIKE):
-        field = names[near]
-        if field[-2:] in _AXES and not (field[-2:] in column or column[-1:] == field[-1:]):
-            continue
-        if all(column.endswith(unit) == near.endswith(unit) for unit in _UNITS if unit in column):
-            return field
-    return ""
+    names = {name: field for field, some in FIELDS.items() if field not in taken for name in some}
+    likeness = {name: _likeness(column, name, field) for name, field in names.items()}
+    near = max(likeness, key=likeness.__getitem__, default="")
+    return names[near] if near and likeness[near] else ""
+
+
+def _likeness(column: str, name: str, field: str) -> float:
+    """Return how alike a column's name and one of a field are; 0 for not enough."""
+    text, own = parted_unit(column)[0], parted_unit(name)[0]
+    if any(column.endswith(unit) != name.endswith(unit) for unit in _UNITS if unit in column):
+        return 0.0
+    if text[:1] != own[0] or len(_words(text)) > len(_words(name)):
+        return 0.0
+    if is_of_axis(field) and text[-1] != field[-1]:
+        return 0.0
+    found = [0.0]
+    for one in (own, "".join(_words(name))):
+        ratio = SequenceMatcher(None, text, one).ratio()
+        least = _ALIKE_SHORT if len(one) == _SHORT else _ALIKE
+        found += [ratio] if len(one) >= _SHORT and ratio >= least else []
+    return max(found)
+
+
+def is_of_axis(field: str) -> bool:
+    """Return whether a field is of one axis of a sensor."""
+    return field.endswith(("_x", "_y", "_z"))
+
+
+def _words(name: str) -> list[str]:
+    return name.replace("_", " ").split()
 
 
 def column_option(field: str, column: str) -> str:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
-from mapfilter.tracks.readers.csv_fields import meant
+from mapfilter.tracks.readers.csv_fields import FIELDS, is_of_axis, meant
 
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
@@ -16,7 +16,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "lat_deg": ("latitude", "lat", "gps latitude", "gps lat"),
     "lon_deg": ("longitude", "lon", "lng", "long", "gps longitude", "gps lon"),
     "altitude_m": ("altitude", "alt", "height", "elevation", "ele", "gps altitude"),
-    "accuracy_m": ("accuracy", "horizontal accuracy", "position accuracy", "gps accuracy", "acc"),
+    "accuracy_m": ("accuracy", "horizontal accuracy", "position accuracy", "gps accuracy"),
     "speed_mps": (
         *("speed", "velocity", "gps speed", "gnss speed", "gps velocity", "ground speed"),
         *("speed over ground", "sog", "location speed"),
@@ -52,6 +52,8 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 
 _UNITLESS = ("time", "steps")
 """Fields without a unit, or whose unit is found by their values."""
+_OF_PLACES = ("altitude_m", "accuracy_m", "hdop")
+"""Fields that are of use beside positions only."""
 _COMPASS_UNITS = ("deg", "gon")
 """Radians of a heading count from east elsewhere than in a compass."""
 _OTHER_UNIT = {
@@ -61,6 +63,10 @@ _OTHER_UNIT = {
     "turn_rad": "turn_deg",
 }
 """Fields of the same quantity as others."""
+_OTHER_MEANING = {**_OTHER_UNIT, "step_m": "steps"}
+"""Fields that a name without a unit may mean as well."""
+_LEAST_LETTERS = 3
+"""Of an abbreviation."""
 _WORD = re.compile(r"[^\W\d_]+")
 
 
@@ -98,19 +104,23 @@ def stated_fields(
 
 
 def fields_meant(column: str) -> tuple[str, ...]:
-    """Return the fields whose quantity a column's name states without their unit.
+    """Return the fields whose quantity a column's name states, or abbreviates, without their unit.
 
     Examples
     --------
-    >>> fields_meant("velocity"), fields_meant("vehicle_speed"), fields_meant("rpm")
-    (('speed_mps', 'speed_kmh'), ('wheel_speed_mps', 'wheel_speed_kmh'), ())
+    >>> fields_meant("velocity"), fields_meant("step"), fields_meant("acc"), fields_meant("rpm")
+    (('speed_mps', 'speed_kmh'), ('step_m', 'steps'), ('accuracy_m',), ())
     """
     text, unit = parted_unit(column)
     if not unit and "[" in text:
         return ()
-    some = [one for one in _fields_of(text) if not unit or unit in UNITS.get(quantity_of(one), ())]
+    some = [
+        one
+        for one in _fields_of(text) or _abbreviated(text)
+        if not unit or unit in UNITS.get(quantity_of(one), ())
+    ]
     # One of several units is as good as the other where the header states it.
-    others = {} if unit else _OTHER_UNIT
+    others = {} if unit else _OTHER_MEANING
     return tuple(one for field in some for one in (field, others.get(field)) if one)
 
 
@@ -122,9 +132,11 @@ def likely_fields(column: str, taken: Collection[str]) -> list[str]:
     taken : collection of str
         Fields that other columns hold.
     """
-    if stated := [field for field in fields_meant(column) if field not in taken]:
+    useless = () if {"lat_deg", "lon_deg"} <= set(taken) else _OF_PLACES
+    held = {*taken, *useless}
+    if stated := [field for field in fields_meant(column) if field not in held]:
         return stated
-    near = "" if "[" in column or "(" in column else meant(column, taken)
+    near = "" if "[" in column or "(" in column else meant(column, held)
     return [near] if near else []
 
 
@@ -136,6 +148,20 @@ def _fits(field: str, unit: str) -> bool:
     if field == "compass_deg":
         return unit in _COMPASS_UNITS
     return unit in UNITS[quantity_of(field)]
+
+
+def _abbreviated(text: str) -> list[str]:
+    """Return the field of the only quantity in one word that begins with a text, if any."""
+    if len(text) < _LEAST_LETTERS or not text.isalpha():
+        return []
+    found = {
+        field
+        for field in {**FIELDS, **QUANTITIES}
+        if not is_of_axis(field)
+        for name in (*FIELDS.get(field, ()), *QUANTITIES.get(field, ()))
+        if name.isalpha() and name.startswith(text)
+    }
+    return list(found) if len(found) == 1 else []
 
 
 def _fields_of(text: str) -> dict[str, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
@@ -47,11 +48,8 @@ def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
         if likely == ["compass_deg"] and "heading" in name and not _walks(mapped):
             # Beside positions alone a compass is of no use, a course is.
             likely = ["course_deg"]
-        if likely == ["accuracy_m"] and not mapped.has("lat_deg", "lon_deg"):
-            # The name may mean an acceleration, too.
-            likely = []
-        if likely == ["step_m"] and _counts(mapped, name):
-            likely = [] if "steps" in found else ["steps"]
+        if "step_m" in likely:
+            likely = _of_steps(mapped, name, likely)
         if len(likely) > 1 and likely[0].endswith("_mps"):
             unit = speed_unit(mapped, name, time_s)
             if unit not in _OF_SPEEDS:
@@ -72,15 +70,19 @@ def unused_note(unread: tuple[str, ...]) -> str:
     return f"columns not used: {listed(unread)} (likely: {option})"
 
 
+def _of_steps(mapped: Mapped, column: str, likely: list[str]) -> list[str]:
+    """Return the fields that a column of steps may be by its values: lengths, or a counter."""
+    number = pd.to_numeric(pd.Series(mapped.rows.texts(column)), errors="coerce").to_numpy()
+    known = number[np.isfinite(number)]
+    if not np.all(known == np.round(known)):
+        return ["step_m"]
+    grows = known.size > 1 and known[-1] > known[0] and bool(np.all(np.diff(known) >= 0))
+    return [field for field in likely if field == "steps"] if grows else likely
+
+
 def _walks(mapped: Mapped) -> bool:
     placed = mapped.has("lat_deg", "lon_deg") and not mapped.has("course_deg")
     return not placed or mapped.has("steps") or mapped.has("step_m")
-
-
-def _counts(mapped: Mapped, column: str) -> bool:
-    """Return whether a column has whole numbers only, of which some are not 0: counted steps."""
-    number = pd.to_numeric(pd.Series(mapped.rows.texts(column)), errors="coerce").dropna()
-    return bool((number % 1 == 0).all() and number.any())
 
 
 def _with_fields(name: str, fields: list[str]) -> str:

@@ -199,9 +199,9 @@ def _other_names(names: Sequence[str]) -> str:
     found = {*usual, *stated}
     others = [name for name in names if name and name not in (*usual.values(), *stated.values())]
     likely = {name: fields for name in others if (fields := likely_fields(name, found))}
-    such = [_pairs(name, fields) for name, fields in likely.items()] or [
-        "wheel_speed_mps=SPEED for m/s"
-    ]
+    such = [_pairs(name, fields) for name, fields in likely.items()]
+    if not such and not {"lat_deg", "lon_deg"} <= found:
+        such = ["lat_deg=LATITUDE", "lon_deg=LONGITUDE"]
     times = ""
     if "time" not in found:
         times = "a CSV without a column of times; "

@@ -29,8 +29,8 @@ from mapfilter.tracks.readers.recording import Clock, Recording
 from mapfilter.tracks.readers.tables import RECORDED
 from mapfilter.tracks.readers.tallies import Tallies
 from mapfilter.tracks.readers.unusable import Unusable, nothing_usable
+from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import NEIGHBOUR
-from mapfilter.tracks.unnamed_neighbours import without_other_cells
 
 _LINES_KEPT = 3
 _EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
@@ -257,9 +257,7 @@ class Reading:
             rows = reordered(rows, np.argsort(time, kind="stable"))
             time = rows["time_s"].to_numpy()
         if (np.diff(time) == 0).any():
-            duplicate = duplicates(rows)
-            if table == "radio":
-                duplicate = without_other_cells(rows, duplicate)
+            duplicate = repeated_readings(rows, duplicates(rows))
             if duplicate.any():
                 self.note(
                     f"{table}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped"
