@@ -17,7 +17,7 @@ from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail, noted
-from mapfilter.evaluation.accuracy import Truth, accuracy, truth_notes
+from mapfilter.evaluation.accuracy import Truth, accuracy, held_by_radius_95, truth_notes
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -280,6 +280,8 @@ def _write(
         route_of(log),
         baseline,
     )
+    if truth is not None:
+        replayed = replace(replayed, held_95=held_by_radius_95(track.estimate, truth))
     head = {"log": name, "filter": track.estimate.filter}
     write_json(out / FIGURES, {**head, **to_jsonable(replayed.figures)})
     for picture, png in pictures.items():

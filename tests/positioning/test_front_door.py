@@ -155,6 +155,19 @@ def test_a_score_takes_ground_truth_in_any_order_and_each_row_once(track):
         mf.score(track, truth.assign(east_m=truth["east_m"].where(truth.index != 5)))
 
 
+def test_a_score_has_the_share_within_the_radius(track):
+    truth = walk_log().truth
+    assert np.isnan(mf.score(track, truth).within_95)
+    wide_m = np.where(np.arange(len(track.estimate)) % 4, 1e6, 1e-6)
+    radii_m = np.repeat(wide_m[:, None], 3, axis=1)
+    score = mf.score(replace(track.estimate, radii_m=radii_m), truth)
+    begin = track.estimate.converged_at
+    scored = np.flatnonzero(np.isfinite(score.error_m))
+    expected = np.mean(scored[scored >= begin] % 4 > 0)
+    assert score.within_95 == score.to_dataframe()["within_95"][0] == expected
+    assert repr(score).endswith(f" m at 95 %; the 95 % radius holds {expected:.2f}")
+
+
 def test_a_score_says_what_the_ground_truth_does_not_tell(track):
     truth = walk_log().truth
     whole = mf.score(track, truth)

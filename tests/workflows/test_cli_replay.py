@@ -162,6 +162,9 @@ def test_a_log_without_truth_is_located_and_told(log, replay, tmp_path):
     lon, lat = unproject(estimate.crs, estimate.east_m[-1:], estimate.north_m[-1:])
     assert (found["last_lon_deg"], found["last_lat_deg"]) == (lon[0], lat[0])
     assert with_truth["scored_epochs"] <= found["epochs"]
+    # The candidate filter has no radii.
+    assert with_truth["within_95"] is None
+    assert "within_95" not in found
     assert found["radius_95_median_m"] is None
     assert sum(found["seconds_by_status"].values()) == pytest.approx(np.ptp(estimate.time_s))
     text = assert_done(replay(log)).out
