@@ -192,7 +192,7 @@ def test_another_format_is_named(written):
         (b"\x89PNG\r\n\x1a\n", "PNG"),
         (bytes(range(256)) * 20, "binary"),
         (b"hello\nworld\n", "none of them"),
-        (b"lat,lon\n60.1,24.9\n", "without a column of times.* and time=COLUMN"),
+        (b"lat,lon\n60.1,24.9\n", "without a column of times.* such as time=COLUMN"),
         (b"time,lat,Laenge\n1,60.1,24.9\n", "likely: a CSV with other names of columns: --column"),
         (gzip.compress(b"", mtime=0), "an empty file"),
     ],
