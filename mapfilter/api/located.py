@@ -29,6 +29,7 @@ from mapfilter.evaluation.accuracy import (
 )
 from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
+from mapfilter.positioning.assumed_errors import assumed_note
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.integrity import DEFAULT_RISK
@@ -233,6 +234,7 @@ def locate(
         bound: Filter[Any] = over_sites(options, plan)
     else:
         bound = as_filter(options, database.without_cells() if alone else database, ways=ways)
+    notes = (*notes, *assumed_note(log, options, bound.uses))
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     trace = TraceRecorder(bound) if record else None
     found = loop.locate(given, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)

@@ -20,6 +20,7 @@ from mapfilter.errors import ConfigError, fail, noted
 from mapfilter.evaluation.accuracy import Truth, accuracy, held_by_radius_95, truth_notes
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
+from mapfilter.positioning.assumed_errors import assumed_note
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
@@ -154,6 +155,7 @@ def run_replay(
         given, undirected = with_joined_steps(log, fitted)
         notes = (*notes, *undirected)
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
+        notes = (*notes, *assumed_note(log, fitted, filter_.uses))
         log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
