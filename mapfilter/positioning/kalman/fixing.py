@@ -88,7 +88,7 @@ class FixErrors(NamedTuple):
     def after_a_jump(self) -> FixErrors:
         """Return them where what contradicted the belief has led it elsewhere."""
         record = replace(self.record, rows=())
-        return self._replace(record=record, wander=self.wander.before_a_jump())
+        return self._replace(record=record, wander=self.wander.broken_off())
 
     def after_fix(self, lasting_m: float, record: FixRecord, time_s: float) -> FixErrors:
         """Return them after a fix."""
