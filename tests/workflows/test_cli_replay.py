@@ -271,7 +271,10 @@ def test_logs_whose_motion_lacks_something(columns, lack, log, replay):
     motion[columns].to_csv(log / "motion.csv", index=False)
     outcome = replay(log)
     assert outcome.code == 3
-    assert outcome.err == f"mapfilter: nothing is located in my-walk: {lack}\n"
+    *notes, said = outcome.err.splitlines()
+    assert said == f"mapfilter: nothing is located in my-walk: {lack}"
+    undirected = columns == ["time_s", "step_m"]
+    assert [": no headings and no turns" in note for note in notes] == [True] * undirected
 
 
 def test_turns_alone_are_enough_for_the_bayes_filter(log, replay):
