@@ -17,7 +17,8 @@ mapfilter.errors.InputError: cells.csv row 3, lat: expected degrees in -90..90, 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite
 
@@ -98,13 +99,22 @@ class Stopped(BaseException):
 
 @dataclass(slots=True)
 class Faults:
-    """Collects faults, so that all of them are reported together."""
+    """Collects faults, so that all of them are reported together.
+
+    ``notes`` are on inputs that have faults; the error that is raised has them as its own.
+    """
 
     found: list[Fault] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def add(self, where: str, expected: str, got: object, hint: str = "") -> None:
         """Note one fault."""
         self.found.append(Fault(where, expected, str(got), hint))
+
+    def take(self, error: MapfilterError) -> None:
+        """Note the faults of an error, with its notes."""
+        self.found.extend(error.faults)
+        self.notes.extend(notes_of(error))
 
     def check_positive(self, where: str, unit: str, **values: float) -> None:
         """Note each value that is no finite number > 0; its place is ``where`` and its name."""
@@ -115,7 +125,37 @@ class Faults:
     def raise_if_any(self, kind: type[MapfilterError]) -> None:
         """Raise ``kind`` with every fault noted so far, or return when there is none."""
         if self.found:
-            raise kind(tuple(self.found))
+            with noted(self.notes):
+                raise kind(tuple(self.found))
+
+
+@contextmanager
+def noted(notes: Iterable[str]) -> Iterator[None]:
+    """Add notes on an input to an error of it that is raised within; the command shows them first.
+
+    They often tell why: which rows were left out, and how columns were understood.
+
+    Examples
+    --------
+    >>> try:
+    ...     with noted(["a.csv: columns not used: acc"]):
+    ...         raise fail(InputError, "a.csv", "positions", "none")
+    ... except InputError as error:
+    ...     notes_of(error)
+    ['a.csv: columns not used: acc']
+    """
+    try:
+        yield
+    except MapfilterError as error:
+        for note in notes:
+            if note not in notes_of(error):
+                error.add_note(note)
+        raise
+
+
+def notes_of(error: BaseException) -> list[str]:
+    """Return the notes that were added to an error."""
+    return list(getattr(error, "__notes__", ()))
 
 
 def listed(names: Sequence[str], most: int = 8) -> str:

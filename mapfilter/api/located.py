@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from html import escape
+from math import isfinite, nan
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +19,17 @@ from mapfilter.api.mapless import over_sites, own_sites, without_sites
 from mapfilter.api.motion import with_right_motion
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
+from mapfilter.evaluation.accuracy import (
+    Accuracy,
+    Truth,
+    accuracy,
+    held_by_radius_95,
+    position_errors_m,
+    share_of,
+)
 from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
+from mapfilter.positioning.assumed_errors import assumed_note
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.integrity import DEFAULT_RISK
@@ -225,6 +234,7 @@ def locate(
         bound: Filter[Any] = over_sites(options, plan)
     else:
         bound = as_filter(options, database.without_cells() if alone else database, ways=ways)
+    notes = (*notes, *assumed_note(log, options, bound.uses))
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     trace = TraceRecorder(bound) if record else None
     found = loop.locate(given, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)
@@ -253,14 +263,19 @@ def _not_located(
 class Score(Accuracy):
     """Accuracy of one track against ground truth.
 
-    Besides the figures of :class:`mapfilter.evaluation.accuracy.Accuracy`, the error of each epoch.
+    Besides the figures of :class:`mapfilter.evaluation.accuracy.Accuracy`, how often the radius
+    holds the true position, and the error of each epoch.
 
     Parameters
     ----------
+    within_95 : float
+        Share of the scored epochs with a radius whose 95 % radius holds the true position; NaN
+        without any.
     error_m : (N,) array
         NaN where the track has no position, or the ground truth none.
     """
 
+    within_95: float = nan
     error_m: Any = None
 
     def __repr__(self) -> str:
@@ -269,6 +284,8 @@ class Score(Accuracy):
         then = "the ground truth tells nothing of what came then"
         if self.scored_epochs:
             then = f"then {self.error_mean_m:.1f} m on average, {self.error_95_m:.1f} m at 95 %"
+            if isfinite(self.within_95):
+                then += f"; the 95 % radius holds {self.within_95:.2f}"
         if self.success is None:
             return f"Score: converged where the ground truth does not tell; {then}"
         outcome = "right" if self.success else "wrong"
@@ -320,4 +337,5 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
             raise fail(InputError, "truth", "two positions or more", got, hint)
         truth = known
     figures = asdict(accuracy(estimate, truth))
-    return Score(**figures, error_m=position_errors_m(estimate, truth))
+    within_95 = share_of(held_by_radius_95(estimate, truth))
+    return Score(**figures, within_95=within_95, error_m=position_errors_m(estimate, truth))

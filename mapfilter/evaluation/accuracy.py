@@ -137,6 +137,28 @@ def position_errors_m(estimate: TrackEstimate, truth: Truth) -> Floats:
     return np.where(truth.tells(estimate.time_s), errors_m, np.nan)
 
 
+def held_by_radius_95(estimate: TrackEstimate, truth: Truth) -> Bools:
+    """Return whether the 95 % radius holds the true position, of each scored epoch with a radius.
+
+    Examples
+    --------
+    >>> held_by_radius_95(TrackEstimate.of_fixes("EPSG:32635", "none", []), Truth(*np.eye(3, 2)))
+    array([], dtype=bool)
+    """
+    switch = estimate.converged_at
+    if switch is None:
+        return np.zeros(0, dtype=np.bool_)
+    errors_m = position_errors_m(estimate, truth)[switch:]
+    radius_m = estimate.radii_m[switch:, -1]
+    scored = np.isfinite(errors_m) & np.isfinite(radius_m)
+    return np.asarray(errors_m[scored] <= radius_m[scored])
+
+
+def share_of(held: Bools) -> float:
+    """Return the share of what holds; NaN without any."""
+    return float(held.mean()) if held.size else nan
+
+
 def percentile_m(errors_m: Floats, share: float) -> float:
     """Return the smallest error that ``share`` of the errors do not exceed; NaN without any.
 

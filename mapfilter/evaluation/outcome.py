@@ -41,7 +41,7 @@ class Outcome:
     radius_95_median_m : float
         Radius that holds 95 % of the belief, the median over located epochs; NaN without any.
     radius_95_last_m : float
-        That of the last position.
+        That of the last position; NaN where the filter claims none: it is ``LOST`` or ``OUTSIDE``.
     seconds_by_status : dict
         How long each status lasted that occurs, from its epochs to the next ones, without pauses.
     seconds_without_epochs : float
@@ -74,6 +74,7 @@ def outcome(estimate: TrackEstimate) -> Outcome:
     statuses = Counter(estimate.status)
     located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))[-1:]
     lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
+    claimed = located.size and estimate.status[located[0]] not in (Status.LOST, Status.OUTSIDE)
     followed = np.array([status.is_followed for status in estimate.status], dtype=bool)
     radius_m = estimate.radii_m[followed, -1] if len(estimate) else np.zeros(0)
     radius_m = radius_m[np.isfinite(radius_m)]
@@ -93,7 +94,7 @@ def outcome(estimate: TrackEstimate) -> Outcome:
         float(lat[0]) if located.size else nan,
         float(estimate.time_s[located[0]]) if located.size else nan,
         float(np.median(radius_m)) if radius_m.size else nan,
-        float(estimate.radii_m[located[0], -1]) if located.size else nan,
+        float(estimate.radii_m[located[0], -1]) if claimed else nan,
         _seconds_by_status(estimate),
         float(np.diff(pauses_s(estimate)).sum()),
         dict(sorted(unused.items())),

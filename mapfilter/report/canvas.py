@@ -107,6 +107,9 @@ _WRITER: dict[str, dict[str, Any]] = {
     "pdf": {},
 }
 
+_MOST_LAYOUTS, _SETTLED = 5, 0.005
+"""How often maps are laid out again, and how far axes may move still, as a share of the figure."""
+
 styled = matplotlib.rc_context(_STYLE)
 """Decorator of all functions that draw: fonts, sizes and colours of the package."""
 
@@ -190,8 +193,14 @@ def _laid_out(figure: Figure) -> Iterator[None]:
     figure.set_dpi(DPI)
     engine.execute(figure)
     if any(axes.get_aspect() != "auto" for axes in figure.axes):
-        # The first time the room for a title is that over axes whose shape is not fitted yet.
-        engine.execute(figure)
+        # Room for titles and labels is that around axes as they were before: of another shape.
+        before = np.full((len(figure.axes), 4), np.inf)
+        for _ in range(_MOST_LAYOUTS):
+            placed = np.array([axes.get_position(original=True).bounds for axes in figure.axes])
+            if np.abs(placed - before).max() < _SETTLED:
+                break
+            before = placed
+            engine.execute(figure)
     figure.set_layout_engine(None)
     try:
         yield

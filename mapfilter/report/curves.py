@@ -1,4 +1,4 @@
-"""Curves of errors over time, as distributions and over a threshold, and scenes seen from above."""
+"""Curves of errors over time and over a threshold, and scenes seen from above."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from mapfilter.report.canvas import (
     VERMILLION,
     Look,
     bottom_legend,
-    draw_shares,
     legend,
     new_figure,
     single_axes,
@@ -36,7 +35,6 @@ from mapfilter.report.canvas import (
 _SIZE_IN = (7.6, 5.2)
 _SHADE, _NONE = "#f3ddd0", np.zeros(0, dtype=np.bool_)
 _HOUSE = "#d9d9d9"
-_PUBLISHED = Look(markersize=8, markerfacecolor="white", markeredgewidth=1.8)
 
 
 class Curve(NamedTuple):
@@ -120,52 +118,6 @@ def curves_of(
         for key, (name, colour, style) in names.items()
         if key in found
     ]
-
-
-class Distribution(NamedTuple):
-    """The errors of one filter: NaN where it has no position; the curve then ends below 100 %.
-
-    ``claim_m`` is what is published for the share that is marked.
-    """
-
-    name: str
-    errors_m: Floats
-    colour: str
-    style: str = "-"
-    claim_m: float | None = None
-
-
-@styled
-def plot_cumulative(
-    curves: Sequence[Distribution],
-    ax: Axes | None = None,
-    *,
-    title: str,
-    most_m: float,
-    share: float = 0.9,
-) -> Axes:
-    """Draw cumulative distributions, a line at a share (0 to 1), and what is claimed for it.
-
-    ``most_m`` is the end of the axis of errors.
-    """
-    axes = single_axes(ax, *_SIZE_IN)
-    for curve in curves:
-        look = Look(color=curve.colour, linestyle=curve.style, linewidth=1.6)
-        draw_shares(axes, curve.errors_m, label=curve.name, **look)
-    dotted = Look(color=GREY, linewidth=0.9, linestyle=(0, (2, 2)))
-    axes.axhline(100 * share, label=f"{100 * share:g} % of the epochs", **dotted)
-    claims = [(curve.claim_m, curve.colour) for curve in curves if curve.claim_m is not None]
-    for claim_m, colour in claims:
-        look = Look(markeredgecolor=colour, zorder=5, clip_on=False) | _PUBLISHED
-        axes.plot([claim_m], [100 * share], "D", **look)
-    if claims:
-        name = f"published, {100 * share:g} %"
-        axes.plot([], [], "D", markeredgecolor=GREY, label=name, **_PUBLISHED)
-    axes.set_xlim(0, most_m)
-    axes.set(xlabel="position error / m", ylabel="share of epochs / %", title=title)
-    tidy(axes)
-    legend(axes, ax, 3)
-    return axes
 
 
 class OverThreshold(NamedTuple):

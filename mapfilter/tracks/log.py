@@ -33,10 +33,12 @@ from mapfilter.tracks.log_checks import (
     check_steps,
     early_ends,
     truth_far_off,
+    undirected_note,
 )
 from mapfilter.tracks.log_times import seconds_of_tables
 from mapfilter.tracks.misplaced import FAR_APART
 from mapfilter.tracks.motion_faults import compared_places, motion_faults
+from mapfilter.tracks.moved import UNDIRECTED
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
 from mapfilter.tracks.tables import tidy_table
@@ -242,6 +244,8 @@ def make_log(
             every_note += truth_far_off(str(crs), tables)
         # Of values that are refused nothing is told besides.
         if not faults.found:
+            if not any(UNDIRECTED in note for note in every_note):
+                every_note += undirected_note(tables["motion"], called.get("motion", "motion"))
             places = compared_places(tables["truth"], tables["gnss"])
             for column, wrong in motion_faults(tables["motion"], places).items():
                 fault = f", {column}: {wrong}"

@@ -13,6 +13,7 @@ from mapfilter.errors import Faults
 from mapfilter.lattice import Lattice
 from mapfilter.tracks.clock_notes import week_fault
 from mapfilter.tracks.misplaced import FAR_M, misplaced_by
+from mapfilter.tracks.moved import UNDIRECTED
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0
@@ -173,6 +174,25 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
         note = f"motion, step_m: only {moved_m:.3g} m in {lasted_s:.0f} s; kilometres for metres?"
         return (note,)
     return ()
+
+
+def undirected_note(motion: pd.DataFrame, where: str) -> tuple[str, ...]:
+    """Return a note on steps without any heading or turn; none of a few rows.
+
+    Examples
+    --------
+    >>> walk = pd.DataFrame({"step_m": [1.4] * 10, "heading_rad": np.nan, "turn_rad": np.nan})
+    >>> undirected_note(walk, "motion")[0][:58]
+    'motion: no headings and no turns (heading_rad or turn_rad)'
+    >>> undirected_note(walk.assign(turn_rad=0.0), "motion")
+    ()
+    """
+    if len(motion) < _FEW_ROWS or not (motion["step_m"].abs() > 0).any():
+        return ()
+    # The first row turns by nothing.
+    if motion["heading_rad"].notna().any() or motion["turn_rad"].iloc[1:].notna().any():
+        return ()
+    return (f"{where}: no headings and no turns (heading_rad or turn_rad): {UNDIRECTED}",)
 
 
 def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float) -> float:

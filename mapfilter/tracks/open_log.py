@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from mapfilter.errors import InputError
+from mapfilter.errors import InputError, noted
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -82,8 +82,9 @@ def open_log(
 
         recordings, notes = read_recordings(given, options)
         wanted = with_measured(options.combine, given)
-        joined = combine(recordings, replace(wanted, crs=wanted.crs or crs))
         of_files = [remark for recording in recordings for remark in recording.remarks]
+        with noted((*notes, *of_files)):
+            joined = combine(recordings, replace(wanted, crs=wanted.crs or crs))
         every_note = dict.fromkeys((*notes, *of_files, *joined.log.notes))
         log = replace(joined.log, notes=tuple(every_note))
         name = given[0].name.partition(".")[0] or given[0].name

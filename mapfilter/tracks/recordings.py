@@ -40,7 +40,7 @@ def read_recordings(
         except ConfigError:
             raise
         except MapfilterError as error:
-            faults.found.extend(error.faults)
+            faults.take(error)
     if reading.shared and not faults.found:
         _check_named(recordings, options.columns, faults)
     faults.raise_if_any(InputError)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._words import number_of
-from mapfilter.errors import ConfigError, OutputError, fail
+from mapfilter.errors import ConfigError, OutputError, fail, noted
 from mapfilter.geodesy import short_crs
 from mapfilter.tracks.combine import combine
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -86,7 +86,9 @@ def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = 
     truth = [path for path in options.combine.truth if path not in files]
     _check_out(out, [*files, *truth])
     recordings, notes = read_recordings([*files, *truth], options)
-    combined = combine(recordings, with_measured(options.combine, files))
+    of_files = (remark for recording in recordings for remark in recording.remarks)
+    with noted((*notes, *of_files)):
+        combined = combine(recordings, with_measured(options.combine, files))
     write_log(combined.log, out, sensors=combined.sensors)
     rows = {table: len(getattr(combined.log, table)) for table in TABLES}
     rows |= {f"sensors/{name}": len(table) for name, table in combined.sensors.items()}

@@ -29,7 +29,7 @@ from mapfilter.geodesy import utm_crs
 from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.report.canvas import BLACK, GREEN, GREY, ORANGE, PURPLE, SKY, save
-from mapfilter.report.curves import Distribution, plot_cumulative
+from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
 from mapfilter.workflows.evaluate_ottawa import session_files
 from mapfilter.workflows.result_text import to_jsonable
 
@@ -102,9 +102,8 @@ def run_single_reports(
                 progress(done, count)
         # What "auto" chose lies on that method's curve: dashed, above it.
         curves.sort(key=lambda curve: curve.style == "--")
-        most_m = max(float(np.quantile(curve.errors_m, 0.95)) for curve in curves)
-        title = f"{name}: errors of single reports"
-        drawn = plot_cumulative(curves, title=title, most_m=most_m, share=_SHARE)
+        title, most_m = f"{name}: errors of single reports", axis_end_m(curves)
+        drawn = plot_cumulative(curves, title=title, most_m=most_m, share=_SHARE, of="reports")
         save(drawn, out / f"{name}.png")
     result = SingleReportsResult(tuple(rows), time.perf_counter() - began_s, out)
     write_json(out / TABLE, to_jsonable(result))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import open_database
-from mapfilter.errors import Faults, InputError, MapfilterError, fail
+from mapfilter.errors import Faults, InputError, MapfilterError, fail, noted
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import (
     is_table,
@@ -83,13 +83,14 @@ def read_reports(
             frame = crs or (logs[0].crs if logs else "")
             opened = open_log(one, crs=frame, plan=plan, options=options)
         except MapfilterError as error:
-            faults.found.extend(error.faults)
+            faults.take(error)
         else:
             log = _with_positions(opened.log)
             logs.append(log if plan is None else with_range_notes(log, plan))
             names.append(opened.name)
     faults.raise_if_any(InputError)
-    return reports_of_logs(logs, plan), names
+    with noted(note for log in logs for note in log.notes):
+        return reports_of_logs(logs, plan), names
 
 
 def _journeys(path: Path) -> list[Path]:

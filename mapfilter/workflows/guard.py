@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from mapfilter._printing import quiet_callbacks
-from mapfilter.errors import MapfilterError, Stopped
+from mapfilter.errors import MapfilterError, Stopped, notes_of
 from mapfilter.workflows.terminal import print_message
 
 WRONG = 2
@@ -68,7 +68,7 @@ def stop_signals() -> Iterator[None]:
 def stopped_text(error: BaseException) -> str:
     """Return what is kept when a command was stopped, and how to go on."""
     number = error.signal_number if isinstance(error, Stopped) else signal.SIGINT
-    kept = getattr(error, "__notes__", None) or [
+    kept = notes_of(error) or [
         "nothing half-written is left, older results are as they were; run the command again"
     ]
     return f"stopped by {signal.Signals(number).name}: {'; '.join(dict.fromkeys(kept))}"
@@ -76,6 +76,8 @@ def stopped_text(error: BaseException) -> str:
 
 def guarded(run: Callable[[], int | None]) -> int:
     """Run a command and return its exit code, 0 for none; errors of input go to stderr.
+
+    Notes that an error has come first.
 
     When a signal stops it, stderr gets what is kept, and the code is 128 and the signal's number.
     """
@@ -87,6 +89,8 @@ def guarded(run: Callable[[], int | None]) -> int:
         print_message(stopped_text(error))
         return 128 + error.signal_number
     except MapfilterError as error:
+        for note in notes_of(error):
+            print_message(note, "note: ")
         print_message(str(error), "error: ")
     except MemoryError:
         hint = "too large an area, too fine a resolution, or a value in the wrong unit"

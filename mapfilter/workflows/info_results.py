@@ -22,6 +22,7 @@ _OF_REPLAY = (
     *("log", "logs", "filter", "epochs", "epochs_by_status", "final_status", "final_statuses"),
     *("switched", "switch_time_s", "switch_distance_m", "error_at_switch_m"),
     *("success", "wrong", "error_mean_m", "error_67_m", "error_95_m", "scored_epochs"),
+    "within_95",
 )
 """Figures of one replayed log, and of several, that are shown; those of errors need a truth."""
 _OF_REPORTS = (

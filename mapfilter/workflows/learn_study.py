@@ -294,7 +294,7 @@ def _opened(config: Config, paths: Sequence[Path], database: RadioRouteDatabase)
         except ConfigError:
             raise
         except MapfilterError as error:
-            faults.found.extend(error.faults)
+            faults.take(error)
             continue
         check_log(path, opened.log, database.lattice, faults)
         logs.append(replace(opened, log=name_by_plan(opened.log, database.plan)))

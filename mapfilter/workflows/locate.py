@@ -27,7 +27,7 @@ from mapfilter.positioning.fingerprints.matches import locator
 from mapfilter.positioning.fingerprints.options import AUTO, Centroid, method_name
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.report.canvas import BLUE, GREY, save
-from mapfilter.report.curves import Distribution, plot_cumulative
+from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.placeless import is_local_frame
 from mapfilter.workflows.fingerprints import read_database, read_reports
@@ -150,15 +150,16 @@ def _inputs(
     try:
         known, plan = read_database(database, crs, level_error_db)
     except MapfilterError as error:
-        faults.found.extend(error.faults)
+        faults.take(error)
     try:
         query = read_reports(log, known.crs if known is not None else crs, plan, columns)
     except MapfilterError as error:
-        faults.found.extend(error.faults)
+        faults.take(error)
     if known is not None and query is not None:
         _check_near(log, query[0], known, faults)
-    if known is None or query is None or faults.found:
-        raise InputError(tuple(faults.found))
+    faults.raise_if_any(InputError)
+    assert known is not None
+    assert query is not None
     return known, query
 
 
@@ -206,9 +207,9 @@ def _draw(located: LocatedReports, baseline_m: Floats, path: Path) -> Path:
         if known_m.size:
             label = f"{name}, median {np.median(known_m):.3g} m"
             curves.append(Distribution(label, known_m, colour))
-    most_m = max(float(np.quantile(curve.errors_m, 0.98)) for curve in curves)
-    title = "Errors of single reports, without motion"
-    return save(plot_cumulative(curves, title=title, most_m=max(most_m, 1.0), share=_SHARE), path)
+    title, most_m = "Errors of single reports, without motion", axis_end_m(curves)
+    drawn = plot_cumulative(curves, title=title, most_m=most_m, share=_SHARE, of="reports")
+    return save(drawn, path)
 
 
 def _advice(fitted: ReportLocator) -> list[str]:

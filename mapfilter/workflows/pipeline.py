@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mapfilter.workflows.guard import guarded
+from mapfilter.workflows.replay_text import replay_text
 from mapfilter.workflows.result_text import to_jsonable
-from mapfilter.workflows.terminal import print_result
+from mapfilter.workflows.terminal import print_message, print_result
 
 if TYPE_CHECKING:
     from mapfilter.config.sections import Config
@@ -20,6 +21,8 @@ Stage = Callable[["Config"], Any]
 
 def run_pipeline(stages: Mapping[str, Stage], file: Path, argv: Sequence[str] | None = None) -> int:
     """Run all stages, print their results, and return the exit code: 0, 2, or 3 for partly done.
+
+    Without ``--json`` results are printed as ``mapfilter replay`` prints its own, notes to stderr.
 
     Parameters
     ----------
@@ -50,7 +53,9 @@ def _run(stages: Mapping[str, Stage], given: argparse.Namespace) -> int:
         found[name] = to_jsonable(stage(config))
         found[name]["seconds"] = round(time.perf_counter() - began_s, 3)
         if not given.json:
-            print_result({name: found[name]}, as_json=False)
+            print_result({name: replay_text(found[name])}, as_json=False)
+            for note in dict.fromkeys(found[name].get("notes", ())):
+                print_message(note, "note: ")
     if given.json:
         print_result(found, as_json=True)
     return 3 if any(stage.get("partial") for stage in found.values()) else 0

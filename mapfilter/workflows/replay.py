@@ -16,10 +16,11 @@ from mapfilter._parallel import Progress, SerialExecutor
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, fail
-from mapfilter.evaluation.accuracy import Truth, accuracy, truth_notes
+from mapfilter.errors import ConfigError, fail, noted
+from mapfilter.evaluation.accuracy import Truth, accuracy, held_by_radius_95, truth_notes
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
+from mapfilter.positioning.assumed_errors import assumed_note
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
@@ -36,6 +37,7 @@ from mapfilter.report.ground import BaseMap
 from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
+from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.store import is_log
 from mapfilter.workflows.apart import check_out_apart
@@ -142,8 +144,7 @@ def run_replay(
     wanted, count = config.output.pictures, len(journeys.paths)
     risk = config.integrity.of(IntegrityOptions).risk
 
-    def located(index: int, path: Path, new: Path) -> ReplayedLog:
-        opened = journeys.open(path)
+    def located(index: int, opened: OpenedLog, new: Path) -> ReplayedLog:
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         log = with_range_notes(log, sites(crs)) if has_sites else without_cells(log, _SITES)
@@ -154,6 +155,7 @@ def run_replay(
         given, undirected = with_joined_steps(log, fitted)
         notes = (*notes, *undirected)
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
+        notes = (*notes, *assumed_note(log, fitted, filter_.uses))
         log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
@@ -216,7 +218,9 @@ def run_replay(
     ):
         logs = []
         for index, path in enumerate(journeys.paths):
-            logs.append(located(index, path, new))
+            opened = journeys.open(path)
+            with noted(opened.log.notes):
+                logs.append(located(index, opened, new))
             if progress is not None:
                 progress(index + 1, count)
         result = ReplayResult(config.filter.name, tuple(logs), summary_of(logs), out)
@@ -278,6 +282,8 @@ def _write(
         route_of(log),
         baseline,
     )
+    if truth is not None:
+        replayed = replace(replayed, held_95=held_by_radius_95(track.estimate, truth))
     head = {"log": name, "filter": track.estimate.filter}
     write_json(out / FIGURES, {**head, **to_jsonable(replayed.figures)})
     for picture, png in pictures.items():

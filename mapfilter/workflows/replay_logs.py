@@ -8,7 +8,7 @@ from pathlib import Path
 from mapfilter._inputs import path_fault, shown
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, noted
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.kalman.siteless import needs_sites
 from mapfilter.tracks.log import leave_out
@@ -68,6 +68,7 @@ class ReplayLogs:
             if wrong := path_fault(path):
                 faults.add("logs", wrong, shown(str(path)))
                 continue
+            before = len(faults.found)
             try:
                 opened = self.open(path)
                 self._check_motion(path, opened, faults)
@@ -76,7 +77,9 @@ class ReplayLogs:
             except ConfigError:
                 raise
             except MapfilterError as error:
-                faults.found.extend(error.faults)
+                faults.take(error)
+            else:
+                faults.notes += opened.log.notes if len(faults.found) > before else ()
         faults.raise_if_any(InputError)
 
     def _check_motion(self, path: Path, opened: OpenedLog, faults: Faults) -> None:
@@ -97,7 +100,9 @@ class ReplayLogs:
         """Refuse logs that a filter without a map can only locate by the sites of their cells."""
         for path in self.paths:
             log = leave_out(self.open(path).log, self.config.track.without)
-            if needs_sites(log):
+            if not needs_sites(log):
+                continue
+            with noted(log.notes):
                 for note in log.notes:
                     _, unread, why = note.partition(_UNREAD)
                     if unread and any(name in why for name in _DEGREES):

@@ -28,7 +28,7 @@ def replay_text(figures: Mapping[str, Any]) -> dict[str, Any]:
     if lasted_s := shown.get("seconds_by_status"):
         whole_s = sum(lasted_s.values()) or 1.0
         shown["seconds_by_status"] = {
-            status: f"{seconds:.5g} ({seconds / whole_s:.0%})".replace("%", " %")
+            status: f"{_rounded(seconds)} ({seconds / whole_s:.0%})".replace("%", " %")
             for status, seconds in lasted_s.items()
         }
     if unused := shown.get("unused"):
@@ -36,3 +36,8 @@ def replay_text(figures: Mapping[str, Any]) -> dict[str, Any]:
             reason: f"{count} ({REASONS[Reason(reason)]})" for reason, count in unused.items()
         }
     return shown
+
+
+def _rounded(seconds: float) -> str:
+    """Format a duration: whole seconds from 1000 s on, never with an exponent."""
+    return f"{seconds:.0f}" if seconds >= 1000 else f"{seconds:.4g}"

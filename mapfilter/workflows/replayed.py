@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mapfilter._types import Bools
 from mapfilter._words import number_of
-from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.evaluation.accuracy import Accuracy, share_of
 from mapfilter.evaluation.outcome import Outcome
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason, Status
@@ -30,6 +31,7 @@ _SHOWN = {
     "error_mean_m": "mean error, m",
     "error_67_m": "error at 67 %, m",
     "error_95_m": "error at 95 %, m",
+    "within_95": "share within the 95 % radius",
     "final_status": "status at the end",
 }
 """Figures of a run that a page shows, and their names there."""
@@ -61,6 +63,8 @@ class ReplayedLog:
         Errors of the reports, each located by itself; None without truth, reports or cells.
     foreign : str
         Why the database may lack all of its unknown cells, or an empty text.
+    held_95 : ndarray of bool
+        Whether the 95 % radius holds the truth, of each scored epoch with a radius.
     """
 
     name: str
@@ -73,11 +77,14 @@ class ReplayedLog:
     route: str = ""
     baseline: SingleReports | None = None
     foreign: str = ""
+    held_95: Bools = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     @property
     def figures(self) -> dict[str, Any]:
         """Outcome, notes and, with ground truth, the score beside that of single reports."""
-        score = asdict(self.accuracy) if self.accuracy is not None else {}
+        score = {}
+        if self.accuracy is not None:
+            score = asdict(self.accuracy) | {"within_95": share_of(self.held_95)}
         return {**asdict(self.outcome), "notes": self.notes, **score, **_beside(self.baseline)}
 
 
@@ -145,7 +152,10 @@ def summary_of(logs: Sequence[ReplayedLog]) -> SuccessSummary | None:
 def summary_figures(result: ReplayResult) -> dict[str, Any]:
     """Return the sums over several logs, and the success rate of those with truth."""
     outcomes = [log.outcome for log in result.logs]
-    scores = asdict(result.summary) if result.summary is not None else {}
+    scores = {}
+    if result.summary is not None:
+        held = share_of(np.concatenate([log.held_95 for log in result.logs]))
+        scores = asdict(result.summary) | {"within_95": held}
     return {
         "logs": len(outcomes),
         **scores,
@@ -222,7 +232,7 @@ def run_figures(figures: Mapping[str, Any]) -> dict[str, str]:
             found[label] = "yes" if value else "no"
         elif isinstance(value, float):
             if isfinite(value):
-                found[label] = f"{value:.1f}"
+                found[label] = f"{value:.2f}" if name == "within_95" else f"{value:.1f}"
         elif value is not None:
             found[label] = str(value)
     return found

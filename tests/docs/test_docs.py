@@ -159,6 +159,21 @@ def test_command_line_page_names_every_command_and_option():
                     assert option in text, (name, option)
 
 
+def test_the_readme_names_the_commands_that_read_a_configuration():
+    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    (told,) = re.findall(r"([^.]+) read a configuration\s+\(`-c FILE`", text)
+    commands = typer.main.get_command(app).commands
+    having = {
+        option: {
+            name for name, sub in commands.items() if any(option in p.opts for p in sub.params)
+        }
+        for option in ("-c", "--set", "--json")
+    }
+    assert set(re.findall(r"`(\w+)`", told)) == having["-c"]
+    assert having["--set"] - having["-c"] == {"demo"}
+    assert set(commands) - having["--json"] == {"serve"}
+
+
 def test_help_has_whole_summaries_examples_and_pages(monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     text = CliRunner().invoke(app, ["--help"]).output

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from mapfilter.evaluation.accuracy import (
     Truth,
     accuracy,
+    held_by_radius_95,
     percentile_m,
     position_errors_m,
+    share_of,
     truth_notes,
 )
 from mapfilter.filters.contract import Reason, Status
@@ -85,6 +87,16 @@ def test_a_track_scored_by_hand():
     assert (score.switch_time_s, score.switch_distance_m, score.error_at_switch_m) == (5, 50, 5)
     assert score.error_mean_m == pytest.approx(11 / 4)
     assert (score.error_67_m, score.error_95_m, score.scored_epochs) == (3.0, 5.0, 4)
+
+
+def test_the_share_within_the_radius_is_of_scored_epochs_with_one():
+    rows = [(4, -400, 0, S), (5, 53, 4, C), (6, 60, 1, T), (10, 100, 3, T), (15, 98, 50, T)]
+    found = estimate([*rows, (16, 100, 60, T), (25, 0, 0, T)])
+    # Before the switch; 5 m in 5 m; 1 m in 2 m; 3 m in 2 m; 2 m without a radius; held; no truth.
+    found.radii_m[:, -1] = [9.0, 5.0, 2.0, 2.0, nan, 1.0, 1e9]
+    assert held_by_radius_95(found, TRUTH).tolist() == [True, True, False, True]
+    assert share_of(held_by_radius_95(found, TRUTH)) == 0.75
+    assert isnan(share_of(held_by_radius_95(estimate(rows[:1]), TRUTH)))
 
 
 def test_positions_before_the_switch_do_not_count():

@@ -77,7 +77,12 @@ def test_radii_are_those_of_located_epochs_and_of_the_last_position():
     track = estimate(*((status, 0.0, 0.0) for status in statuses))
     track.radii_m[:, -1] = [900.0, 30.0, 20.0, 400.0, 500.0]
     found = outcome(track)
-    assert (found.radius_95_median_m, found.radius_95_last_m) == (30.0, 500.0)
+    assert found.radius_95_median_m == 30.0
+    # Of a position that is lost nothing is claimed.
+    assert np.isnan(found.radius_95_last_m)
+    before = estimate(*((status, 0.0, 0.0) for status in statuses[:-1]))
+    before.radii_m[:, -1] = track.radii_m[:-1, -1]
+    assert outcome(before).radius_95_last_m == 400.0
     track.radii_m[:, -1] = nan
     assert np.isnan(outcome(track).radius_95_median_m)
 

@@ -3,6 +3,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import geopandas as gpd
 import numpy as np
@@ -108,7 +109,7 @@ def test_cells_without_sites_are_left_out_where_there_are_fixes():
     fixes = walk.truth[["time_s", "east_m", "north_m"]]
     placed = mf.make_log(walk.crs, motion=walk.motion, radio=walk.radio, gnss=fixes)
     found = mf.locate(placed, filter="ekf")
-    (note,) = found.log.notes
+    note, _ = found.log.notes
     assert note.startswith(f"{len(walk.radio)} rows of cells (radio) left out: ")
     assert "KalmanFilter().over_sites(plan)" in note
     bare = mf.locate(mf.make_log(walk.crs, motion=walk.motion, gnss=fixes), filter="ekf")
@@ -153,6 +154,19 @@ def test_a_score_takes_ground_truth_in_any_order_and_each_row_once(track):
         assert repr(mf.score(track, Truth.of_table(other))) == expected
     with pytest.raises(mf.MapfilterError, match="truth row 6, east_m"):
         mf.score(track, truth.assign(east_m=truth["east_m"].where(truth.index != 5)))
+
+
+def test_a_score_has_the_share_within_the_radius(track):
+    truth = walk_log().truth
+    assert np.isnan(mf.score(track, truth).within_95)
+    wide_m = np.where(np.arange(len(track.estimate)) % 4, 1e6, 1e-6)
+    radii_m = np.repeat(wide_m[:, None], 3, axis=1)
+    score = mf.score(replace(track.estimate, radii_m=radii_m), truth)
+    begin = track.estimate.converged_at
+    scored = np.flatnonzero(np.isfinite(score.error_m))
+    expected = np.mean(scored[scored >= begin] % 4 > 0)
+    assert score.within_95 == score.to_dataframe()["within_95"][0] == expected
+    assert repr(score).endswith(f" m at 95 %; the 95 % radius holds {expected:.2f}")
 
 
 def test_a_score_says_what_the_ground_truth_does_not_tell(track):

@@ -7,13 +7,12 @@ from matplotlib.figure import Figure
 
 from mapfilter.evaluation.track_percentiles import Percentile
 from mapfilter.report.canvas import BLUE, ORANGE, save
+from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
 from mapfilter.report.curves import (
     Curve,
-    Distribution,
     OverThreshold,
     Panel,
     SeenMap,
-    plot_cumulative,
     plot_error_panels,
     plot_over_threshold,
     plot_seen_satellites,
@@ -74,6 +73,23 @@ def test_epochs_without_a_position_keep_curves_below_all():
     np.testing.assert_allclose(some.get_xdata(), [0.0, 1.0, 2.0, 3.0])
     np.testing.assert_allclose(some.get_ydata(), [0.0, 25.0, 50.0, 75.0])
     assert none.get_xdata().tolist() == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("errors_m", "end_m"),
+    [(np.arange(100.0), 99.0), (np.append(np.arange(100.0), 140.0), 140.0), (np.zeros(3), 1.0),
+     (np.append(np.arange(100.0), 900.0), 98.0)],
+)  # fmt: skip
+def test_an_axis_of_errors_ends_at_the_largest_unless_it_is_far(errors_m, end_m):
+    """It ended where the last 2 % of a curve began."""
+    near = Distribution("near", np.ones(50) / 2, BLUE)
+    assert axis_end_m([near, Distribution("wide", errors_m, ORANGE)]) == end_m
+
+
+def test_errors_of_reports_are_no_epochs():
+    axes = plot_cumulative(CURVES, title="errors", most_m=5.0, share=0.95, of="reports")
+    assert axes.get_ylabel() == "share of reports / %"
+    assert any(line.get_label() == "95 % of the reports" for line in axes.lines)
 
 
 def test_the_line_at_a_share_is_named():

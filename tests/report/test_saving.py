@@ -12,7 +12,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLACK, BLUE, distinct_colours, save
-from mapfilter.report.curves import Distribution, plot_cumulative
+from mapfilter.report.cumulative import Distribution, plot_cumulative
 from mapfilter.report.errors import (
     plot_error_over_distance,
     plot_errors_apart,

@@ -81,7 +81,7 @@ def corner(size_m, count=100):
     return TrackEstimate.of_fixes("EPSG:32635", "ekf", fixes)
 
 
-@pytest.mark.parametrize("height_m", [300.0, 380.0])
+@pytest.mark.parametrize("height_m", [200.0, 300.0, 380.0])
 def test_the_title_over_a_square_map_is_not_cut_off(height_m):
     """With a legend of two rows, as the layout first leaves room over axes of another shape."""
     found = corner((400.0, height_m))

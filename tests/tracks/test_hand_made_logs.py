@@ -124,7 +124,8 @@ def test_signs_for_missing_values(table, column):
 
 def walk(step_m, seconds=100):
     time_s = np.arange(1.0, seconds + 1)
-    return pd.DataFrame({"time_s": time_s, "step_m": np.broadcast_to(step_m, time_s.shape)})
+    step_m = np.broadcast_to(step_m, time_s.shape)
+    return pd.DataFrame({"time_s": time_s, "step_m": step_m, "heading_rad": 0.0})
 
 
 def track(length_m, seconds=100):
@@ -182,3 +183,18 @@ def test_a_table_that_ends_early_is_told_once_however_often_it_is_stored(tmp_pat
     write_log(log, tmp_path / "walk")
     assert read_log(tmp_path / "walk").notes == log.notes
     assert make_log(CRS, motion=walk(1.4), radio=heard[:130]).notes == ()
+
+
+@pytest.mark.parametrize("columns", [{}, {"turn_rad": np.append(0.1, np.full(99, np.nan))}])
+def test_steps_without_any_direction_are_noted_once(columns, tmp_path):
+    log = make_log(CRS, motion=walk(1.4).drop(columns="heading_rad").assign(**columns))
+    (note,) = log.notes
+    assert note.startswith("motion: no headings and no turns (heading_rad or turn_rad): ")
+    write_log(log, tmp_path / "log")
+    assert read_log(tmp_path / "log").notes == (note,)
+
+
+@pytest.mark.parametrize("columns", [{"turn_rad": 0.0}, {"heading_rad": 1.0}, {"step_m": 0.0}])
+def test_a_direction_or_rest_needs_no_note_on_directions(columns):
+    motion = walk(1.4).drop(columns="heading_rad").assign(**columns)
+    assert make_log(CRS, motion=motion).notes == ()

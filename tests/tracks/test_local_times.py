@@ -1,9 +1,11 @@
 """Local times without a zone are noted, whatever recordings have them."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.tracks.readers.times import parse_times
 
 TIMES = pd.Timestamp("2026-05-01 10:00:00") + pd.to_timedelta(range(60), unit="s")
 LAT, LON = 60.0, 25.0
@@ -58,3 +60,17 @@ def test_local_times_that_become_utc_are_not_named(notes):
     found, log = notes(track_gpx=gpx("Z"), cells_csv=table(**CELLS))
     assert found == []
     assert any("cells.csv: local time is UTC+00:00" in note for note in log.notes)
+
+
+@pytest.mark.parametrize("style", ["%I:%M:%S %p", "%I:%M %p", "%I:%M:%S.25%p"])
+def test_hours_of_half_a_day_are_those_of_the_whole(style):
+    times = pd.date_range("2026-05-01 00:07", periods=48, freq="30min")
+    whole_s, _ = parse_times(np.array([f"{time:%Y-%m-%d %H:%M:%S}" for time in times], object))
+    for texts in (times.strftime(f"%Y-%m-%d {style}"), times.strftime(f"%d.%m.%Y {style}Z")):
+        found_s, _ = parse_times(np.array(texts.str.lower().str.replace("z", "Z"), object))
+        np.testing.assert_allclose(found_s - whole_s, 0.25 * (".25" in style))
+
+
+def test_hours_that_no_half_day_has_are_no_times():
+    texts = np.array([f"2026-05-01 {hour:02d}:00 PM" for hour in (0, 13, 24)], object)
+    assert np.isnan(parse_times(texts)[0]).all()

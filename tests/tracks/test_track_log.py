@@ -258,7 +258,8 @@ def test_a_clock_that_was_set_back_is_named_and_its_rows_go_on(back_s, rows):
     """Sorted rows would be those of two moments, in turns."""
     time_s = np.arange(100.0)
     time_s[rows:] -= back_s
-    log = make_log(CRS, motion=pd.DataFrame({"time_s": time_s, "step_m": np.arange(100) % 7 / 5}))
+    steps = {"step_m": np.arange(100) % 7 / 5, "heading_rad": 0.0}
+    log = make_log(CRS, motion=pd.DataFrame({"time_s": time_s, **steps}))
     said = f"motion: time goes back by {back_s - 1:g} s after {rows - 1} s, as when a clock"
     assert [note.startswith(said) for note in log.notes] == [True]
     assert log.motion["time_s"].to_list() == list(range(100))
@@ -268,7 +269,8 @@ def test_a_clock_that_was_set_back_is_named_and_its_rows_go_on(back_s, rows):
 def test_rows_out_of_order_are_no_clock():
     time_s = np.arange(100.0)
     time_s[[40, 41]] = time_s[[41, 40]]
-    swapped = make_log(CRS, motion=pd.DataFrame({"time_s": time_s, "step_m": 1.0}))
+    steps = {"step_m": 1.0, "heading_rad": 0.0}
+    swapped = make_log(CRS, motion=pd.DataFrame({"time_s": time_s, **steps}))
     assert swapped.notes == ("motion: out of order in 1 place, sorted by time",)
     shuffled = np.random.default_rng(0).permutation(100).astype(float)
     log = make_log(CRS, motion=pd.DataFrame({"time_s": shuffled, "step_m": 1.0}))

@@ -7,6 +7,7 @@ import json
 import re
 import sys
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from unittest.mock import patch
 
@@ -57,12 +58,14 @@ def assert_done(outcome: Outcome) -> Outcome:
 
 
 def assert_refused(outcome: Outcome, *told: object) -> None:
-    """Exit code 2, nothing on stdout, and a message per line: where, expected, found."""
+    """Exit code 2, nothing on stdout; notes, then a message per line: where, expected, found."""
     assert outcome.code == 2, (outcome.code, outcome.err)
     assert outcome.out == ""
     lines = outcome.err.splitlines()
-    assert lines
-    for line in lines:
+    notes = list(takewhile(lambda line: line.startswith("mapfilter: note: "), lines))
+    assert len(set(notes)) == len(notes)
+    assert lines[len(notes) :]
+    for line in lines[len(notes) :]:
         assert re.fullmatch(r"mapfilter: error: .+: expected .+, found .+", line), line
     for text in told:
         assert str(text) in outcome.err, (text, outcome.err)

@@ -162,6 +162,9 @@ def test_a_log_without_truth_is_located_and_told(log, replay, tmp_path):
     lon, lat = unproject(estimate.crs, estimate.east_m[-1:], estimate.north_m[-1:])
     assert (found["last_lon_deg"], found["last_lat_deg"]) == (lon[0], lat[0])
     assert with_truth["scored_epochs"] <= found["epochs"]
+    # The candidate filter has no radii.
+    assert with_truth["within_95"] is None
+    assert "within_95" not in found
     assert found["radius_95_median_m"] is None
     assert sum(found["seconds_by_status"].values()) == pytest.approx(np.ptp(estimate.time_s))
     text = assert_done(replay(log)).out
@@ -268,7 +271,10 @@ def test_logs_whose_motion_lacks_something(columns, lack, log, replay):
     motion[columns].to_csv(log / "motion.csv", index=False)
     outcome = replay(log)
     assert outcome.code == 3
-    assert outcome.err == f"mapfilter: nothing is located in my-walk: {lack}\n"
+    *notes, said = outcome.err.splitlines()
+    assert said == f"mapfilter: nothing is located in my-walk: {lack}"
+    undirected = columns == ["time_s", "step_m"]
+    assert [": no headings and no turns" in note for note in notes] == [True] * undirected
 
 
 def test_turns_alone_are_enough_for_the_bayes_filter(log, replay):

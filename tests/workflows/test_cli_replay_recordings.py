@@ -211,7 +211,26 @@ def test_why_positions_are_none_is_said_where_they_are_needed(tmp_path):
     told = (
         "none used of 60 rows: lat_deg: not degrees in -90..90 (likely: degrees times 1e6 or 1e7)"
     )
-    assert_refused(mapfilter(*given), "'e7.csv': expected positions", told, "cells.plan, or --db")
+    done = mapfilter(*given)
+    assert_refused(done, "'e7.csv': expected positions", told, "cells.plan, or --db")
+
+
+def test_notes_on_reading_come_before_an_error(tmp_path):
+    """They tell why: of a replay that stops after reading, and of recordings that do not fit."""
+    rows = [f"{k},262-1-7-{k % 3},-80,5.5" for k in range(60)]
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,cell,level_dbm,mood", *rows]))
+    note = "mapfilter: note: a.csv: columns not used: mood"
+    given = ("--log", tmp_path / "a.csv", "--filter", "ekf", "--out", tmp_path / "out")
+    done = mapfilter("replay", *given)
+    assert_refused(done, "cells.plan")
+    assert sum(note in line for line in done.err.splitlines()[:-1]) == 1
+    # Refused by what joins recordings, not by the reader.
+    done = mapfilter("replay", *given, "--truth", tmp_path / "a.csv")
+    assert_refused(done, "expected positions, as the truth")
+    assert note in done.err.splitlines()[0]
+    done = mapfilter("convert", tmp_path / "a.csv", "--truth", tmp_path / "a.csv", "--out", "log")
+    assert_refused(done, "expected positions, as the truth")
+    assert note in done.err.splitlines()[0]
 
 
 def test_pseudoranges_that_no_filter_without_a_map_uses_are_said_to_be(tmp_path):

@@ -374,7 +374,14 @@ def test_dates_of_a_plain_table(tmp_path):
     # 10:00 in Helsinki is 8:00 in UTC in winter.
     start_s = pd.Timestamp("2026-11-02T08:00:00.5Z").timestamp()
     assert (log.start_utc_s + log.gnss["time_s"] - start_s).tolist() == [0.0, 3.0, 6.0]
+    # Noon and midnight have the hour 12.
+    converted_of(*(f"2026-11-02 {when}" for when in ("11:59:59 AM", "12:00:03 p.m.", "1:00:06 pm")))
+    log = read_log(tmp_path / "log")
+    start_s = pd.Timestamp("2026-11-02T09:59:59Z").timestamp()
+    assert (log.start_utc_s + log.gnss["time_s"] - start_s).tolist() == [0.0, 4.0, 3607.0]
     for given, hint in (
+        ("2026-11-02 14:00:00 PM", "AM and PM go with hours of 1 to 12"),
+        ("2026-11-02 0:30 AM", "AM and PM go with hours of 1 to 12"),
         ("11/02/2026 10:00:00", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),
         ("04-03-2021 10:00:00", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),
         ("4-3-21", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),

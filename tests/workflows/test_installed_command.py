@@ -71,6 +71,22 @@ def test_a_pipeline_runs_its_stages(own_world, tmp_path, capsys):
     assert contents(out / "database") == contents(own_world.database)
 
 
+def test_a_pipeline_prints_as_replay_does(own_world, tmp_path, capsys):
+    figures = {
+        "seconds_by_status": {"SEARCHING": 352944.0, "TRACKING": 117648.0},
+        "unused": {"no_step": 2},
+        "notes": ["a note", "a note"],
+    }
+    stages = {"replay": lambda _: figures}
+    assert run_pipeline(stages, own_world.toml, ["--out", str(tmp_path)]) == 0
+    told = capsys.readouterr()
+    lines = told.out.splitlines()
+    assert "    SEARCHING: 352944 (75 %)" in lines
+    assert "    no_step: 2 (the length of the step is unknown)" in lines
+    assert "notes" not in told.out
+    assert told.err == "mapfilter: note: a note\n"
+
+
 def test_a_pipeline_refuses_as_the_commands_do(own_world, capsys):
     before = contents(own_world.folder)
     wrong = ["--set", "database.margin=1", "--json"]

@@ -152,4 +152,6 @@ def _of_time(text: str) -> str:
         return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
     if re.match(r"\d{1,2}:\d\d", text.strip()):
         return "a time of day without its date; write 2026-05-01T08:00:00, or seconds"
+    if re.search(r"\d\s?[ap]\.?m\.?$", text.strip(), re.IGNORECASE):
+        return "AM and PM go with hours of 1 to 12; write 2026-05-01T14:00:00"
     return ""

@@ -30,6 +30,11 @@ _NAMED = re.compile(
     re.ASCII | re.IGNORECASE,
 )
 """Day, month in English, and year."""
+_HALF_DAY = re.compile(
+    r"(?<=[\sT])(0?[1-9]|1[0-2])(:[0-5]\d(?::[0-5]\d(?:\.\d{1,9})?)?)\s?([ap])\.?m\.?(?=\s*(?:$|Z|[+-]))",
+    re.IGNORECASE,
+)
+"""Hours of half a day, minutes, and AM or PM."""
 _UTC = re.compile(r"\s{0,3}\b(?:UTC|GMT)\s{0,3}$")
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
@@ -84,7 +89,7 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
         Zone of times that state none.
     layout : str
         Format as of ``strptime``, or "ISO8601"; numbers are Unix times then, and days with dots
-        (31.12.2026) or names of months (31-Dec-2026) are read, too.
+        (31.12.2026), names of months (31-Dec-2026) and AM or PM after the time are read, too.
 
     Returns
     -------
@@ -117,6 +122,7 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
             )
         if plain.str.match(_NAMED).any():
             plain = plain.str.replace(_NAMED, _with_month_number, regex=True)
+        plain = plain.str.replace(_HALF_DAY, _with_whole_day, regex=True)
     plain = plain.where(plain.str.match(r"\s*(?:19|20)\d\d"), "")
     moments = pd.to_datetime(plain, format=layout, utc=True, errors="coerce")
     seconds = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy(dtype=np.float64)
@@ -133,6 +139,11 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
 def _with_month_number(found: re.Match[str]) -> str:
     month = _MONTHS.index(found[2].lower()) + 1
     return f"{found[3]}-{month:02d}-{int(found[1]):02d}"
+
+
+def _with_whole_day(found: re.Match[str]) -> str:
+    hour = int(found[1]) % 12 + (12 if found[3].lower() == "p" else 0)
+    return f"{hour:02d}{found[2]}"
 
 
 def utc_from_local_s(local_s: ArrayLike, zone: str) -> Floats:

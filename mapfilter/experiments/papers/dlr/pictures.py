@@ -13,13 +13,12 @@ from mapfilter.experiments.papers.dlr.scene import Where
 from mapfilter.experiments.papers.paper import Picture
 from mapfilter.gnss.sky import directions
 from mapfilter.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, Look
+from mapfilter.report.cumulative import Distribution, plot_cumulative
 from mapfilter.report.curves import (
     Curve,
-    Distribution,
     OverThreshold,
     Panel,
     SeenMap,
-    plot_cumulative,
     plot_error_panels,
     plot_over_threshold,
     plot_seen_satellites,
