@@ -17,7 +17,7 @@ def streets(rng, count, mps=1.4, every_s=1.0):
     return np.cumsum(mps * every_s * np.exp(1j * np.cumsum(turns)))
 
 
-def lasting(rng, count, sd_m, memory_s=30.0):
+def lasting(rng, count, sd_m, memory_s=60.0):
     """A Gauss-Markov process at each second, as complex numbers."""
     kept, found = np.exp(-1 / memory_s), np.empty(count, dtype=complex)
     found[0] = complex(*rng.normal(0, sd_m, 2))
@@ -45,8 +45,8 @@ def after(
 
 
 def times(rng, white_m, lasting_m, sd_m, **options):
-    way = streets(rng, COUNT)
-    errors = white(rng, COUNT, white_m) + lasting(rng, COUNT, lasting_m)
+    way = streets(rng, 2 * COUNT)
+    errors = white(rng, 2 * COUNT, white_m) + lasting(rng, 2 * COUNT, lasting_m)
     # Headings that are off by any angle, and steps that are too short.
     seen = 0.97 * way * np.exp(1j * rng.uniform(0, 6))
     return sum(after(seen, way + errors, sd_m, **options).now)
@@ -136,8 +136,8 @@ def test_few_fixes_or_a_short_time_say_nothing():
     fixes = way + white(rng, COUNT, 30.0)
     assert after(way[:60], fixes[:60]).now == FoundErrors()
     assert after(way[:62], fixes[:62]).now != FoundErrors()
-    # Seven in two minutes.
-    assert after(way, fixes, every_s=20).now == FoundErrors()
+    # Seven in three minutes.
+    assert after(way, fixes, every_s=30).now == FoundErrors()
 
 
 def test_what_was_known_before_is_two_minutes_old():

@@ -16,7 +16,7 @@ from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanTracker
 from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.reckoning import RECKONED, Reckoning, jump_to
-from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn, _Stretches
+from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.radio.cells import Cell, CellPlan
@@ -116,62 +116,6 @@ def test_other_faults_are_no_jumps(fault):
         assert followed(steps, fixes)[2] == []
 
 
-def test_stretches_are_least_squares():
-    """Each by the matrix of its rows: east and north of a fix, by four unknowns."""
-    rng = np.random.default_rng(7)
-    way = np.cumsum(rng.normal(5, 3, (12, 2)), axis=0)
-    turned = 1.1 * np.exp(0.8j) * (way[:, 0] + 1j * way[:, 1])
-    fixes = np.stack([turned.real, turned.imag], 1) + rng.normal(0, 2, (12, 2)) + [EAST, NORTH]
-    rows = np.column_stack([np.arange(12.0), way, fixes, np.full(12, 60.0), np.zeros((12, 2))])
-    found = _Stretches.of(rows)
-    for first in range(7):
-        x, y = way[first:].T
-        one, zero = np.ones_like(x), np.zeros_like(x)
-        matrix = np.vstack([np.stack([one, zero, x, -y], 1), np.stack([zero, one, y, x], 1)])
-        given = np.concatenate([fixes[first:, 0] - EAST, fixes[first:, 1] - NORTH])
-        (east, north, a, b), left, _, _ = np.linalg.lstsq(matrix, given, rcond=None)
-        assert found.factor[first] == pytest.approx(complex(a, b), rel=1e-9)
-        covariance = 60.0 * np.linalg.inv(matrix.T @ matrix)
-        size = abs(complex(a, b))
-        assert found.sd_rad[first] == pytest.approx(np.sqrt(covariance[2, 2]) / size, rel=1e-9)
-        assert found.fits[first] == (left[0] <= 2.0 * 60.0 * (2 * (12 - first) - 4))
-        turn = found.turn(first, complex(*way[-1]), 12 - first)
-        place = complex(east, north) + complex(a, b) * complex(*way[-1])
-        assert (turn.east_m - EAST, turn.north_m - NORTH) == pytest.approx(
-            (place.real, place.imag), rel=1e-6
-        )
-        at = np.array([1.0, 0.0, way[-1, 0], -way[-1, 1]])
-        assert turn.sd_m == pytest.approx(np.sqrt(at @ covariance @ at), rel=1e-6)
-        assert turn.turned_rad == pytest.approx(np.angle(complex(a, b)))
-        assert found.residual_m2[first] == pytest.approx(left[0], rel=1e-6)
-        if turn.sd_rad > radians(3.5):
-            continue
-        # By the angle alone: that of a and b across them.
-        across = np.array([0.0, 0.0, -b, a]) / size**2
-        shared = [
-            at @ covariance @ across,
-            np.array([0, 1.0, *way[-1, ::-1]]) @ covariance @ across,
-        ]
-        assert turn.shared_m_rad == pytest.approx(shared, rel=1e-6)
-    assert not found.fits[7:].any()
-
-
-@pytest.mark.parametrize("off_deg", [10.0, 60.0, 180.0])
-def test_the_ratio_is_that_of_sums_of_squares(off_deg):
-    """Of exact fixes, with the angle of the belief known: what another angle leaves of them."""
-    rng = np.random.default_rng(3)
-    way = np.cumsum(rng.normal(5, 3, (10, 2)), axis=0) @ [1, 1j]
-    fixes = np.exp(0.3j) * way
-    columns = [np.arange(10.0), way.real, way.imag, fixes.real, fixes.imag, np.full(10, 49.0)]
-    found = _Stretches.of(np.column_stack([*columns, np.zeros((10, 2))]))
-    nats = found.nats(np.full(10, radians(off_deg)), np.zeros(10))
-    for first in range(5):
-        other = np.exp(1j * (0.3 + radians(off_deg))) * way[first:]
-        off = fixes[first:] - other
-        left = np.abs(off - off.mean()) ** 2
-        assert nats[first] == pytest.approx(left.sum() / (2 * 49.0), rel=1e-6)
-
-
 def test_a_way_is_broken_off_where_its_direction_or_length_is_not_known():
     fix, known, white = (EAST, NORTH, 25.0), (0.0, 0.01), NONE_LASTS
     way, _ = RecentWay().at_fix(0.0, fix, known, white)
@@ -217,10 +161,10 @@ def test_what_a_rate_adds_is_in_the_way_and_not_in_the_error():
 @pytest.mark.parametrize(
     ("variance_m2", "lasting", "after_s", "expected_m2"),
     [(25.0, NONE_LASTS, 5.0, 7.5**2), (400.0, NONE_LASTS, 5.0, 400.0),
-     (100.0, Lasting(0.0, 6.0, 30.0), 5.0, 100.0 + 2 * 36 * 30 / 5.0),
+     (100.0, Lasting(0.0, 6.0, 30.0), 5.0, 100.0),
      (100.0, Lasting(6.0, 0.0, 30.0), 5.0, 100.0), (25.0, NONE_LASTS, 0.5, 7.5**2)],
 )  # fmt: skip
-def test_errors_that_last_count_once_and_fixes_may_be_late(
+def test_noise_and_what_lasts_are_kept_apart_and_fixes_may_be_late(
     variance_m2, lasting, after_s, expected_m2
 ):
     way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, variance_m2), (0.0, 0.01), lasting)
@@ -229,8 +173,7 @@ def test_errors_that_last_count_once_and_fixes_may_be_late(
     way, _ = gone.at_fix(after_s, (EAST + 6.0, NORTH, variance_m2), (0.0, 0.01), lasting)
     late_m2 = (2 * 6.0 / after_s) ** 2
     assert way.rows[1].variance_m2 == pytest.approx(expected_m2 + late_m2)
-    usual_m2 = 2 * lasting.usual_m**2 * 30 / after_s
-    assert way.rows[1].lasting_m2 == pytest.approx(usual_m2)
+    assert (way.rows[1].usual_m, way.rows[1].beyond_m) == lasting[:2]
 
 
 def test_what_usually_lasts_counts_once_a_jump_is_found():
@@ -249,11 +192,16 @@ def test_what_usually_lasts_counts_once_a_jump_is_found():
     assert found[0.0][0] == found[5.0][0]
     plain, lasting = found[0.0][1], found[5.0][1]
     assert plain.turned_rad == lasting.turned_rad == pytest.approx(np.pi / 2, abs=0.4)
-    # 7.5 m and the way of two seconds, and what counts once in 30 s but for the first fix.
+    # 7.5 m and the way of two seconds; what lasts changes hardly from one fix to the next.
     last = found[0.0][0]
-    larger = 1 + 2 * 25.0 * 30 / 6.0 * last / (last + 1) / (7.5**2 + 4.0)
-    assert lasting.sd_m / plain.sd_m == pytest.approx(np.sqrt(larger), rel=0.05)
-    assert lasting.sd_rad > 1.5 * plain.sd_rad
+    apart_s = 6.0 * np.abs(np.subtract.outer(np.arange(last + 1), np.arange(last + 1)))
+    noise = np.diag([7.5**2, *[7.5**2 + 4.0] * last])
+    middle = np.arange(last + 1) - last / 2
+    at_end = 1 / (last + 1) + middle * middle[-1] / (middle @ middle)
+    for turn, both_m2 in ((plain, noise), (lasting, noise + 25.0 * np.exp(-apart_s / 30.0))):
+        assert turn.sd_m == pytest.approx(np.sqrt(at_end @ both_m2 @ at_end), rel=1e-6)
+    assert lasting.sd_m > 1.2 * plain.sd_m
+    assert lasting.sd_rad > 1.1 * plain.sd_rad
 
 
 @pytest.mark.parametrize("rate_deg_per_s", [0.3, 1.0])

@@ -7,7 +7,7 @@ where steps have led, q, moved, turned, drawn out and bent by least squares, as 
 
     z = p + a q + c ∫ t dq + w + b,
 
-with white noise w and a first-order Gauss-Markov process b of 30 s; c is a lasting error of the
+with white noise w and a first-order Gauss-Markov process b of a minute; c is a lasting error of the
 rate of turns. The sums of squares of what is left, and of its second differences, are linear in the
 variances of w and b and in that of a random walk of headings, which is assumed; the two equations
 give both (estimation by moments).
@@ -23,7 +23,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 
-_APART_S, _WINDOW_S, _LEAST_S, _LEAST_ROWS = 5.0, 120.0, 60.0, 8
+_APART_S, _WINDOW_S, _LEAST_S, _LEAST_ROWS = 5.0, 180.0, 60.0, 8
 """Time between two fixes that are kept, and for which they are; time and number of those that are
 looked at, at least."""
 _LEAST_WAY_M = 20.0
@@ -31,7 +31,9 @@ _LEAST_WAY_M = 20.0
 right."""
 _RESTS_S = 10.0
 """Time without a step from which on one rests."""
-_LASTS_S = 30.0
+_BEFORE_S = 120.0
+"""Time by which what was known is older than what may be of a jump of headings."""
+_LASTS_S = 60.0
 """Time after which the correlation of the error that lasts is 1/e."""
 _MEMORY_S, _PRIOR_S = 180.0, 120.0
 """Time over which the variances are followed, and that for which stated ones count before."""
@@ -179,13 +181,14 @@ class FixWander:
             return after
         new_s = since_s if self.seen_s > 0 else span_s
         seen_s = self.seen_s + new_s
-        share = new_s / min(seen_s + _PRIOR_S, _MEMORY_S)
+        # What lasts for a minute is hardly told from none in a minute.
+        share = new_s / min(seen_s + _PRIOR_S, _MEMORY_S) * (span_s / _WINDOW_S)
         found = _times_stated(np.array(rows), rate_radps, drift_rad_per_sqrt_m)
         return replace(after, now=self.now.towards(*found, share), seen_s=seen_s)
 
     def _known_at(self, time_s: float) -> FixWander:
         """Return it with what was known two minutes before a time."""
-        old = [one for one in self.known if one[0] <= time_s - _WINDOW_S]
+        old = [one for one in self.known if one[0] <= time_s - _BEFORE_S]
         before = FoundErrors(*old[-1][1:]) if old else self.before
         known = (*self.known[len(old) :], (time_s, *self.now))
         return replace(self, before=before, known=known)

@@ -17,7 +17,7 @@ beside those of fixes, and left out.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, hypot, isfinite, radians, sin, sqrt
+from math import cos, hypot, isfinite, radians, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -25,18 +25,16 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep
 from mapfilter.geodesy import wrap_rad
+from mapfilter.positioning.kalman.stretches import LEAST_ROWS, Stretches, WayFix, led_by
 
-_MOST_ROWS, _LEAST_ROWS, _APART_M = 30, 6, 5.0
-"""Fixes that are kept, those of a stretch at least, and the way between two of them."""
+_MOST_ROWS, _APART_M = 30, 5.0
+"""Fixes that are kept, and the way between two of them."""
 _LEAST_FIX_SD_M, _LATE_S = 7.5, 2.0
 """Fixes between houses are off to one side for a while, beyond what they state; and by the way of
 the time by which a receiver may be late, which a corner would turn."""
 _LEAST_TURN_RAD, _FOLLOWED_RAD, _LEAST_NATS = radians(20.0), radians(10.0), 12.0
 """Smallest jump, the difference below which the belief has followed it, and the log-likelihood
 ratio at which it is one."""
-_SHORTEST, _LONGEST, _MOST_MISFIT = 0.7, 1.4, 2.0
-"""Lengths of the way by fixes to that by steps between which they are the same way; largest mean
-square of what is left of fixes, in their variances."""
 _LEAST_SD_RAD, _FOUND_RAD = radians(3.0), radians(6.0)
 """Least deviation of an angle, and that from which on it is left to the filter."""
 
@@ -71,30 +69,6 @@ class Lasting(NamedTuple):
     beyond_m: float
     memory_s: float
 
-    def variances_m2(self, since_s: float) -> tuple[float, float]:
-        """Return what both add to a fix's variance, so long after the one before."""
-        times = 2 * self.memory_s / since_s
-        return times * self.usual_m**2, times * self.beyond_m**2
-
-
-class _Row(NamedTuple):
-    """A fix, where steps have led at its time, and what the belief had.
-
-    ``variance_m2`` is that of the fix along one axis without what usually lasts, ``lasting_m2``
-    that. ``turned_rad`` is the belief's heading error less what a rate of turns has added since the
-    first fix, and ``turned_rad2`` its variance.
-    """
-
-    time_s: float
-    way_east_m: float
-    way_north_m: float
-    east_m: float
-    north_m: float
-    variance_m2: float
-    lasting_m2: float
-    turned_rad: float
-    turned_rad2: float
-
 
 @dataclass(frozen=True, slots=True)
 class RecentWay:
@@ -106,7 +80,7 @@ class RecentWay:
         Where they have led, from anywhere.
     by_rate_rad : float
         What a lasting error of the rate of turns, as the belief has it, has added to headings.
-    rows : tuple of _Row
+    rows : tuple of WayFix
         The fixes.
     is_turning : bool
         Whether a jump was found whose angle is not known well yet.
@@ -115,7 +89,7 @@ class RecentWay:
     east_m: float = 0.0
     north_m: float = 0.0
     by_rate_rad: float = 0.0
-    rows: tuple[_Row, ...] = ()
+    rows: tuple[WayFix, ...] = ()
     is_turning: bool = False
 
     def moved(self, step: MotionStep, by_rate_rad: float) -> RecentWay:
@@ -157,28 +131,25 @@ class RecentWay:
             What lasts of its error.
         """
         east_m, north_m, variance_m2 = place
-        gone_m = mps = lasting_m2 = 0.0
+        gone_m = mps = 0.0
         if self.rows:
             last = self.rows[-1]
             gone_m = hypot(self.east_m - last.way_east_m, self.north_m - last.way_north_m)
             if gone_m < _APART_M:
                 return self, None
-            since_s = max(time_s - last.time_s, 1e-3)
-            mps = gone_m / since_s
-            lasting_m2, beyond_m2 = lasting.variances_m2(since_s)
-            variance_m2 += beyond_m2
+            mps = gone_m / max(time_s - last.time_s, 1e-3)
         variance_m2 = max(variance_m2, _LEAST_FIX_SD_M**2) + (_LATE_S * mps) ** 2
         now_rad = turned[0] - self.by_rate_rad
-        row = _Row(
-            *(time_s, self.east_m, self.north_m, east_m, north_m, variance_m2, lasting_m2),
-            *(now_rad, turned[1]),
+        row = WayFix(
+            *(time_s, self.east_m, self.north_m, east_m, north_m, variance_m2),
+            *(lasting.usual_m, lasting.beyond_m, now_rad, turned[1]),
         )
         rows = (*self.rows, row)[-_MOST_ROWS:]
         after = replace(self, rows=rows)
-        if len(rows) < _LEAST_ROWS:
+        if len(rows) < LEAST_ROWS:
             return after, None
         given = np.array(rows)
-        found = _Stretches.of(given)
+        found = Stretches.of(given, lasting.memory_s)
         turns = np.angle(found.factor)
         off = wrap_rad(turns - [one.turned_rad for one in rows])
         nats = found.nats(off, np.array([one.turned_rad2 for one in rows]))
@@ -191,109 +162,22 @@ class RecentWay:
         # A stretch that has shown it may have begun before the jump.
         left_m2 = np.where(found.fits, found.residual_m2 + _followed_m2(given), np.inf)
         best = int(np.argmin(left_m2))
-        turn = found.turn(best, complex(self.east_m, self.north_m), len(rows) - best)
+        led = led_by(given[best:], complex(self.east_m, self.north_m), lasting.memory_s)
+        turned_rad, sd_rad = float(turns[best]), hypot(led.sd_rad, _LEAST_SD_RAD)
         is_found = float(found.sd_rad[best]) <= _FOUND_RAD
         if is_found:
             # What the belief had before is no longer compared with.
-            told = {"turned_rad": turn.turned_rad, "turned_rad2": turn.sd_rad**2}
+            told = {"turned_rad": turned_rad, "turned_rad2": sd_rad**2}
             rows = tuple(one._replace(**told) for one in rows[best:])
-        turned_rad = float(wrap_rad(turn.turned_rad + self.by_rate_rad))
-        turn = turn._replace(turned_rad=turned_rad, is_new=not self.is_turning)
+        turned_rad = float(wrap_rad(turned_rad + self.by_rate_rad))
+        turn = Turn(turned_rad, sd_rad, *led[1:], is_new=not self.is_turning)
         return replace(after, rows=rows, is_turning=not is_found), turn
-
-
-class _Stretches(NamedTuple):
-    """Regressions of the fixes from each on to the last.
-
-    Parameters
-    ----------
-    factor : (N,) complex array
-        a.
-    mean_way, mean_fix : (N,) complex array
-    spread_m2 : (N,) array
-        Sum of squares of the way about its mean.
-    variance_m2, lasting_m2 : (N,) array
-        Mean variance of fixes, without and with what usually lasts.
-    residual_m2 : (N,) array
-        Sum of squares of what is left of the fixes.
-    fits : (N,) bool array
-        Whether the fixes lie on the way.
-    """
-
-    factor: np.ndarray
-    mean_way: np.ndarray
-    mean_fix: np.ndarray
-    spread_m2: Floats
-    variance_m2: Floats
-    lasting_m2: Floats
-    residual_m2: Floats
-    fits: np.ndarray
-
-    @classmethod
-    def of(cls, rows: Floats) -> _Stretches:
-        """Return the regressions of rows whose columns are those of :class:`_Row`."""
-        # From the last fix: sums of squares of coordinates of a country lose digits.
-        last = rows[-1, 1] + 1j * rows[-1, 2], rows[-1, 3] + 1j * rows[-1, 4]
-        way, fix = rows[:, 1] + 1j * rows[:, 2] - last[0], rows[:, 3] + 1j * rows[:, 4] - last[1]
-        count = np.arange(len(rows), 0, -1.0)
-        mean_way, mean_fix = _sums(way) / count, _sums(fix) / count
-        spread = _sums(np.abs(way) ** 2) - count * np.abs(mean_way) ** 2
-        spread = np.maximum(spread, 1e-6)
-        cross = _sums(np.conj(way) * fix) - count * np.conj(mean_way) * mean_fix
-        variance, factor = _sums(rows[:, 5]) / count, cross / spread
-        lasting = variance + _sums(rows[:, 6]) / count
-        residual = _sums(np.abs(fix) ** 2) - count * np.abs(mean_fix) ** 2
-        residual -= np.abs(cross) ** 2 / spread
-        fits = residual <= _MOST_MISFIT * variance * np.maximum(2 * count - 4, 1.0)
-        fits &= (np.abs(factor) >= _SHORTEST) & (np.abs(factor) <= _LONGEST)
-        fits &= count >= _LEAST_ROWS
-        means = mean_way + last[0], mean_fix + last[1]
-        return cls(factor, *means, spread, variance, lasting, residual, fits)
-
-    @property
-    def sd_rad(self) -> Floats:
-        """Deviation of the direction of each."""
-        size = np.maximum(np.abs(self.factor), _SHORTEST)
-        return np.asarray(np.sqrt(self.variance_m2 / self.spread_m2) / size)
-
-    def nats(self, off_rad: Floats, others_rad2: Floats) -> Floats:
-        """Return the log-likelihood ratios of directions to others, which have variances.
-
-        That of a fixed direction is ``|a| Σ|q - q̄|² (1 - cos off) / σ²``: large angles count by
-        their chord.
-        """
-        size = np.maximum(np.abs(self.factor), _SHORTEST)
-        variance = self.variance_m2 / (self.spread_m2 * size)
-        return np.asarray(2 * np.sin(off_rad / 2) ** 2 / (variance + others_rad2))
-
-    def turn(self, index: int, here: complex, count: int) -> Turn:
-        """Return the turn by one of them, and where it leads."""
-        off = here - self.mean_way[index]
-        place = self.mean_fix[index] + self.factor[index] * off
-        share = 1 / count + abs(off) ** 2 / self.spread_m2[index]
-        variance_m2 = float(self.lasting_m2[index])
-        sd_rad = float(self.sd_rad[index]) * sqrt(variance_m2 / float(self.variance_m2[index]))
-        # By the angle alone, a place off the middle moves across the way to it.
-        shared = 1j * self.factor[index] * off * sd_rad**2
-        return Turn(
-            float(np.angle(self.factor[index])),
-            hypot(sd_rad, _LEAST_SD_RAD),
-            float(place.real),
-            float(place.imag),
-            sqrt(variance_m2 * share),
-            (float(shared.real), float(shared.imag)),
-        )
 
 
 def _followed_m2(rows: Floats) -> Floats:
     """Return what is left of the fixes before each, as the belief had headings at the first."""
     off = rows[:, 3] + 1j * rows[:, 4] - (rows[0, 3] + 1j * rows[0, 4])
-    off -= np.exp(1j * rows[0, 7]) * (rows[:, 1] + 1j * rows[:, 2] - complex(*rows[0, 1:3]))
+    off -= np.exp(1j * rows[0, 8]) * (rows[:, 1] + 1j * rows[:, 2] - complex(*rows[0, 1:3]))
     sums, squares = np.cumsum(off), np.cumsum(np.abs(off) ** 2)
     left = squares - np.abs(sums) ** 2 / np.arange(1.0, len(rows) + 1)
     return np.concatenate([[0.0], left[:-1]])
-
-
-def _sums(values: np.ndarray) -> np.ndarray:
-    """Return the sum from each value on to the last."""
-    return np.cumsum(values[::-1])[::-1]
