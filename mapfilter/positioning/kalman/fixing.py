@@ -24,6 +24,7 @@ from mapfilter.positioning.kalman.disputed import (
 )
 from mapfilter.positioning.kalman.lasting import Motion, fix_layout, rescaled, white_part
 from mapfilter.positioning.kalman.models import KalmanOptions, compiled
+from mapfilter.positioning.kalman.proof import Doubt, way_agrees
 from mapfilter.positioning.kalman.readings import fix_covariance_m2
 from mapfilter.positioning.kalman.reckoning import RATE, at_rest
 from mapfilter.positioning.kalman.turned import Lasting
@@ -32,6 +33,8 @@ _RECKONED, _MOVING = Patience(30.0, 120.0), Patience(5.0, 5.0)
 """With dead reckoning, and where but a velocity is known."""
 _UNSEEN_S = 20.0
 """Time without a fix after which one that contradicts the belief is as likely to be right."""
+_PROVEN_S = 120.0
+"""Time for which fixes agree with a belief, whatever the way, that shows it to be right."""
 
 
 class FixErrors(NamedTuple):
@@ -49,6 +52,10 @@ class FixErrors(NamedTuple):
         How far fixes have wandered beside dead reckoning.
     way, fixed_way : Way
         Where that has led, by headings as they were measured: now, and at the last fix.
+    doubt : Doubt
+        Whether the belief is claimed before fixes and steps have told the same way.
+    doubted_s : float
+        Time of the last fix before which that was so.
     """
 
     lasting_m: float = 0.0
@@ -57,6 +64,8 @@ class FixErrors(NamedTuple):
     wander: FixWander = FixWander()
     way: Way = Way()
     fixed_way: Way = Way()
+    doubt: Doubt = Doubt.NONE
+    doubted_s: float = nan
 
     @property
     def understated(self) -> float:
@@ -87,8 +96,8 @@ class FixErrors(NamedTuple):
 
     def after_a_jump(self) -> FixErrors:
         """Return them where what contradicted the belief has led it elsewhere."""
-        record = replace(self.record, rows=())
-        return self._replace(record=record, wander=self.wander.broken_off())
+        record, doubt = replace(self.record, rows=()), max(self.doubt, Doubt.IF_CONTRADICTED)
+        return self._replace(record=record, wander=self.wander.broken_off(), doubt=doubt)
 
     def after_fix(self, lasting_m: float, record: FixRecord, time_s: float) -> FixErrors:
         """Return them after a fix."""
@@ -101,6 +110,15 @@ class FixErrors(NamedTuple):
         place = fix.east_m, fix.north_m
         wander = self.wander.at_fix(time_s, self.way, place, variance_m2, *turns)
         return self._replace(wander=wander)
+
+    def proven(self, time_s: float, lasting_s: float) -> FixErrors:
+        """Return them after a fix that agreed: whether steps have told the same way since."""
+        if self.doubt is Doubt.NONE:
+            return self._replace(doubted_s=time_s)
+        agrees = way_agrees(self.wander.rows, self.understated, lasting_s)
+        if time_s - max(self.doubted_s, self.record.agreed_from_s) >= _PROVEN_S:
+            agrees = True
+        return self._replace(doubt=self.doubt.after(agrees))
 
 
 class WeighedFix(NamedTuple):
@@ -217,6 +235,8 @@ class FixWeighing:
                 motion = self._begun((fix.east_m, fix.north_m) - back_m, white, wanted_m)
                 # What was learnt beside a belief that was wrong is no more than that.
                 errors = errors.after_fix(wanted_m, record, time_s)._replace(wander=FixWander())
+                if found.ruling is Ruling.ANEW and own is not MOVING:
+                    errors = errors._replace(doubt=Doubt.UNTIL_PROVEN)
                 return WeighedFix(belief.predict(*motion), errors, motion, found.ruling, nan, True)
             if found.ruling is Ruling.OUTLIER and own is not MOVING:
                 errors = errors.after_fix(lasting_m, record, time_s)
@@ -233,6 +253,7 @@ class FixWeighing:
         elif own is not MOVING:
             turns = float(belief.moments.mean[RATE]), radians(drift_deg_per_sqrt_m)
             errors = errors.wandered(fix, float(np.trace(stated)) / 2, time_s, turns)
+        errors = errors.proven(time_s, self.options.fix_lasting_s)
         return WeighedFix(belief, errors, motion, found.ruling, nis, info.used)
 
     def _lasting_m(self, errors: FixErrors, wanted_m: float, time_s: float) -> float:

@@ -28,6 +28,7 @@ from mapfilter.positioning.kalman.level_errors import (
 )
 from mapfilter.positioning.kalman.models import SiteModels, compiled
 from mapfilter.positioning.kalman.place import WITHIN_M, belief_tail, place_of, share_within
+from mapfilter.positioning.kalman.proof import Doubt
 from mapfilter.positioning.kalman.readings import (
     SiteReadings,
     fix_covariance_m2,
@@ -310,6 +311,7 @@ class KalmanStep:
         else:
             lost = lost or self.reckoning.may_have_left or self.fixes.record.is_lost
             near = radius_m <= self.options.converged_radius_m
-            self.status = Status.TRACKING if near else Status.UNCERTAIN
+            claimed = near and self.fixes.doubt is not Doubt.UNTIL_PROVEN
+            self.status = Status.TRACKING if claimed else Status.UNCERTAIN
             if lost:
                 self.status = Status.LOST
