@@ -192,8 +192,9 @@ def build(
             raise fail(InputError, str(rasters.path), expected, got, hint)
         counts = {
             "points": written.received,
-            "points_below_floor": written.points - written.received,
+            "points_below_floor": written.below_floor,
             "points_off_rasters": job.off_rasters(written.points),
+            "points_without_level": written.points - written.received - written.below_floor,
         }
         inputs = (*inputs, InputFile("rasters", rasters.path.name, digest.result()))
         parts = None
