@@ -165,7 +165,7 @@ class Rasters(Section):
     crs : str, optional
         CRS of files without one.
     factor : float
-        dB per stored unit, such as 0.0625 for sixteenths.
+        dB per stored unit, such as 0.0625 for sixteenths; not of files that state a scale.
     nodata : float, optional
         A stored number that means no data, besides those that the files name.
     resolution_m : float, optional

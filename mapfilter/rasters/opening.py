@@ -99,7 +99,8 @@ def open_rasters(
     )
     path = Path(path)
     _check_options(crs, factor, nodata, resolution_m)
-    declared = Declared(projected_crs(crs, "rasters, crs") if crs is not None else None, nodata)
+    crs = projected_crs(crs, "rasters, crs") if crs is not None else None
+    declared = Declared(crs, nodata, float(factor))
     index = find_index(path) if path.is_dir() else None
     if path.suffix.lower() in INDEX_SUFFIXES and not path.is_dir():
         check_file(path)
