@@ -12,6 +12,7 @@ from mapfilter.database.parquet import Window
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, cut_by_tile, overlap
 from mapfilter.database.tiles import TileRows, TileTask, grouped, read_tiles, tile_windows
 from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
@@ -49,6 +50,7 @@ class BuildJob:
 
         Errors are those of :func:`mapfilter.database.build.build`.
         """
+        check_scale(rasters.lattice.crs, rasters.lattice.bounds_m, f"{rasters.path}, CRS")
         source = cut_by_tile(routes)
         rasters = named_by_plan(rasters, plan)
         check_against_plan(rasters, plan)

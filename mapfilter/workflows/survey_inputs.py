@@ -9,7 +9,7 @@ import numpy as np
 from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, InputError, fail, listed
-from mapfilter.geodesy import projected_crs
+from mapfilter.geodesy import check_scale, projected_crs
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -24,7 +24,6 @@ from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
     area_lattice,
     check_cells_near,
-    check_scale,
     open_by_section,
 )
 

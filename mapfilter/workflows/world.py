@@ -13,7 +13,7 @@ from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import projected_crs, same_crs, short_crs, unproject
+from mapfilter.geodesy import check_scale, projected_crs, same_crs, short_crs, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
@@ -30,7 +30,6 @@ from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.area_lattice import area_lattice as area_lattice
-from mapfilter.workflows.area_lattice import check_scale as check_scale
 from mapfilter.workflows.area_lattice import roads_lattice as roads_lattice
 from mapfilter.workflows.on_lattice import pixels_on
 from mapfilter.workflows.planned_cells import plan_antennas, planned_cells

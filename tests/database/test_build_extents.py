@@ -8,6 +8,7 @@ import pytest
 from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
 
 from mapfilter.database.build import build
+from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
@@ -108,3 +109,14 @@ def test_windows_of_mixed_resolutions_say_what_the_whole_says(resampling, tmp_pa
             read = some.read((row, col, rows, cols), (cell_id,))
             expected[rasters.cell_ids.index(cell_id)] = read[0]
         np.testing.assert_array_equal(whole[:, row : row + rows, col : col + cols], expected)
+
+
+def test_rasters_whose_metres_are_none_on_the_ground_are_refused(tmp_path):
+    """Steps of dead reckoning would be a quarter too short on such a map, without a word."""
+    mercator = dataclasses.replace(LATTICE, crs="EPSG:3857")
+    levels = [(cell_id, np.full((40, 50), -70.0)) for cell_id in IDS]
+    write_rasters(tmp_path / "a.tif", mercator, levels, IDS)
+    routes = dataclasses.replace(make_routes(), lattice=mercator)
+    with pytest.raises(InputError, match=r"EPSG:3857, of which 100 m are 79 m .*Web Mercator"):
+        build(open_rasters(tmp_path / "a.tif"), make_plan(), routes, tmp_path / "db")
+    assert not (tmp_path / "db").exists()
