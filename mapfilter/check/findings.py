@@ -123,6 +123,7 @@ _BY_HINT = {
     "GHz given for MHz": "frequency-unit",
     "Hz given for MHz": "frequency-unit",
     "a row given twice": "duplicate-id",
+    "a cell of several carriers or antennas; give each its own id, or keep one": "duplicate-id",
     "a cell of another place, or another CRS": "crs-mixed",
     "two systems mixed up": "crs-mixed",
     "another zone": "crs-mixed",
