@@ -168,7 +168,9 @@ def _listed(folder: Path) -> list[Path]:
     found = sorted(path for path in folder.iterdir() if _is_raster(path))
     if not found:
         expected = f"raster files ({', '.join(FORMATS)}) or an index of them"
-        raise fail(InputError, str(folder), expected, "none in this folder")
+        others = sorted(path.name for path in folder.iterdir() if path.is_file())
+        hint = f"gdal_translate FROM TO.tif converts others, such as {others[0]}" if others else ""
+        raise fail(InputError, str(folder), expected, "none in this folder", hint)
     if len(found) > _MOST_FILES:
         raise fail(InputError, str(folder), f"at most {_MOST_FILES} rasters", len(found))
     return found

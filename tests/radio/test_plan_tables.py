@@ -51,7 +51,11 @@ def test_angles_are_those_of_their_parts(sign):
         wanted = sign * (3600 * deg + 60 * minute + second) / 3600
         signed = f"{'-' if sign < 0 else ''}{deg}:{minute}:{second}"
         letter = "E" if sign > 0 else "W"
-        for text in (signed, f"{deg}°{minute}'{second}\"{letter}", f"{letter}{deg} {minute} {second}"):
+        for text in (
+            signed,
+            f"{deg}°{minute}'{second}\"{letter}",
+            f"{letter}{deg} {minute} {second}",
+        ):
             assert sexagesimal_deg(text, "EW") == pytest.approx(wanted, abs=1e-9)
     for wrong in ("-8 30 W", "8 60", "8 30 60", "8.5 30", "8 30 N", "1 2 3 4", "8°", "W", "", "8--3",
                   "8,30,0 W", "٨ ٣٠", "8 30" + " " * 50 + "1"):  # fmt: skip
@@ -75,14 +79,18 @@ def test_lines_of_a_title_are_left_out_and_noted(tmp_path, separator):
 def test_a_table_of_one_column_keeps_its_header(tmp_path):
     path = tmp_path / "cells.csv"
     path.write_text("cell\nA\nB\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"expected a column height_m, found none \(columns: cell\)"):
+    with pytest.raises(
+        InputError, match=r"expected a column height_m, found none \(columns: cell\)"
+    ):
         read_cell_plan(path, CRS)
 
 
 def test_rows_of_one_cell_that_differ_are_not_called_the_same(tmp_path):
     assert "(likely: a row given twice)" in refused(tmp_path, {}, {})
     told = refused(tmp_path, {}, {"frequency_mhz": "900"})
-    assert "row 3, cell: expected an id used once, found 'A' (likely: a cell of several carr" in told
+    assert (
+        "row 3, cell: expected an id used once, found 'A' (likely: a cell of several carr" in told
+    )
 
 
 @pytest.mark.parametrize(

@@ -233,7 +233,9 @@ def test_wrong_choices_are_told_together() -> None:
 
 def test_tilts_that_a_list_counts_upwards_are_told() -> None:
     def plan(*tilts_deg, **more):
-        cells = (replace(NORTH, id=f"N{n}", downtilt_deg=t, **more) for n, t in enumerate(tilts_deg))
+        cells = (
+            replace(NORTH, id=f"N{n}", downtilt_deg=t, **more) for n, t in enumerate(tilts_deg)
+        )
         return CellPlan(CRS, tuple(cells))
 
     (told,) = upward_tilts(plan(-6.0, 0.0, -4.0))

@@ -200,7 +200,9 @@ def test_numbers_are_not_scaled_twice(tmp_path):
     with pytest.raises(InputError, match=r"its own scale, 0\.1, .* found a factor of 0\.1 .*leave"):
         open_rasters(path, "level", factor=0.1)
     plain = foreign(tmp_path / "b.tif", data, scales=(1.0, 1.0), offsets=(0.0, 0.0))
-    np.testing.assert_allclose(open_rasters(plain, "level", factor=0.1).read(), data / 10, atol=1e-4)
+    np.testing.assert_allclose(
+        open_rasters(plain, "level", factor=0.1).read(), data / 10, atol=1e-4
+    )
 
 
 def test_masks_and_numbers_that_mean_no_data(tmp_path):
