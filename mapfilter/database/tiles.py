@@ -55,7 +55,8 @@ class TileLevels:
 
     Of each point: the strongest cell (of equals the first in the plan; -1 when none is above the
     floor), its level (of one weaker than the floor, too; NaN without any), and its margin over the
-    second strongest (NaN without one). Of each level, sorted by both: its cell, and the index of its point; and the level, rounded to 0.01 dB.
+    second strongest (NaN without one). Of each level, sorted by both: its cell, and the index of
+    its point; and the level, rounded to 0.01 dB.
     """
 
     best: Ints32

@@ -10,7 +10,7 @@ _LONGEST = 40
 
 
 def sexagesimal_deg(text: str, hemispheres: str) -> float | None:
-    """Return an angle of degrees, minutes and seconds in degrees, or None.
+    r"""Return an angle of degrees, minutes and seconds in degrees, or None.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ def sexagesimal_deg(text: str, hemispheres: str) -> float | None:
 
     Examples
     --------
-    >>> sexagesimal_deg("60°10'12\\"N", "NS"), sexagesimal_deg("W 8 30.6", "EW")
+    >>> sexagesimal_deg("60°10'12\"N", "NS"), sexagesimal_deg("W 8 30.6", "EW")
     (60.17, -8.51)
     >>> sexagesimal_deg("8,51 W", "EW"), sexagesimal_deg("-33:30:00", "NS")
     (-8.51, -33.5)
@@ -43,5 +43,5 @@ def sexagesimal_deg(text: str, hemispheres: str) -> float | None:
     values = [float(part.replace(",", ".")) for part in parts]
     if any(value >= 60 for value in values[1:]) or not all(part.isdecimal() for part in parts[:-1]):
         return None
-    size_deg = round(sum(value / 60**n for n, value in enumerate(values)), 12)
+    size_deg: float = round(sum(value / 60**n for n, value in enumerate(values)), 12)
     return -size_deg if size != bare or letter == hemispheres[1] else size_deg

@@ -1,4 +1,4 @@
-"""Cell plans as people write them: degrees and minutes, titles, units, cells of several carriers."""
+"""Cell plans as people write them: degrees and minutes, titles, units, several carriers."""
 
 import numpy as np
 import pytest
@@ -57,8 +57,8 @@ def test_angles_are_those_of_their_parts(sign):
             f"{letter}{deg} {minute} {second}",
         ):
             assert sexagesimal_deg(text, "EW") == pytest.approx(wanted, abs=1e-9)
-    for wrong in ("-8 30 W", "8 60", "8 30 60", "8.5 30", "8 30 N", "1 2 3 4", "8°", "W", "", "8--3",
-                  "8,30,0 W", "٨ ٣٠", "8 30" + " " * 50 + "1"):  # fmt: skip
+    for wrong in ("-8 30 W", "8 60", "8 30 60", "8.5 30", "8 30 N", "1 2 3 4", "8°", "W", "",
+                  "8--3", "8,30,0 W", "٨ ٣٠", "8 30" + " " * 50 + "1"):  # fmt: skip
         assert sexagesimal_deg(wrong, "EW") is None
 
 

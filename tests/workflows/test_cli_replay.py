@@ -456,7 +456,7 @@ def test_a_database_that_nobody_names_is_named(log, world, tmp_path, monkeypatch
 
 
 def test_python_draws_as_the_command_by_the_name_of_the_log(world, log, replay, tmp_path):
-    assert_done(replay(log, "--seed", "3"))
+    assert_done(replay(log, "--filter", "bayes", "--seed", "3"))
     written = read_estimate(tmp_path / "out" / "estimate.parquet")
     options = load_config(world.toml).filter.bayes.of(mf.BayesFilter)
     track = mf.locate(log, world.database, options, seed=named_rng(3, "replay", "my-walk"))
