@@ -136,8 +136,8 @@ def build(
     ------
     InputError
         Rasters and plan hold different cells, rasters and roads do not align or overlap, metres of
-        their CRS are not metres on the ground (Web Mercator), a parameter is out of range, or no
-        point has a level above the floor.
+        their CRS are not metres on the ground (Web Mercator), cells lie more than 50 km outside, a
+        parameter is out of range, or no point has a level above the floor.
     OutputError
         The folder cannot be written, holds other files than a database, or another build is
         writing it.

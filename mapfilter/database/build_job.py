@@ -15,6 +15,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.far_cells import check_cells_near
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
@@ -63,7 +64,9 @@ class BuildJob:
         if not windows:
             hint = "files of different areas"
             raise fail(InputError, str(rasters.path), "points of the roads", "none", hint)
-        return cls(rasters, plan.to_crs(lattice.crs), source, floor_dbm, tuple(windows))
+        plan = plan.to_crs(lattice.crs)
+        check_cells_near(plan, lattice, "plan")
+        return cls(rasters, plan, source, floor_dbm, tuple(windows))
 
     def task(self, number: int) -> TileTask:
         """Return the task that makes a tile."""

@@ -18,12 +18,13 @@ from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict, simulate_ground_truth
 from mapfilter.propagation.remarks import off_frequency, outside_validity, upward_tilts
 from mapfilter.radio.cells import write_cell_plan
+from mapfilter.radio.far_cells import check_cells_near
 from mapfilter.radio.plan_notes import carrier_notes
 from mapfilter.rasters.geotiff_writer import is_as_written, write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.apart import check_no_input_replaced
-from mapfilter.workflows.world import World, check_cells_near, map_cover
+from mapfilter.workflows.world import World, map_cover
 
 if TYPE_CHECKING:
     from mapfilter.workflows.survey import SurveyResult

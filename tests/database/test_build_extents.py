@@ -120,3 +120,21 @@ def test_rasters_whose_metres_are_none_on_the_ground_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"EPSG:3857, of which 100 m are 79 m .*Web Mercator"):
         build(open_rasters(tmp_path / "a.tif"), make_plan(), routes, tmp_path / "db")
     assert not (tmp_path / "db").exists()
+
+
+@pytest.mark.parametrize(
+    ("move", "hint"),
+    [
+        (lambda c: {"east_m": c.east_m - 460_000.0}, "a CRS of another zone"),
+        (lambda c: {"east_m": c.north_m, "north_m": c.east_m}, "east and north swapped"),
+    ],
+)
+def test_a_plan_of_another_place_is_refused_as_by_the_command(tmp_path, move, hint):
+    world = make_world(tmp_path)
+    cells = tuple(dataclasses.replace(cell, **move(cell)) for cell in world.plan.cells)
+    plan = dataclasses.replace(world.plan, cells=cells)
+    with pytest.raises(
+        InputError, match=rf"plan: expected cells within 50 km .*found 3 of 3.*{hint}"
+    ):
+        build(world.rasters, plan, world.routes, tmp_path / "db")
+    assert not (tmp_path / "db").exists()
