@@ -166,7 +166,7 @@ def _check_is_tiff(path: Path) -> None:
         hint = "a virtual raster or an address; gdal_translate FROM TO.tif copies its pixels"
         raise fail(InputError, str(path), _ELSEWHERE, "text that may lead to other places", hint)
     got = "an empty file" if not head else "no TIFF"
-    hint = "cut off, or no raster"
+    hint = "cut off, or no raster; gdal_translate FROM TO.tif converts other formats"
     raise fail(InputError, str(path), "a raster that GDAL can read (GeoTIFF)", got, hint)
 
 

@@ -23,6 +23,9 @@ from mapfilter.errors import Faults, InputError, fail
 
 _SHORT = 20
 _LEAST_UTM_DEG, _MOST_UTM_DEG = -80.0, 84.0
+_EARTH_RADIUS_M = 6_371_000.0
+_SHORT_M = 100.0
+_SCALE_TOLERANCE = 0.03
 
 
 def wrap_rad(angle_rad: ArrayLike) -> Floats:
@@ -247,6 +250,26 @@ def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> 
     elif west >= east or south >= north:
         faults.add(where, "west < east and south < north", bbox, "corners swapped")
     faults.raise_if_any(InputError)
+
+
+def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
+    """Check that metres of a CRS are metres on the ground in the middle of an area.
+
+    Raises
+    ------
+    InputError
+        They differ by more than 3 %: the CRS is made for another region or is Web Mercator.
+    """
+    west, south, east, north = bounds_m
+    middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
+    ends_m = middle_m + np.array([[0.0, _SHORT_M], [0.0, 0.0]])
+    lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
+    along_rad = np.hypot(np.diff(lon_rad) * np.cos(lat_rad[0]), np.diff(lat_rad))
+    ground_m = float(along_rad[0] * _EARTH_RADIUS_M)
+    if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:
+        expected = "a CRS whose metres are metres on the ground in this area"
+        got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
+        raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
 
 
 @lru_cache(maxsize=16)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import same_crs, short_crs
 
@@ -142,3 +143,11 @@ class Lattice:
             and abs(self.north_m - other.north_m) <= tolerance_m
             and same_crs(self.crs, other.crs)
         )
+
+
+def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
+    """Return how far outside a lattice positions lie; 0 inside."""
+    west, south, east, north = lattice.bounds_m
+    off_east_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
+    off_north_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
+    return np.asarray(np.hypot(off_east_m, off_north_m))

@@ -106,6 +106,7 @@ REMEDIES = {
     "site-labels-swapped": "Exchange the labels of the rasters, or the positions in the plan.",
     "site-off-peak": "Correct the site's position, or take the raster that belongs to the cell.",
     "site-outside-area": "Correct the position, or take the cell out if it is not of this area.",
+    "tilts-upwards": "Change the sign of the tilts: downtilts are positive below the horizon.",
     "values-implausible": "Check rasters.factor and rasters.quantity.",
     "ways-with-gaps": "Raise half widths to half a pixel, or read the rasters on finer pixels "
     "(rasters.resolution_m; of rasters that mapfilter predicts, area.resolution_m).",
@@ -122,6 +123,7 @@ _BY_HINT = {
     "GHz given for MHz": "frequency-unit",
     "Hz given for MHz": "frequency-unit",
     "a row given twice": "duplicate-id",
+    "a cell of several carriers or antennas; give each its own id, or keep one": "duplicate-id",
     "a cell of another place, or another CRS": "crs-mixed",
     "two systems mixed up": "crs-mixed",
     "another zone": "crs-mixed",

@@ -170,7 +170,8 @@ def sampled(
     if nodata:
         worst = max(nodata, key=lambda one: one[2])
         ids = listed([one[0] for one in nodata])
-        evidence = f"{worst[1]:g} stands in up to {worst[2]:.1%} of the pixels, as a number."
+        share = f"{worst[2]:.1%}" if worst[2] >= 0.01 else f"{worst[2]:.2%}"
+        evidence = f"{worst[1]:g} stands in up to {share} of the pixels, as a number."
         findings.add("nodata-as-level", f"{where}, cells {ids}", evidence)
     if empty:
         cells = f"{where}, cells {listed(empty)}"

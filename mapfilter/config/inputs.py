@@ -156,7 +156,7 @@ class Rasters(Section):
     ----------
     path : Path, optional
         A GeoTIFF, a folder of rasters or an index of them (Atoll); by default ``rxlev.tif`` in the
-        output folder.
+        output folder. Other keys describe these files, or those of ``calibrate`` of a survey.
     ground_truth : Path, optional
         Rasters of the simulated ground truth; by default ``rxlev-ground-truth.tif`` in the output
         folder.
@@ -165,7 +165,7 @@ class Rasters(Section):
     crs : str, optional
         CRS of files without one.
     factor : float
-        dB per stored unit, such as 0.0625 for sixteenths.
+        dB per stored unit, such as 0.0625 for sixteenths; not of files that state a scale.
     nodata : float, optional
         A stored number that means no data, besides those that the files name.
     resolution_m : float, optional
@@ -184,13 +184,16 @@ class Rasters(Section):
     resampling: Literal["nearest", "bilinear"] = "nearest"
 
     @model_validator(mode="after")
-    def _keys_of_a_path(self) -> Rasters:
-        given = (self.quantity, self.crs, self.nodata, self.resolution_m)
-        if self.path is None and (any(one is not None for one in given) or self.factor != 1):
-            raise ValueError("path, which the other keys describe")
+    def _factor_of_something(self) -> Rasters:
         if self.factor == 0:
             raise ValueError("a factor other than 0")
         return self
+
+    @property
+    def describes_files(self) -> bool:
+        """Whether keys describe files that another program wrote."""
+        given = (self.quantity, self.crs, self.nodata, self.resolution_m)
+        return any(one is not None for one in given) or self.factor != 1
 
 
 class Database(Section):

@@ -10,6 +10,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Literal
 
+from pydantic import ValidationInfo, field_validator
+
 from mapfilter.config.fields import (
     Count,
     FilePath,
@@ -139,6 +141,18 @@ class Config(Section):
     integrity: IntegritySection = IntegritySection()
     sweep: SweepSection = SweepSection()
     output: Output = Output()
+
+    @field_validator("rasters", mode="after")
+    @classmethod
+    def _keys_describe_files(cls, rasters: Rasters, given: ValidationInfo) -> Rasters:
+        prediction = given.data.get("prediction")
+        # Of a section with faults of its own nothing is known.
+        calibrates = prediction is None or (
+            prediction.model == "survey" and prediction.survey.calibrate is not None
+        )
+        if rasters.describes_files and rasters.path is None and not calibrates:
+            raise ValueError("path, which the other keys describe")
+        return rasters
 
     @property
     def rasters_path(self) -> Path:

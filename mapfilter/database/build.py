@@ -135,7 +135,8 @@ def build(
     Raises
     ------
     InputError
-        Rasters and plan hold different cells, rasters and roads do not align or overlap, a
+        Rasters and plan hold different cells, rasters and roads do not align or overlap, metres of
+        their CRS are not metres on the ground (Web Mercator), cells lie more than 50 km outside, a
         parameter is out of range, or no point has a level above the floor.
     OutputError
         The folder cannot be written, holds other files than a database, or another build is
@@ -192,8 +193,9 @@ def build(
             raise fail(InputError, str(rasters.path), expected, got, hint)
         counts = {
             "points": written.received,
-            "points_below_floor": written.points - written.received,
+            "points_below_floor": written.below_floor,
             "points_off_rasters": job.off_rasters(written.points),
+            "points_without_level": written.points - written.received - written.below_floor,
         }
         inputs = (*inputs, InputFile("rasters", rasters.path.name, digest.result()))
         parts = None

@@ -12,8 +12,10 @@ from mapfilter.database.parquet import Window
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, cut_by_tile, overlap
 from mapfilter.database.tiles import TileRows, TileTask, grouped, read_tiles, tile_windows
 from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.far_cells import check_cells_near
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
@@ -49,6 +51,7 @@ class BuildJob:
 
         Errors are those of :func:`mapfilter.database.build.build`.
         """
+        check_scale(rasters.lattice.crs, rasters.lattice.bounds_m, f"{rasters.path}, CRS")
         source = cut_by_tile(routes)
         rasters = named_by_plan(rasters, plan)
         check_against_plan(rasters, plan)
@@ -61,7 +64,9 @@ class BuildJob:
         if not windows:
             hint = "files of different areas"
             raise fail(InputError, str(rasters.path), "points of the roads", "none", hint)
-        return cls(rasters, plan.to_crs(lattice.crs), source, floor_dbm, tuple(windows))
+        plan = plan.to_crs(lattice.crs)
+        check_cells_near(plan, lattice, "plan")
+        return cls(rasters, plan, source, floor_dbm, tuple(windows))
 
     def task(self, number: int) -> TileTask:
         """Return the task that makes a tile."""

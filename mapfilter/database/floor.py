@@ -22,6 +22,8 @@ The latter three are of a part of the carrier (:mod:`mapfilter.radio.reported_po
 weaker where the carrier is as strong.
 """
 
+_WEAK_SHARE = 0.05
+
 
 def floor_of(plan: CellPlan, floor_dbm: float | None = None) -> float:
     """Return the floor of a database: the one that is given, or the usual one of its cells (dBm).
@@ -46,6 +48,30 @@ def floor_notes(plan: CellPlan, floor_dbm: float | None = None) -> tuple[str, ..
     names = (name for name in _technologies(plan) if FLOORS_DBM[name] == taken_dbm)
     reason = f"the usual one of {' and '.join(sorted(names))} cells"
     return (f"database.floor_dbm = {taken_dbm:g} is taken, {reason}",)
+
+
+def weak_points_note(counts: Mapping[str, int], floor_dbm: float) -> tuple[str, ...]:
+    """Return a note where the floor leaves out more than 5 % of the points that have levels.
+
+    Parameters
+    ----------
+    counts : mapping of str to int
+        Of the manifest of a database that was built.
+
+    Examples
+    --------
+    >>> weak_points_note({"points": 990, "points_below_floor": 10}, -104.0)
+    ()
+    """
+    weak = counts["points_below_floor"]
+    points = counts["points"] + weak
+    if weak <= _WEAK_SHARE * points:
+        return ()
+    why = "likely: RSRP or RSCP, which are weaker than RxLev: lower it, or state the technology"
+    return (
+        f"{weak} of {points} points left out: all of their levels are below database.floor_dbm = "
+        f"{floor_dbm:g} ({why} of the cells)",
+    )
 
 
 def _technologies(plan: CellPlan) -> set[str]:

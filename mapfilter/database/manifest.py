@@ -97,6 +97,7 @@ class _Counts(_Strict):
     points: _Count
     points_below_floor: _Count | None
     points_off_rasters: _Count | None
+    points_without_level: _Count | None = None
 
 
 class _Part(_Strict):

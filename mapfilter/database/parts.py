@@ -90,8 +90,8 @@ class PartWriter:
 
     With several ``writers`` as many threads write these parts while rows of the next ones are
     collected, and no longer than that: twice as many rows are in memory. The parts do not depend on
-    it. ``points`` counts those added and ``received`` those of them with a level; ``parts`` are the
-    manifest's entries at the end.
+    it. ``points`` counts those added, ``received`` those of them with a level above the floor and
+    ``below_floor`` those with weaker ones only; ``parts`` are the manifest's entries at the end.
     """
 
     def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int = 1) -> None:
@@ -105,7 +105,7 @@ class PartWriter:
         self._points_file: pq.ParquetWriter | None = None
         self._bounds: tuple[Floats, Floats] = (np.full(2, np.inf), np.full(2, -np.inf))
         self._written: dict[int, list[dict[str, Any]]] = {}
-        self.points, self.received = 0, 0
+        self.points, self.received, self.below_floor = 0, 0, 0
         self.parts: list[dict[str, Any]] = []
 
     def __enter__(self) -> PartWriter:
@@ -124,6 +124,8 @@ class PartWriter:
         points = points_table(places, levels, self._cell_ids)
         self.points += places.num_rows
         self.received += points.num_rows
+        weak = (levels.best < 0) & np.isfinite(levels.best_level_dbm)
+        self.below_floor += int(np.count_nonzero(weak))
         if points.num_rows:
             self._points.append(points)
         for cell, rows in levels_rows(places, levels):

@@ -97,8 +97,9 @@ def rewrite(
             raise fail(InputError, str(out), "a level above the floor", "none")
         counts = {
             "points": written.received,
-            "points_below_floor": written.points - written.received,
+            "points_below_floor": written.below_floor,
             "points_off_rasters": None,
+            "points_without_level": written.points - written.received - written.below_floor,
         }
         measured = database.measured()
         if measured is not None:

@@ -54,8 +54,9 @@ class TileLevels:
     """Levels at a tile's N points: L of them in all.
 
     Of each point: the strongest cell (of equals the first in the plan; -1 when none is above the
-    floor), its level, and its margin over the second strongest (NaN without one). Of each level,
-    sorted by both: its cell, and the index of its point; and the level, rounded to 0.01 dB.
+    floor), its level (of one weaker than the floor, too; NaN without any), and its margin over the
+    second strongest (NaN without one). Of each level, sorted by both: its cell, and the index of
+    its point; and the level, rounded to 0.01 dB.
     """
 
     best: Ints32
@@ -197,6 +198,8 @@ def received_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
         strength = np.full((1, *strength.shape[1:]), -np.inf)
     best = strength.argmax(axis=0)
     best_dbm = strength.max(axis=0)
+    received = np.isfinite(best_dbm)
+    strongest_dbm = np.where(received, best_dbm, np.fmax.reduce(level, axis=0, initial=np.nan))
     second_dbm = np.full_like(best_dbm, -np.inf)
     if len(strength) > 1:
         second_dbm = np.partition(strength, -2, axis=0)[-2]
@@ -205,8 +208,8 @@ def received_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
     cell, which = np.nonzero(np.isfinite(strength))
     kept_dbm = strength[cell, which]
     return TileLevels(
-        np.where(np.isfinite(best_dbm), best, -1).astype(np.int32),
-        best_dbm.astype(np.float32),
+        np.where(received, best, -1).astype(np.int32),
+        strongest_dbm.astype(np.float32),
         np.round(margin, 2).astype(np.float32),
         cell.astype(np.int32),
         which.astype(np.int32),

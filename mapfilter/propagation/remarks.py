@@ -1,4 +1,4 @@
-"""Remarks on predictions outside the published range of a model, or of an antenna's frequency."""
+"""Remarks on predictions: outside what models and patterns are made for, or of unlikely tilts."""
 
 from __future__ import annotations
 
@@ -56,6 +56,23 @@ def off_frequency(plan: CellPlan, antennas: Antennas) -> tuple[str, ...]:
             note = f"antenna {cell.antenna!r} was measured at {measured.frequency_mhz:g} MHz"
             ids[note].append(cell.id)
     return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
+
+
+def upward_tilts(plan: CellPlan) -> tuple[str, ...]:
+    """Return a remark where most tilted outdoor antennas of a plan look upwards.
+
+    Some do in hilly towns; most do where the list counts angles upwards.
+    """
+    notes = []
+    for name in ("downtilt_deg", "mechanical_downtilt_deg"):
+        tilts = {cell.id: getattr(cell, name) for cell in plan.cells if not cell.indoor}
+        upward = [cell_id for cell_id, tilt_deg in tilts.items() if tilt_deg < 0]
+        if 2 * len(upward) > sum(tilt_deg != 0 for tilt_deg in tilts.values()):
+            notes.append(
+                f"{_named(upward)}: {name} below 0, such as {tilts[upward[0]]:g}: above the "
+                "horizon (likely: the list counts tilts upwards)"
+            )
+    return tuple(notes)
 
 
 def _named(ids: list[str]) -> str:

@@ -30,12 +30,14 @@ from mapfilter.radio.cell_rules import (
 )
 from mapfilter.radio.headings import Heading, places_named, resembling, unit_of
 from mapfilter.radio.identities import technology
-from mapfilter.radio.tables import number, read_table
+from mapfilter.radio.sexagesimal import sexagesimal_deg
+from mapfilter.radio.tables import number, read_table, why_no_number
 
 _ALLOWED = {*COLUMNS, "east", "north", "crs", *OFFSETS, *chain.from_iterable(ALIASES.values())}
 _REQUIRED = ("cell", "height_m", "eirp_dbm", "frequency_mhz")
 _DEFAULT_HINT = "set cells.{}, which is then taken for all cells without one"
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
+_HEMISPHERES = {"lat": "NS", "lon": "EW"}
 _NEAR_DEG = 3.0
 _OTHER_LAYOUTS: Mapping[Layout, str] = {
     "atoll": "transmitters of Atoll",
@@ -157,6 +159,9 @@ def _check_fields(
         if name not in fields:
             hint = f"left out or misspelt; cells.columns.{name} names a column called otherwise"
             hint += f"; or {_DEFAULT_HINT.format(name)}" if name in RANGES else ""
+            if name == "eirp_dbm" and any("power" in one.lower() for one in header):
+                what = "the power in dBm plus the antenna gain in dBi less losses"
+                hint = f"{what} belongs in it; else {hint}"
             faults.add(where, f"a column {name}", none_of(header), hint)
 
 
@@ -172,12 +177,16 @@ def _row(where: str, line: int, given: Mapping[str, str], table: Arranged, fault
     def parse(name: str, expected: str) -> float | None:
         text = given[name]
         value = number(text, decimal_comma=table.decimal_comma)
+        if value is None and name in _HEMISPHERES:
+            value = sexagesimal_deg(text, _HEMISPHERES[name])
         if value is None:
-            comma = "," in text and text.replace(",", "", 1).lstrip("-").isdigit()
             got = repr(text[:_LONGEST_SHOWN]) if text else "nothing"
             if text.lower().lstrip("+-") in ("nan", "inf", "infinity"):
                 got = text
-            refuse(name, expected, got, "a decimal comma" if comma else "")
+            why = why_no_number(text)
+            if name == "azimuth_deg" and not (why or any(map(str.isdigit, text))):
+                why = "to be left empty where the antenna is omnidirectional"
+            refuse(name, expected, got, why)
         return value
 
     values["id"], values["site"] = given["cell"], given.get("site") or given["cell"]
@@ -197,7 +206,7 @@ def _row(where: str, line: int, given: Mapping[str, str], table: Arranged, fault
             values[name] = None
     for name in ("lat", "lon", "east", "north"):
         if name in given:
-            values[name] = parse(name, "a number")
+            values[name] = parse(name, "degrees" if name in _HEMISPHERES else "a number")
     for name in OFFSETS:
         if given.get(name):
             value = parse(name, OFFSET.expected)

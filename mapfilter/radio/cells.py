@@ -210,7 +210,10 @@ def check_cells(
             hint = "azimuth left out, or the antenna is omni"
             faults.add(where(i, "azimuth_deg"), expected, "nothing", hint)
         if cell.id in first:
-            faults.add(where(i, "cell"), "an id used once", repr(cell.id), "a row given twice")
+            hint = "a row given twice"
+            if cell != cells[first[cell.id]]:
+                hint = "a cell of several carriers or antennas; give each its own id, or keep one"
+            faults.add(where(i, "cell"), "an id used once", repr(cell.id), hint)
         first.setdefault(cell.id, i)
     azimuths = [cell.azimuth_deg for cell in cells if cell.azimuth_deg is not None]
     if looks_like_radians(azimuths):

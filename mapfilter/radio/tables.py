@@ -8,19 +8,23 @@ import math
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
+from string import ascii_letters
 from typing import Any
 
 from python_calamine import CalamineError, CalamineWorkbook
 
 from mapfilter._inputs import first_foreign_byte, read_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
 
 _LARGEST_BYTES = 1 << 26
 _LARGEST_UNPACKED_BYTES = 1 << 29
 _MOST_FIELDS = 5_000_000
 _MOST_COLUMNS = 1000
+_MOST_TITLES = 10
 _SEPARATORS = (",", ";", "\t")
 _WIDE_SHARE = 0.4
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
@@ -73,11 +77,30 @@ def number(text: str, *, decimal_comma: bool = False) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def why_no_number(text: str) -> str:
+    """Return the likely reason why a text is no number, or "".
+
+    Examples
+    --------
+    >>> why_no_number("60,5"), why_no_number("5.334.900,5")
+    ('a decimal comma', 'marks between thousands; leave them out')
+    >>> why_no_number("30 m"), why_no_number("high")
+    ('a unit beside the number; leave it out', '')
+    """
+    if "," in text and text.replace(",", "", 1).lstrip("-").isdigit():
+        return "a decimal comma"
+    if text.translate(dict.fromkeys(map(ord, " .,'’\u00a0\u202f"))).lstrip("-").isdigit():
+        return "marks between thousands; leave them out"
+    begins = text.split(maxsplit=1)[0].rstrip(f"°%µ{ascii_letters}") if text.strip() else ""
+    return "a unit beside the number; leave it out" if number(begins) is not None else ""
+
+
 def read_table(path: Path, what: str) -> Table:
     """Read a table whose first line names its columns.
 
     Text has commas, semicolons or tabs, and is UTF-8, UTF-16 or UTF-32 with a byte order mark, or
-    else Windows-1252 (with a note); a first line ``sep=;`` is no header. Of a workbook (.xlsx,
+    else Windows-1252 (with a note); a first line ``sep=;`` is no header, nor are up to ten lines of
+    a title, which hold no separator (with a note). Of a workbook (.xlsx,
     .xls, .ods) the first sheet is read.
 
     Parameters
@@ -95,7 +118,8 @@ def read_table(path: Path, what: str) -> Table:
         return _read_workbook(path, data, what)
     text, notes = _decoded(path, data)
     text = without_separator_line(text)
-    head = next((line for line in text.splitlines() if line.strip()), "")
+    heads = [*islice((line for line in text.splitlines() if line.strip()), _MOST_TITLES + 1)]
+    head = next((line for line in heads if any(mark in line for mark in _SEPARATORS)), "")
     separator = max(_SEPARATORS, key=head.count)
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
     lines: list[tuple[int, list[str]]] = []
@@ -111,6 +135,11 @@ def read_table(path: Path, what: str) -> Table:
         raise fail(InputError, f"{path} row {reader.line_num}", "CSV", error) from error
     if not lines:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "an empty file")
+    titles = next((n for n, (_, row) in enumerate(lines) if len(row) > 1), 0)
+    if 0 < titles <= _MOST_TITLES:
+        some = number_of(titles, "line")
+        notes += (f"{path.name}: {some} above the header left out: {lines[0][1][0].strip()!r}",)
+        lines = lines[titles:]
     header = tuple(name.strip() for name in lines[0][1])
     if len(header) > _MOST_COLUMNS:
         expected = f"{what} of at most {_MOST_COLUMNS} columns"

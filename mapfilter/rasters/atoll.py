@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from mapfilter._inputs import open_input
+from mapfilter._inputs import open_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.lattice import Lattice
@@ -143,11 +143,13 @@ def _is_index(path: Path) -> bool:
         return False
     try:
         with open_input(path) as stream:
-            head = without_separator_line(stream.read(_LONGEST_HEAD_BYTES)).upper()
+            data = stream.read(_LONGEST_HEAD_BYTES)
     except (OSError, InputError):
         return False
-    first = next((line for line in head.splitlines() if line.strip()), b"")
-    return all(name.encode() in first for name in INDEX_COLUMNS)
+    head = data.decode(wide_encoding(data) or "utf-8", errors="replace")
+    lines = without_separator_line(head).upper().splitlines()
+    first = next((line for line in lines if line.strip()), "")
+    return all(name in first for name in INDEX_COLUMNS)
 
 
 def _rows(
@@ -190,7 +192,8 @@ def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:
     if not place.parts or place.is_absolute() or ".." in place.parts or ":" in name or "\0" in name:
         return None
     # Names from Windows ignore the case.
-    path = folder / (names.get(name.lower(), name) if len(place.parts) == 1 else place)
+    own = place.name
+    path = folder / (names.get(own.lower(), own) if len(place.parts) == 1 else place)
     try:
         # A name may be longer than the file system allows.
         held = path.is_file() and path.resolve().is_relative_to(folder.resolve())

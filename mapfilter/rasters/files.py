@@ -38,6 +38,8 @@ class Declared:
         Projected CRS.
     nodata : float or None
         A number that means no data, besides the files' own.
+    factor : float
+        By which all numbers are multiplied; 1 of files that state scales of their own.
     header : (str, mapping of str to str) or None
         Row of an index of raw pixels, and the keys and values of a header; used where the pixels
         have none, or one without the place.
@@ -45,6 +47,7 @@ class Declared:
 
     crs: str | None = None
     nodata: float | None = None
+    factor: float = 1.0
     header: tuple[str, Mapping[str, str]] | None = None
 
 

@@ -77,6 +77,7 @@ def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
                 described = names != ("",)
                 names = names if described else (cell_id,)
                 _check_bands(str(path), names, source.dtypes, faults)
+                _check_scale(str(path), source, declared.factor, faults)
                 lattice = _lattice(str(path), source, declared.crs, not caught, faults)
                 quantity, tagged = _quantity(source), QUANTITY_TAG in source.tags()
                 # Those beside it, such as .aux.xml, change what is read.
@@ -137,6 +138,15 @@ def _lattice(
     elif crs is not None:
         return Lattice(crs, t.c, t.f, t.a, source.height, source.width)
     return None
+
+
+def _check_scale(where: str, source: Any, factor: float, faults: Faults) -> None:
+    """Check that numbers are not multiplied twice: by the file's own scale and by a factor."""
+    scale = next((scale for scale in source.scales if scale != 1), None)
+    if factor != 1 and scale is not None:
+        expected = f"no factor, as the file states its own scale, {scale:g}, which is applied"
+        hint = "leave the factor out; gdal_translate -unscale writes numbers without a scale"
+        faults.add(f"{where}, scale", expected, f"a factor of {factor:g}", hint)
 
 
 def _check_bands(where: str, names: tuple[str, ...], dtypes: Sequence[str], faults: Faults) -> None:

@@ -99,7 +99,8 @@ def open_rasters(
     )
     path = Path(path)
     _check_options(crs, factor, nodata, resolution_m)
-    declared = Declared(projected_crs(crs, "rasters, crs") if crs is not None else None, nodata)
+    crs = projected_crs(crs, "rasters, crs") if crs is not None else None
+    declared = Declared(crs, nodata, float(factor))
     index = find_index(path) if path.is_dir() else None
     if path.suffix.lower() in INDEX_SUFFIXES and not path.is_dir():
         check_file(path)
@@ -167,7 +168,9 @@ def _listed(folder: Path) -> list[Path]:
     found = sorted(path for path in folder.iterdir() if _is_raster(path))
     if not found:
         expected = f"raster files ({', '.join(FORMATS)}) or an index of them"
-        raise fail(InputError, str(folder), expected, "none in this folder")
+        others = sorted(path.name for path in folder.iterdir() if path.is_file())
+        hint = f"gdal_translate FROM TO.tif converts others, such as {others[0]}" if others else ""
+        raise fail(InputError, str(folder), expected, "none in this folder", hint)
     if len(found) > _MOST_FILES:
         raise fail(InputError, str(folder), f"at most {_MOST_FILES} rasters", len(found))
     return found

@@ -68,7 +68,11 @@ class GridHeader:
     @classmethod
     def read(cls, path: Path) -> GridHeader:
         """Read the header file of raw pixels."""
-        return cls.of(str(path), read_input(path, _LARGEST_HEADER_BYTES, "a header").splitlines())
+        lines = read_input(path, _LARGEST_HEADER_BYTES, "a header").splitlines()
+        if lines and lines[0].strip() == b"ENVI":
+            hint = "gdal_translate FROM TO.tif converts the raster"
+            raise fail(InputError, str(path), "a header of ESRI (NROWS, NCOLS, …)", "ENVI", hint)
+        return cls.of(str(path), lines)
 
     def first(self, *keys: str) -> str | None:
         """Return the first of some keys that is there."""

@@ -27,6 +27,7 @@ from mapfilter.rasters.files import (
 from mapfilter.rasters.resampling import Resampling, read_on
 
 _LARGEST_READ_BYTES = 4 << 30
+_TRIED = 3
 
 
 @dataclass(frozen=True, repr=False)
@@ -213,12 +214,26 @@ def in_other_case(unknown: Sequence[str], missing: Sequence[str]) -> str:
     return f"names differ in upper and lower case only: raster {name!r}, cell {cell_id!r}{others}"
 
 
+def _several_of_one(unknown: Sequence[str], missing: Sequence[str]) -> str:
+    """Return that several rasters have the name of one cell in theirs, or ""."""
+    for cell_id in missing[:_TRIED]:
+        several = [name for name in unknown if cell_id in name]
+        if len(several) > 1 and len(unknown) >= 2 * len(missing):
+            some = " and ".join(map(repr, several[:2]))
+            return (
+                f"several rasters of cell {cell_id!r}, such as {some}; join tiles of an area "
+                "(gdal_merge.py), and leave one raster for each cell"
+            )
+    return ""
+
+
 def check_against_plan(rasters: RxLevRasters, plan: CellPlan) -> None:
     """Check that rasters and plan hold the same cells."""
     faults, held = Faults(), set(rasters.cell_ids)
     unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
     missing = [cell_id for cell_id in plan.ids if cell_id not in held]
-    hint = in_other_case(unknown, missing) or "rasters and plan of different dates or places"
+    hint = in_other_case(unknown, missing) or _several_of_one(unknown, missing)
+    hint = hint or "rasters and plan of different dates or places"
     if unknown:
         got = listed([repr(one) for one in unknown])
         faults.add(str(rasters.path), "cells of the plan only", got, hint)

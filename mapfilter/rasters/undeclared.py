@@ -30,7 +30,7 @@ def nodata_taken_as_level(values: Floats32, factor: float = 1.0) -> tuple[float,
 
     That is one and the same number, beyond all levels (such as -9999), exactly 0 among levels
     that are below it, the largest number of an integer type, far above all others, or any number
-    that hardly a level or loss reaches (-1, -200), in many pixels and far from all others.
+    that hardly a level or loss reaches (-1, -200), in 20 pixels or more and far from all others.
 
     Parameters
     ----------
@@ -94,14 +94,18 @@ def check_nodata_stated(
     for cell_id, band in zip(cells, values, strict=True):
         number, share = nodata_taken_as_level(band, factor) or (np.nan, 0.0)
         if low < number < high and share * np.count_nonzero(~np.isnan(band)) >= _FEWEST:
-            got = f"{number:g} in {share:.0%} of the pixels of a tile"
+            part = f"{share:.0%}" if share >= _TELLING_SHARE else f"{share:.2%}"
+            got = f"{number:g} in {part} of the pixels of a tile"
             hint = f"{number:g} means no data, and the file does not state it; set nodata"
             faults.add(f"{path} pixels, cell {cell_id}", f"a {quantity}, or no data", got, hint)
     faults.raise_if_any(InputError)
 
 
 def _far_from_others(known: Floats32) -> tuple[float, float] | None:
-    """Return a number in many pixels that hardly a level or loss reaches, and its share."""
+    """Return a number that hardly a level or loss reaches, and its share.
+
+    It may be that of a small hole in the data: on a street it would be the strongest level by far.
+    """
     if not known.size:
         return None
     low, high = float(known.min()), float(known.max())
@@ -113,8 +117,7 @@ def _far_from_others(known: Floats32) -> tuple[float, float] | None:
     for number in likely:
         count = np.count_nonzero(known == number)
         near = np.count_nonzero(np.abs(known - number) < _FAR_DB) - count
-        often = count >= max(_TELLING_SHARE * known.size, _FEWEST) and count < known.size
-        if often and count > _MANY_TIMES * near:
+        if _FEWEST <= count < known.size and count > _MANY_TIMES * near:
             return number, float(count) / known.size
     return None
 

@@ -30,6 +30,10 @@ _FILES_NAMED = 3
 _SUFFIXES = (".csv", ".log", ".tsv")
 _RECORDED_SUFFIXES = (".txt", ".gz")
 _HEAD_OF_LOG = "log.json"
+_NO_CELLS = (
+    "the column of cells has another name; columns.cell names it (prediction.survey.columns.cell), "
+    "or mcc, mnc, lac and ci"
+)
 
 
 def read_measurements(
@@ -81,7 +85,9 @@ def read_measurements(
             aside = "; ".join(counted(count, what) for what, count in table.aside.items())
             got = number_of(table.read, "row") + (f": {aside}" if aside else "")
             expected = "at least one level with cell and position"
-            faults.extend(table.faults or (Fault(str(path), expected, got),))
+            unnamed = any("without identity" in what for what in table.aside)
+            hint = _NO_CELLS if unnamed else ""
+            faults.extend(table.faults or (Fault(str(path), expected, got, hint),))
     if faults:
         raise InputError(tuple(faults))
     if crs is None:

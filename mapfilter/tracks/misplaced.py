@@ -10,7 +10,7 @@ from pyproj.exceptions import ProjError
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
 from mapfilter.geodesy import project, unproject
-from mapfilter.lattice import Lattice
+from mapfilter.lattice import Lattice, outside_m
 
 AWAY_M = 5000.0
 """Positions all of which lie farther outside of an area are those of another one."""
@@ -29,14 +29,6 @@ UNDONE = {
 _MOST_TRIED = 200
 _TIMES = 10.0
 """Undoing a mistake brings positions so many times nearer, or it explains nothing."""
-
-
-def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
-    """Return how far outside a lattice positions lie; 0 inside."""
-    west, south, east, north = lattice.bounds_m
-    off_east_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
-    off_north_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
-    return np.asarray(np.hypot(off_east_m, off_north_m))
 
 
 def nearest_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> float:

@@ -7,15 +7,12 @@ import numpy as np
 from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults, InputError, fail
-from mapfilter.geodesy import check_bbox, project, projected_crs, unproject, utm_crs
+from mapfilter.geodesy import check_bbox, check_scale, project, projected_crs, utm_crs
 from mapfilter.lattice import Lattice
 from mapfilter.roads.maps import check_on_map, map_bounds_deg
 from mapfilter.roads.raster import raster_lattice
 
 LARGEST_AREA_PX = 400_000_000
-EARTH_RADIUS_M = 6_371_000.0
-_SHORT_M = 100.0
-_SCALE_TOLERANCE = 0.03
 
 
 def area_lattice(area: Area, *, on_map: bool = True) -> Lattice:
@@ -82,23 +79,3 @@ def roads_lattice(config: Config) -> Lattice:
         got = f"{lattice.rows * lattice.cols:.1e} at {area.resolution_m:g} m"
         raise fail(ConfigError, f"{raster}, area.resolution_m", expected, got, "a large raster")
     return lattice
-
-
-def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
-    """Check that metres of a CRS are metres on the ground in the middle of an area.
-
-    Raises
-    ------
-    InputError
-        They differ by more than 3 %: the CRS is made for another region or is Web Mercator.
-    """
-    west, south, east, north = bounds_m
-    middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
-    ends_m = middle_m + np.array([[0.0, _SHORT_M], [0.0, 0.0]])
-    lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
-    along_rad = np.hypot(np.diff(lon_rad) * np.cos(lat_rad[0]), np.diff(lat_rad))
-    ground_m = float(along_rad[0] * EARTH_RADIUS_M)
-    if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:
-        expected = "a CRS whose metres are metres on the ground in this area"
-        got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
-        raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")

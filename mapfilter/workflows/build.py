@@ -14,7 +14,7 @@ from mapfilter.config.sections import Config
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.build_job import TASKS_A_WORKER
 from mapfilter.database.estimate import BuildEstimate, dry_run
-from mapfilter.database.floor import floor_notes
+from mapfilter.database.floor import floor_notes, weak_points_note
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.measured import Readings, read_checked_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -100,6 +100,7 @@ def run_build(
         )
     counts: dict[str, Any] = database.manifest["counts"]
     floor = floor_notes(plan, section.floor_dbm)
+    floor = (*floor, *weak_points_note(counts, database.floor_dbm))
     cover = (*raster_cover(config.area, world.lattice), *map_cover(world))
     return BuildResult(
         points=int(counts["points"]),

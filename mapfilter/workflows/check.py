@@ -19,8 +19,9 @@ from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, MapfilterError, listed
+from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
-from mapfilter.propagation.remarks import off_frequency
+from mapfilter.propagation.remarks import off_frequency, upward_tilts
 from mapfilter.radio.arrange_cells import UNUSED_COLUMNS
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
@@ -133,6 +134,7 @@ class _Checks:
     def _opened(self, path: Path, open_them: Callable[[], RxLevRasters]) -> RxLevRasters | None:
         with self._reported("rasters-invalid"):
             rasters = open_them()
+            check_scale(rasters.lattice.crs, rasters.lattice.bounds_m, f"{path}, CRS")
             if rasters.quantity != "deviation":
                 return rasters
             evidence = "The file holds the deviations of a survey, not its levels."
@@ -225,6 +227,8 @@ class _Checks:
         check_power(levels, plan, self.plan_name, findings)
 
     def check_antennas(self, plan: CellPlan, lattice: Lattice, severity: Severity) -> None:
+        for note in upward_tilts(plan):
+            self.findings.add("tilts-upwards", self.plan_name, f"{note}.", "warning")
         named = sorted({cell.antenna for cell in plan.cells} - set(ANTENNAS))
         if not named:
             return

@@ -9,12 +9,11 @@ from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
 from mapfilter.geodesy import same_crs, short_crs
-from mapfilter.lattice import Lattice
+from mapfilter.lattice import Lattice, outside_m
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.misplaced import outside_m
 from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame

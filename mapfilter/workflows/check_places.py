@@ -14,12 +14,11 @@ from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, listed
 from mapfilter.geodesy import project, projected_crs, same_crs, unproject, utm_zone, utm_zone_crs
-from mapfilter.lattice import Lattice
+from mapfilter.lattice import Lattice, outside_m
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg
 from mapfilter.roads.ways import Ways
-from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.world import area_lattice
 
 BoxDeg = tuple[float, float, float, float]

@@ -16,14 +16,15 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict, simulate_ground_truth
-from mapfilter.propagation.remarks import off_frequency, outside_validity
+from mapfilter.propagation.remarks import off_frequency, outside_validity, upward_tilts
 from mapfilter.radio.cells import write_cell_plan
+from mapfilter.radio.far_cells import check_cells_near
 from mapfilter.radio.plan_notes import carrier_notes
 from mapfilter.rasters.geotiff_writer import is_as_written, write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.apart import check_no_input_replaced
-from mapfilter.workflows.world import World, check_cells_near, map_cover
+from mapfilter.workflows.world import World, map_cover
 
 if TYPE_CHECKING:
     from mapfilter.workflows.survey import SurveyResult
@@ -151,6 +152,7 @@ def _predict_network(config: Config, progress: Progress | None) -> PredictResult
         *(note for antenna in antennas.values() for note in antenna.notes),
         *outside_validity(plan, lattice, model),
         *off_frequency(plan, antennas),
+        *upward_tilts(plan),
     )
     parts = 2 if both else 1
     tags = {

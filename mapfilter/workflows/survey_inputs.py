@@ -9,22 +9,20 @@ import numpy as np
 from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, InputError, fail, listed
-from mapfilter.geodesy import projected_crs
-from mapfilter.lattice import Lattice
+from mapfilter.geodesy import check_scale, projected_crs
+from mapfilter.lattice import Lattice, outside_m
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.far_cells import check_cells_near
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.measurements import Measurements, named_after
 from mapfilter.survey.options import SurveyOptions
 from mapfilter.tracks.foreign_cells import foreign_cells
-from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.planned_cells import planned_cells
 from mapfilter.workflows.stated_power import check_eirp_stated
 from mapfilter.workflows.streets import measurements_of
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
     area_lattice,
-    check_cells_near,
-    check_scale,
     open_by_section,
 )
 

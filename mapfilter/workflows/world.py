@@ -13,10 +13,11 @@ from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import projected_crs, same_crs, short_crs, unproject
+from mapfilter.geodesy import check_scale, projected_crs, same_crs, short_crs, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.far_cells import check_cells_near
 from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.opening import open_rasters
@@ -27,23 +28,17 @@ from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.maps import map_bounds_deg, resolve_map
 from mapfilter.roads.route_points import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
-from mapfilter.tracks.misplaced import outside_m
 from mapfilter.workflows.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.area_lattice import area_lattice as area_lattice
-from mapfilter.workflows.area_lattice import check_scale as check_scale
 from mapfilter.workflows.area_lattice import roads_lattice as roads_lattice
 from mapfilter.workflows.on_lattice import pixels_on
 from mapfilter.workflows.planned_cells import plan_antennas, planned_cells
 from mapfilter.workflows.stated_power import check_eirp_stated
 from mapfilter.workflows.streets import Streets
 
-FARTHEST_M = 50_000.0
-"""No cell is received from farther away."""
-
 _ENOUGH = 0.95
 _ABOUT_WAYS_M = 100.0
 _SAMPLES = 64
-_NAMED = 3
 
 
 def planned_rasters(config: Config) -> RxLevRasters:
@@ -242,36 +237,6 @@ class World:
     def antennas(self) -> dict[str, MeasuredAntenna]:
         """The measured antennas that the plan names."""
         return plan_antennas(self.config, self.plan)
-
-
-def check_cells_near(plan: CellPlan, lattice: Lattice, where: str) -> None:
-    """Check that no cell lies more than 50 km outside an area.
-
-    Parameters
-    ----------
-    plan : CellPlan
-        In the CRS of the lattice.
-    where : str
-        What messages call the plan.
-
-    Raises
-    ------
-    InputError
-        Some do; one fault for all of them.
-    """
-    east_m = np.array([cell.east_m for cell in plan.cells])
-    north_m = np.array([cell.north_m for cell in plan.cells])
-    away_m = outside_m(east_m, north_m, lattice)
-    far = np.flatnonzero(away_m > FARTHEST_M)
-    if not far.size:
-        return
-    named = ", ".join(plan.ids[index] for index in far[:_NAMED])
-    more = f" and {far.size - _NAMED} more" if far.size > _NAMED else ""
-    got = f"{far.size} of {len(plan)} up to {away_m.max() / 1000:.0f} km off ({named}{more})"
-    swapped = outside_m(north_m[far], east_m[far], lattice).min() <= FARTHEST_M
-    hint = "east and north swapped" if swapped else "a CRS of another zone, or swapped coordinates"
-    expected = f"cells within {FARTHEST_M / 1000:.0f} km of the area"
-    raise fail(InputError, where, expected, got, hint)
 
 
 def map_cover(world: World) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import pytest
 from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
 
 from mapfilter.database.build import build
+from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
@@ -72,7 +73,9 @@ def test_a_tile_that_no_raster_reaches_has_points_and_no_levels(tmp_path):
     assert max(row.to_pylist()) < 8
     assert max(col.to_pylist()) < 8
     counts = database.manifest["counts"]
-    assert counts["points"] + counts["points_below_floor"] == len(make_routes())
+    assert counts["points_without_level"] > 0
+    left_out = counts["points_below_floor"] + counts["points_without_level"]
+    assert counts["points"] + left_out == len(make_routes())
 
 
 def test_reaching_is_told_by_the_files_own_extent(tmp_path):
@@ -106,3 +109,32 @@ def test_windows_of_mixed_resolutions_say_what_the_whole_says(resampling, tmp_pa
             read = some.read((row, col, rows, cols), (cell_id,))
             expected[rasters.cell_ids.index(cell_id)] = read[0]
         np.testing.assert_array_equal(whole[:, row : row + rows, col : col + cols], expected)
+
+
+def test_rasters_whose_metres_are_none_on_the_ground_are_refused(tmp_path):
+    """Steps of dead reckoning would be a quarter too short on such a map, without a word."""
+    mercator = dataclasses.replace(LATTICE, crs="EPSG:3857")
+    levels = [(cell_id, np.full((40, 50), -70.0)) for cell_id in IDS]
+    write_rasters(tmp_path / "a.tif", mercator, levels, IDS)
+    routes = dataclasses.replace(make_routes(), lattice=mercator)
+    with pytest.raises(InputError, match=r"EPSG:3857, of which 100 m are 79 m .*Web Mercator"):
+        build(open_rasters(tmp_path / "a.tif"), make_plan(), routes, tmp_path / "db")
+    assert not (tmp_path / "db").exists()
+
+
+@pytest.mark.parametrize(
+    ("move", "hint"),
+    [
+        (lambda c: {"east_m": c.east_m - 460_000.0}, "a CRS of another zone"),
+        (lambda c: {"east_m": c.north_m, "north_m": c.east_m}, "east and north swapped"),
+    ],
+)
+def test_a_plan_of_another_place_is_refused_as_by_the_command(tmp_path, move, hint):
+    world = make_world(tmp_path)
+    cells = tuple(dataclasses.replace(cell, **move(cell)) for cell in world.plan.cells)
+    plan = dataclasses.replace(world.plan, cells=cells)
+    with pytest.raises(
+        InputError, match=rf"plan: expected cells within 50 km .*found 3 of 3.*{hint}"
+    ):
+        build(world.rasters, plan, world.routes, tmp_path / "db")
+    assert not (tmp_path / "db").exists()

@@ -72,7 +72,7 @@ def test_what_is_heard_of_four_cells_at_six_points():
     # At the floor counts; levels are rounded before; of equals the first is the best.
     assert heard.best.tolist() == [3, 0, -1, 0, -1, 0]
     np.testing.assert_allclose(
-        heard.best_level_dbm, [-69.99, -70.0, -np.inf, -104.0, -np.inf, -80.0], rtol=1e-6
+        heard.best_level_dbm, [-69.99, -70.0, -104.01, -104.0, NAN, -80.0], rtol=1e-6
     )
     np.testing.assert_allclose(heard.margin_db, [0.01, 6.5, NAN, NAN, NAN, 0.01], atol=1e-6)
     assert heard.cell.tolist() == [0, 0, 0, 0, 1, 1, 1, 2, 3, 3, 3]

@@ -76,6 +76,7 @@ def test_a_database_that_is_written_anew_is_the_same(database, tmp_path):
     assert found.manifest["parameters"] == database.manifest["parameters"]
     assert found.manifest["counts"] == {
         "points": len(database.points()), "points_below_floor": 0, "points_off_rasters": None,
+        "points_without_level": 0,
     }  # fmt: skip
     assert found.measured() is None
 
@@ -105,7 +106,8 @@ def test_other_levels_and_fewer_cells(database, tmp_path):
     ]
     np.testing.assert_array_equal(found.points().point, database.points().point[kept])
     assert found.manifest["counts"]["points"] == kept.size
-    assert found.manifest["counts"]["points_below_floor"] == count - kept.size
+    assert found.manifest["counts"]["points_without_level"] == 4
+    assert found.manifest["counts"]["points_below_floor"] == count - kept.size - 4
     assert found.cell_ids == tuple(cell.id for cell in cells)
     expected = np.where(level_dbm >= FLOOR_DBM, level_dbm, np.nan)[:, kept]
     assert_levels_are(found, found.cell_ids, expected)

@@ -8,7 +8,7 @@ from small_world import CRS, make_plan, make_world
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run
-from mapfilter.database.floor import floor_notes, floor_of
+from mapfilter.database.floor import floor_notes, floor_of, weak_points_note
 from mapfilter.radio.cells import CellPlan
 
 
@@ -67,3 +67,12 @@ def test_a_build_takes_and_records_the_floor(tmp_path):
         assert estimate.levels == levels[name][1]
     assert [floor_dbm for floor_dbm, _ in levels.values()] == [-104.0, -125.0, -104.0]
     assert levels["lte"][1] > levels["unknown"][1] == levels["stated"][1]
+
+
+def test_points_that_are_too_weak_for_the_floor_are_noted():
+    counts = {"points": 1290, "points_below_floor": 2302, "points_without_level": 999}
+    (note,) = weak_points_note(counts, -104.0)
+    assert note.startswith("2302 of 3592 points left out: all of their levels are below ")
+    assert "database.floor_dbm = -104 " in note
+    assert "RSRP" in note
+    assert weak_points_note(counts | {"points_below_floor": 60}, -104.0) == ()

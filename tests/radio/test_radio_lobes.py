@@ -177,6 +177,13 @@ def test_a_number_that_hardly_a_level_reaches_means_no_data_far_from_all_others(
     for number in (-1, 5, -200):
         found = nodata_taken_as_level(np.append(levels, np.float32([number] * 100)))
         assert found == (number, 0.2)
+    # A hole of a few streets in a raster of a town.
+    town = np.linspace(-130, -45, 40_000, dtype=np.float32)
+    for number in (0, -1, -200):
+        found = nodata_taken_as_level(np.append(town, np.float32([number] * 36)))
+        assert found == (number, pytest.approx(36 / 40_036))
+    lost = np.append(70 - town, np.float32([0] * 36))
+    assert nodata_taken_as_level(lost) == (0, pytest.approx(36 / 40_036))
     # Too few, one that levels reach, near others, and cut off.
     few = np.append(levels, np.float32([-1] * 4))
     usual = np.append(levels, np.float32([-25] * 100))

@@ -14,7 +14,7 @@ from mapfilter.propagation.empirical import friis_db, log_distance_db, okumura_h
 from mapfilter.propagation.line_of_sight import line_of_sight
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict, simulate_ground_truth
-from mapfilter.propagation.remarks import off_frequency
+from mapfilter.propagation.remarks import off_frequency, upward_tilts
 from mapfilter.propagation.tr38901 import hidden_loss_db, seen_loss_db, sight_probability
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
@@ -229,3 +229,19 @@ def test_wrong_choices_are_told_together() -> None:
         "reference_loss_db",
     ):
         assert part in text
+
+
+def test_tilts_that_a_list_counts_upwards_are_told() -> None:
+    def plan(*tilts_deg, **more):
+        cells = (
+            replace(NORTH, id=f"N{n}", downtilt_deg=t, **more) for n, t in enumerate(tilts_deg)
+        )
+        return CellPlan(CRS, tuple(cells))
+
+    (told,) = upward_tilts(plan(-6.0, 0.0, -4.0))
+    assert told.startswith("2 cells ('N0', 'N2'): downtilt_deg below 0, such as -6: above the hor")
+    # One that looks up a slope, among others; none; and indoors.
+    assert upward_tilts(plan(-2.0, 4.0, 6.0)) == upward_tilts(plan(0.0)) == ()
+    assert upward_tilts(plan(-6.0, indoor=True)) == ()
+    one = CellPlan(CRS, (replace(NORTH, mechanical_downtilt_deg=-3.0),))
+    assert upward_tilts(one)[0].startswith("cell 'N': mechanical_downtilt_deg below 0, such as -3")

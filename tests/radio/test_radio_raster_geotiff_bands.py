@@ -12,6 +12,7 @@ from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.geotiff import open_geotiff, tag_of
 from mapfilter.rasters.geotiff_writer import is_as_written, new_geotiff, write_rasters
+from mapfilter.rasters.opening import open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)
@@ -21,8 +22,8 @@ LEVEL = np.linspace(-110, -60, 48).reshape(6, 8)
 class Declared:
     """What a user declares, besides the file."""
 
-    def __init__(self, crs=None, nodata=None):
-        self.crs, self.nodata = crs, nodata
+    def __init__(self, crs=None, nodata=None, factor=1.0):
+        self.crs, self.nodata, self.factor = crs, nodata, factor
 
 
 def foreign(path, data, *, lattice=LATTICE, names=(), crs=CRS, **more):
@@ -189,6 +190,19 @@ def test_scales_and_offsets_of_each_band(tmp_path, scales, offsets):
     np.testing.assert_array_equal(found, expected.astype("f4"))
     assert found.dtype == np.float32
     np.testing.assert_array_equal(read(path, [1], nodata=-70), expected[1:].astype("f4"))
+
+
+def test_numbers_are_not_scaled_twice(tmp_path):
+    """Tenths of a dB, with the scale in the file: a factor of 0.1, too, would give -7 dBm."""
+    data = np.random.default_rng(2).integers(-900, -600, (2, 6, 8)).astype("i2")
+    path = foreign(tmp_path / "a.tif", data, scales=(0.1, 0.1), offsets=(0.0, 0.0))
+    np.testing.assert_allclose(open_rasters(path, "level").read(), data / 10, atol=1e-4)
+    with pytest.raises(InputError, match=r"its own scale, 0\.1, .* found a factor of 0\.1 .*leave"):
+        open_rasters(path, "level", factor=0.1)
+    plain = foreign(tmp_path / "b.tif", data, scales=(1.0, 1.0), offsets=(0.0, 0.0))
+    np.testing.assert_allclose(
+        open_rasters(plain, "level", factor=0.1).read(), data / 10, atol=1e-4
+    )
 
 
 def test_masks_and_numbers_that_mean_no_data(tmp_path):

@@ -42,6 +42,24 @@ def test_which_files_are_an_index(tmp_path):
     assert find_index(tmp_path) == tmp_path / "INDEX.TXT"
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-be", "cp1252"])
+@pytest.mark.parametrize("first", ["", "sep=;\r\n"])
+def test_an_index_saved_as_unicode_is_found(tmp_path, encoding, first):
+    """As Excel saves "Unicode text": without it rasters had no header, or other names."""
+    write_bil(tmp_path / "a.bil", LATTICE, np.full((6, 8), 100, np.int16))
+    mark = "\ufeff" if encoding == "utf-16-be" else ""
+    text = f"{mark}{first}{INDEX_HEADER}Köln;a.bil;5;385000;385040;6672970;6673000;16\n"
+    (tmp_path / "index.txt").write_bytes(text.encode(encoding))
+    assert find_index(tmp_path) == tmp_path / "index.txt"
+    assert [row.cell_id for row in read_index(tmp_path / "index.txt")] == ["Köln"]
+
+
+def test_names_with_the_folder_itself_are_those_of_its_files(tmp_path):
+    write_bil(tmp_path / "a.bil", LATTICE, np.full((6, 8), 100, np.int16))
+    rows = read_index(index(tmp_path, "TX_NAME;FILE_NAME\nA;.\\A.BIL\nB;./a.bil\n"))
+    assert [row.path for row in rows] == [tmp_path / "a.bil"] * 2
+
+
 @pytest.mark.parametrize(
     ("area", "fits"),
     [

@@ -136,3 +136,13 @@ def test_a_check_tells_of_another_case_too():
     findings = Findings()
     check_ids(rasters("t1a"), plan("S1A"), "cells.csv", findings)
     assert all("case" not in finding.evidence for finding in findings.result().findings)
+
+
+def test_tiles_of_one_cell_are_named_as_such():
+    with pytest.raises(InputError) as caught:
+        check_against_plan(rasters("A_1", "A_2", "B_1", "B_2"), plan("A", "B"))
+    hint = "several rasters of cell 'A', such as 'A_1' and 'A_2'; join tiles of an area"
+    assert [fault.hint.startswith(hint) for fault in caught.value.faults] == [True, True]
+    for others in (("A_1", "B_2"), ("X_1", "X_2", "X_3", "X_4")):
+        with pytest.raises(InputError, match="different dates or places"):
+            check_against_plan(rasters(*others), plan("A", "B"))

@@ -141,3 +141,12 @@ def test_the_crs_file_belongs_to_the_raster(tmp_path):
     grid = open_raw_grid(tmp_path / "a.bil", "A", Declared())
     assert grid.lattice == LATTICE
     assert grid.parts == (tmp_path / "a.bil", tmp_path / "a.hdr", crs_file)
+
+
+def test_a_header_of_envi_is_named_as_that(tmp_path):
+    path = tmp_path / "a.bil"
+    path.write_bytes(VALUES.astype("u1").tobytes())
+    path.with_suffix(".hdr").write_text("ENVI\nsamples = 4\nlines = 3\ndata type = 1\n")
+    with pytest.raises(InputError, match=r"a\.hdr: .* found ENVI .*gdal_translate") as caught:
+        open_raw_grid(path, "A", Declared())
+    assert len(caught.value.faults) == 1

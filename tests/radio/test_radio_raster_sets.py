@@ -130,7 +130,9 @@ def test_one_cell_in_two_files(tmp_path: Path) -> None:
 
 
 def test_empty_folders_and_names_that_are_no_ids(tmp_path: Path) -> None:
-    assert "found none in this folder" in _complaint(tmp_path)
+    assert _complaint(tmp_path).endswith("found none in this folder")
+    (tmp_path / "A.grd").write_bytes(b"DSBB")
+    assert "gdal_translate FROM TO.tif converts others, such as A.grd" in _complaint(tmp_path)
     write_ascii(tmp_path / "a..b.asc", FINE, _values(FINE))
     assert "an id of 1..128 characters" in _complaint(tmp_path)
 

@@ -272,6 +272,16 @@ def test_a_missing_antenna_is_an_error_where_rasters_are_to_be_predicted(world):
     assert (outcome.code, codes) == (2, {("antenna-missing", "error")})
 
 
+def test_tilts_that_are_counted_upwards(world):
+    for row in world.rows:
+        row["downtilt_deg"] = -6
+    world.write()
+    (finding,) = mapfilter("check", "-c", world.toml, "--json").json["findings"]
+    assert (finding["code"], finding["severity"]) == ("tilts-upwards", "warning")
+    assert "9 cells" in finding["evidence"]
+    assert "sign" in finding["remedy"]
+
+
 def test_landuse_colours_that_the_table_does_not_have(world):
     world.landuse[20:23] = 7
     (found,) = check(world)

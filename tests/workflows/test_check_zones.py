@@ -1,11 +1,14 @@
 """Sites in the zone of UTM that its rule without exceptions gives to western Norway."""
 
 import numpy as np
+from check_world import make_world
+from command_line import assert_refused, mapfilter
 
 from mapfilter.check.findings import Findings
 from mapfilter.geodesy import project, utm_crs
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.workflows.check_places import check_sites
 
 BERGEN = 5.32, 60.39
@@ -27,3 +30,18 @@ def test_sites_in_zone_31_are_found_about_bergen():
     (found,) = findings.found
     assert found.code == "crs-mixed"
     assert "With their numbers read as EPSG:32631, 4 of them lie inside" in found.evidence
+
+
+def test_rasters_in_web_mercator_are_reported_as_build_reports_them(tmp_path):
+    """100 m of it are 50 m in Helsinki."""
+    world = make_world(tmp_path, {})
+    world.landuse = None
+    world.write()
+    lattice = Lattice("EPSG:3857", 2_775_000.0, 8_438_000.0, 10.0, 40, 40)
+    cells = [row["cell"] for row in world.rows]
+    write_rasters(world.rasters, lattice, [(one, np.full((40, 40), -70.0)) for one in cells], cells)
+    (finding,) = mapfilter("check", "-c", world.toml, "--json").json["findings"]
+    assert finding["code"] == "crs-mixed"
+    told = "found EPSG:3857, of which 100 m are 50 m"
+    assert told in finding["evidence"]
+    assert_refused(mapfilter("build", "-c", world.toml), told)

@@ -27,6 +27,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.filter import locate
+from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.store import read_log, write_log
 from mapfilter.viewing.words import REASONS
 from mapfilter.workflows import replay as workflow
@@ -452,3 +453,12 @@ def test_a_database_that_nobody_names_is_named(log, world, tmp_path, monkeypatch
     assert (done.code, done.err) == (0, f"mapfilter: no --db: the database is {taken}\n")
     named = "--db", taken
     assert_done(mapfilter("replay", "--log", log, *named, *few, "--json"))
+
+
+def test_python_draws_as_the_command_by_the_name_of_the_log(world, log, replay, tmp_path):
+    assert_done(replay(log, "--filter", "bayes", "--seed", "3"))
+    written = read_estimate(tmp_path / "out" / "estimate.parquet")
+    options = load_config(world.toml).filter.bayes.of(mf.BayesFilter)
+    track = mf.locate(log, world.database, options, seed=named_rng(3, "replay", "my-walk"))
+    np.testing.assert_array_equal(track.estimate.east_m, written.east_m)
+    np.testing.assert_array_equal(track.estimate.north_m, written.north_m)

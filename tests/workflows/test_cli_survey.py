@@ -161,15 +161,17 @@ def test_what_is_said_of_rasters_is_said_of_those_to_calibrate(survey, world, tm
         prediction__survey__calibrate=tenths,
         prediction__survey__cross_validate="false",
         prediction__survey__fill="true",
-        rasters__path=tmp_path / "made.tif",
         rasters__quantity="level",
         rasters__factor=0.1,
     )
-    given = ("-c", survey / "survey.toml", "--out", tmp_path / "out", *more)
-    assert_done(mapfilter("predict", *given))
-    error = open_rasters(tmp_path / "made.tif").read() - rasters.read()
-    assert np.sqrt(np.mean(error**2)) < 1.5
-    assert assert_done(mapfilter("build", *given, "--json")).json["points"] > 1000
+    for name, elsewhere in [("rxlev", ()), ("made", settings(rasters__path=tmp_path / "made.tif"))]:
+        out = tmp_path / ("out" if name == "rxlev" else "other")
+        given = ("-c", survey / "survey.toml", "--out", out, *more, *elsewhere)
+        assert_done(mapfilter("predict", *given))
+        made = out / "rxlev.tif" if name == "rxlev" else tmp_path / "made.tif"
+        error = open_rasters(made).read() - rasters.read()
+        assert np.sqrt(np.mean(error**2)) < 1.5
+        assert assert_done(mapfilter("build", *given, "--json")).json["points"] > 1000
 
 
 def test_surveyed_cells_far_off_are_refused(survey, tmp_path):

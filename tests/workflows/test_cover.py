@@ -7,9 +7,8 @@ import pytest
 import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter
 
-from mapfilter.lattice import Lattice
+from mapfilter.lattice import Lattice, outside_m
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.tracks.misplaced import outside_m
 
 BEYOND = "--set=area.bbox=24.9420,60.1660,24.9645,60.1697"
 """The world's box, three times as wide."""

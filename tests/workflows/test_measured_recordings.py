@@ -147,3 +147,16 @@ def test_a_map_of_a_recorded_drive(made, tmp_path):
     assert done["measurements"] == COUNT
     (tmp_path / "walk.txt").write_text(MADE["gpx"][1])
     assert_refused(mapfilter("predict", "-c", config), "walk.txt: expected levels of cells")
+
+
+def test_a_column_of_cells_of_another_name_is_named_as_the_mistake(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text("Timestamp,Latitude,Longitude,CellName,RSRP\n" + "".join(
+        f"{1_700_000_000 + n},60.17{n:02},24.94,A,-8{n % 10}\n" for n in range(20)
+    ))  # fmt: skip
+    with pytest.raises(
+        InputError, match=r"20 levels of cells without identity .*survey\.columns\.cell"
+    ):
+        read(path)
+    columns = {"cell": "CellName", "lat": "Latitude", "lon": "Longitude", "level_dbm": "RSRP"}
+    assert read_measurements([path], "EPSG:32635", columns=columns).cell_ids == ("A",)

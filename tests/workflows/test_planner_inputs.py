@@ -218,3 +218,18 @@ def test_losses_to_calibrate_need_an_eirp_too(world, levels):
     assert not (world.folder / "out").exists()
     set_ = settings(cells__eirp_dbm=43.0)
     assert "EIRP" not in mapfilter("predict", "-c", world.toml, *given, *set_, *out).err
+
+
+def test_points_below_the_usual_floor_are_not_left_out_without_a_word(world):
+    """Levels of an LTE carrier, 45 dB below those of GSM, of cells without a technology."""
+    world.levels = {i: v + 45 * 16 for i, v in world.levels.items()}
+    world.write()
+    write_list(world)
+    built = assert_done(build(world)).json
+    (note,) = (note for note in built["notes"] if "left out" in note)
+    left_out = built["routable_points"] - built["points"]
+    assert 0.3 < left_out / built["routable_points"] < 1
+    assert note.startswith(f"{left_out} of {built['routable_points']} points left out")
+    lower = assert_done(build(world, *settings(database__floor_dbm=-150))).json
+    assert lower["points"] == built["routable_points"]
+    assert not [note for note in lower["notes"] if "left out" in note]

@@ -21,7 +21,7 @@ from mapfilter.positioning.sensors.pace import WALKERS_MPS
 
 _LEAST_M2 = 7.5**2
 """Fixes between houses are off to one side for a while, beyond what they state."""
-_WALKED, _DRIVEN, _DEVIATIONS = (0.12, 0.1), (0.03, 0.03), 1.5
+_WALKED, _DRIVEN, _DEVIATIONS = (0.15, 0.1), (0.03, 0.03), 1.5
 """Deviation of the length of the way by fixes, in lengths of that by steps, at which it is known,
 and what steps or wheels may be too short or long by; times of that deviation beyond it."""
 
