@@ -87,16 +87,18 @@ def test_a_burst_that_ends_the_fixes_is_forgotten():
 def test_fixes_that_go_on_elsewhere_are_right(jump_m, at, waits_s):
     """For half a minute it is LOST, then it begins anew; after a jump for as long as they agreed.
 
-    So far steps do not lead astray at once: a spoofer puts positions there.
+    So far steps do not lead astray at once: a spoofer puts positions there. It is claimed once
+    steps have told the same way for a minute or so.
     """
     rng = np.random.default_rng(6)
-    steps, way = straight(rng, 300)
+    steps, way = straight(rng, 400)
     way[at:] += jump_m
-    places, _, statuses, _, _ = followed([fix_at(one) for one in way + errors(rng, 300)], steps)
+    places, _, statuses, _, _ = followed([fix_at(one) for one in way + errors(rng, 400)], steps)
     off_m = np.abs(places - way)
     assert set(statuses[at + 2 : at + waits_s]) == {Status.LOST}
     assert off_m[at + waits_s + 2 :].max() < 15.0
-    assert set(statuses[at + waits_s + 2 :]) == {Status.TRACKING}
+    assert set(statuses[at + waits_s + 2 : at + waits_s + 40]) == {Status.UNCERTAIN}
+    assert set(statuses[at + waits_s + 100 :]) == {Status.TRACKING}
 
 
 @pytest.mark.parametrize(
@@ -197,7 +199,8 @@ def test_fixes_that_state_too_little_are_believed_less():
         widest.append(np.median(radii_m[60:]))
     assert np.mean(held) > 0.9
     assert max(widest) < 40.0
-    assert plain == [1.0] * 3
+    # Right ones are, too, by chance and a little.
+    assert np.mean(plain) < 1.3
 
 
 def test_without_dead_reckoning_outliers_do_not_throw_the_velocity():

@@ -14,7 +14,7 @@ def rows_of(way, fixes, variance_m2, usual_m=0.0, beyond_m=0.0, every_s=4.0):
     """Rows of fixes beside a way, as complex numbers, that are some seconds apart."""
     many = len(way)
     columns = [every_s * np.arange(many), way.real, way.imag, fixes.real + EAST, fixes.imag + NORTH]
-    same = [np.full(many, one) for one in (variance_m2, usual_m, beyond_m, 0.0, 0.0)]
+    same = [np.full(many, one) for one in (variance_m2, usual_m, beyond_m, 0.0, 0.0, 50.0)]
     return np.column_stack([*columns, *same])
 
 

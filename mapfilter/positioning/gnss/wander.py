@@ -26,6 +26,8 @@ from mapfilter._types import Floats
 _APART_S, _WINDOW_S, _LEAST_S, _LEAST_ROWS = 5.0, 180.0, 60.0, 8
 """Time between two fixes that are kept, and for which they are; time and number of those that are
 looked at, at least."""
+_TELLS_S = 120.0
+"""Time below which they tell less of what lasts."""
 _LEAST_WAY_M = 20.0
 """Way from the first to the farthest of them, at least: what goes on while steps rest may be
 right."""
@@ -182,7 +184,7 @@ class FixWander:
         new_s = since_s if self.seen_s > 0 else span_s
         seen_s = self.seen_s + new_s
         # What lasts for a minute is hardly told from none in a minute.
-        share = new_s / min(seen_s + _PRIOR_S, _MEMORY_S) * (span_s / _WINDOW_S)
+        share = new_s / min(seen_s + _PRIOR_S, _MEMORY_S) * min(span_s / _TELLS_S, 1.0)
         found = _times_stated(np.array(rows), rate_radps, drift_rad_per_sqrt_m)
         return replace(after, now=self.now.towards(*found, share), seen_s=seen_s)
 

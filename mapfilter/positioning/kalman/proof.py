@@ -21,7 +21,7 @@ from mapfilter.positioning.sensors.pace import WALKERS_MPS
 
 _LEAST_M2 = 7.5**2
 """Fixes between houses are off to one side for a while, beyond what they state."""
-_WALKED, _DRIVEN, _DEVIATIONS = (0.15, 0.1), (0.03, 0.03), 1.5
+_WALKED, _DRIVEN, _DEVIATIONS = (0.15, 0.1), (0.04, 0.03), 1.5
 """Deviation of the length of the way by fixes, in lengths of that by steps, at which it is known,
 and what steps or wheels may be too short or long by; times of that deviation beyond it."""
 
@@ -63,9 +63,8 @@ def way_agrees(rows: tuple[WanderFix, ...], understated: float, lasting_s: float
         variance_m2 = max(understated * one.sd_m**2, _LEAST_M2)
         lasting_m = sqrt((1 - LEAST_WHITE) * variance_m2)
         place = one.way_east_m, one.way_north_m, one.east_m, one.north_m
-        given.append(
-            WayFix(one.time_s, *place, LEAST_WHITE * variance_m2, 0.0, lasting_m, 0.0, 0.0)
-        )
+        noise = LEAST_WHITE * variance_m2, 0.0, lasting_m
+        given.append(WayFix(one.time_s, *place, *noise, 0.0, 0.0, one.sd_m))
     found = Stretches.of(np.array(given), lasting_s)
     sd = float(found.sd_rad[0])
     known, usual = _DRIVEN if _usual_mps(rows) > WALKERS_MPS else _WALKED

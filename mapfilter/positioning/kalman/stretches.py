@@ -21,6 +21,8 @@ LEAST_ROWS = 6
 _SHORTEST, _LONGEST, _MOST_MISFIT = 0.7, 1.4, 2.0
 """Lengths of the way by fixes to that by steps between which they are the same way; largest mean
 square of what is left of fixes, in their variances."""
+_JUMPED = 4.0
+"""Deviations, as stated, beyond the way between two fixes from which on they have jumped."""
 
 
 class WayFix(NamedTuple):
@@ -29,7 +31,7 @@ class WayFix(NamedTuple):
     ``variance_m2`` is that of noise along one axis; ``usual_m`` and ``beyond_m`` are deviations of
     what lasts: of a usual fix, and what is known beyond that. ``turned_rad`` is the belief's
     heading error less what a rate of turns has added since the first fix, ``turned_rad2`` its
-    variance.
+    variance. ``stated_m`` is the deviation along one axis that the fix states.
     """
 
     time_s: float
@@ -42,6 +44,7 @@ class WayFix(NamedTuple):
     beyond_m: float
     turned_rad: float
     turned_rad2: float
+    stated_m: float
 
 
 class Led(NamedTuple):
@@ -69,7 +72,8 @@ class Stretches(NamedTuple):
     residual_m2 : (N,) array
         Sum of squares of what is left of the fixes.
     fits : (N,) bool array
-        Whether the fixes lie on the way.
+        Whether the fixes lie on the way, and do not jump: where headings have jumped, places have
+        not, and where walls reflect signals they have.
     """
 
     factor: np.ndarray
@@ -83,7 +87,7 @@ class Stretches(NamedTuple):
 
         Parameters
         ----------
-        rows : (N, 10) array
+        rows : (N, 11) array
         lasting_s : float
             Time after which the correlation of what lasts is 1/e.
         """
@@ -106,6 +110,7 @@ class Stretches(NamedTuple):
         fits = residual <= _MOST_MISFIT * np.maximum(expected, covariance[-1, -1])
         fits &= (size >= _SHORTEST) & (size <= _LONGEST) & (count >= LEAST_ROWS)
         slope[-1] = np.inf  # One fix has no direction.
+        fits &= ~_jump_later(rows)
         sd_rad = np.sqrt(slope) / np.maximum(size, _SHORTEST)
         return cls(factor, sd_rad, residual, fits)
 
@@ -124,7 +129,7 @@ def led_by(rows: Floats, here: complex, lasting_s: float) -> Led:
 
     Parameters
     ----------
-    rows : (N, 10) array
+    rows : (N, 11) array
         Of the stretch; columns are those of :class:`WayFix`.
     here : complex
         Where steps have led by now.
@@ -154,6 +159,13 @@ def _from_last(rows: Floats) -> tuple[np.ndarray, np.ndarray]:
     both = rows[:, [1, 3]] + 1j * rows[:, [2, 4]]
     way, fix = (both - both[-1]).T
     return way, fix
+
+
+def _jump_later(rows: Floats) -> np.ndarray:
+    """Return whether fixes jump after each, farther than steps have led."""
+    gone_m, moved_m = (np.hypot(*np.diff(rows[:, place], axis=0).T) for place in ([1, 2], [3, 4]))
+    jumps = moved_m > gone_m + _JUMPED * np.hypot(rows[1:, 10], rows[:-1, 10])
+    return np.append(np.logical_or.accumulate(jumps[::-1])[::-1], False)
 
 
 def _covariance_m2(rows: Floats, lasting_m: Floats, lasting_s: float) -> Floats:

@@ -17,7 +17,7 @@ beside those of fixes, and left out.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, hypot, isfinite, radians, sin
+from math import cos, hypot, isfinite, radians, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -138,11 +138,12 @@ class RecentWay:
             if gone_m < _APART_M:
                 return self, None
             mps = gone_m / max(time_s - last.time_s, 1e-3)
+        stated_m = sqrt(variance_m2)
         variance_m2 = max(variance_m2, _LEAST_FIX_SD_M**2) + (_LATE_S * mps) ** 2
         now_rad = turned[0] - self.by_rate_rad
         row = WayFix(
             *(time_s, self.east_m, self.north_m, east_m, north_m, variance_m2),
-            *(lasting.usual_m, lasting.beyond_m, now_rad, turned[1]),
+            *(lasting.usual_m, lasting.beyond_m, now_rad, turned[1], stated_m),
         )
         rows = (*self.rows, row)[-_MOST_ROWS:]
         after = replace(self, rows=rows)
