@@ -222,6 +222,26 @@ def test_a_way_without_headings_is_straight_for_a_while():
     assert (fixed.headless_m, fixed.fixed_s) == (0.0, 7.0)
 
 
+def test_ways_before_and_after_a_fix_go_the_same_way():
+    """A belief that took them apart lags behind, by no more than a way that nothing parts."""
+
+    def gone(made, steps):
+        for _ in range(steps):
+            made, _, _ = made.moved(MotionStep(1.0, nan), 1.0, OPTIONS, np.zeros(3))
+        return made
+
+    first = gone(Reckoning(), 60)
+    assert first.astray_m2 == 0.0
+    made = gone(first.positioned(1.0), 40)
+    parted_m2 = (way_spread_m2(60.0) + way_spread_m2(40.0)) / 2
+    assert made.astray_m2 == pytest.approx(way_spread_m2(100.0) / 2 - parted_m2)
+    assert made.astray_m2 > 500.0
+    assert gone(made.positioned(2.0), 40).astray_m2 > made.astray_m2
+    headed, _, _ = made.moved(MotionStep(1.0, 0.0), 1.0, OPTIONS, np.zeros(3))
+    assert headed.positioned(2.0).astray_m2 == 0.0
+    assert gone(headed.positioned(2.0), 40).astray_m2 == 0.0
+
+
 @pytest.mark.parametrize("fault", ["paused", "ended", "no length"])
 def test_dead_sensors_do_not_leave_a_narrow_belief_behind(fault):
     """One goes straight on for a minute while motion is not measured; then it is again."""

@@ -32,7 +32,7 @@ from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
-from mapfilter.positioning.sensors.unmeasured import headless_step, missed_step
+from mapfilter.positioning.sensors.unmeasured import common_way_m2, headless_step, missed_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
 
 RECKONED = StateLayout(5, 0, 1)
@@ -80,6 +80,8 @@ class Reckoning:
         Of motion rows and reports.
     headless_m : float
         Way without headings since the last heading or fix.
+    before_m : float
+        Way without headings before that fix, since the last heading.
     fixed_s : float
         Time of the last fix that was used.
     alignment : Alignment
@@ -92,10 +94,20 @@ class Reckoning:
 
     watch: SensorWatch = field(default_factory=SensorWatch)
     headless_m: float = 0.0
+    before_m: float = 0.0
     fixed_s: float = -inf
     alignment: Alignment = field(default_factory=Alignment)
     turned_s: float = nan
     recent: RecentWay = field(default_factory=RecentWay)
+
+    @property
+    def astray_m2(self) -> float:
+        """Variance along one axis by which a belief may lag behind a fix, besides its own.
+
+        Ways without headings go on and on, each taken for one to any side: fixes that are all ahead
+        would be taken for errors that last.
+        """
+        return common_way_m2(self.headless_m, self.before_m)
 
     @property
     def may_have_left(self) -> bool:
@@ -142,7 +154,8 @@ class Reckoning:
     def positioned(self, time_s: float) -> Reckoning:
         """Return it after a fix that was used."""
         watch = self.watch.positioned(time_s)
-        return replace(self, watch=watch, headless_m=0.0, fixed_s=time_s)
+        before_m = self.before_m + self.headless_m
+        return replace(self, watch=watch, headless_m=0.0, before_m=before_m, fixed_s=time_s)
 
     def carried(self) -> Reckoning:
         """Return it where positions have shown that one goes on though no step is counted."""
@@ -211,7 +224,8 @@ class Reckoning:
         noise[:2, :2] = options.step_sd_m**2 * np.outer(along, along)
         noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
         noise[:2, :2] += cross_m**2 * np.outer(across, across)
-        after = after if self.headless_m == 0 else replace(after, headless_m=0.0)
+        if self.headless_m or self.before_m:
+            after = replace(after, headless_m=0.0, before_m=0.0)
         return after, (transition, noise, shift), Reason.USED
 
     def fixed(
