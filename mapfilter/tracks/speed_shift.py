@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 
 from mapfilter._types import Floats
@@ -41,10 +43,13 @@ applied, see --offset (likely: GPS time for UTC)'
         return ""
     shifts = np.arange(-_WITHIN_S, _WITHIN_S + _PERIOD_S / 2, _PERIOD_S)
     agreed = np.array([_correlation(one, other, shift) for shift in shifts])
-    if not np.isfinite(agreed).all():
+    now = float(agreed[len(shifts) // 2])
+    if not isfinite(now):
         return ""
+    # Of short recordings a shift to one side leaves too little in common.
+    shifts, agreed = shifts[np.isfinite(agreed)], agreed[np.isfinite(agreed)]
     at = int(np.argmax(agreed))
-    shift_s, best, now = float(shifts[at]), float(agreed[at]), float(agreed[len(shifts) // 2])
+    shift_s, best = float(shifts[at]), float(agreed[at])
     # A speed that repeats itself, as between lights, agrees at several shifts.
     peak = np.r_[False, (agreed[1:-1] >= agreed[:-2]) & (agreed[1:-1] >= agreed[2:]), False]
     peak &= np.abs(shifts - shift_s) > _PEAK_S
