@@ -32,6 +32,7 @@ from mapfilter.tracks.position_sources import measured_positions
 from mapfilter.tracks.readers.recording import Recording
 
 _LONGEST_GAP_S = 3600.0
+_SUMMER_HOURS = 1.1
 OF_RECEIVER = "motion comes from GNSS"
 
 
@@ -174,11 +175,13 @@ def _check_gaps(recording: Recording, time_s: Floats) -> None:
     got = f"{hours:.1f} h from {before} (row {row}) to {after} (row {row + 1}){more}"
     where, expected = f"{recording.path}, odometry", "rows at most 1 h apart"
     hint = "a recording of several journeys: split it there, convert each alone"
+    if recording.clock.kind == "local" and not recording.clock.zone and hours < _SUMMER_HOURS:
+        hint = f"a clock that was set forward for summer: --zone; or {hint}"
     raise fail(InputError, where, expected, got, hint)
 
 
 def _shown_time(recording: Recording, time_s: float) -> str:
-    if not recording.clock.absolute:
+    if recording.clock.kind == "monotonic":
         return f"{time_s:g} s"
     return datetime.fromtimestamp(time_s, UTC).isoformat(" ", "seconds").removesuffix("+00:00")
 
