@@ -103,7 +103,10 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     tables = {
         "motion": moved.rows,
         "radio": _joined(shifted, "radio"),
-        "gnss": fixes_of(others, frame, None if by_receiver else moved.rows, notes, truth),
+        "gnss": fixes_of(
+            *(others, frame, None if by_receiver else moved.rows, notes, truth),
+            driven=bool(moved.vehicle),
+        ),
         "truth": truth,
         "pseudoranges": _satellites(recordings, shifted, notes),
     }
