@@ -13,7 +13,8 @@ def parted_odometry(
     recordings: Sequence[Recording],
 ) -> tuple[list[Recording], list[Recording]]:
     """Return the recordings with speeds, and those with yaw rates alone."""
-    fast, turning = [], []
+    fast: list[Recording] = []
+    turning: list[Recording] = []
     for one in recordings:
         has_speeds = one.tables["odometry"]["speed_mps"].notna().any()
         (fast if has_speeds else turning).append(one)
