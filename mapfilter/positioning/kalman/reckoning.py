@@ -16,7 +16,7 @@ alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, inf, isfinite, nan, radians, sin, sqrt
+from math import cos, hypot, inf, isfinite, nan, radians, sin, sqrt
 
 import numpy as np
 
@@ -46,6 +46,8 @@ _TURNS_SD_RAD = radians(2.0)
 iron."""
 _ASTRAY_RAD, _ASTRAY_RADPS = radians(30.0), radians(1.0)
 """What is added to the errors of turns and of their rate where they have led astray."""
+_FARTHER, _FARTHER_SD = 1.5, 4.0
+"""How much longer than the way fixes may go without contradicting it, and deviations of these."""
 
 
 def at_rest(layout: StateLayout) -> Motion:
@@ -82,6 +84,8 @@ class Reckoning:
         Way without headings since the last heading or fix.
     before_m : float
         Way without headings before that fix, since the last heading.
+    origin : tuple of float or None
+        Place of the first fix on that way, and the way before it.
     fixed_s : float
         Time of the last fix that was used.
     alignment : Alignment
@@ -95,18 +99,32 @@ class Reckoning:
     watch: SensorWatch = field(default_factory=SensorWatch)
     headless_m: float = 0.0
     before_m: float = 0.0
+    origin: tuple[float, float, float] | None = None
     fixed_s: float = -inf
     alignment: Alignment = field(default_factory=Alignment)
     turned_s: float = nan
     recent: RecentWay = field(default_factory=RecentWay)
 
-    @property
-    def astray_m2(self) -> float:
-        """Variance along one axis by which a belief may lag behind a fix, besides its own.
+    def astray_m2(self, fix: GnssFix, variance_m2: float) -> float:
+        """Return the variance along one axis by which a belief may lag behind a fix.
 
         Ways without headings go on and on, each taken for one to any side: fixes that are all ahead
-        would be taken for errors that last.
+        would be taken for errors that last. Where turns are measured fixes soon tell the direction,
+        and fixes that go farther than the way contradict it.
+
+        Parameters
+        ----------
+        fix : GnssFix
+        variance_m2 : float
+            Of the fix, along one axis.
         """
+        if isfinite(self.turned_s) or self.origin is None:
+            return 0.0
+        east_m, north_m, way_m = self.origin
+        gone_m = hypot(fix.east_m - east_m, fix.north_m - north_m)
+        most_m = _FARTHER * (self.before_m + self.headless_m - way_m)
+        if gone_m > most_m + _FARTHER_SD * sqrt(variance_m2):
+            return 0.0
         return common_way_m2(self.headless_m, self.before_m)
 
     @property
@@ -224,8 +242,8 @@ class Reckoning:
         noise[:2, :2] = options.step_sd_m**2 * np.outer(along, along)
         noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
         noise[:2, :2] += cross_m**2 * np.outer(across, across)
-        if self.headless_m or self.before_m:
-            after = replace(after, headless_m=0.0, before_m=0.0)
+        if self.headless_m or self.before_m or self.origin is not None:
+            after = replace(after, headless_m=0.0, before_m=0.0, origin=None)
         return after, (transition, noise, shift), Reason.USED
 
     def fixed(
@@ -260,6 +278,7 @@ class Reckoning:
             self,
             alignment=alignment,
             recent=recent if found is None else RecentWay(),
+            origin=self.origin or (fix.east_m, fix.north_m, self.before_m + self.headless_m),
         )
         return after, found or jump
 
