@@ -7,9 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._types import Floats
+from mapfilter._words import number_of
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.log import TrackLog
 
+_APART_SD, _APART_M, _FIX_SD_M = 2.5, 25.0, 10.0
+"""Way between positions that are used, in deviations of these, at most, and the deviation of those
+that state none: fixes nearer to each other are all ahead of a belief that spreads to all sides from
+each of them, and contradict it in the end."""
 _NEAR_M = 30.0
 """So far from a position a way to all sides is as good as any: that is what radii are then."""
 
@@ -21,8 +27,9 @@ def with_joined_steps(log: TrackLog, options: Any) -> tuple[TrackLog, tuple[str,
     right; of many, which go the same way mostly, the sum would be a rest with a small radius. So
     where no row has a direction, the rows from each position to the next are made one, and from
     30 m after a position on lengths are unknown: filters then spread by the usual speed, and the
-    position is lost. Other filters leave such steps out themselves. Without positions nothing is
-    claimed by such steps, and the log stays as it is.
+    position is lost. Positions that are too near to each other for that are left out. Other filters
+    leave such steps out themselves. Without positions nothing is claimed by such steps, and the log
+    stays as it is.
 
     Parameters
     ----------
@@ -42,10 +49,15 @@ def with_joined_steps(log: TrackLog, options: Any) -> tuple[TrackLog, tuple[str,
     if turned or motion["heading_rad"].notna().any():
         return log, ()
     time_s = motion["time_s"].to_numpy(dtype=np.float64)
+    way_m = np.cumsum(np.abs(np.nan_to_num(step_m)))
+    apart_m = min(_APART_SD * _usual_sd_m(log), _APART_M)
+    kept_s = _apart(known_s, np.interp(known_s, time_s, way_m, left=0.0), apart_m)
+    left_out = len(known_s) - len(kept_s)
+    known_s = kept_s
     # A row at the time of a position ends the way to it.
     passed = np.searchsorted(known_s, time_s, side="left")
     first = np.searchsorted(passed, passed, side="left")
-    gone_m = np.append(0.0, np.cumsum(np.abs(np.nan_to_num(step_m))))
+    gone_m = np.append(0.0, way_m)
     since_m = gone_m[1:] - gone_m[first]
     blind = since_m > _NEAR_M
     joined = np.append((passed[1:] == passed[:-1]) & ~blind[1:], False)
@@ -56,4 +68,32 @@ def with_joined_steps(log: TrackLog, options: Any) -> tuple[TrackLog, tuple[str,
         f"joined from each position to the next, and where they lead after {_NEAR_M:g} m is not "
         "known"
     )
-    return replace(log, motion=rows.reset_index(drop=True)), (note,)
+    given = replace(log, motion=rows.reset_index(drop=True))
+    if not left_out:
+        return given, (note,)
+    placed = {
+        name: table[table["time_s"].isin(kept_s)].reset_index(drop=True)
+        for name, table in (("gnss", log.gnss), ("pseudoranges", log.pseudoranges))
+    }
+    left = (
+        f"gnss: positions of {number_of(left_out, 'time')} left out, less than {apart_m:.0f} m of "
+        "way after another one: without directions they would be taken for errors that last"
+    )
+    return replace(given, **placed), (note, left)
+
+
+def _usual_sd_m(log: TrackLog) -> float:
+    """Return the median deviation of fixes along one axis."""
+    variance_m2 = log.gnss[["var_east_m2", "var_north_m2"]].mean(axis=1).to_numpy(dtype=np.float64)
+    stated = np.where(variance_m2 > 0, variance_m2, _FIX_SD_M**2)
+    return float(np.sqrt(np.median(stated))) if stated.size else _FIX_SD_M
+
+
+def _apart(known_s: Floats, way_m: Floats, apart_m: float) -> Floats:
+    """Return times of positions that are some way apart, the first of them among them."""
+    kept = [0]
+    while (at := int(np.searchsorted(way_m, way_m[kept[-1]] + apart_m))) < len(way_m):
+        # Beyond the way that is known the one before it is the better one.
+        at -= way_m[at] - way_m[kept[-1]] > _NEAR_M and at - 1 > kept[-1]
+        kept.append(at)
+    return known_s[kept]

@@ -41,7 +41,7 @@ BARS_DBM: dict[str, tuple[float, float, float, float]] = {
 """Least level (RSSI, RSCP, RSRP, SS-RSRP) of one to four bars on Android, unless the operator has
 set others."""
 
-_SPLIT = re.compile(r"[-_:;,/ .]+")
+_SPLIT = re.compile(r"[-_:;,/| .]+")
 _FAMILIES = {
     "GSM": ("GSM", "GPRS", "EDGE", "2G"),
     "UMTS": ("UMTS", "WCDMA", "HSPA", "HSPA+", "HSPAP", "HSDPA", "HSUPA", "DC-HSPA", "3G"),
@@ -69,18 +69,23 @@ def technology(word: str) -> str | None:
 def parse_cgi(text: str) -> tuple[int, int, int | None, int] | None:
     """Return mcc, mnc, lac and ci of a CGI ``MCC-MNC-LAC-CI``, or ECGI or NCGI ``MCC-MNC-CI``.
 
-    Parts are decimal, with any separator; None for other texts. The lac of an ECGI is None.
+    Parts are decimal, with any separator; None for other texts. The lac of an ECGI is None. The
+    first of three parts may be both of the network, ``MCCMNC``, of five or six digits.
 
     Examples
     --------
     >>> parse_cgi("262-01-1234-5678"), parse_cgi("302:720:9751830"), parse_cgi("B12-3")
     ((262, 1, 1234, 5678), (302, 720, None, 9751830), None)
+    >>> parse_cgi("26201-1234-5678")
+    (262, 1, 1234, 5678)
     """
     words = [word for word in _SPLIT.split(text.strip()) if word]
     if len(words) not in (3, 4) or not all(w.isascii() and w.isdigit() for w in words):
         return None
     if max(map(len, words)) > 11:
         return None
+    if len(words) == 3 and len(words[0]) in (5, 6):
+        words[:1] = words[0][:3], words[0][3:]
     mcc, mnc, *area, ci = map(int, words)
     return mcc, mnc, area[0] if area else None, ci
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 
 _INACTIVE = frozenset({"no", "n", "0", "false", "non", "nein", "nee", "faux", "falsch", "falso"})
-_CELLS_OF_NODE = 256
+CELLS_OF_NODE = 256
 """An E-UTRAN cell identity is that of the eNodeB, times 256, and the cell's own (TS 36.413)."""
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
 _LOWEST_MHZ, _HIGHEST_MHZ = 400, 6000
@@ -45,8 +45,8 @@ def stated_otherwise(values: Mapping[str, str]) -> dict[str, str]:
         found["frequency_mhz"] = f"{mhz:g}"
     node, number = (_whole(values.get(name, "")) for name in ("enodeb", "cell_number"))
     if not values.get("ci") and number is not None:
-        of_node = node is not None and number < _CELLS_OF_NODE
-        found["ci"] = str(_CELLS_OF_NODE * node + number if of_node and node else number)
+        of_node = node is not None and number < CELLS_OF_NODE
+        found["ci"] = str(CELLS_OF_NODE * node + number if of_node and node else number)
     return found
 
 

@@ -17,10 +17,12 @@ from mapfilter.tracks.gps_dates import early_dates, later, span_s, week_start_s
 from mapfilter.tracks.misplaced import FAR_APART, FAR_M
 from mapfilter.tracks.position_units import METRES_PER_DEGREE
 from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.speed_shift import shift_note, speed_agreement, speeds_of_places
+from mapfilter.tracks.speed_shift import best_shift, shift_note, speed_agreement, speeds_of_places
 
 _QUARTER_S = 900.0
-_MOST_ZONE_S = 14 * 3600.0
+_MOST_ZONE_S, _HOUR_S = 14 * 3600.0, 3600.0
+_ZONE_QUARTERS = (*range(-48, 57, 4), -38, -14, -10, 14, 18, 22, 23, 26, 35, 38, 42, 51, 55)
+"""Zones that are in use, in quarters of an hour ahead of UTC: whole hours, and others."""
 _MOST_POINTS = 400
 _MOST_SHIFTS = 4000
 _COMMON_SHARE = 0.5
@@ -151,14 +153,22 @@ def _zone(
             note = f"local time is UTC{_clock(-shift_s)} (by positions, median {near:.1f} m apart)"
             fine = _disagreement(first.path.name, one, (other[0] + shift_s, *other[1:]))
             return shift_s, f"{note}; {fine}" if fine else note
+    shifts = -_QUARTER_S * np.array(_ZONE_QUARTERS)
     common = np.array([_common(recording, first, shift) for shift in shifts])
     if common.max() <= 0:
         expected = f"local times that overlap those of {first.path.name} in some zone"
         hint = "recordings of two journeys, or a wrong date; else give --zone or --offset"
         raise fail(InputError, str(recording.path), expected, "none", hint)
+    found = best_shift(shifts[common > 0], _speed(first), _speed(recording))
+    if found is not None:
+        return found, f"local time is UTC{_clock(-found)} (by speeds)"
     good = shifts[common >= common.max() - 1e-6]
-    shift_s = float(good[np.argmin(np.abs(good))])
-    return shift_s, f"local time is UTC{_clock(-shift_s)} (by the overlap of times)"
+    # Where one of them lasts longer, both begin together, or both end.
+    ends = np.abs(np.subtract(span_s(first), span_s(recording))[:, None] - good).min(axis=0)
+    order = good[np.argsort(ends, kind="stable")]
+    others = [f"UTC{_clock(-shift)}" for shift in order[1:].tolist() if shift % _HOUR_S == 0]
+    also = f"; {' or '.join(others[:2])} would do as well: --zone" if others else ""
+    return float(order[0]), f"local time is UTC{_clock(-order[0])} (by the overlap of times{also})"
 
 
 def _clock(shift_s: float) -> str:

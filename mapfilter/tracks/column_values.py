@@ -87,7 +87,7 @@ def _texts(column: Column, values: pd.Series, found: TableFaults) -> Any:
         # Not as text of pandas, which cannot hold half of a surrogate pair.
         filled = np.array([str(value) != "" for value in values], dtype=np.bool_)
         present = values.notna().to_numpy() & filled
-        known = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
+        known = [_text(v) if ok else None for v, ok in zip(values, present, strict=True)]
     texts = np.array([*known, None], dtype=object)[:-1][codes]
     if column.required:
         missing = np.array([*(text is None for text in known), True])[:-1]
@@ -104,6 +104,13 @@ def _texts(column: Column, values: pd.Series, found: TableFaults) -> Any:
         )
     # Without the dtype pandas 3 makes these strings, and None becomes NaN.
     return pd.Series(texts, dtype=object)
+
+
+def _text(value: object) -> str:
+    """Return a value as text; whole numbers are floats where others of their column are missing."""
+    if isinstance(value, float | np.floating) and float(value).is_integer():
+        return str(int(value))
+    return str(value)
 
 
 def _is_unicode(text: str) -> bool:

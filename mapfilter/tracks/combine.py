@@ -22,6 +22,7 @@ from mapfilter.tracks.mirrored import mirrored_notes
 from mapfilter.tracks.motion_factors import scaled_motion
 from mapfilter.tracks.moved import places_of_poses
 from mapfilter.tracks.open_options import CombineOptions
+from mapfilter.tracks.parted_odometry import parted_odometry, with_turns
 from mapfilter.tracks.position_sources import fixes_of, measured_positions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
 from mapfilter.tracks.readers.recording import Recording
@@ -103,7 +104,10 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     tables = {
         "motion": moved.rows,
         "radio": _joined(shifted, "radio"),
-        "gnss": fixes_of(others, frame, None if by_receiver else moved.rows, notes, truth),
+        "gnss": fixes_of(
+            *(others, frame, None if by_receiver else moved.rows, notes, truth),
+            driven=bool(moved.vehicle),
+        ),
         "truth": truth,
         "pseudoranges": _satellites(recordings, shifted, notes),
     }
@@ -199,6 +203,10 @@ def _sensors(
     for name, columns in SENSOR_COLUMNS.items():
         if name == "velocity":
             rows = _velocity([r for r in recordings if r.path not in truth], frame)
+        elif name == "odometry":
+            fast, turning = parted_odometry([r for r in recordings if name in r.tables])
+            rows = _joined(_apart(fast, name, notes), name)
+            rows = None if rows is None else with_turns(rows, turning)[0]
         else:
             rows = _joined(_apart(recordings, name, notes), name)
         if rows is not None and len(rows):

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import InputError, fail, listed
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.exchanged import check_columns
 from mapfilter.tracks.frame import Frame
@@ -23,6 +23,7 @@ from mapfilter.tracks.moved import (
     motion_from_course,
     motion_from_poses,
 )
+from mapfilter.tracks.parted_odometry import parted_odometry, with_turns
 from mapfilter.tracks.pdr.counted import reckon_counted
 from mapfilter.tracks.pdr.options import WalkOptions, without_effect
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
@@ -32,6 +33,7 @@ from mapfilter.tracks.position_sources import measured_positions
 from mapfilter.tracks.readers.recording import Recording
 
 _LONGEST_GAP_S = 3600.0
+_SUMMER_HOURS = 1.1
 OF_RECEIVER = "motion comes from GNSS"
 
 
@@ -101,6 +103,11 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
     """Return motion that a recording holds as such, odometry or poses; None without any."""
     for name in ("motion", "odometry", "poses"):
         having = [r for r in recordings if name in r.tables]
+        if name == "odometry":
+            having, turns = parted_odometry(having)
+            if turns and not having:
+                some = listed([one.path.name for one in turns])
+                notes.append(f"{some}: yaw rates without speeds (wheel_speed_mps): no motion")
         if not having:
             continue
         for other in having[1:]:
@@ -108,8 +115,9 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
         rows, source = having[0].tables[name], f"motion is that of {having[0].path.name}"
         if name == "odometry":
             _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))
+            rows, joined = with_turns(rows, turns)
             moved, imu, words = reckon_odometry(rows)
-            notes += words
+            notes += [*joined, *words]
             return Moved(moved, imu, vehicle=True, source=source)
         poses, compass = name == "poses", False
         if "compass_deg" in rows and rows["compass_deg"].notna().any():
@@ -174,11 +182,13 @@ def _check_gaps(recording: Recording, time_s: Floats) -> None:
     got = f"{hours:.1f} h from {before} (row {row}) to {after} (row {row + 1}){more}"
     where, expected = f"{recording.path}, odometry", "rows at most 1 h apart"
     hint = "a recording of several journeys: split it there, convert each alone"
+    if recording.clock.kind == "local" and not recording.clock.zone and hours < _SUMMER_HOURS:
+        hint = f"a clock that was set forward for summer: --zone; or {hint}"
     raise fail(InputError, where, expected, got, hint)
 
 
 def _shown_time(recording: Recording, time_s: float) -> str:
-    if not recording.clock.absolute:
+    if recording.clock.kind == "monotonic":
         return f"{time_s:g} s"
     return datetime.fromtimestamp(time_s, UTC).isoformat(" ", "seconds").removesuffix("+00:00")
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 
 from mapfilter.errors import Faults
+
+_DATE = re.compile(r"\s{0,9}(?:\d{1,4}[-/:]\d|\d\d?\.\d\d?\.\d)", re.ASCII)
+"""Begin of a date or a time of day; numbers as texts are read as numbers."""
 
 
 def seconds_of_tables(
@@ -19,7 +24,7 @@ def seconds_of_tables(
     Parameters
     ----------
     given : mapping of str to pandas.DataFrame
-        Tables with ``time_s`` in seconds, or timestamps in ``time_s`` or ``time``.
+        Tables with ``time_s`` in seconds, or timestamps in ``time_s`` or ``time``, or in the index.
     start_utc_s : float
         UTC seconds at second 0; NaN where the timestamps are to tell.
     names : mapping of str to str
@@ -43,14 +48,20 @@ def seconds_of_tables(
             twice = ", ".join(map(str, rows.columns[rows.columns.duplicated()].unique()))
             faults.add(where, "each column once", f"{twice} more often")
             continue
+        if not {"time_s", "time"}.intersection(rows.columns) and _is_of_times(rows.index):
+            rows = rows.rename_axis(rows.index.name or "time").reset_index()
+            rows = rows.rename(columns={rows.columns[0]: "time_s"})
         tables[table] = rows
         name = "time_s" if "time_s" in rows else "time"
-        time = rows[name].infer_objects() if name in rows else pd.Series(dtype=float)
+        time = _as_timestamps(rows[name]) if name in rows else pd.Series(dtype=float)
         if isinstance(time.dtype, pd.DatetimeTZDtype):
             tables[table], times[table] = rows.drop(columns=name), time
         elif pd.api.types.is_datetime64_any_dtype(time.dtype):
             hint = 'UTC or local time? add it, such as by .dt.tz_localize("UTC")'
             faults.add(f"{where}, {name}", "timestamps with a time zone", "none", hint)
+            del tables[table]
+        elif other := _other_times(time):
+            faults.add(f"{where}, {name}", "timestamps with a time zone, or seconds", *other)
             del tables[table]
     known = [time.min() for time in times.values() if time.notna().any()]
     if known and np.isnan(start_utc_s):
@@ -65,3 +76,28 @@ def seconds_of_tables(
         time_s = (time - origin).dt.total_seconds() - offset_s
         tables[table] = tables[table].assign(time_s=time_s)
     return tables, start_utc_s
+
+
+def _is_of_times(index: pd.Index) -> bool:
+    """Return whether an index holds the times of its rows."""
+    return isinstance(index, pd.DatetimeIndex) or index.name in ("time_s", "time")
+
+
+def _as_timestamps(time: pd.Series) -> pd.Series:
+    """Return times of any kind of timestamps as those of pandas, others as they are."""
+    if isinstance(time.dtype, pd.ArrowDtype) and pa.types.is_timestamp(time.dtype.pyarrow_dtype):
+        return pd.Series(pd.DatetimeIndex(time), index=time.index)
+    return time.infer_objects()
+
+
+def _other_times(time: pd.Series) -> tuple[str, str] | None:
+    """Return what times are that are neither timestamps nor seconds, and what makes them these."""
+    if pd.api.types.is_timedelta64_dtype(time.dtype):
+        return "durations", "make seconds of them: .dt.total_seconds()"
+    first = time.dropna().head(1).tolist()
+    if not first or not isinstance(first[0], str) or not _DATE.match(first[0]):
+        return None
+    return (
+        f"texts such as {first[0][:40]!r}",
+        "make timestamps of them: pd.to_datetime(…, utc=True)",
+    )

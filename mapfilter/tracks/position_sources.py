@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.position_units import RADIUS_68
@@ -20,6 +20,7 @@ PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
 _SAME_M, _FEWEST, _MOVED_M, _COMMON = 0.5, 20, 50.0, 0.5
 _NEAR_S, _NEAR = 2.0, 1.5
 """A position stands for others within 2 s of it, or one and a half of its file's intervals."""
+_STAY_M, _STAY_MOVED_M, _STANDING_MPS = 3.0, 100.0, 0.3
 _HELD_S, _CELLS = 10.0, 2.0
 """A way with corners within one step of rounded degrees is up to two steps long."""
 
@@ -47,6 +48,8 @@ def fixes_of(
     motion: pd.DataFrame | None,
     notes: list[str],
     truth: pd.DataFrame | None = None,
+    *,
+    driven: bool = False,
 ) -> pd.DataFrame | None:
     """Return the positions of recordings as fixes of a log; None without any.
 
@@ -61,6 +64,8 @@ def fixes_of(
         Grows by what is left out, and by stated errors that are far too small.
     truth : pandas.DataFrame, optional
         time_s, east_m and north_m.
+    driven : bool
+        Whether motion is that of wheels.
     """
     placed, rounded_m = [], {}
     for recording in recordings:
@@ -86,7 +91,7 @@ def fixes_of(
     notes += of_sources
     parts = []
     for recording, fixes in kept:
-        fixes, note = without_held(fixes, motion, rounded_m[id(recording)])
+        fixes, note = without_held(fixes, motion, rounded_m[id(recording)], driven=driven)
         notes += [f"{recording.path.name}: {note}"] if note else []
         parts.append(fixes)
     return pd.concat(parts, ignore_index=True).sort_values("time_s")
@@ -129,13 +134,18 @@ def of_one_receiver(placed: Sequence[Placed]) -> tuple[list[Placed], tuple[str, 
 
 
 def without_held(
-    gnss: pd.DataFrame, motion: pd.DataFrame | None, rounded_m: float = 0.0
+    gnss: pd.DataFrame,
+    motion: pd.DataFrame | None,
+    rounded_m: float = 0.0,
+    *,
+    driven: bool = False,
 ) -> tuple[pd.DataFrame, str]:
     """Return fixes without those that stay where they are while the phone moves, and a note.
 
     A receiver without satellites, or a program, may repeat its last position for minutes. Of equal
     positions over more than 10 s, in which motion goes more than 50 m, the first one stays. Those
-    of rounded degrees are equal on a longer way.
+    of rounded degrees are equal on a longer way. Wheels, which do not turn where one stands, show
+    it also of positions within 3 m, over more than 100 m.
 
     Parameters
     ----------
@@ -145,6 +155,8 @@ def without_held(
         time_s and step_m.
     rounded_m : float
         The step of rounded degrees, see :func:`mapfilter.tracks.readers.held_positions.rounding_m`.
+    driven : bool
+        Whether motion is that of wheels.
 
     Examples
     --------
@@ -158,23 +170,55 @@ def without_held(
         return gnss, ""
     time_s, east_m, north_m = _columns(gnss)
     moved = np.nan_to_num(np.abs(motion["step_m"].to_numpy(dtype=np.float64)))
-    way_m = np.interp(time_s, motion["time_s"].to_numpy(dtype=np.float64), np.cumsum(moved))
+    moved_s = motion["time_s"].to_numpy(dtype=np.float64)
+    way_m = np.interp(time_s, moved_s, np.cumsum(moved))
     changed = np.concatenate([[True], (np.diff(east_m) != 0) | (np.diff(north_m) != 0)])
     first = np.flatnonzero(changed)
     last = np.append(first[1:], len(gnss)) - 1
     moved_m = max(_MOVED_M, _CELLS * rounded_m)
     held = (time_s[last] - time_s[first] > _HELD_S) & (way_m[last] - way_m[first] > moved_m)
-    if not held.any():
+    first, last = first[held], last[held]
+    if driven:
+        places = east_m + 1j * north_m
+        # The noise of speeds at rest adds up to a way.
+        moved[moved < _STANDING_MPS * np.diff(moved_s, prepend=moved_s[:1])] = 0.0
+        way_m = np.interp(time_s, moved_s, np.cumsum(moved))
+        stay = _stays(time_s, places, way_m, max(_STAY_MOVED_M, _CELLS * rounded_m))
+        first, last = (
+            np.append(some, more) for some, more in zip((first, last), stay, strict=True)
+        )
+    if not first.size:
         return gnss, ""
-    dropped = np.repeat(held, last - first + 1) & ~changed
-    longest_s = float((time_s[last] - time_s[first])[held].max())
-    gone_m = float((way_m[last] - way_m[first])[held].max())
+    dropped = np.zeros(len(gnss), dtype=np.bool_)
+    for begin, end in zip(first.tolist(), last.tolist(), strict=True):
+        dropped[begin + 1 : end + 1] = True
+    longest_s = float((time_s[last] - time_s[first]).max())
+    gone_m = float((way_m[last] - way_m[first]).max())
+    near = "the same" if held.any() else f"within {_STAY_M:g} m"
     note = (
-        f"gnss: {number_of(int(dropped.sum()), 'position')} left out, as they stay the same for up "
+        f"gnss: {number_of(int(dropped.sum()), 'position')} left out, as they stay {near} for up "
         f"to {longest_s:.0f} s while motion goes {gone_m:.0f} m (likely: held by a receiver "
         "without satellites)"
     )
     return gnss[~dropped].reset_index(drop=True), note
+
+
+def _stays(time_s: Floats, places: np.ndarray, way_m: Floats, moved_m: float) -> tuple[Ints, Ints]:
+    """Return first and last rows of stretches that stay near their first place on a way."""
+    later = np.searchsorted(way_m, way_m + moved_m, side="right")
+    rows = np.flatnonzero(later < len(places))
+    near = np.abs(places[later[rows]] - places[rows]) <= _STAY_M
+    found, end = [], -1
+    for begin in rows[near].tolist():
+        if begin <= end:
+            continue
+        left = np.abs(places[begin:] - places[begin]) > _STAY_M
+        last = begin + int(np.argmax(left)) - 1 if left.any() else len(places) - 1
+        if time_s[last] - time_s[begin] > _HELD_S and way_m[last] - way_m[begin] > moved_m:
+            found.append((begin, last))
+            end = last
+    first, last_rows = np.array(found, dtype=np.int64).reshape(-1, 2).T
+    return first, last_rows
 
 
 def _stated_notes(placed: Sequence[Placed], truth: pd.DataFrame | None) -> list[str]:

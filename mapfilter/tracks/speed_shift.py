@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 
 from mapfilter._types import Floats
@@ -10,6 +12,8 @@ _WITHIN_S, _PERIOD_S = 60.0, 0.5
 _FEWEST_S, _LEAST, _TIMES, _GAIN, _PEAK_S = 180.0, 0.7, 3.0, 0.05, 8.0
 """What is left unexplained has to be three times as much without the shift."""
 _REMARKABLE_S, _HALF_S, _LONGEST_S = 1.5, 2.5, 7200.0
+_STEADY = 1e-3
+"""Speeds that differ by no more than this share are one speed and the rounding of positions."""
 _LEAP_S = (17.0, 19.0)
 """GPS time is 18 s ahead of UTC since 2017."""
 
@@ -41,16 +45,22 @@ applied, see --offset (likely: GPS time for UTC)'
         return ""
     shifts = np.arange(-_WITHIN_S, _WITHIN_S + _PERIOD_S / 2, _PERIOD_S)
     agreed = np.array([_correlation(one, other, shift) for shift in shifts])
-    if not np.isfinite(agreed).all():
+    now = float(agreed[len(shifts) // 2])
+    if not isfinite(now):
         return ""
+    # Of short recordings a shift to one side leaves too little in common.
+    shifts, agreed = shifts[np.isfinite(agreed)], agreed[np.isfinite(agreed)]
     at = int(np.argmax(agreed))
-    shift_s, best, now = float(shifts[at]), float(agreed[at]), float(agreed[len(shifts) // 2])
+    shift_s, best = float(shifts[at]), float(agreed[at])
     # A speed that repeats itself, as between lights, agrees at several shifts.
     peak = np.r_[False, (agreed[1:-1] >= agreed[:-2]) & (agreed[1:-1] >= agreed[2:]), False]
     peak &= np.abs(shifts - shift_s) > _PEAK_S
     other_best = float(agreed[peak].max(initial=-1.0))
-    clear = best >= _LEAST and 1 - max(now, other_best) >= _TIMES * (1 - best) + _GAIN
-    if not clear or abs(shift_s) < _REMARKABLE_S or at in (0, len(shifts) - 1):
+    if (
+        not _is_clear(best, max(now, other_best))
+        or abs(shift_s) < _REMARKABLE_S
+        or at in (0, len(shifts) - 1)
+    ):
         return ""
     low, high = _LEAP_S
     leap = " (likely: GPS time for UTC)" if low <= abs(shift_s) <= high else ""
@@ -63,6 +73,17 @@ applied, see --offset (likely: GPS time for UTC)'
 def speed_agreement(one: Speeds | None, other: Speeds | None, shift_s: float) -> float:
     """Return the correlation of speeds of which the second are shifted; NaN where nothing tells."""
     return float("nan") if one is None or other is None else _correlation(one, other, shift_s)
+
+
+def best_shift(shifts: Floats, one: Speeds | None, other: Speeds | None) -> float | None:
+    """Return the shift of some at which speeds agree far better than at others, or None."""
+    if one is None or other is None:
+        return None
+    agreed = np.array([_correlation(one, other, shift) for shift in shifts.tolist()])
+    agreed = np.where(np.isfinite(agreed), agreed, -1.0)
+    order = np.argsort(-agreed)
+    best, second = [*agreed[order[:2]].tolist(), -1.0][:2]
+    return float(shifts[order[0]]) if _is_clear(best, second) else None
 
 
 def speeds_of_places(time_s: Floats, east_m: Floats, north_m: Floats) -> Speeds:
@@ -82,16 +103,22 @@ def speeds_of_places(time_s: Floats, east_m: Floats, north_m: Floats) -> Speeds:
     return time_s, np.hypot(*moved) / (end_s - begin_s)
 
 
+def _is_clear(best: float, other: float) -> bool:
+    """Return whether speeds that agree so well leave no doubt about another shift."""
+    return best >= _LEAST and 1 - other >= _TIMES * (1 - best) + _GAIN
+
+
 def _correlation(one: Speeds, other: Speeds, shift_s: float) -> float:
     """Return the correlation of speeds of which the second are shifted; NaN for a short time."""
     begin_s = max(one[0][0], other[0][0] + shift_s)
     end_s = min(one[0][-1], other[0][-1] + shift_s, begin_s + _LONGEST_S)
     if end_s - begin_s < _FEWEST_S:
         return float("nan")
-    at_s = np.arange(begin_s, end_s, _PERIOD_S)
+    # Means beside an end would fall there in both.
+    at_s = np.arange(begin_s + _HALF_S, end_s - _HALF_S, _PERIOD_S)
     first, second = _smoothed(one, at_s), _smoothed(other, at_s - shift_s)
     spread = float(first.std() * second.std())
-    if spread <= 0:
+    if spread <= _STEADY**2 * float(first.mean() * second.mean()):
         return float("nan")
     return float(np.mean((first - first.mean()) * (second - second.mean()))) / spread
 

@@ -194,7 +194,7 @@ def run_replay(
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
         if truth is not None:
             log = replace(log, notes=(*log.notes, *truth_notes(track.estimate, truth)))
-        fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
+        fixes = fixes_note(opened, log, given, config.track.truth, filter_.uses, track.estimate)
         ends = early_end_note(opened, track.estimate, over_map=database is not None)
         pauses = pause_note(track.estimate)
         log = replace(log, notes=(*log.notes, *fixes, *pauses, *ends))

@@ -222,6 +222,37 @@ def test_a_way_without_headings_is_straight_for_a_while():
     assert (fixed.headless_m, fixed.fixed_s) == (0.0, 7.0)
 
 
+def test_ways_before_and_after_a_fix_go_the_same_way():
+    """A belief that took them apart lags behind, by no more than a way that nothing parts."""
+
+    def gone(made, steps):
+        for _ in range(steps):
+            made, _, _ = made.moved(MotionStep(1.0, nan), 1.0, OPTIONS, np.zeros(3))
+        return made
+
+    def fixed(made, time_s, east_m=0.0):
+        fix = GnssFix(EAST + east_m, NORTH)
+        after, _ = made.fixed(time_s, fix, np.eye(2), KNOWN, (0.0, 30.0))
+        return after.positioned(time_s)
+
+    here = GnssFix(EAST, NORTH)
+    first = fixed(gone(Reckoning(), 60), 1.0)
+    assert gone(Reckoning(), 60).astray_m2(here, 1.0) == 0.0
+    made = gone(first, 40)
+    parted_m2 = (way_spread_m2(60.0) + way_spread_m2(40.0)) / 2
+    assert made.astray_m2(here, 1.0) == pytest.approx(way_spread_m2(100.0) / 2 - parted_m2)
+    assert made.astray_m2(here, 1.0) > 500.0
+    assert gone(fixed(made, 2.0), 40).astray_m2(here, 1.0) > made.astray_m2(here, 1.0)
+    headed, _, _ = made.moved(MotionStep(1.0, 0.0), 1.0, OPTIONS, np.zeros(3))
+    assert gone(fixed(headed, 2.0), 40).astray_m2(here, 1.0) == 0.0
+    # Fixes that go farther than the way contradict it.
+    assert made.astray_m2(GnssFix(EAST + 63.0, NORTH), 1.0) > 500.0
+    assert made.astray_m2(GnssFix(EAST + 65.0, NORTH), 1.0) == 0.0
+    assert made.astray_m2(GnssFix(EAST + 65.0, NORTH), 4.0) > 500.0
+    turning, _, _ = made.moved(MotionStep(1.0, nan, 0.1), 1.0, OPTIONS, np.zeros(3))
+    assert turning.astray_m2(here, 1.0) == 0.0
+
+
 @pytest.mark.parametrize("fault", ["paused", "ended", "no length"])
 def test_dead_sensors_do_not_leave_a_narrow_belief_behind(fault):
     """One goes straight on for a minute while motion is not measured; then it is again."""

@@ -98,3 +98,45 @@ def test_motion_with_directions_or_without_positions_stays_as_it_is():
         assert with_joined_steps(log, options) == (log, ())
     # These leave out such steps themselves.
     assert with_joined_steps(plain, CandidateFilter()) == (plain, ())
+
+
+def paced(pace_mps, fix_sd_m, lasts_s):
+    """A way with a fix each second, and lengths alone."""
+    path_m = drive(TOWN, 3, lasts_s * pace_mps)
+    rng = np.random.default_rng(7)
+    count = int(len(path_m) * STEP_M / pace_mps)
+    at = pace_mps * np.arange(count) / STEP_M
+    east_m, north_m = (np.interp(at, np.arange(len(path_m)), axis) for axis in path_m.T)
+    places = pd.DataFrame({"time_s": np.arange(count) * 1.0, "east_m": east_m, "north_m": north_m})
+    noise_m = rng.normal(0, fix_sd_m, (2, count))
+    fixes = places.assign(
+        east_m=east_m + noise_m[0],
+        north_m=north_m + noise_m[1],
+        var_east_m2=fix_sd_m**2,
+        var_north_m2=fix_sd_m**2,
+    )
+    motion = pd.DataFrame({"time_s": places["time_s"], "step_m": pace_mps})
+    return make_log(CRS, motion=motion, gnss=fixes, truth=places)
+
+
+@pytest.mark.parametrize("fix_sd_m", [5.0, 10.0])
+def test_a_walk_of_lengths_alone_is_followed_by_its_fixes(town, fix_sd_m):
+    """Fixes a step apart were all ahead, and then rejected: hundreds of metres off."""
+    log = paced(1.4, fix_sd_m, 500.0)
+    track = mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW))
+    score = mf.score(track, log.truth)
+    assert score.error_mean_m < 2.5 * fix_sd_m
+    assert score.within_95 > 0.8
+    assert any("m of way after another one" in note for note in track.log.notes)
+
+
+@pytest.mark.parametrize(("pace_mps", "fix_sd_m"), [(1.4, 3.0), (1.4, 10.0), (9.0, 10.0)])
+def test_without_a_map_fixes_are_followed_by_whom_has_lengths_alone(pace_mps, fix_sd_m):
+    """Fixes that are all ahead were taken for errors that last: up to 80 m behind, within 30 m."""
+    log = paced(pace_mps, fix_sd_m, 700.0)
+    east_m, north_m = (log.truth[name] for name in ("east_m", "north_m"))
+    found = mf.locate(log, filter="ekf").to_dataframe()
+    off_m = np.hypot(found["east_m"] - east_m, found["north_m"] - north_m)[10:]
+    assert len(off_m) > 500
+    assert off_m.mean() < 1.5 * fix_sd_m
+    assert (off_m <= found["radius_95_m"][10:]).mean() > 0.9

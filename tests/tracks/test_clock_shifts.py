@@ -17,7 +17,7 @@ WEEKS_S = 1024 * 7 * 86_400
 def notes(tmp_path):
     """Notes on a drive of uneven speed, with fixes of 3 m and a clock of its odometry."""
 
-    def of(shift_s, *, steady=False, seed=1):
+    def of(shift_s, *, steady=False, seed=1, fixes_s=COUNT):
         rng = np.random.default_rng(seed)
         knots = rng.uniform(0, 16, COUNT // 20 + 2)
         speed = np.full(COUNT, 10.0) if steady else np.interp(np.arange(COUNT) / 20, *_at(knots))
@@ -32,7 +32,9 @@ def notes(tmp_path):
             ("fixes.csv", TIME_S, places),
             ("odometry.csv", TIME_S + shift_s, odometry),
         ):
-            pd.DataFrame({"time": times, **rows}).to_csv(tmp_path / name, index=False)
+            table = pd.DataFrame({"time": times, **rows})
+            table = table[: fixes_s if name == "fixes.csv" else COUNT]
+            table.to_csv(tmp_path / name, index=False)
         found = mf.read_log([tmp_path / "fixes.csv", tmp_path / "odometry.csv"]).notes
         return [note for note in found if "speeds agree" in note]
 
@@ -51,6 +53,15 @@ def test_a_clock_of_other_seconds_is_named(notes, shift_s, seed):
     assert before == "odometry.csv: speeds agree with those of fixes.csv"
     assert float(after.split()[0]) == pytest.approx(-shift_s, abs=1.0)
     assert ("(likely: GPS time for UTC)" in note) == (shift_s == 18.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("shift_s", [18.0, 7.0, -18.0])
+def test_so_is_one_where_positions_end_early(notes, shift_s, seed):
+    """As of a drive that is jammed: shifts to one side leave too little in common."""
+    (note,) = notes(shift_s, seed=seed, fixes_s=220)
+    assert float(note.partition(" best ")[2].split()[0]) == pytest.approx(-shift_s, abs=1.0)
+    assert notes(0.0, seed=seed, fixes_s=220) == []
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -38,6 +38,55 @@ def test_timestamps_beside_a_start_count_from_it():
     assert log.start_utc_s == NOON_UTC_S
 
 
+@pytest.mark.parametrize("zone", ["UTC", "Europe/Helsinki"])
+def test_timestamps_of_arrow(zone):
+    """They were refused, as if they had no zone."""
+    times = TIMES.tz_convert(zone).to_series().reset_index(drop=True)
+    walk = pd.DataFrame({"time": times, **STEPS}).convert_dtypes(dtype_backend="pyarrow")
+    assert isinstance(walk["time"].dtype, pd.ArrowDtype)
+    log = make_log(CRS, motion=walk)
+    assert (log.start_utc_s, log.motion["time_s"].tolist()) == (NOON_UTC_S + 0.25, [0.0, 0.75])
+    none = walk.assign(time=TIMES.tz_localize(None).astype("timestamp[ns][pyarrow]"))
+    with pytest.raises(InputError, match="expected timestamps with a time zone, found none"):
+        make_log(CRS, motion=none)
+
+
+@pytest.mark.parametrize("name", ["time", "time_s", "logged", None])
+def test_timestamps_and_seconds_in_the_index(name):
+    walk = pd.DataFrame(STEPS, index=TIMES.rename(name))
+    log = make_log(CRS, motion=walk)
+    assert (log.start_utc_s, log.motion["time_s"].tolist()) == (NOON_UTC_S + 0.25, [0.0, 0.75])
+    seconds = pd.DataFrame(STEPS, index=pd.Index([1.0, 2.5], name="time_s"))
+    assert make_log(CRS, motion=seconds).motion["time_s"].tolist() == [1.0, 2.5]
+
+
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [
+        (HOURS, r"found texts such as '2.*pd\.to_datetime"),
+        (["28.05.2026 12:00", "28.05.2026 12:01"], r"found texts such as '28\.05"),
+        (pd.to_timedelta([1, 2], "s"), r"found durations .*total_seconds"),
+    ],
+)
+def test_times_of_another_type_are_named(times, told):
+    with pytest.raises(InputError, match="motion, time: .*" + told):
+        make_log(CRS, motion=pd.DataFrame({"time": times, **STEPS}))
+    seconds = pd.DataFrame({"time_s": ["1.5", "2.25"], **STEPS})
+    assert make_log(CRS, motion=seconds).motion["time_s"].tolist() == [1.5, 2.25]
+
+
+@pytest.mark.parametrize("kind", [float, object])
+def test_whole_numbers_of_cells_beside_missing_ones_are_no_fractions(kind):
+    """A merge of pandas makes floats of them: cell 10303.0 is in no plan."""
+    cells = pd.Series([10303.0, np.nan, 7.5], dtype=kind)
+    radio = pd.DataFrame({"time_s": [0.0, 1.0, 2.0], "role": "serving", "cell": cells})
+    assert make_log(CRS, radio=radio.assign(level_dbm=-80)).radio["cell"].tolist() == [
+        "10303",
+        None,
+        "7.5",
+    ]
+
+
 def test_timestamps_of_any_zone_and_as_objects():
     walk = pd.DataFrame({"time": [pd.Timestamp(hour).tz_convert("Asia/Tokyo") for hour in HOURS]})
     log = make_log(CRS, motion=walk.astype(object).assign(**STEPS))

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import mapfilter as mf
 from mapfilter.errors import InputError
 from mapfilter.geodesy import unproject
 from mapfilter.tracks.open_options import OpenOptions
@@ -68,3 +69,24 @@ def test_a_file_with_none_of_the_columns_is_no_plain_table(files, tmp_path):
     (tmp_path / "notes.txt").write_text("a;b\n1;2\n")
     with pytest.raises(InputError, match=r"notes.txt: expected a recording in a known format"):
         read_recordings([*files, tmp_path / "notes.txt"], OpenOptions(columns=NAMED))
+
+
+@pytest.mark.parametrize("name", ["walk.jsonl", "walk.json", "walk.log"])
+@pytest.mark.parametrize("start", ['{"time": 1.0, "steps": 2}', '[{"time": 1.0, "step_m": 0.7},'])
+def test_json_is_named(tmp_path, name, start):
+    """Its keys were read as a header: a time that is none, or columns that are not used."""
+    (tmp_path / name).write_text(f"{start}\n" * 3)
+    with pytest.raises(InputError, match=r"begins with .* \(likely: JSON; export GPX, or a table"):
+        mf.read_log(tmp_path / name)
+
+
+def test_columns_of_another_language_are_named_by_their_units(tmp_path):
+    """The columns of positions were proposed, of which the file has none."""
+    head = "time;Vitesse (km/h);Vitesse de lacet (deg/s);Niveau [dBm];Remarque"
+    (tmp_path / "trajet.csv").write_text(f"{head}\n1778666400;3,6;0,1;-80;x\n")
+    options = (
+        r"such as 'wheel_speed_kmh=vitesse \(km/h\)' and 'yaw_rate_degps=vitesse de lacet "
+        r"\(deg/s\)' and 'level_dbm=niveau \[dbm\]'\)"
+    )
+    with pytest.raises(InputError, match=options):
+        mf.read_log(tmp_path / "trajet.csv")

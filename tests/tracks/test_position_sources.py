@@ -142,3 +142,34 @@ def test_rounded_degrees_of_a_slow_way_are_not_held(read, held):
     log = read(a=table(lat=lat, lon=LON.round(3), wheel_speed_mps=5.0, yaw_rate_radps=0.01))
     assert len(log.gnss) == COUNT if not held else len(log.gnss) < COUNT - 90
     assert any("held by a receiver" in note for note in log.notes) == held
+
+
+def wandering(still):
+    """Positions of a drive of 10 m/s that a receiver holds for 100 s, with noise of 0.3 m."""
+    rng = np.random.default_rng(3)
+    north_m = 10.0 * np.arange(COUNT)
+    north_m[100:200] = north_m[100] if still else north_m[100:200]
+    noise = rng.normal(0, 0.3, (2, COUNT))
+    return {"lat": 60 + (north_m + noise[0]) / 111_195, "lon": 25 + noise[1] / 55_600}
+
+
+def test_positions_that_hardly_move_while_wheels_turn_are_held(read):
+    """They were followed, with radii of some 17 m, and what wheels told was rejected."""
+    wheels = {"wheel_speed_mps": 10.0, "yaw_rate_radps": 0.0}
+    log = read(drive=table(**wandering(still=True), **wheels))
+    assert set(np.arange(101.0, 200.0)).isdisjoint(log.gnss["time_s"])
+    assert len(log.gnss) == COUNT - 99
+    assert any(
+        "99 positions left out, as they stay within 3 m for up to 99" in n for n in log.notes
+    )
+    assert len(read(drive=table(**wandering(still=False), **wheels)).gnss) == COUNT
+
+
+def test_steps_in_one_place_and_noise_of_wheels_at_rest_hold_nothing(read):
+    """A walker may go to and fro, and speeds of 0.2 m/s at rest add up to a way."""
+    steps = table(**wandering(still=True), steps=2 * np.arange(COUNT), compass_deg=0.0)
+    assert len(read(walk=steps).gnss) == COUNT
+    speed = np.where((np.arange(COUNT) > 99) & (np.arange(COUNT) < 200), 0.2, 10.0)
+    time_s = TIME_S + np.cumsum(np.where(speed < 1, 10.0, 1.0))
+    wheels = {"wheel_speed_mps": speed, "yaw_rate_radps": 0.0}
+    assert len(read(drive=table(time_s, **wandering(still=True), **wheels)).gnss) == COUNT

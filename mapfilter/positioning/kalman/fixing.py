@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from math import exp, hypot, isfinite, nan, radians, sqrt
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ from mapfilter.positioning.kalman.lasting import Motion, fix_layout, rescaled, w
 from mapfilter.positioning.kalman.models import KalmanOptions, compiled
 from mapfilter.positioning.kalman.proof import Doubt, way_agrees
 from mapfilter.positioning.kalman.readings import fix_covariance_m2
-from mapfilter.positioning.kalman.reckoning import RATE, at_rest
+from mapfilter.positioning.kalman.reckoning import RATE, after_each_other, at_rest
 from mapfilter.positioning.kalman.turned import Lasting
 
 _RECKONED, _MOVING = Patience(30.0, 120.0), Patience(5.0, 5.0)
@@ -182,6 +183,7 @@ class FixWeighing:
         drift_deg_per_sqrt_m: float,
         rests_since_s: float = nan,
         is_doubted: bool = False,
+        astray_m2: float = 0.0,
     ) -> WeighedFix:
         """Return what a fix leads to.
 
@@ -197,6 +199,8 @@ class FixWeighing:
             Time since which steps say that one stands; NaN where they do not.
         is_doubted : bool
             Whether the belief may be wrong by what is known before the fix.
+        astray_m2 : float
+            Variance along one axis of what it may lag behind besides.
         """
         own, record, rests = self.own, errors.record, isfinite(rests_since_s)
         stated = fix_covariance_m2(fix, self.options.fix_sd_m)
@@ -242,6 +246,11 @@ class FixWeighing:
                 errors = errors.after_fix(lasting_m, record, time_s)
                 return WeighedFix(belief, errors, motion, found.ruling, nan, False)
             white = white + (found.larger - 1) * noise
+        if astray_m2:
+            lag = at_rest(self.layout)
+            for one, other in product(self._places, repeat=2):
+                lag[1][one, other] = astray_m2
+            belief, motion = belief.predict(*lag), after_each_other(motion, lag)
         model = compiled(position_fix(layout, white))
         place = [fix.east_m, fix.north_m]
         belief, info = belief.update(model, place, self.method, self.compared)
@@ -255,6 +264,12 @@ class FixWeighing:
             errors = errors.wandered(fix, float(np.trace(stated)) / 2, time_s, turns)
         errors = errors.proven(time_s, self.options.fix_lasting_s)
         return WeighedFix(belief, errors, motion, found.ruling, nis, info.used)
+
+    @property
+    def _places(self) -> list[list[int]]:
+        """Components of the position, and of the place that fixes are of."""
+        own, size = [self.own.east, self.own.north], self.own.size
+        return [own, [size, size + 1]] if self._lasts else [own]
 
     def _lasting_m(self, errors: FixErrors, wanted_m: float, time_s: float) -> float:
         """Return B at a fix: smaller errors last less at once, larger ones come with time.
@@ -274,13 +289,11 @@ class FixWeighing:
         lasts. A velocity is unknown again.
         """
         transition, noise, shift = at_rest(self.layout)
-        own = [self.own.east, self.own.north]
-        places = [own, [self.own.size, self.own.size + 1]] if self._lasts else [own]
-        for place in places:
+        for place, other in product(self._places, repeat=2):
             transition[place] = 0.0
             shift[place] = place_m
-            for other in places:
-                noise[np.ix_(place, other)] = white_m2
+            noise[np.ix_(place, other)] = white_m2
+        own = self._places[0]
         noise[own, own] += lasting_m**2
         if self.own is MOVING:
             velocity = list(self.own.velocity)

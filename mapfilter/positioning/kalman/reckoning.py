@@ -16,7 +16,7 @@ alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, inf, isfinite, nan, radians, sin, sqrt
+from math import cos, hypot, inf, isfinite, nan, radians, sin, sqrt
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
-from mapfilter.positioning.sensors.unmeasured import headless_step, missed_step
+from mapfilter.positioning.sensors.unmeasured import common_way_m2, headless_step, missed_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
 
 RECKONED = StateLayout(5, 0, 1)
@@ -46,6 +46,8 @@ _TURNS_SD_RAD = radians(2.0)
 iron."""
 _ASTRAY_RAD, _ASTRAY_RADPS = radians(30.0), radians(1.0)
 """What is added to the errors of turns and of their rate where they have led astray."""
+_FARTHER, _FARTHER_SD = 1.5, 4.0
+"""How much longer than the way fixes may go without contradicting it, and deviations of these."""
 
 
 def at_rest(layout: StateLayout) -> Motion:
@@ -80,6 +82,10 @@ class Reckoning:
         Of motion rows and reports.
     headless_m : float
         Way without headings since the last heading or fix.
+    before_m : float
+        Way without headings before that fix, since the last heading.
+    origin : tuple of float or None
+        Place of the first fix on that way, and the way before it.
     fixed_s : float
         Time of the last fix that was used.
     alignment : Alignment
@@ -92,10 +98,34 @@ class Reckoning:
 
     watch: SensorWatch = field(default_factory=SensorWatch)
     headless_m: float = 0.0
+    before_m: float = 0.0
+    origin: tuple[float, float, float] | None = None
     fixed_s: float = -inf
     alignment: Alignment = field(default_factory=Alignment)
     turned_s: float = nan
     recent: RecentWay = field(default_factory=RecentWay)
+
+    def astray_m2(self, fix: GnssFix, variance_m2: float) -> float:
+        """Return the variance along one axis by which a belief may lag behind a fix.
+
+        Ways without headings go on and on, each taken for one to any side: fixes that are all ahead
+        would be taken for errors that last. Where turns are measured fixes soon tell the direction,
+        and fixes that go farther than the way contradict it.
+
+        Parameters
+        ----------
+        fix : GnssFix
+        variance_m2 : float
+            Of the fix, along one axis.
+        """
+        if isfinite(self.turned_s) or self.origin is None:
+            return 0.0
+        east_m, north_m, way_m = self.origin
+        gone_m = hypot(fix.east_m - east_m, fix.north_m - north_m)
+        most_m = _FARTHER * (self.before_m + self.headless_m - way_m)
+        if gone_m > most_m + _FARTHER_SD * sqrt(variance_m2):
+            return 0.0
+        return common_way_m2(self.headless_m, self.before_m)
 
     @property
     def may_have_left(self) -> bool:
@@ -142,7 +172,8 @@ class Reckoning:
     def positioned(self, time_s: float) -> Reckoning:
         """Return it after a fix that was used."""
         watch = self.watch.positioned(time_s)
-        return replace(self, watch=watch, headless_m=0.0, fixed_s=time_s)
+        before_m = self.before_m + self.headless_m
+        return replace(self, watch=watch, headless_m=0.0, before_m=before_m, fixed_s=time_s)
 
     def carried(self) -> Reckoning:
         """Return it where positions have shown that one goes on though no step is counted."""
@@ -211,7 +242,8 @@ class Reckoning:
         noise[:2, :2] = options.step_sd_m**2 * np.outer(along, along)
         noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
         noise[:2, :2] += cross_m**2 * np.outer(across, across)
-        after = after if self.headless_m == 0 else replace(after, headless_m=0.0)
+        if self.headless_m or self.before_m or self.origin is not None:
+            after = replace(after, headless_m=0.0, before_m=0.0, origin=None)
         return after, (transition, noise, shift), Reason.USED
 
     def fixed(
@@ -246,6 +278,7 @@ class Reckoning:
             self,
             alignment=alignment,
             recent=recent if found is None else RecentWay(),
+            origin=self.origin or (fix.east_m, fix.north_m, self.before_m + self.headless_m),
         )
         return after, found or jump
 

@@ -244,6 +244,7 @@ class KalmanStep:
             drift_deg_per_sqrt_m=drift_deg,
             rests_since_s=since_s,
             is_doubted=doubted,
+            astray_m2=self.reckoning.astray_m2(fix, float(np.trace(noise)) / 2),
         )
         self.belief, self.fixes = after.belief, after.errors
         motion = after.motion

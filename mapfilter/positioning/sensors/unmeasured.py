@@ -41,6 +41,21 @@ def headless_step(step_m: float, from_m: float) -> MotionStep:
     return MotionStep(step_m, nan, nan, sqrt(max(more_m2, 0.0)))
 
 
+def common_way_m2(since_m: float, before_m: float) -> float:
+    """Return the variance along one axis that ways before and after a fix have in common.
+
+    Both go much the same way, whichever that is: so much is missing where the spreads of both are
+    added up as if one did not depend on the other.
+
+    Examples
+    --------
+    >>> common_way_m2(10.0, 0.0), round(common_way_m2(10.0, 1000.0))
+    (0.0, 792)
+    """
+    apart_m2 = way_spread_m2(since_m) + way_spread_m2(before_m)
+    return max(way_spread_m2(since_m + before_m) - apart_m2, 0.0) / 2
+
+
 def missed_step(rest: Rest, time_s: float) -> MotionStep:
     """Return the step of a rest that levels left in doubt, once steps are counted again.
 

@@ -7,22 +7,17 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import only
+from mapfilter.tracks.readers.csv_identities import cell_identities, roles
 from mapfilter.tracks.readers.csv_mapped import Mapped
-from mapfilter.tracks.readers.identities import add_radio, parse_identities
+from mapfilter.tracks.readers.identities import add_radio
 from mapfilter.tracks.readers.reading import Reading
 
 
 def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     """Add the rows that hold a cell or a level."""
-    if not any(map(mapped.has, ("level_dbm", "bars", "ci", "cell"))):
+    if not any(map(mapped.has, ("level_dbm", "bars", "ci", "cell", "cgi", "enodeb"))):
         return
-    identity = {name: mapped.whole(name) for name in ("mcc", "mnc", "lac", "ci")}
-    if mapped.has("cgi"):
-        given = parse_identities(mapped.texts("cgi"))
-        identity = {
-            name: np.where(np.isnan(values), given[name], values)
-            for name, values in identity.items()
-        }
+    identity = cell_identities(mapped)
     columns = {
         **identity,
         "time_s": time_s,
@@ -38,10 +33,7 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     there = identified | ~np.isnan(columns["level_dbm"])
     if mapped.has("cell"):
         columns["cell"] = cell
-    serving = mapped.rows.flags(*mapped.names("role"), true=("serving",))
-    neighbour = mapped.rows.flags(*mapped.names("role"), true=("neighbour", "neighbor"))
-    serving |= identified & ~neighbour
-    columns["role"] = np.array(["neighbour", "serving"], dtype=object)[serving.astype(np.int64)]
+    columns["role"] = roles(mapped, identified)
     add_radio(reading, *only(columns, mapped.rows.line, there))
 
 

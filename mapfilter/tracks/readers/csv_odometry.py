@@ -6,6 +6,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
+from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.reading import Reading
@@ -40,9 +41,35 @@ def has_unused_odometry(mapped: Mapped) -> bool:
     return speeds and _is_placed(mapped) and _is_turned(mapped) and not mapped.has("steps")
 
 
+def turns_alone(mapped: Mapped) -> bool:
+    """Return whether a file has the yaw rate of a vehicle whose speeds another file has."""
+    others = (*_OF_PHONES, *_SPEEDS)
+    beside = has_odometry(mapped) or _is_placed(mapped) or any(map(mapped.has, others))
+    return _is_turned(mapped) and not beside
+
+
+def heading_of_wheels(mapped: Mapped) -> str:
+    """Return the field of headings by which a vehicle without a yaw rate turns; "" for none.
+
+    Beside positions a heading may be the course of their receiver, which ends with them, and beside
+    steps it is a walker's.
+    """
+    others = ("steps", "step_m")
+    if not has_odometry(mapped) or _is_turned(mapped) or _is_placed(mapped):
+        return ""
+    if any(map(mapped.has, others)):
+        return ""
+    return next(filter(mapped.has, ("heading_rad", "compass_deg")), "")
+
+
 def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     """Add the rows with a vehicle's speed or yaw rate, and yaw rates of rows beside them."""
     if not has_odometry(mapped):
+        if turns_alone(mapped):
+            rates = mapped.radians("yaw_rate", "ps")
+            there = np.isfinite(rates) & (np.abs(rates) <= FASTEST_TURN_RADPS)
+            columns = {"time_s": time_s, "yaw_rate_radps": rates}
+            add_rows(reading, "odometry", columns, mapped.rows, there)
         if _is_placed(mapped) and any(map(mapped.has, _SPEEDS)):
             _note_speeds(mapped, reading)
         return
@@ -51,7 +78,12 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         reading.note("speed: taken for a vehicle's, as there are no positions beside it")
     _note_units(mapped, reading)
     speed = speeds_of(mapped, "wheel_speed" if wheels else "speed")
-    yaw = _at_speeds(reading, time_s, speed, mapped.radians("yaw_rate", "ps"))
+    rates = mapped.radians("yaw_rate", "ps")
+    if heading := heading_of_wheels(mapped):
+        rates = _rates_of(mapped, heading, time_s)
+        column = mapped.rows.find(*mapped.names(heading))
+        reading.note(f"yaw rates are those by which {column} changes")
+    yaw = _at_speeds(reading, time_s, speed, rates)
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
     if not np.isfinite(speed).any():
         return
@@ -100,6 +132,25 @@ def _note_speeds(mapped: Mapped, reading: Reading) -> None:
     if (count := int(alone.sum())) >= max(_FEWEST_ALONE, _ALONE_SHARE * measured.sum()):
         some = f"{count} of {number_of(int(measured.sum()), 'speed')}"
         reading.ignore(f"{column}: {some} without a position in the row, not used; {option}")
+
+
+def _rates_of(mapped: Mapped, field: str, time_s: Floats) -> Floats:
+    """Return the rates by which headings turn, counter-clockwise; NaN after rows far apart."""
+    given = mapped.number(field)
+    heading = given if field == "heading_rad" else -np.radians(given)
+    rates = np.full(len(heading), np.nan)
+    rows = np.flatnonzero(np.isfinite(heading) & np.isfinite(time_s))
+    rows = rows[np.argsort(time_s[rows], kind="stable")]
+    lasted_s = np.diff(time_s[rows])
+    turned = wrap_rad(np.diff(heading[rows]))
+    good = (lasted_s > 0) & (lasted_s <= 2 * _NEAR_S)
+    # The rate of an interval is taken for its middle: at a row it is the mean of both.
+    both = np.full((2, rows.size), np.nan)
+    both[0, 1:][good] = both[1, :-1][good] = turned[good] / lasted_s[good]
+    known = np.isfinite(both)
+    mean = np.where(known, both, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    rates[rows] = np.where(known.any(axis=0), mean, np.nan)
+    return rates
 
 
 def _at_speeds(reading: Reading, time_s: Floats, speed: Floats, yaw: Floats) -> Floats:

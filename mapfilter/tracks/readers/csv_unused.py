@@ -10,7 +10,12 @@ from mapfilter.errors import listed
 from mapfilter.tracks.readers.csv_fields import FIELDS, column_options
 from mapfilter.tracks.readers.csv_headers import likely_fields
 from mapfilter.tracks.readers.csv_mapped import Mapped
-from mapfilter.tracks.readers.csv_odometry import has_odometry, has_unused_odometry
+from mapfilter.tracks.readers.csv_odometry import (
+    has_odometry,
+    has_unused_odometry,
+    heading_of_wheels,
+    turns_alone,
+)
 from mapfilter.tracks.readers.csv_speed_units import speed_unit
 
 _OF_PLACES = ("altitude_m", "accuracy_m", "hdop", "course_deg", "speed_mps", "speed_kmh")
@@ -98,8 +103,10 @@ def _useful(mapped: Mapped) -> set[str]:
         useful.add("heading_rad")
     elif mapped.has("step_m"):
         useful.update(("heading_rad", *_OF_STEPS))
-    if has_odometry(mapped) or has_unused_odometry(mapped):
+    if has_odometry(mapped) or has_unused_odometry(mapped) or turns_alone(mapped):
         useful.update(_OF_ODOMETRY)
+    if heading := heading_of_wheels(mapped):
+        useful.add(heading)
     if mapped.has("steps") and not mapped.has("step_m"):
         useful.update(_OF_COUNTED_STEPS)
     return useful

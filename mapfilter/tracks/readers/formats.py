@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from mapfilter._header_units import parted_unit
 from mapfilter.errors import ConfigError, InputError, MapfilterError, fail, listed
 from mapfilter.tracks.readers import (
     antennas,
@@ -62,6 +64,15 @@ FORMATS: tuple[Format, ...] = (
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 _LIST = "docs/howto/recordings.rst lists them"
 _PEEKED_BYTES = 1 << 18
+_JSON = ('{"', '[{"')
+_FIELD_OF_UNIT = {
+    "km/h": "wheel_speed_kmh",
+    "m/s": "wheel_speed_mps",
+    "deg/s": "yaw_rate_degps",
+    "rad/s": "yaw_rate_radps",
+    "dbm": "level_dbm",
+}
+"""Fields that a column whose name is of another language may be, by its unit."""
 _NOT_READ = {
     ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
     ".dt1": "a Nemo log of version 1; export it as CSV, and map the columns",
@@ -70,6 +81,8 @@ _NOT_READ = {
     ".kmz": "KML; export GPX, or a table as CSV",
     ".geojson": "GeoJSON; export GPX, or a table as CSV",
     ".json": "JSON; export GPX, or a table as CSV",
+    ".jsonl": "JSON; export GPX, or a table as CSV",
+    ".ndjson": "JSON; export GPX, or a table as CSV",
     ".fit": "a FIT file; export GPX",
     ".xlsx": "a spreadsheet; export it as CSV",
     ".xls": "a spreadsheet; export it as CSV",
@@ -89,6 +102,8 @@ def format_named(name: str) -> Format:
 
 def find_format(text: Text) -> Format | None:
     """Return the format that a file looks like, or None."""
+    if text.first_line.lstrip().startswith(_JSON):
+        return None
     return next((known for known in FORMATS if known.matches(text)), None)
 
 
@@ -185,6 +200,8 @@ def _unknown(path: Path, text: Text) -> MapfilterError:
     names = header_names(text.first_line, separator)
     is_table = len(names) > 1 and not text.first_line.lstrip().startswith(("{", "[", "<"))
     hint = _NOT_READ.get(path.suffix.lower(), "") or _other_separators(path, text)
+    if text.first_line.lstrip().startswith(_JSON):
+        hint = hint or _NOT_READ[".json"]
     if is_table and not hint:
         hint = _other_names(names)
     got = f"none of them; it begins with {text.first_line[:60]!r}"
@@ -200,6 +217,11 @@ def _other_names(names: Sequence[str]) -> str:
     others = [name for name in names if name and name not in (*usual.values(), *stated.values())]
     likely = {name: fields for name in others if (fields := likely_fields(name, found))}
     such = [_pairs(name, fields) for name, fields in likely.items()]
+    such += [
+        shlex.quote(f"{_FIELD_OF_UNIT[unit]}={name}")
+        for name in others
+        if name not in likely and (unit := parted_unit(name)[1]) in _FIELD_OF_UNIT
+    ]
     if not such and not {"lat_deg", "lon_deg"} <= found:
         such = ["lat_deg=LATITUDE", "lon_deg=LONGITUDE"]
     times = ""

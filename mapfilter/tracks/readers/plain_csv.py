@@ -26,7 +26,7 @@ _SPEEDS = ("speed_mps", "speed_kmh")
 _CONTENT = (
     *(("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("bars",)),
     *(("acc_x",), ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",)),
-    *(("wheel_speed_kmh",), ("steps",)),
+    *(("wheel_speed_kmh",), ("steps",), ("yaw_rate_radps",), ("yaw_rate_degps",)),
     *((speed,) for speed in _SPEEDS),
 )
 _VITAL = (

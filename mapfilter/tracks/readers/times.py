@@ -20,6 +20,7 @@ from mapfilter.gnss.orbits import LEAPS_UTC_S
 GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
 DAY_S = 86_400.0
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
+_QUARTER_S = 900.0
 _FAR_QUARTERS = 6e7
 """Quarters of an hour, 1700 years from 1970; datetime ends soon after."""
 _DOTTED = re.compile(r"^\s*(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)(?!\d)", re.ASCII)
@@ -128,7 +129,8 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
     seconds = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy(dtype=np.float64)
     seconds = seconds + leap
     if zone and not aware.all():
-        seconds = np.where(aware, seconds, utc_from_local_s(seconds, zone))
+        local_s = np.where(aware, np.nan, seconds)
+        seconds = np.where(aware, seconds, utc_from_local_s(local_s, zone))
     time_s[~is_number] = seconds
     understood = np.isfinite(seconds)
     # A line of units or another header among Unix times has no zone.
@@ -149,19 +151,54 @@ def _with_whole_day(found: re.Match[str]) -> str:
 def utc_from_local_s(local_s: ArrayLike, zone: str) -> Floats:
     """Turn local times, in seconds as if their zone were UTC, into UTC seconds.
 
-    Of an hour that a clock set back passes twice the first is taken.
+    An hour that a clock set back passes twice is the first, until times fall back in it. It is the
+    second where times go on after it without a gap, and do not come from before it.
+
+    Examples
+    --------
+    >>> local = [datetime(2026, 10, 25, 2, m, tzinfo=UTC).timestamp() for m in (50, 59, 0, 10)]
+    >>> (np.diff(utc_from_local_s(local, "Europe/Berlin")) / 60).tolist()
+    [9.0, 1.0, 10.0]
     """
     rules = parse_zone(zone)
     local = np.asarray(local_s, dtype=np.float64)
     # The shift is constant within an hour's quarter in every zone.
-    quarter = np.floor(np.where(np.isfinite(local), local, 0.0) / 900.0)
+    quarter = np.floor(np.where(np.isfinite(local), local, 0.0) / _QUARTER_S)
     values, of = np.unique(np.clip(quarter, -_FAR_QUARTERS, _FAR_QUARTERS), return_inverse=True)
-    shift = np.empty(len(values))
+    shift = np.empty((len(values), 2))
     for i, value in enumerate(values.tolist()):
-        moment = datetime(1970, 1, 1) + timedelta(seconds=value * 900.0)
-        offset = moment.replace(tzinfo=rules).utcoffset() or timedelta(0)
-        shift[i] = offset.total_seconds()
-    return np.asarray(local - shift[of].reshape(local.shape))
+        moment = datetime(1970, 1, 1) + timedelta(seconds=value * _QUARTER_S)
+        for fold in (0, 1):
+            offset = moment.replace(tzinfo=rules, fold=fold).utcoffset() or timedelta(0)
+            shift[i, fold] = offset.total_seconds()
+    first_s = np.asarray(local - shift[of, 0].reshape(local.shape))
+    later_s = np.maximum(shift[:, 0] - shift[:, 1], 0.0)
+    if later_s.any():
+        known = np.isfinite(local)
+        first_s[known] += _second_pass_s(local[known], later_s[of].reshape(local.shape)[known])
+    return first_s
+
+
+def _second_pass_s(local_s: Floats, later_s: Floats) -> Floats:
+    """Return the seconds to add to rows of an hour's second pass, 0 in the first.
+
+    Parameters
+    ----------
+    local_s, later_s : (N,) array
+        Times in the order of rows, and by how much the second pass is later; 0 elsewhere.
+    """
+    added_s, size = np.zeros(len(local_s)), len(local_s)
+    edges = np.diff((later_s > 0).astype(np.int8), prepend=0, append=0)
+    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    steps = np.diff(local_s)
+    for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
+        falls = np.flatnonzero(steps[begin : end - 1] < -later_s[begin] / 2)
+        comes = begin > 0 and 0 <= steps[begin - 1] <= _QUARTER_S
+        goes_on = end < size and 0 <= steps[end - 1] <= _QUARTER_S
+        if falls.size or (goes_on and not comes):
+            since = begin + int(falls[0]) + 1 if falls.size else begin
+            added_s[since:end] = later_s[since:end]
+    return added_s
 
 
 def parse_zone(zone: str) -> tzinfo:

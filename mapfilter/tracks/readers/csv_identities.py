@@ -1,0 +1,94 @@
+"""Identities of cells in a plain CSV: decimal or hexadecimal parts, one text, nodes and sectors."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from mapfilter._types import Bools, Floats
+from mapfilter._words import number_of
+from mapfilter.radio.transmitter_lists import CELLS_OF_NODE
+from mapfilter.tracks.readers.csv_mapped import Mapped
+from mapfilter.tracks.readers.identities import parse_identities
+
+_HEX = re.compile(r"[0-9A-F]{1,9}", re.ASCII | re.IGNORECASE)
+_LEAST_LETTERS = 0.5
+"""Share of different numbers with a letter: of hexadecimal ones of four digits 0.85 have one."""
+_IDENTITY = ("mcc", "mnc", "lac", "ci")
+
+
+def cell_identities(mapped: Mapped) -> dict[str, Floats]:
+    """Return mcc, mnc, lac and ci of each row, NaN where missing.
+
+    A cell of an eNodeB, given by the numbers of both, has the identity of LTE that these make. What
+    a text of an identity holds fills what has no column of its own.
+    """
+    mapped = _without_hexadecimals(mapped)
+    identity = {name: mapped.whole(name) for name in _IDENTITY}
+    if mapped.has("enodeb"):
+        identity["ci"] = _of_nodes(mapped, identity["ci"])
+    if mapped.has("cgi"):
+        texts = mapped.texts("cgi")
+        given = parse_identities(texts)
+        _note_others(mapped, "cgi", texts, np.isnan(given["ci"]), "identities (262-01-1234-5678)")
+        identity = {
+            name: np.where(np.isnan(values), given[name], values)
+            for name, values in identity.items()
+        }
+    return identity
+
+
+def roles(mapped: Mapped, identified: Bools) -> np.ndarray:
+    """Return the role of each row: as it is stated, else serving where a cell is identified."""
+    stated = mapped.rows.mapped(_role, *mapped.names("role"))
+    others = np.array([role is None for role in stated], dtype=bool)
+    texts = mapped.texts("role")
+    _note_others(mapped, "role", texts, others, "roles (serving, neighbour)")
+    serving = np.asarray(stated == "serving", dtype=bool)
+    serving |= identified & np.asarray(stated != "neighbour", dtype=bool)
+    return np.array(["neighbour", "serving"], dtype=object)[serving.astype(np.int64)]
+
+
+def _role(word: str) -> str | None:
+    """Return the role that a word means, "" where it is missing, None for other words."""
+    word = word.strip().lower()
+    known = {"": "", "serving": "serving", "s": "serving", "n": "neighbour"}
+    known |= dict.fromkeys(("neighbour", "neighbor", "neighboring", "neighbouring"), "neighbour")
+    return known.get(word)
+
+
+def _without_hexadecimals(mapped: Mapped) -> Mapped:
+    """Return columns whose hexadecimal numbers without a mark have one."""
+    rows = mapped.rows
+    for field in ("lac", "ci"):
+        name = rows.find(*mapped.names(field))
+        words = {} if name is None else {word.strip() for word in set(rows.texts(name))} - {""}
+        if name is None or not words or not all(map(_HEX.fullmatch, words)):
+            continue
+        if sum(not word.isdigit() for word in words) >= _LEAST_LETTERS * len(words):
+            rows = rows.rewritten(r"^\s*([0-9A-Fa-f]+)\s*$", r"0x\1", name)
+            rows.reading.note(f"{name}: taken for hexadecimal numbers")
+    return replace(mapped, rows=rows)
+
+
+def _of_nodes(mapped: Mapped, ci: Floats) -> Floats:
+    """Return identities made of those of nodes and their cells, where they are not whole."""
+    node = mapped.whole("enodeb")
+    cell = np.where(np.isnan(mapped.whole("sector")), ci, mapped.whole("sector"))
+    parts = (node > 0) & (cell >= 0) & (cell < CELLS_OF_NODE)
+    return np.where(parts & ~(ci >= CELLS_OF_NODE), CELLS_OF_NODE * node + cell, ci)
+
+
+def _note_others(
+    mapped: Mapped, field: str, texts: np.ndarray, others: Bools, expected: str
+) -> None:
+    """Note the texts of a field that are not understood."""
+    others = others & (texts != "")
+    if others.any():
+        at = int(np.argmax(others))
+        some = number_of(int(others.sum()), "value is", "values are")
+        first = f"first {str(texts[at])[:40]!r} in line {mapped.rows.line[at]}"
+        name = mapped.rows.find(*mapped.names(field))
+        mapped.rows.reading.ignore(f"{name}: {some} no {expected}, taken as missing ({first})")

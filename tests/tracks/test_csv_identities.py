@@ -1,0 +1,103 @@
+"""Identities of cells in tables of one's own: hexadecimal, of nodes and sectors, in one text."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+
+COUNT = 40
+
+
+@pytest.fixture
+def read(tmp_path):
+    def of(**columns):
+        table = {"time": 1_778_666_400.0 + np.arange(COUNT), "level_dbm": -80.0, **columns}
+        pd.DataFrame(table).to_csv(tmp_path / "phone.csv", index=False)
+        log = mf.read_log(tmp_path / "phone.csv")
+        return log.radio, " ".join(log.notes)
+
+    return of
+
+
+def numbers(low, high, seed=1):
+    return np.random.default_rng(seed).integers(low, high, COUNT)
+
+
+def test_hexadecimal_numbers_without_a_mark(read):
+    """Those of digits alone were read as decimal ones, all others were lost."""
+    ci, lac = numbers(4096, 65536), numbers(4096, 65536, 2)
+    ci[3], ci[7] = 0x1234, 0x9001
+    texts = {"lac": [f"{one:x}" for one in lac], "ci": [f"{one:04X}" for one in ci]}
+    radio, notes = read(mcc=244, mnc=91, **texts)
+    assert radio["cell"].tolist() == [f"244-91-{a}-{c}" for a, c in zip(lac, ci, strict=True)]
+    assert set(radio["role"]) == {"serving"}
+    assert "lac: taken for hexadecimal numbers" in notes
+    assert "ci: taken for hexadecimal numbers" in notes
+
+
+def test_a_slip_among_decimal_numbers_is_none(read):
+    ci = numbers(1000, 9999).astype(str).astype(object)
+    ci[5] = "12a4"
+    radio, notes = read(mcc=244, mnc=91, lac=7, ci=ci)
+    wrong = radio["cell"].isna()
+    assert wrong.tolist() == (np.arange(COUNT) == 5).tolist()
+    assert radio["cell"][0] == f"244-91-7-{ci[0]}"
+    assert "hexadecimal" not in notes
+
+
+@pytest.mark.parametrize(
+    ("node", "cell"), [("enodeb_id", "cell_id"), ("eNB", "sector"), ("enb_id", "local_cell_id")]
+)
+def test_a_cell_of_a_node_is_not_that_of_another(read, node, cell):
+    """All nodes were one cell, by the number of the cell within them."""
+    nodes = numbers(100, 900_000)
+    radio, notes = read(mcc=244, mnc=91, tac=7, **{node: nodes, cell: 3})
+    assert radio["cell"].tolist() == [f"244-91-7-{256 * one + 3}" for one in nodes]
+    assert "not used" not in notes
+
+
+def test_a_whole_identity_beside_its_node_stays(read):
+    nodes = numbers(100, 900_000)
+    radio, _ = read(mcc=244, mnc=91, tac=7, enodeb=nodes, sector=3, eci=256 * nodes + 4)
+    assert radio["cell"].tolist() == [f"244-91-7-{256 * one + 4}" for one in nodes]
+
+
+@pytest.mark.parametrize(
+    ("text", "cell"),
+    [
+        ("26201-1234-5678", "262-1-1234-5678"),
+        ("262|01|1234|5678", "262-1-1234-5678"),
+        ("310410-9751830", "310-410-9751830"),
+        ("244-91-9751830", "244-91-9751830"),
+    ],
+)
+def test_one_text_of_an_identity(read, text, cell):
+    radio, notes = read(cgi=text)
+    assert set(radio["cell"]) == {cell}
+    assert "taken as missing" not in notes
+
+
+def test_a_text_that_is_no_identity_is_counted(read):
+    """It was left out without a word, and the rows were neighbours of no name."""
+    texts = np.where(np.arange(COUNT) < 30, "24491027DA01", "244-91-7-5")
+    _, notes = read(ecgi=texts)
+    expected = "ecgi: 30 values are no identities (262-01-1234-5678), taken as missing (first "
+    assert expected + "'24491027DA01' in line 2)" in notes
+
+
+def test_a_table_of_positions_and_identities_alone(tmp_path):
+    rows = {"time": 1_778_666_400.0 + np.arange(COUNT), "lat": 60.0, "lon": 25.0}
+    table = pd.DataFrame({**rows, "cgi": "244-91-7-5"})
+    table.to_csv(tmp_path / "phone.csv", index=False)
+    assert set(mf.read_log(tmp_path / "phone.csv").radio["cell"]) == {"244-91-7-5"}
+
+
+def test_roles_by_a_letter_and_words_that_are_none(read):
+    """A neighbour with an identity was a serving cell."""
+    words = np.array(["S", "N", "Serving", "neighbour", "", "other"])[np.arange(COUNT) % 6]
+    radio, notes = read(mcc=244, mnc=91, lac=7, ci=numbers(1, 999), role=words)
+    expected = ["serving", "neighbour", "serving", "neighbour", "serving", "serving"]
+    by_time = radio.sort_values("time_s", kind="stable")["role"]
+    assert by_time.tolist() == [expected[row % 6] for row in range(COUNT)]
+    assert "role: 6 values are no roles (serving, neighbour), taken as missing" in notes

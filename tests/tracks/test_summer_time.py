@@ -1,0 +1,116 @@
+"""Local times over the hour that a clock passes twice or not at all, and zones that are found."""
+
+from datetime import datetime
+from zoneinfo import ZoneInfo
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+from mapfilter.errors import InputError
+from mapfilter.tracks.readers.times import parse_times, utc_from_local_s
+
+BERLIN = "Europe/Berlin"
+BACK_S = datetime(2026, 10, 25, 1, tzinfo=ZoneInfo("UTC")).timestamp()
+FORWARD_S = datetime(2026, 3, 29, 1, tzinfo=ZoneInfo("UTC")).timestamp()
+
+
+def local_s(utc_s, zone=BERLIN):
+    """Local times as if their zone were UTC, by the standard library."""
+    moments = [datetime.fromtimestamp(time, ZoneInfo(zone)) for time in np.asarray(utc_s).tolist()]
+    return np.asarray(utc_s) + [moment.utcoffset().total_seconds() for moment in moments]
+
+
+@pytest.mark.parametrize("step_s", [0.2, 1.0, 60.0, 600.0])
+@pytest.mark.parametrize("change_s", [BACK_S, FORWARD_S])
+@pytest.mark.parametrize(
+    ("begin_s", "end_s"),
+    [(-600, 600), (-6000, 9000), (-3000, 9000), (-3599, 3599), (10, 9000), (-9000, -10)],
+)
+def test_a_clock_that_changes_on_the_way(step_s, change_s, begin_s, end_s):
+    utc_s = change_s + np.arange(begin_s, end_s, step_s)
+    found = utc_from_local_s(local_s(utc_s), BERLIN)
+    np.testing.assert_allclose(found, utc_s, atol=1e-6)
+
+
+def test_the_first_pass_where_nothing_tells():
+    """Also of a single time, and of rows with missing times between."""
+    utc_s = BACK_S - 600.0 + np.arange(0.0, 500.0)
+    np.testing.assert_array_equal(utc_from_local_s(local_s(utc_s), BERLIN), utc_s)
+    assert utc_from_local_s(local_s([BACK_S - 600.0]), BERLIN).tolist() == [BACK_S - 600.0]
+    times = np.array([np.nan, BACK_S - 60.0, np.nan, BACK_S + 60.0, np.nan])
+    given = np.where(np.isfinite(times), local_s(np.nan_to_num(times)), np.nan)
+    np.testing.assert_array_equal(utc_from_local_s(given, BERLIN), times)
+
+
+def test_times_with_a_zone_among_local_ones_are_no_fall():
+    texts = np.array(["2026-10-25T02:50:00", "2026-10-25T00:51:00Z", "2026-10-25T02:52:00"])
+    found, zoned = parse_times(texts, BERLIN)
+    assert zoned
+    assert (np.diff(found) / 60).tolist() == [1.0, 1.0]
+
+
+@pytest.fixture
+def journey(tmp_path):
+    """Fixes in UTC, and odometry in local times that lasts longer."""
+
+    def of(begin_s, zone, *, from_s, until_s, steady=False):
+        rng = np.random.default_rng(4)
+        time_s = begin_s + np.arange(2400.0)
+        knots = rng.uniform(0, 14, len(time_s) // 20 + 2)
+        speed = np.interp(np.arange(len(time_s)) / 20, np.arange(len(knots)), knots)
+        speed = np.full(len(time_s), 8.0) if steady else speed
+        lat = 52.5 + np.cumsum(speed) / 111_195.0
+        fixes = pd.DataFrame({"time": time_s, "lat": lat, "lon": 13.4})[from_s:until_s]
+        local = pd.to_datetime(local_s(time_s, zone), unit="s").strftime("%Y-%m-%d %H:%M:%S")
+        wheels = pd.DataFrame({"time": local, "wheel_speed_mps": speed, "yaw_rate_radps": 0.0})
+        fixes.to_csv(tmp_path / "fixes.csv", index=False)
+        wheels.to_csv(tmp_path / "wheels.csv", index=False)
+        return [tmp_path / "fixes.csv", tmp_path / "wheels.csv"]
+
+    return of
+
+
+def found_zone(log):
+    (note,) = [note for note in log.notes if "local time is" in note]
+    return note.partition("local time is ")[2]
+
+
+@pytest.mark.parametrize("from_s", [0, 1000, 1900])
+@pytest.mark.parametrize("zone", [BERLIN, "Asia/Kathmandu", "America/St_Johns"])
+def test_speeds_tell_the_zone_of_a_recording_that_lasts_longer(journey, zone, from_s):
+    """Quarters of an hour were taken that no zone has: all of them overlap as well."""
+    paths = journey(BACK_S - 1e6, zone, from_s=from_s, until_s=from_s + 450)
+    hours = datetime.fromtimestamp(BACK_S - 1e6, ZoneInfo(zone)).strftime("%z")
+    assert found_zone(mf.read_log(paths)) == f"UTC{hours[:3]}:{hours[3:]} (by speeds)"
+
+
+def test_without_speeds_that_differ_other_zones_are_named(journey):
+    paths = journey(BACK_S - 1e6, BERLIN, from_s=0, until_s=300, steady=True)
+    assert found_zone(mf.read_log(paths)) == "UTC+02:00 (by the overlap of times)"
+    paths = journey(BACK_S - 1e6, BERLIN, from_s=300, until_s=2300, steady=True)
+    wheels = pd.read_csv(paths[1])
+    earlier = pd.to_datetime(wheels["time"]) - pd.Timedelta(hours=2)
+    more = wheels.assign(time=earlier.dt.strftime("%Y-%m-%d %H:%M:%S"))
+    beside = pd.concat([more[::2400], wheels]).rename(columns={"wheel_speed_mps": "pressure_hpa"})
+    beside.assign(pressure_hpa=1000.0)[["time", "pressure_hpa"]].to_csv(paths[1], index=False)
+    found = found_zone(mf.read_log(paths))
+    assert found.startswith("UTC+02:00 (by the overlap of times; UTC+")
+    assert found.endswith("would do as well: --zone)")
+
+
+def test_a_drive_on_which_the_clock_is_set_back(journey):
+    paths = journey(BACK_S - 1200.0, BERLIN, from_s=0, until_s=900)
+    log = mf.read_log(paths, zone=BERLIN)
+    assert log.duration_s == 2399.0
+    assert not [note for note in log.notes if "backwards" in note]
+    likely = "times go backwards in 1 place; sorted (likely: a clock that was set back by an hour"
+    assert any(likely in note for note in mf.read_log(paths).notes)
+
+
+def test_a_drive_on_which_the_clock_is_set_forward(journey):
+    paths = journey(FORWARD_S - 1200.0, BERLIN, from_s=0, until_s=900)
+    assert mf.read_log(paths, zone=BERLIN).duration_s == 2399.0
+    with pytest.raises(InputError, match=r"2026-03-29 00:59:59 .*set forward for summer: --zone"):
+        mf.read_log(paths)
