@@ -70,7 +70,8 @@ def test_a_phone_that_is_turned_is_followed(method, jump_deg):
         fixes = [fix_at(p, 5.0, rng) if k < 300 and k % 5 == 0 else None for k, p in enumerate(way)]
         places, radii_m, jumps, error_deg = followed(steps, fixes, method=method)
         assert len(jumps) == 1
-        assert 200 < jumps[0] <= 270
+        # A smaller angle is shown by a longer way.
+        assert 200 < jumps[0] <= (300 if abs(jump_deg) < 45 else 270)
         off_m = np.abs(places - way)
         assert np.median(off_m[275:300]) < 6.0
         assert (off_m <= radii_m)[300:].mean() > 0.95

@@ -26,8 +26,6 @@ from mapfilter._types import Floats
 _APART_S, _WINDOW_S, _LEAST_S, _LEAST_ROWS = 5.0, 180.0, 60.0, 8
 """Time between two fixes that are kept, and for which they are; time and number of those that are
 looked at, at least."""
-_TELLS_S = 120.0
-"""Time below which they tell less of what lasts."""
 _LEAST_WAY_M = 20.0
 """Way from the first to the farthest of them, at least: what goes on while steps rest may be
 right."""
@@ -183,8 +181,7 @@ class FixWander:
             return after
         new_s = since_s if self.seen_s > 0 else span_s
         seen_s = self.seen_s + new_s
-        # What lasts for a minute is hardly told from none in a minute.
-        share = new_s / min(seen_s + _PRIOR_S, _MEMORY_S) * min(span_s / _TELLS_S, 1.0)
+        share = new_s / min(seen_s + _PRIOR_S, _MEMORY_S)
         found = _times_stated(np.array(rows), rate_radps, drift_rad_per_sqrt_m)
         return replace(after, now=self.now.towards(*found, share), seen_s=seen_s)
 
@@ -217,15 +214,21 @@ def _times_stated(
     # What a change of headings between two rows moves those after it, across the way.
     changed = np.tril(way[:, None] - way) * np.sqrt(np.abs(gone)) * drift_rad_per_sqrt_m
     changed /= sd_m[:, None]
-    left, wanted = [], []
+    seen, left, wanted = [], [], []
     for shape in (beside, bent):
         # Of both axes.
         by_headings = (np.abs(shape @ changed) ** 2).sum()
         both = (np.abs(shape @ (fix / sd_m)) ** 2).sum() - by_headings
         left.append(max(float(both), 0.0) / 2)
-        seen = shape.conj().T @ shape
-        wanted.append([float(np.trace(seen).real), float((seen * lasting.T).sum().real)])
-    white, slow = np.linalg.solve(np.array(wanted), np.array(left))
+        squared = shape.conj().T @ shape
+        seen.append(squared)
+        wanted.append([float(np.trace(squared).real), float((squared * lasting.T).sum().real)])
+    inverse = np.linalg.inv(np.array(wanted))
+    white, slow = inverse @ left
     if white < 0:
         return 0.0, left[0] / wanted[0][1]
-    return (left[0] / wanted[0][0], 0.0) if slow < 0 else (float(white), float(slow))
+    # White noise alone looks as if some of it lasted, by chance.
+    only_white = left[0] / wanted[0][0]
+    covariance = np.array([[float((one * other.T).sum().real) for other in seen] for one in seen])
+    by_chance = only_white * sqrt(float((inverse @ covariance @ inverse.T)[1, 1]))
+    return (float(white), float(slow)) if slow > by_chance else (only_white, 0.0)
