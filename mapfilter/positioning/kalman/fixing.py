@@ -95,6 +95,10 @@ class FixErrors(NamedTuple):
         usual_m = 0.0 if options.fix_lasting_m else options.lasting_fix_m(variance_m2)
         return Lasting(usual_m, beyond_m, options.fix_lasting_s)
 
+    def led(self) -> FixErrors:
+        """Return them where they lead another way than steps, by any angle."""
+        return self._replace(doubt=Doubt.UNTIL_PROVEN, wander=self.wander.broken_off())
+
     def after_a_jump(self) -> FixErrors:
         """Return them where what contradicted the belief has led it elsewhere."""
         record, doubt = replace(self.record, rows=()), max(self.doubt, Doubt.IF_CONTRADICTED)

@@ -221,6 +221,7 @@ class KalmanStep:
             moments, options = self.belief.moments, self.options
             lasting = self.fixes.lasting(float(np.trace(noise)) / 2, options)
             self.reckoning, found = self.reckoning.fixed(time_s, fix, noise, moments, lasting)
+            self.fixes = self.fixes.led() if self.reckoning.recent.is_led else self.fixes
             if isinstance(found, Turn):
                 self.reckoning = self.reckoning.positioned(time_s)
                 self._jump(jump_to(found, layout, self.fixes.lasting_m if self.lasts else None))

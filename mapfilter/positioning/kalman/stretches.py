@@ -21,6 +21,8 @@ LEAST_ROWS = 6
 _SHORTEST, _LONGEST, _MOST_MISFIT = 0.7, 1.4, 2.0
 """Lengths of the way by fixes to that by steps between which they are the same way; largest mean
 square of what is left of fixes, in their variances."""
+_USUAL, _DEVIATIONS = 0.1, 2.0
+"""What steps are usually too short or long by; deviations beyond it by which they may be, too."""
 _JUMPED = 4.0
 """Deviations, as stated, beyond the way between two fixes from which on they have jumped."""
 
@@ -72,14 +74,18 @@ class Stretches(NamedTuple):
     residual_m2 : (N,) array
         Sum of squares of what is left of the fixes.
     fits : (N,) bool array
-        Whether the fixes lie on the way, and do not jump: where headings have jumped, places have
-        not, and where walls reflect signals they have.
+        Whether the fixes lie on the way, without jumps: where headings have jumped places have not,
+        and where walls reflect signals they have.
+    drawn_out : (N,) bool array
+        Whether that way is drawn out by more than steps may be too short or long, as where a
+        spoofer leads away.
     """
 
     factor: np.ndarray
     sd_rad: Floats
     residual_m2: Floats
     fits: np.ndarray
+    drawn_out: np.ndarray
 
     @classmethod
     def of(cls, rows: Floats, lasting_s: float) -> Stretches:
@@ -112,7 +118,8 @@ class Stretches(NamedTuple):
         slope[-1] = np.inf  # One fix has no direction.
         fits &= ~_jump_later(rows)
         sd_rad = np.sqrt(slope) / np.maximum(size, _SHORTEST)
-        return cls(factor, sd_rad, residual, fits)
+        drawn_out = np.abs(size - 1) > _USUAL + _DEVIATIONS * sd_rad
+        return cls(factor, sd_rad, residual, fits, drawn_out)
 
     def nats(self, off_rad: Floats, others_rad2: Floats) -> Floats:
         """Return the log-likelihood ratios of directions to others, which have variances.

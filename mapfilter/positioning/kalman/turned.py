@@ -84,6 +84,9 @@ class RecentWay:
         The fixes.
     is_turning : bool
         Whether a jump was found whose angle is not known well yet.
+    is_led : bool
+        Whether the last fix showed a jump but for a way that is drawn out: steps do not tell the
+        way of the fixes by any angle.
     """
 
     east_m: float = 0.0
@@ -91,6 +94,7 @@ class RecentWay:
     by_rate_rad: float = 0.0
     rows: tuple[WayFix, ...] = ()
     is_turning: bool = False
+    is_led: bool = False
 
     def moved(self, step: MotionStep, by_rate_rad: float) -> RecentWay:
         """Add a step, and what a rate of turns adds to headings over its time.
@@ -146,7 +150,7 @@ class RecentWay:
             *(lasting.usual_m, lasting.beyond_m, now_rad, turned[1], stated_m),
         )
         rows = (*self.rows, row)[-_MOST_ROWS:]
-        after = replace(self, rows=rows)
+        after = replace(self, rows=rows, is_led=False)
         if len(rows) < LEAST_ROWS:
             return after, None
         given = np.array(rows)
@@ -157,11 +161,14 @@ class RecentWay:
         shown = (np.abs(off) >= _LEAST_TURN_RAD) & (nats >= _LEAST_NATS) & found.fits
         if not self.is_turning:
             shown &= np.abs(wrap_rad(turns - now_rad)) >= _FOLLOWED_RAD
-        if not shown.any():
+        if not (shown & ~found.drawn_out).any():
+            after = replace(after, is_led=bool(shown.any()))
             # Fixes that all lie on one way as the belief has it leave nothing to be found.
             return replace(after, is_turning=self.is_turning and not found.fits[0]), None
         # A stretch that has shown it may have begun before the jump.
-        left_m2 = np.where(found.fits, found.residual_m2 + _followed_m2(given), np.inf)
+        left_m2 = np.where(
+            found.fits & ~found.drawn_out, found.residual_m2 + _followed_m2(given), np.inf
+        )
         best = int(np.argmin(left_m2))
         led = led_by(given[best:], complex(self.east_m, self.north_m), lasting.memory_s)
         turned_rad, sd_rad = float(turns[best]), hypot(led.sd_rad, _LEAST_SD_RAD)
