@@ -16,7 +16,7 @@ import numpy as np
 
 from mapfilter.positioning.gnss.wander import WanderFix
 from mapfilter.positioning.kalman.lasting import LEAST_WHITE
-from mapfilter.positioning.kalman.stretches import Stretches, WayFix
+from mapfilter.positioning.kalman.stretches import LEAST_ROWS, Stretches, WayFix
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 
 _LEAST_M2 = 7.5**2
@@ -45,7 +45,7 @@ class Doubt(IntEnum):
 
 
 def way_agrees(rows: tuple[WanderFix, ...], understated: float, lasting_s: float) -> bool | None:
-    """Return whether fixes lie where steps have led; None where the way is too short to tell.
+    """Return whether fixes lie where steps have led; None where that cannot be told.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def way_agrees(rows: tuple[WanderFix, ...], understated: float, lasting_s: float
     lasting_s : float
         Time after which the correlation of what lasts of their errors is 1/e.
     """
-    if not rows:
+    if len(rows) < LEAST_ROWS:
         return None
     given = []
     for one in rows:
