@@ -132,6 +132,18 @@ def test_a_walk_of_lengths_alone_is_followed_by_its_fixes(town, fix_sd_m):
     assert any("m of way after another one" in note for note in track.log.notes)
 
 
+@pytest.mark.parametrize("wrong", [1, 3, 20])
+def test_first_fixes_that_are_wrong_do_not_part_later_ones_from_the_way(wrong):
+    """As far from the first place as no way leads, they were lagged behind: by 115 m for 400 s."""
+    log = paced(1.4, 10.0, 500.0)
+    gnss = log.gnss.copy()
+    gnss.loc[gnss.index[:wrong], "east_m"] += 600.0
+    found = mf.locate(replace(log, gnss=gnss), filter="ekf").to_dataframe()
+    off_m = np.hypot(*(found[name] - log.truth[name] for name in ("east_m", "north_m")))[100:]
+    assert off_m.mean() < 15.0
+    assert (off_m <= found["radius_95_m"][100:]).mean() > 0.9
+
+
 @pytest.mark.parametrize("fault", ["ended", "no lengths", "gap"])
 def test_positions_stay_where_the_way_between_them_is_not_known(town, fault):
     """They were left out, as if one stood, and the walk went on without any: 180 m off."""

@@ -137,6 +137,8 @@ class WeighedFix(NamedTuple):
         it was not updated, or by an outlier.
     used : bool
         Whether the fix is in the belief.
+    drifted : bool
+        Whether the belief has begun anew after fixes that had left it by and by.
     """
 
     belief: SumBelief
@@ -145,6 +147,7 @@ class WeighedFix(NamedTuple):
     ruling: Ruling
     nis: float
     used: bool
+    drifted: bool = False
 
 
 @dataclass(frozen=True)
@@ -241,7 +244,10 @@ class FixWeighing:
                 errors = errors.after_fix(wanted_m, record, time_s)._replace(wander=FixWander())
                 if found.ruling is Ruling.ANEW and own is not MOVING:
                     errors = errors._replace(doubt=Doubt.UNTIL_PROVEN)
-                return WeighedFix(belief.predict(*motion), errors, motion, found.ruling, nan, True)
+                belief = belief.predict(*motion)
+                return WeighedFix(
+                    belief, errors, motion, found.ruling, nan, True, drifted=found.drifted
+                )
             if found.ruling is Ruling.OUTLIER and own is not MOVING:
                 errors = errors.after_fix(lasting_m, record, time_s)
                 return WeighedFix(belief, errors, motion, found.ruling, nan, False)

@@ -172,6 +172,14 @@ class Reckoning:
         before_m = self.before_m + self.headless_m
         return replace(self, watch=watch, headless_m=0.0, before_m=before_m, fixed_s=time_s)
 
+    def begun(self) -> Reckoning:
+        """Return it where the belief has begun anew with a fix: the way counts from the next one.
+
+        The first place may have been as wrong as the belief, and so may this one. Where fixes have
+        drifted away lengths may be wrong, and the way still counts from there.
+        """
+        return replace(self, headless_m=0.0, before_m=0.0, origin=None)
+
     def carried(self) -> Reckoning:
         """Return it where positions have shown that one goes on though no step is counted."""
         return replace(self, watch=self.watch.carried())

@@ -258,6 +258,8 @@ class KalmanStep:
             self.belief = turned_to(self.belief, found)
         if after.used:
             self.reckoning = self.reckoning.positioned(time_s)
+            if after.ruling.begins and not after.drifted:
+                self.reckoning = self.reckoning.begun()
             if after.ruling is Ruling.CARRIED:
                 self.reckoning = self.reckoning.carried()
             return Reason.USED
