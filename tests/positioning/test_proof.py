@@ -1,4 +1,4 @@
-"""Positions after a belief has begun anew: not claimed before fixes and steps tell the same way."""
+"""Positions after a belief has begun anew: not claimed before fixes and steps agree on it."""
 
 import numpy as np
 import pytest

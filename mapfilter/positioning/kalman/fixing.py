@@ -54,9 +54,9 @@ class FixErrors(NamedTuple):
     way, fixed_way : Way
         Where that has led, by headings as they were measured: now, and at the last fix.
     doubt : Doubt
-        Whether the belief is claimed before fixes and steps have told the same way.
+        Whether the belief is claimed before fixes and steps have agreed on the way.
     doubted_s : float
-        Time of the last fix before which that was so.
+        Time of the last fix that was used while there was no doubt; NaN before the first.
     """
 
     lasting_m: float = 0.0
@@ -113,7 +113,7 @@ class FixErrors(NamedTuple):
         return self._replace(wander=wander)
 
     def proven(self, time_s: float, lasting_s: float) -> FixErrors:
-        """Return them after a fix that agreed: whether steps have told the same way since."""
+        """Return them after a fix that agreed: whether steps have led the same way since."""
         if self.doubt is Doubt.NONE:
             return self._replace(doubted_s=time_s)
         agrees = way_agrees(self.wander.rows, self.understated, lasting_s)

@@ -1,8 +1,8 @@
-"""Whether fixes and steps tell the same way again, after they had contradicted each other.
+"""Whether fixes and steps agree on the way again, after they had contradicted each other.
 
 Where fixes go on beside the steps a belief begins anew with them, as steps may have been wrong for
-a while. Positions that a spoofer leads away slowly do the same. They are told apart by what
-follows: from then on fixes lie where steps lead, turned by some angle, but not drawn out, or fixes
+a while. Positions that a spoofer leads away slowly do the same. What follows distinguishes
+them: from then on fixes lie where steps lead, turned by some angle, but not drawn out, or fixes
 are led on. Until that is known a position is not claimed.
 """
 
@@ -27,10 +27,10 @@ and what steps or wheels may be too short or long by; times of that deviation be
 
 
 class Doubt(IntEnum):
-    """Whether a position is claimed before fixes and steps have told the same way.
+    """Whether a position is claimed before fixes and steps have agreed on the way.
 
-    ``IF_CONTRADICTED``: headings have jumped, and it is until they tell another one.
-    ``UNTIL_PROVEN``: the belief has begun anew, and it is not until they tell the same.
+    ``IF_CONTRADICTED``: headings have jumped, and it is claimed until they disagree.
+    ``UNTIL_PROVEN``: the belief has begun anew, and it is not claimed until they agree.
     """
 
     NONE = 0
