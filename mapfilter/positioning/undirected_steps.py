@@ -11,6 +11,7 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.moved import long_gaps
 
 _APART_SD, _APART_M, _FIX_SD_M = 2.5, 25.0, 10.0
 """Way between positions that are used, in deviations of these, at most, and the deviation of those
@@ -27,9 +28,9 @@ def with_joined_steps(log: TrackLog, options: Any) -> tuple[TrackLog, tuple[str,
     right; of many, which go the same way mostly, the sum would be a rest with a small radius. So
     where no row has a direction, the rows from each position to the next are made one, and from
     30 m after a position on lengths are unknown: filters then spread by the usual speed, and the
-    position is lost. Positions that are too near to each other for that are left out. Other filters
-    leave such steps out themselves. Without positions nothing is claimed by such steps, and the log
-    stays as it is.
+    position is lost. Positions that are too near to each other for that are left out, where the way
+    between them is known. Other filters leave such steps out themselves. Without positions nothing
+    is claimed by such steps, and the log stays as it is.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def with_joined_steps(log: TrackLog, options: Any) -> tuple[TrackLog, tuple[str,
     time_s = motion["time_s"].to_numpy(dtype=np.float64)
     way_m = np.cumsum(np.abs(np.nan_to_num(step_m)))
     apart_m = min(_APART_SD * _usual_sd_m(log), _APART_M)
-    kept_s = _apart(known_s, np.interp(known_s, time_s, way_m, left=0.0), apart_m)
+    kept_s = _apart(known_s, _way_at(known_s, time_s, step_m), apart_m)
     left_out = len(known_s) - len(kept_s)
     known_s = kept_s
     # A row at the time of a position ends the way to it.
@@ -87,6 +88,15 @@ def _usual_sd_m(log: TrackLog) -> float:
     variance_m2 = log.gnss[["var_east_m2", "var_north_m2"]].mean(axis=1).to_numpy(dtype=np.float64)
     stated = np.where(variance_m2 > 0, variance_m2, _FIX_SD_M**2)
     return float(np.sqrt(np.median(stated))) if stated.size else _FIX_SD_M
+
+
+def _way_at(known_s: Floats, time_s: Floats, step_m: Floats) -> Floats:
+    """Return the way by each position; over steps and times without any it is taken for far."""
+    way_m = np.cumsum(np.abs(np.nan_to_num(step_m, nan=_NEAR_M)))
+    # By the next row: after the last one, and in a gap. Before the first one nothing moves.
+    unknown = np.append(long_gaps(time_s), True)
+    far_m = _NEAR_M * np.cumsum(unknown[np.searchsorted(time_s, known_s)])
+    return np.asarray(np.interp(known_s, time_s, way_m) + far_m)
 
 
 def _apart(known_s: Floats, way_m: Floats, apart_m: float) -> Floats:

@@ -23,7 +23,7 @@ from mapfilter.radio.cell_layouts import (
 )
 from mapfilter.radio.cell_rules import TECHNOLOGIES, technology_faults
 from mapfilter.radio.headings import Heading, doubtful_units, places_named, resembling, unit_of
-from mapfilter.radio.identities import parse_cgi, technology
+from mapfilter.radio.identities import parse_cgi, parted_network, technology
 from mapfilter.radio.reported_power import ASSUMABLE, REPORTED_SHARE_DB, reported_eirp_dbm
 from mapfilter.radio.tables import Table
 from mapfilter.radio.transmitter_lists import is_inactive, stated_otherwise
@@ -232,7 +232,7 @@ def _first(texts: list[str], places: tuple[int, ...]) -> str:
 
 def _by_technology(values: dict[str, str], implied: list[str | None]) -> None:
     """Fill in the parts of a CGI, and the technology that columns with values imply."""
-    identity = parse_cgi(values.pop("cgi", ""))
+    identity = parse_cgi(parted_network(values.pop("cgi", "")))
     if identity is not None:
         for name, part in zip(_IDENTITY, identity, strict=True):
             values[name] = values.get(name) or ("" if part is None else str(part))

@@ -41,6 +41,8 @@ BARS_DBM: dict[str, tuple[float, float, float, float]] = {
 """Least level (RSSI, RSCP, RSRP, SS-RSRP) of one to four bars on Android, unless the operator has
 set others."""
 
+_NETWORK = re.compile(r"^(\d{3})(\d{2,3})(\D+\d+(?:\D+\d+)?)$", re.ASCII)
+"""MCC and MNC as one number, before one or two others."""
 _SPLIT = re.compile(r"[-_:;,/| .]+")
 _FAMILIES = {
     "GSM": ("GSM", "GPRS", "EDGE", "2G"),
@@ -66,26 +68,36 @@ def technology(word: str) -> str | None:
     return _FAMILY.get(word.strip().upper())
 
 
+def parted_network(text: str) -> str:
+    """Return the text of an identity with MCC and MNC apart, where they are one number.
+
+    Only where a text is known to be an identity: site, sector and carrier look alike.
+
+    Examples
+    --------
+    >>> parted_network("26201-1234-5678"), parted_network("310410:9751830")
+    ('262-01-1234-5678', '310-410:9751830')
+    >>> parted_network("262-01-1234-5678")
+    '262-01-1234-5678'
+    """
+    return _NETWORK.sub(r"\1-\2\3", text.strip())
+
+
 def parse_cgi(text: str) -> tuple[int, int, int | None, int] | None:
     """Return mcc, mnc, lac and ci of a CGI ``MCC-MNC-LAC-CI``, or ECGI or NCGI ``MCC-MNC-CI``.
 
-    Parts are decimal, with any separator; None for other texts. The lac of an ECGI is None. The
-    first of three parts may be both of the network, ``MCCMNC``, of five or six digits.
+    Parts are decimal, with any separator; None for other texts. The lac of an ECGI is None.
 
     Examples
     --------
     >>> parse_cgi("262-01-1234-5678"), parse_cgi("302:720:9751830"), parse_cgi("B12-3")
     ((262, 1, 1234, 5678), (302, 720, None, 9751830), None)
-    >>> parse_cgi("26201-1234-5678")
-    (262, 1, 1234, 5678)
     """
     words = [word for word in _SPLIT.split(text.strip()) if word]
     if len(words) not in (3, 4) or not all(w.isascii() and w.isdigit() for w in words):
         return None
     if max(map(len, words)) > 11:
         return None
-    if len(words) == 3 and len(words[0]) in (5, 6):
-        words[:1] = words[0][:3], words[0][3:]
     mcc, mnc, *area, ci = map(int, words)
     return mcc, mnc, area[0] if area else None, ci
 

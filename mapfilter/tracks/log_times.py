@@ -49,8 +49,7 @@ def seconds_of_tables(
             faults.add(where, "each column once", f"{twice} more often")
             continue
         if not {"time_s", "time"}.intersection(rows.columns) and _is_of_times(rows.index):
-            rows = rows.rename_axis(rows.index.name or "time").reset_index()
-            rows = rows.rename(columns={rows.columns[0]: "time_s"})
+            rows = rows.rename_axis("time_s").reset_index()
         tables[table] = rows
         name = "time_s" if "time_s" in rows else "time"
         time = _as_timestamps(rows[name]) if name in rows else pd.Series(dtype=float)

@@ -212,6 +212,9 @@ def _stays(time_s: Floats, places: np.ndarray, way_m: Floats, moved_m: float) ->
     for begin in rows[near].tolist():
         if begin <= end:
             continue
+        # Who is back after a way round has not stayed.
+        if (np.abs(places[begin : later[begin]] - places[begin]) > _STAY_M).any():
+            continue
         left = np.abs(places[begin:] - places[begin]) > _STAY_M
         last = begin + int(np.argmax(left)) - 1 if left.any() else len(places) - 1
         if time_s[last] - time_s[begin] > _HELD_S and way_m[last] - way_m[begin] > moved_m:

@@ -11,11 +11,11 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.gaussian import EKF, UKF
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.kalman.alignment import Alignment
+from mapfilter.positioning.kalman.alignment import Alignment, Direction
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.filter import KalmanTracker
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
-from mapfilter.positioning.kalman.reckoning import Direction, turned_to
+from mapfilter.positioning.kalman.redirected import turned_to
 from mapfilter.radio.cells import CellPlan
 
 EAST, NORTH = 500_000.0, 4_600_000.0

@@ -88,7 +88,7 @@ def test_fixes_that_go_on_elsewhere_are_right(jump_m, at, waits_s):
     """For half a minute it is LOST, then it begins anew; after a jump for as long as they agreed.
 
     So far steps do not lead astray at once: a spoofer puts positions there. It is claimed once
-    steps have told the same way for a minute or so.
+    steps have agreed on the way for a minute or so.
     """
     rng = np.random.default_rng(6)
     steps, way = straight(rng, 400)

@@ -1,4 +1,4 @@
-"""Positions after a belief has begun anew: not claimed before fixes and steps tell the same way."""
+"""Positions after a belief has begun anew: not claimed before fixes and steps agree on it."""
 
 import numpy as np
 import pytest
@@ -69,6 +69,15 @@ def test_a_short_way_tells_nothing():
     # Wheels tell lengths better than steps.
     driven = [agrees(8 * way[:count], 0j + 8 * way[:count]) for count in range(2, 21)]
     assert driven.count(None) < known.count(None)
+
+
+@pytest.mark.parametrize(("mps", "every_s"), [(1.4, 30.0), (15.0, 5.0), (0.0, 5.0), (0.0, 30.0)])
+def test_exact_fixes_do_not_contradict_however_few_or_near(mps, every_s):
+    """Three of them half a minute apart did, and all those where one stands."""
+    way = 0j + mps * every_s * np.arange(12)
+    known = [agrees(way[:count], way[:count], every_s=every_s) for count in range(1, 13)]
+    assert False not in known
+    assert (True in known) == (mps > 0)
 
 
 @pytest.mark.parametrize(

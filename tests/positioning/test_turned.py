@@ -15,7 +15,8 @@ from mapfilter.positioning.kalman.alignment import Alignment
 from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanTracker
 from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
-from mapfilter.positioning.kalman.reckoning import RECKONED, Reckoning, jump_to
+from mapfilter.positioning.kalman.reckoning import RECKONED, Reckoning
+from mapfilter.positioning.kalman.redirected import jump_to
 from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.watch import SensorWatch

@@ -1,5 +1,7 @@
 """Motion without any direction: speeds alone, or counted steps alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -128,6 +130,35 @@ def test_a_walk_of_lengths_alone_is_followed_by_its_fixes(town, fix_sd_m):
     assert score.error_mean_m < 2.5 * fix_sd_m
     assert score.within_95 > 0.8
     assert any("m of way after another one" in note for note in track.log.notes)
+
+
+@pytest.mark.parametrize("wrong", [1, 3, 20])
+def test_first_fixes_that_are_wrong_do_not_part_later_ones_from_the_way(wrong):
+    """As far from the first place as no way leads, they were lagged behind: by 115 m for 400 s."""
+    log = paced(1.4, 10.0, 500.0)
+    gnss = log.gnss.copy()
+    gnss.loc[gnss.index[:wrong], "east_m"] += 600.0
+    found = mf.locate(replace(log, gnss=gnss), filter="ekf").to_dataframe()
+    off_m = np.hypot(*(found[name] - log.truth[name] for name in ("east_m", "north_m")))[100:]
+    assert off_m.mean() < 15.0
+    assert (off_m <= found["radius_95_m"][100:]).mean() > 0.9
+
+
+@pytest.mark.parametrize("fault", ["ended", "no lengths", "gap"])
+def test_positions_stay_where_the_way_between_them_is_not_known(town, fault):
+    """They were left out, as if one stood, and the walk went on without any: 180 m off."""
+    log = paced(1.4, 10.0, 500.0)
+    time_s, step_m = log.motion["time_s"], log.motion["step_m"]
+    blind = (time_s > 150) & ((time_s < 350) | (fault == "ended"))
+    motion = log.motion.assign(step_m=step_m.mask(blind))
+    motion = motion if fault == "no lengths" else motion[~blind]
+    log = replace(log, motion=motion.reset_index(drop=True))
+    given, _ = with_joined_steps(log, BayesFilter())
+    kept_s = given.gnss["time_s"]
+    assert set(time_s[blind]) <= set(kept_s)
+    assert (kept_s <= 150).sum() < 20
+    score = mf.score(mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW)), log.truth)
+    assert score.error_mean_m < 40.0
 
 
 @pytest.mark.parametrize(("pace_mps", "fix_sd_m"), [(1.4, 3.0), (1.4, 10.0), (9.0, 10.0)])

@@ -29,6 +29,12 @@ def refused(tmp_path, *rows, **more):
     return str(caught.value)
 
 
+@pytest.mark.parametrize("text", ["26201-1234-5678", "262-01-1234-5678", "262 01 1234 5678"])
+def test_a_column_of_identities_may_join_both_numbers_of_the_network(tmp_path, text):
+    (cell,) = plan(tmp_path, {"cgi": text}, header=f"{HEADER};cgi").cells
+    assert (cell.mcc, cell.mnc, cell.lac, cell.ci) == (262, 1, 1234, 5678)
+
+
 @pytest.mark.parametrize(
     ("lat", "lon"),
     [

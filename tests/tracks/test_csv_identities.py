@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.tracks.readers import text
 
 COUNT = 40
 
@@ -34,6 +35,14 @@ def test_hexadecimal_numbers_without_a_mark(read):
     assert set(radio["role"]) == {"serving"}
     assert "lac: taken for hexadecimal numbers" in notes
     assert "ci: taken for hexadecimal numbers" in notes
+
+
+def test_hexadecimal_numbers_of_a_later_part_without_letters(read, monkeypatch):
+    """Where one stays in a cell for long: it was another one, of a decimal number."""
+    monkeypatch.setattr(text, "_PART_BYTES", 1 << 9)
+    ci = np.where(np.arange(COUNT) < 20, 0xA000 + np.arange(COUNT), 0x1234)
+    radio, _ = read(mcc=244, mnc=91, lac="AB", ci=[f"{one:X}" for one in ci])
+    assert radio["cell"].tolist() == [f"244-91-171-{one}" for one in ci]
 
 
 def test_a_slip_among_decimal_numbers_is_none(read):

@@ -51,7 +51,7 @@ def test_timestamps_of_arrow(zone):
         make_log(CRS, motion=none)
 
 
-@pytest.mark.parametrize("name", ["time", "time_s", "logged", None])
+@pytest.mark.parametrize("name", ["time", "time_s", "logged", "step_m", None])
 def test_timestamps_and_seconds_in_the_index(name):
     walk = pd.DataFrame(STEPS, index=TIMES.rename(name))
     log = make_log(CRS, motion=walk)

@@ -80,6 +80,14 @@ def test_a_heading_beside_the_speed_of_wheels_tells_how_they_turn(read, field):
     assert not [note for note in log.notes if "not used" in note or "unknown" in note]
 
 
+def test_headings_too_far_apart_tell_no_turns(read):
+    heading = np.degrees(np.pi / 2 - TURNED_RAD[::25]) % 360
+    log = read(drive={"time": TIME_S[::25], "wheel_speed_mps": 8.0, "heading_deg": heading})
+    assert log.motion["turn_rad"].isna()[1:].all()
+    assert any("heading_deg: no two values within 2 s" in note for note in log.notes)
+    assert not any("yaw rates are those" in note for note in log.notes)
+
+
 def test_a_heading_beside_positions_may_be_their_course(read):
     places = {"lat": 60 + 2e-5 * np.arange(TIME_S.size), "lon": 25.0}
     heading = np.degrees(np.pi / 2 - TURNED_RAD) % 360

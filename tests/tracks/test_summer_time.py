@@ -9,6 +9,9 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.readers import text
+from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.times import parse_times, utc_from_local_s
 
 BERLIN = "Europe/Berlin"
@@ -42,6 +45,18 @@ def test_the_first_pass_where_nothing_tells():
     times = np.array([np.nan, BACK_S - 60.0, np.nan, BACK_S + 60.0, np.nan])
     given = np.where(np.isfinite(times), local_s(np.nan_to_num(times)), np.nan)
     np.testing.assert_array_equal(utc_from_local_s(given, BERLIN), times)
+
+
+@pytest.mark.parametrize(("begin_s", "end_s"), [(-1800, 600), (-1800, 3000), (-6000, 9000)])
+def test_parts_of_a_large_file_follow_each_other(tmp_path, monkeypatch, begin_s, end_s):
+    """Parts within the second pass were an hour early, and rows lost as duplicates."""
+    monkeypatch.setattr(text, "_PART_BYTES", 1 << 14)
+    utc_s = BACK_S + np.arange(begin_s, end_s)
+    local = pd.to_datetime(local_s(utc_s), unit="s").strftime("%Y-%m-%d %H:%M:%S")
+    rows = pd.DataFrame({"time": local, "pressure_hpa": 1000.0})
+    rows.to_csv(tmp_path / "phone.csv", index=False)
+    found = read_recording(tmp_path / "phone.csv", options=ReadOptions(zone=BERLIN))
+    np.testing.assert_array_equal(found.tables["barometer"]["time_s"], utc_s)
 
 
 def test_times_with_a_zone_among_local_ones_are_no_fall():

@@ -119,6 +119,20 @@ def test_sectors_whose_sites_have_their_own_names_are_of_one_site():
     assert "C0 and C12 (600, 0) are 2000 m apart" in found.evidence
 
 
+def test_names_of_site_sector_and_carrier_are_no_identities():
+    """A site's number of five digits was taken for that of a network: its sectors were one cell."""
+    cells = [
+        Cell(
+            f"12345-{n}-2", "12345", 385_000.0, 6_673_000.0, 30.0, 120.0 * n, 43.0, 1800.0,
+            technology="LTE",
+        )
+        for n in range(3)
+    ]  # fmt: skip
+    findings = Findings()
+    check_identities(CellPlan(CRS, tuple(cells)), "cells.csv", findings)
+    assert findings.found == []
+
+
 def test_many_cells_of_one_placeholder_take_no_long_time():
     cells = [
         Cell(

@@ -2,7 +2,7 @@
 
 Between houses a receiver's error stays for a while, and changes slowly: fixes agree with each other
 and with a belief that follows them, so that what they are off by in total is not seen one by one.
-It is seen beside dead reckoning over a minute or two. There the last fixes z are compared with
+It is seen beside dead reckoning over one to three minutes. There the last fixes z are compared with
 where steps have led, q, moved, turned, drawn out and bent by least squares, as complex numbers:
 
     z = p + a q + c ∫ t dq + w + b,

@@ -78,11 +78,14 @@ class FixVerdict(NamedTuple):
         Its squared distance from the position predicted, in deviations and per component.
     larger : float
         Times that its variance is larger then.
+    drifted : bool
+        Whether those that show the belief to be wrong had left it by and by, without a jump.
     """
 
     ruling: Ruling
     squared: float
     larger: float = 1.0
+    drifted: bool = False
 
 
 class Patience(NamedTuple):
@@ -218,7 +221,8 @@ class FixRecord:
         variance_m2 = max(float(np.trace(noise_m2)) / 2, _LEAST_SD_M**2)
         rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2, gone_m))
         patience_s = patience.usual_s
-        if rows[0].has_jumped:
+        jumped = rows[0].has_jumped
+        if jumped:
             agreed_s = rows[0].time_s - self.agreed_from_s
             patience_s = max(patience_s, min(agreed_s, patience.jumped_s))
         while time_s - rows[0].time_s > 2 * patience_s and len(rows) > _LEAST_ROWS:
@@ -226,7 +230,8 @@ class FixRecord:
         patience_s /= 1 + min(self.begun, _LOST_AFTER)
         ruling = _ruling(np.array(rows), patience_s, rests=fix.rests)
         if ruling.begins:
-            return self._anew(), FixVerdict(ruling, squared / 2)
+            drifted = ruling is Ruling.ANEW and not jumped
+            return self._anew(), FixVerdict(ruling, squared / 2, drifted=drifted)
         # So much larger that the fix is at the limit along the way to it.
         along = off_m / hypot(*off_m)
         own_m2 = float(along @ noise_m2 @ along)

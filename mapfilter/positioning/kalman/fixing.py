@@ -54,9 +54,9 @@ class FixErrors(NamedTuple):
     way, fixed_way : Way
         Where that has led, by headings as they were measured: now, and at the last fix.
     doubt : Doubt
-        Whether the belief is claimed before fixes and steps have told the same way.
+        Whether the belief is claimed before fixes and steps have agreed on the way.
     doubted_s : float
-        Time of the last fix before which that was so.
+        Time of the last fix that was used while there was no doubt; NaN before the first.
     """
 
     lasting_m: float = 0.0
@@ -117,7 +117,7 @@ class FixErrors(NamedTuple):
         return self._replace(wander=wander)
 
     def proven(self, time_s: float, lasting_s: float) -> FixErrors:
-        """Return them after a fix that agreed: whether steps have told the same way since."""
+        """Return them after a fix that agreed: whether steps have led the same way since."""
         if self.doubt is Doubt.NONE:
             return self._replace(doubted_s=time_s)
         agrees = way_agrees(self.wander.rows, self.understated, lasting_s)
@@ -141,6 +141,8 @@ class WeighedFix(NamedTuple):
         it was not updated, or by an outlier.
     used : bool
         Whether the fix is in the belief.
+    drifted : bool
+        Whether the belief has begun anew after fixes that had left it by and by.
     """
 
     belief: SumBelief
@@ -149,6 +151,7 @@ class WeighedFix(NamedTuple):
     ruling: Ruling
     nis: float
     used: bool
+    drifted: bool = False
 
 
 @dataclass(frozen=True)
@@ -245,7 +248,10 @@ class FixWeighing:
                 errors = errors.after_fix(wanted_m, record, time_s)._replace(wander=FixWander())
                 if found.ruling is Ruling.ANEW and own is not MOVING:
                     errors = errors._replace(doubt=Doubt.UNTIL_PROVEN)
-                return WeighedFix(belief.predict(*motion), errors, motion, found.ruling, nan, True)
+                belief = belief.predict(*motion)
+                return WeighedFix(
+                    belief, errors, motion, found.ruling, nan, True, drifted=found.drifted
+                )
             if found.ruling is Ruling.OUTLIER and own is not MOVING:
                 errors = errors.after_fix(lasting_m, record, time_s)
                 return WeighedFix(belief, errors, motion, found.ruling, nan, False)

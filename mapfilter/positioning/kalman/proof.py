@@ -1,8 +1,8 @@
-"""Whether fixes and steps tell the same way again, after they had contradicted each other.
+"""Whether fixes and steps agree on the way again, after they had contradicted each other.
 
 Where fixes go on beside the steps a belief begins anew with them, as steps may have been wrong for
-a while. Positions that a spoofer leads away slowly do the same. They are told apart by what
-follows: from then on fixes lie where steps lead, turned by some angle, but not drawn out, or fixes
+a while. Positions that a spoofer leads away slowly do the same. What follows distinguishes
+them: from then on fixes lie where steps lead, turned by some angle, but not drawn out, or fixes
 are led on. Until that is known a position is not claimed.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from mapfilter.positioning.gnss.wander import WanderFix
 from mapfilter.positioning.kalman.lasting import LEAST_WHITE
-from mapfilter.positioning.kalman.stretches import Stretches, WayFix
+from mapfilter.positioning.kalman.stretches import LEAST_ROWS, Stretches, WayFix
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 
 _LEAST_M2 = 7.5**2
@@ -27,10 +27,10 @@ and what steps or wheels may be too short or long by; times of that deviation be
 
 
 class Doubt(IntEnum):
-    """Whether a position is claimed before fixes and steps have told the same way.
+    """Whether a position is claimed before fixes and steps have agreed on the way.
 
-    ``IF_CONTRADICTED``: headings have jumped, and it is until they tell another one.
-    ``UNTIL_PROVEN``: the belief has begun anew, and it is not until they tell the same.
+    ``IF_CONTRADICTED``: headings have jumped, and it is claimed until they disagree.
+    ``UNTIL_PROVEN``: the belief has begun anew, and it is not claimed until they agree.
     """
 
     NONE = 0
@@ -45,7 +45,7 @@ class Doubt(IntEnum):
 
 
 def way_agrees(rows: tuple[WanderFix, ...], understated: float, lasting_s: float) -> bool | None:
-    """Return whether fixes lie where steps have led; None where the way is too short to tell.
+    """Return whether fixes lie where steps have led; None where that cannot be told.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def way_agrees(rows: tuple[WanderFix, ...], understated: float, lasting_s: float
     lasting_s : float
         Time after which the correlation of what lasts of their errors is 1/e.
     """
-    if not rows:
+    if len(rows) < LEAST_ROWS:
         return None
     given = []
     for one in rows:

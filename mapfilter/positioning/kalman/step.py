@@ -40,10 +40,8 @@ from mapfilter.positioning.kalman.reckoning import (
     TURNED,
     after_each_other,
     at_rest,
-    jump_to,
-    turned_to,
-    turns_in_doubt,
 )
+from mapfilter.positioning.kalman.redirected import jump_to, turned_to, turns_in_doubt
 from mapfilter.positioning.kalman.start import first_belief
 from mapfilter.positioning.kalman.state import KalmanState
 from mapfilter.positioning.kalman.turned import Turn
@@ -261,6 +259,8 @@ class KalmanStep:
             self.belief = turned_to(self.belief, found)
         if after.used:
             self.reckoning = self.reckoning.positioned(time_s)
+            if after.ruling.begins and not after.drifted:
+                self.reckoning = self.reckoning.begun()
             if after.ruling is Ruling.CARRIED:
                 self.reckoning = self.reckoning.carried()
             return Reason.USED

@@ -18,6 +18,8 @@ from mapfilter._types import Floats
 
 LEAST_ROWS = 6
 """Fixes of a stretch, at least."""
+_NO_WAY_M2 = 1e-6
+"""Sum of squares of a way about its middle up to which there is none."""
 _SHORTEST, _LONGEST, _MOST_MISFIT = 0.7, 1.4, 2.0
 """Lengths of the way by fixes to that by steps between which they are the same way; largest mean
 square of what is left of fixes, in their variances."""
@@ -101,7 +103,7 @@ class Stretches(NamedTuple):
         count = np.arange(len(rows), 0, -1.0)
         within = np.triu(np.ones((len(rows), len(rows))))
         beside = within * (way - (within @ way / count)[:, None])
-        spread = np.maximum((np.abs(beside) ** 2).sum(axis=1), 1e-6)
+        spread = np.maximum((np.abs(beside) ** 2).sum(axis=1), _NO_WAY_M2)
         weights = beside / spread[:, None]
         factor = weights.conj() @ fix
         mean_fix = within @ fix / count
@@ -115,7 +117,8 @@ class Stretches(NamedTuple):
         size = np.abs(factor)
         fits = residual <= _MOST_MISFIT * np.maximum(expected, covariance[-1, -1])
         fits &= (size >= _SHORTEST) & (size <= _LONGEST) & (count >= LEAST_ROWS)
-        slope[-1] = np.inf  # One fix has no direction.
+        # One fix has no direction, nor have several in one place.
+        slope[spread <= _NO_WAY_M2] = np.inf
         fits &= ~_jump_later(rows)
         sd_rad = np.sqrt(slope) / np.maximum(size, _SHORTEST)
         drawn_out = np.abs(size - 1) > _USUAL + _DEVIATIONS * sd_rad
@@ -144,7 +147,7 @@ def led_by(rows: Floats, here: complex, lasting_s: float) -> Led:
     """
     way, fix = _from_last(rows)
     beside = way - way.mean()
-    slope = beside.conj() / max(float((np.abs(beside) ** 2).sum()), 1e-6)
+    slope = beside.conj() / max(float((np.abs(beside) ** 2).sum()), _NO_WAY_M2)
     factor = complex(slope @ fix)
     off = here - complex(rows[-1, 1], rows[-1, 2]) - way.mean()
     place = np.full(len(rows), 1 / len(rows)) + slope * off

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -97,7 +98,9 @@ class Columns:
         found = pc.is_in(pc.utf8_trim_whitespace(column), pa.array(list(true)))
         return np.asarray(found.to_numpy(), dtype=bool)
 
-    def times(self, *names: str, zone: str = "", layout: str = "ISO8601") -> tuple[Floats, bool]:
+    def times(
+        self, *names: str, zone: str = "", layout: str = "ISO8601", after_s: float = nan
+    ) -> tuple[Floats, bool]:
         """Return UTC seconds of a column of times, see :func:`parse_times`."""
         column = self._raw(*names)
         if column is not None and layout == "ISO8601":
@@ -109,9 +112,12 @@ class Columns:
                 pass
             else:
                 return unix_seconds(np.where(np.abs(number) > _LEAST_UNIX_S, number, np.nan)), True
-        if column is not None and (found := _plain_times(column, zone, layout)) is not None:
+        if (
+            column is not None
+            and (found := _plain_times(column, zone, layout, after_s)) is not None
+        ):
             return found
-        return parse_times(self.texts(*names), zone, layout)
+        return parse_times(self.texts(*names), zone, layout, after_s)
 
     def contains(self, part: str, *names: str) -> Bools:
         """Return in which rows a column contains a text."""
@@ -215,7 +221,9 @@ class Columns:
         return pc.cast(pc.if_else(good, column, None), kind)
 
 
-def _plain_times(column: pa.ChunkedArray, zone: str, layout: str) -> tuple[Floats, bool] | None:
+def _plain_times(
+    column: pa.ChunkedArray, zone: str, layout: str, after_s: float
+) -> tuple[Floats, bool] | None:
     """Return times that are all of one plain layout, all of them with a zone or none; else None.
 
     It gives what :func:`parse_times` does, in a tenth of its time.
@@ -233,7 +241,7 @@ def _plain_times(column: pa.ChunkedArray, zone: str, layout: str) -> tuple[Float
         time_s = ns // 10**9 + ns % 10**9 / 1e9
         time_s[(time_s < _EARLIEST_S) | (time_s >= _LATEST_S)] = np.nan
         if own is None and zone:
-            time_s = utc_from_local_s(time_s, zone)
+            time_s = utc_from_local_s(time_s, zone, after_s)
         return time_s, bool(own or zone)
     return None
 

@@ -82,7 +82,10 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     if heading := heading_of_wheels(mapped):
         rates = _rates_of(mapped, heading, time_s)
         column = mapped.rows.find(*mapped.names(heading))
-        reading.note(f"yaw rates are those by which {column} changes")
+        if np.isfinite(rates).any():
+            reading.note(f"yaw rates are those by which {column} changes")
+        else:
+            reading.ignore(f"{column}: no two values within {2 * _NEAR_S:g} s, turns are unknown")
     yaw = _at_speeds(reading, time_s, speed, rates)
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
     if not np.isfinite(speed).any():

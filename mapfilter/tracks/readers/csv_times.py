@@ -59,7 +59,7 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     # A zone that is given is that of the local times of all files.
     rows, name = mapped.rows, mapped.rows.find(*names) or ""
     zone = "UTC" if "utc" in name else options.zone
-    time_s, zoned = rows.times(*names, zone=zone)
+    time_s, zoned = rows.times(*names, zone=zone, after_s=reading.last_s)
     reading.clock = Clock("utc") if zoned else Clock("local", zone)
     _note_gps(reading, name, known)
     if len(time_s) and not np.isfinite(time_s).any():
@@ -118,7 +118,7 @@ def _is_days(known: Floats) -> bool:
 
 def _local(reading: Reading, local_s: Floats, zone: str) -> Floats:
     reading.clock = Clock("local", zone)
-    return utc_from_local_s(local_s, zone) if zone else local_s
+    return utc_from_local_s(local_s, zone, reading.last_s) if zone else local_s
 
 
 def _note_gps(reading: Reading, name: str, known: Floats) -> None:

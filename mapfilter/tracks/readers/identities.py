@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,12 +12,10 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.radio.identities import LIMITS, parse_cgi
+from mapfilter.radio.identities import LIMITS, parse_cgi, parted_network
 from mapfilter.tracks.readers.reading import Reading
 
 _UNAVAILABLE = (-1, 2**31 - 1, 2**63 - 1)
-_NETWORK = re.compile(r"^(\d{3})(\d{2,3})(\D+\d+)$", re.ASCII)
-"""MCC and MNC as one number, before the identity of a cell of LTE or NR."""
 _NO_CELL = (2**28 - 1, 2**36 - 1)
 """Identities with all bits set of LTE and NR, which are of no cell."""
 
@@ -42,7 +39,7 @@ def parse_identities(texts: np.ndarray) -> dict[str, Floats]:
     """
     rows: dict[object, tuple[float, ...]] = {}
     for text in pd.unique(pd.Series(texts, dtype=object)):
-        found = parse_cgi(_NETWORK.sub(r"\1-\2\3", str(text).strip()))
+        found = parse_cgi(parted_network(str(text)))
         parts = (None,) * 4 if found is None else found
         rows[text] = tuple(math.nan if part is None else float(part) for part in parts)
     table = np.array([rows[text] for text in texts], dtype=np.float64).reshape(-1, 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
+from math import nan
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -79,7 +80,9 @@ def unix_seconds(values: ArrayLike) -> Floats:
     return number
 
 
-def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> tuple[Floats, bool]:
+def parse_times(
+    texts: np.ndarray, zone: str = "", layout: str = "ISO8601", after_s: float = nan
+) -> tuple[Floats, bool]:
     """Read dates and times.
 
     Parameters
@@ -91,6 +94,8 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
     layout : str
         Format as of ``strptime``, or "ISO8601"; numbers are Unix times then, and days with dots
         (31.12.2026), names of months (31-Dec-2026) and AM or PM after the time are read, too.
+    after_s : float
+        As of :func:`utc_from_local_s`.
 
     Returns
     -------
@@ -130,7 +135,7 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
     seconds = seconds + leap
     if zone and not aware.all():
         local_s = np.where(aware, np.nan, seconds)
-        seconds = np.where(aware, seconds, utc_from_local_s(local_s, zone))
+        seconds = np.where(aware, seconds, utc_from_local_s(local_s, zone, after_s))
     time_s[~is_number] = seconds
     understood = np.isfinite(seconds)
     # A line of units or another header among Unix times has no zone.
@@ -148,11 +153,20 @@ def _with_whole_day(found: re.Match[str]) -> str:
     return f"{hour:02d}{found[2]}"
 
 
-def utc_from_local_s(local_s: ArrayLike, zone: str) -> Floats:
+def utc_from_local_s(local_s: ArrayLike, zone: str, after_s: float = nan) -> Floats:
     """Turn local times, in seconds as if their zone were UTC, into UTC seconds.
 
     An hour that a clock set back passes twice is the first, until times fall back in it. It is the
-    second where times go on after it without a gap, and do not come from before it.
+    second where times go on after it without a gap, and do not come from before it, or where they
+    follow on others in it.
+
+    Parameters
+    ----------
+    local_s : array_like
+        In the order of rows.
+    zone : str
+    after_s : float
+        UTC seconds of the row before them, as in an earlier part of a file.
 
     Examples
     --------
@@ -173,19 +187,23 @@ def utc_from_local_s(local_s: ArrayLike, zone: str) -> Floats:
             shift[i, fold] = offset.total_seconds()
     first_s = np.asarray(local - shift[of, 0].reshape(local.shape))
     later_s = np.maximum(shift[:, 0] - shift[:, 1], 0.0)
-    if later_s.any():
-        known = np.isfinite(local)
-        first_s[known] += _second_pass_s(local[known], later_s[of].reshape(local.shape)[known])
+    known = np.isfinite(local)
+    if later_s.any() and known.any():
+        behind_s = after_s - float(first_s[known][0])
+        later_s = later_s[of].reshape(local.shape)[known]
+        first_s[known] += _second_pass_s(local[known], later_s, behind_s)
     return first_s
 
 
-def _second_pass_s(local_s: Floats, later_s: Floats) -> Floats:
+def _second_pass_s(local_s: Floats, later_s: Floats, behind_s: float) -> Floats:
     """Return the seconds to add to rows of an hour's second pass, 0 in the first.
 
     Parameters
     ----------
     local_s, later_s : (N,) array
         Times in the order of rows, and by how much the second pass is later; 0 elsewhere.
+    behind_s : float
+        By how much the first of them would be before the row before it.
     """
     added_s, size = np.zeros(len(local_s)), len(local_s)
     edges = np.diff((later_s > 0).astype(np.int8), prepend=0, append=0)
@@ -195,8 +213,9 @@ def _second_pass_s(local_s: Floats, later_s: Floats) -> Floats:
         falls = np.flatnonzero(steps[begin : end - 1] < -later_s[begin] / 2)
         comes = begin > 0 and 0 <= steps[begin - 1] <= _QUARTER_S
         goes_on = end < size and 0 <= steps[end - 1] <= _QUARTER_S
-        if falls.size or (goes_on and not comes):
-            since = begin + int(falls[0]) + 1 if falls.size else begin
+        follows = begin == 0 and later_s[0] / 2 < behind_s < 2 * later_s[0]
+        if falls.size or follows or (goes_on and not comes):
+            since = begin + int(falls[0]) + 1 if falls.size and not follows else begin
             added_s[since:end] = later_s[since:end]
     return added_s
 
