@@ -21,7 +21,7 @@ _SAME_M, _FEWEST, _MOVED_M, _COMMON = 0.5, 20, 50.0, 0.5
 _NEAR_S, _NEAR = 2.0, 1.5
 """A position stands for others within 2 s of it, or one and a half of its file's intervals."""
 _STAY_M, _STAY_MOVED_M, _STANDING_MPS = 3.0, 100.0, 0.3
-_HELD_S, _CELLS = 10.0, 2.0
+_HELD_S, _HELD_APART_S, _CELLS = 10.0, 60.0, 2.0
 """A way with corners within one step of rounded degrees is up to two steps long."""
 
 Placed = tuple[Recording, pd.DataFrame]
@@ -217,7 +217,10 @@ def _stays(time_s: Floats, places: np.ndarray, way_m: Floats, moved_m: float) ->
             continue
         left = np.abs(places[begin:] - places[begin]) > _STAY_M
         last = begin + int(np.argmax(left)) - 1 if left.any() else len(places) - 1
-        if time_s[last] - time_s[begin] > _HELD_S and way_m[last] - way_m[begin] > moved_m:
+        lasted_s = time_s[last] - time_s[begin]
+        # Few positions, hours apart, are of one who comes back.
+        is_dense = last - begin >= 2 and np.diff(time_s[begin : last + 1]).max() <= _HELD_APART_S
+        if is_dense and lasted_s > _HELD_S and way_m[last] - way_m[begin] > moved_m:
             found.append((begin, last))
             end = last
     first, last_rows = np.array(found, dtype=np.int64).reshape(-1, 2).T

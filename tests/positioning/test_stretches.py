@@ -119,3 +119,24 @@ def test_the_ratio_is_that_of_sums_of_squares(off_deg):
         off = fixes[first:] - other
         left = np.abs(off - off.mean()) ** 2
         assert nats[first] == pytest.approx(left.sum() / (2 * 49.0), rel=1e-6)
+
+
+def test_a_way_that_is_drawn_out_is_told_once_it_is_long():
+    way = 5.0 * np.cumsum(np.exp(1j * np.repeat([0.2, 1.8], 15)))
+    for times, expected in ((1.05, False), (1.35, True), (0.7, True)):
+        found = Stretches.of(rows_of(way, times * np.exp(0.7j) * way, 49.0), LASTS_S)
+        assert found.drawn_out[0] == expected
+        # Six fixes over 25 m may be off by as much.
+        assert not found.drawn_out[-6]
+        assert found.fits[[0, -6]].all()
+
+
+def test_fixes_that_jump_do_not_fit():
+    """They state 5 m; 25 m aside is no jump, 35 m is, up to the last fix before it."""
+    way = 5.0 * np.arange(30.0) * np.exp(0.4j)
+    for aside_m, jumps in ((25.0, False), (35.0, True)):
+        rows = rows_of(way, way + 1j * np.exp(0.4j) * aside_m * (np.arange(30) >= 20), 400.0)
+        rows[:, 10] = 5.0
+        fits = Stretches.of(rows, LASTS_S).fits
+        assert fits[20:25].all()
+        assert fits[10:20].any() != jumps

@@ -134,6 +134,23 @@ def test_a_way_is_broken_off_where_its_direction_or_length_is_not_known():
     assert len(again.rows) == 2
 
 
+def test_fixes_that_are_led_away_are_no_jump():
+    """Turned by 0.6 rad and drawn out by 0.38: no angle of the steps tells that way."""
+    for times in (1.0, 1.38):
+        way, turns, led = RecentWay(), 0, 0
+        for k in range(16):
+            place = times * 5.0 * k * np.exp(0.6j)
+            fix = (EAST + place.real, NORTH + place.imag, 4.0)
+            way, turn = way.at_fix(4.0 * k, fix, (0.0, 0.0004), NONE_LASTS)
+            turns, led = turns + (turn is not None), led + way.is_led
+            way = way.moved(MotionStep(5.0, 0.0), 0.0)
+        if times == 1.0:
+            assert (turns > 0, led) == (True, 0)
+        else:
+            assert turns == 0
+            assert led > 2
+
+
 def test_a_jump_is_done_with_once_all_fixes_lie_on_one_way():
     way, _ = RecentWay().at_fix(0.0, (EAST, NORTH, 25.0), (0.0, 0.01), NONE_LASTS)
     way = replace(way, is_turning=True)

@@ -173,3 +173,13 @@ def test_steps_in_one_place_and_noise_of_wheels_at_rest_hold_nothing(read):
     time_s = TIME_S + np.cumsum(np.where(speed < 1, 10.0, 1.0))
     wheels = {"wheel_speed_mps": speed, "yaw_rate_radps": 0.0}
     assert len(read(drive=table(time_s, **wandering(still=True), **wheels)).gnss) == COUNT
+
+
+def test_few_positions_of_round_trips_are_not_held(read):
+    """A van that is back at its depot each quarter of an hour, with positions there alone."""
+    time_s = TIME_S[0] + 900.0 * np.arange(40)
+    way = table(np.arange(TIME_S[0], time_s[-1], 1.0), wheel_speed_mps=10.0, yaw_rate_radps=0.1)
+    rng = np.random.default_rng(5)
+    lat, lon = 60 + rng.normal(0, 3e-6, 40), 25 + rng.normal(0, 5e-6, 40)
+    log = read(depot=table(time_s, lat=lat, lon=lon), wheels=way)
+    assert len(log.gnss) == 40

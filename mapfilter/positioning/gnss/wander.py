@@ -34,7 +34,9 @@ _RESTS_S = 10.0
 _BEFORE_S = 120.0
 """Time by which what was known is older than what may be of a jump of headings."""
 _LASTS_S = 60.0
-"""Time after which the correlation of the error that lasts is 1/e."""
+"""Time after which the correlation of the error that lasts is 1/e. Errors of receivers between
+houses last for up to some minutes, and what lasts longer than this is found too small; filters that
+take it for an error of half a minute believe fixes less, and no longer."""
 _MEMORY_S, _PRIOR_S = 180.0, 120.0
 """Time over which the variances are followed, and that for which stated ones count before."""
 _LEAST_M2 = 1.0

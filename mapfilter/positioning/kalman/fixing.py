@@ -34,8 +34,9 @@ _RECKONED, _MOVING = Patience(30.0, 120.0), Patience(5.0, 5.0)
 """With dead reckoning, and where but a velocity is known."""
 _UNSEEN_S = 20.0
 """Time without a fix after which one that contradicts the belief is as likely to be right."""
-_PROVEN_S = 120.0
-"""Time for which fixes agree with a belief, whatever the way, that shows it to be right."""
+_PROVEN_S, _PROVEN_FIXES = 120.0, 10
+"""Time for which fixes agree with a belief, and how many of them, that show it to be right whatever
+the way."""
 
 
 class FixErrors(NamedTuple):
@@ -121,7 +122,8 @@ class FixErrors(NamedTuple):
         if self.doubt is Doubt.NONE:
             return self._replace(doubted_s=time_s)
         agrees = way_agrees(self.wander.rows, self.understated, lasting_s)
-        if time_s - max(self.doubted_s, self.record.agreed_from_s) >= _PROVEN_S:
+        lasted_s = time_s - max(self.doubted_s, self.record.agreed_from_s)
+        if lasted_s >= _PROVEN_S and self.record.agreed >= _PROVEN_FIXES:
             agrees = True
         return self._replace(doubt=self.doubt.after(agrees))
 
