@@ -85,12 +85,15 @@ def lack_of(
     lack = lack_of_log(log, options, estimate, database)
     if NO_MOTION not in lack:
         return lack
-    columns = columns_of_motion(opened)
+    remedies = []
     if source := receiver_motion(opened):
-        return f"{lack} (--course-motion, track.course_motion, makes it from {source}){columns}"
-    if len(log.radio) and (database is None or database.cell_ids):
-        return f"{lack} (mapfilter locate needs none){columns}"
-    return f"{lack}{columns}"
+        remedies.append(f"--course-motion, track.course_motion, makes it from {source}")
+    elif len(log.radio) and (database is None or database.cell_ids):
+        remedies.append("mapfilter locate needs none")
+    if len(log.gnss):
+        remedies.append("--filter ekf needs none beside positions")
+    hint = f" ({'; '.join(remedies)})" if remedies else ""
+    return f"{lack}{hint}{columns_of_motion(opened)}"
 
 
 def columns_of_motion(opened: OpenedLog) -> str:

@@ -171,6 +171,12 @@ def test_speed_and_course_become_motion_on_request(database, recordings, tmp_pat
     drive.drop(columns=["speed_mps", "bearing"]).to_csv(path, index=False)
     done = replayed(database, tmp_path / "out", *given[:2], *given[3:])
     assert "track.course_motion, makes it from positions)" in done.err
+    # Positions are enough for a Kalman-type filter.
+    drive[["time", "lat", "lon"]].to_csv(tmp_path / "fixes.csv", index=False)
+    alone = ("--log", tmp_path / "fixes.csv")
+    done = replayed(database, tmp_path / "out", *alone)
+    assert "makes it from positions; --filter ekf needs none beside positions)" in done.err
+    assert replayed(database, tmp_path / "out", *alone, "--filter", "ekf").code == 0
     done = replayed(database, tmp_path / "out", *given)
     assert done.code == 0, done.err
     assert "motion comes from GNSS" in done.out
