@@ -65,6 +65,7 @@ def make_estimate(crs=CRS, places=PLACES):
     unused = [
         UnusedReading(0.0, "motion", "", Reason.NOT_STARTED),
         UnusedReading(0.48, "serving", 'Zelle "Ä/1"', Reason.UNKNOWN_CELL),
+        UnusedReading(0.0, "gnss", "", Reason.NOT_USED_BY_FILTER, 120),
     ]
     return TrackEstimate.of_fixes(
         crs, "candidate", fixes, start_utc_s=1_700_000_000.25, unused=unused
@@ -201,7 +202,7 @@ def test_other_files_are_refused(written):
 
 def test_a_newer_version_is_refused_with_what_to_do(written):
     with_meta(written, version=estimate_store.VERSION + 1)
-    assert refused(written, "version <= 2, found 3").faults[0].hint == "a newer mapfilter"
+    assert refused(written, "version <= 3, found 4").faults[0].hint == "a newer mapfilter"
 
 
 def test_missing_columns_are_all_named(written):
@@ -314,7 +315,9 @@ def test_files_of_the_first_version_have_no_levels(tmp_path):
     write_estimate(make_estimate(), path)
     table = pq.read_table(path)
     meta = json.loads(table.schema.metadata[b"mapfilter"])
-    assert meta["version"] == 2
+    assert meta["version"] == 3
+    assert meta["unused"][-1][-1] == 120
+    meta = {**meta, "unused": [one[:4] for one in meta["unused"]]}
     old = table.drop_columns(["radius_99_m", "protection_m"]).replace_schema_metadata(
         {**table.schema.metadata, b"mapfilter": json.dumps({**meta, "version": 1}).encode()}
     )
@@ -322,6 +325,7 @@ def test_files_of_the_first_version_have_no_levels(tmp_path):
     found = read_estimate(path)
     assert np.isnan(found.protection_m).all()
     assert np.isnan(found.radius_99_m).all()
+    assert [one.readings for one in found.unused] == [1, 1, 1]
     assert np.array_equal(found.east_m, make_estimate().east_m, equal_nan=True)
     # A file of the present version without them is damaged.
     pq.write_table(old.replace_schema_metadata(table.schema.metadata), path)

@@ -116,6 +116,21 @@ def test_epochs_with_a_fault_are_refused_with_its_place(cross, body):
     assert all(fault.where and fault.expected for fault in error.faults)
 
 
+@pytest.mark.parametrize(
+    ("body", "mistake"),
+    [
+        ({"epochs": [{"time_s": 1.7e12}]}, "milliseconds for s"),
+        (epoch(motion=[{"step_m": 1, "heading_rad": 90}]), "degrees given for radians"),
+        (epoch(radio=[{**SERVING, "level_dbm": 40}]), "raw RXLEV given for dBm"),
+        (epoch(radio=[{**SERVING, "timing_advance": 5000}]), "metres for steps"),
+    ],
+)
+def test_values_beyond_their_range_name_the_likely_mistake(cross, body, mistake):
+    """As the same values of a log do."""
+    with pytest.raises(RequestError, match=mistake):
+        read_epochs(body, PlanNames(cross.plan), nan)
+
+
 def test_all_faults_of_a_request_are_named_together(cross):
     body = epoch(
         motion=[{"step_m": "1"}], radio=[{"role": "x"}, SERVING, {"role": "neighbour", "cell": ""}]
