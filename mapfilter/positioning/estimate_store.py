@@ -178,8 +178,12 @@ def write_geojson(estimate: TrackEstimate, path: str | Path) -> None:
 
 def _point_properties(estimate: TrackEstimate, index: int) -> dict[str, Any]:
     radius_m, level_m = float(estimate.radii_m[index, 2]), float(estimate.protection_m[index])
+    time_s = float(estimate.time_s[index])
+    known = np.isfinite(estimate.start_utc_s)
+    moment = {"time": _utc_text(estimate.start_utc_s + time_s)} if known else {}
     return {
-        "time_s": round(float(estimate.time_s[index]), 3),
+        **moment,
+        "time_s": round(time_s, 3),
         "status": str(estimate.status[index]),
         "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
         "protection_m": round(level_m, 2) if np.isfinite(level_m) else None,

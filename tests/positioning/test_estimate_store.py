@@ -275,6 +275,13 @@ def test_gpx_of_an_unknown_start_has_no_times(tmp_path):
     assert "<time>" not in text
 
 
+def test_geojson_of_an_unknown_start_has_no_times(tmp_path):
+    write_geojson(replace(make_estimate(), start_utc_s=nan), tmp_path / "track.geojson")
+    points = [one["properties"] for one in strict_json(tmp_path / "track.geojson")["features"]]
+    assert all("time" not in one for one in points)
+    assert points[-1]["time_s"] == 0.48
+
+
 def strict_json(path):
     def never(name):
         raise AssertionError(f"{name} is no JSON")
@@ -293,8 +300,20 @@ def test_geojson_holds_a_line_and_the_located_epochs(tmp_path, crs, lon, lat):
     places = [point["geometry"]["coordinates"] for point in points]
     assert places == line["geometry"]["coordinates"]
     assert [point["properties"] for point in points] == [
-        {"time_s": 0.48, "status": "CONVERGED", "radius_95_m": 9.25, "protection_m": 21.25},
-        {"time_s": 0.48, "status": "TRACKING", "radius_95_m": None, "protection_m": None},
+        {
+            "time": "2023-11-14T22:13:20.730Z",
+            "time_s": 0.48,
+            "status": "CONVERGED",
+            "radius_95_m": 9.25,
+            "protection_m": 21.25,
+        },
+        {
+            "time": "2023-11-14T22:13:20.730Z",
+            "time_s": 0.48,
+            "status": "TRACKING",
+            "radius_95_m": None,
+            "protection_m": None,
+        },
     ]
     frame = geopandas.read_file(path)
     assert frame.crs.to_epsg() == 4326
