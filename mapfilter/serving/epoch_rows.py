@@ -21,6 +21,7 @@ from mapfilter.serving.documents import (
     text,
     whole,
 )
+from mapfilter.serving.places import in_metres
 from mapfilter.tracks.identify import PlanNames, ReportedCell
 from mapfilter.tracks.schema import (
     MISSING_SIGNS,
@@ -132,6 +133,11 @@ def _rows(
     for index, row in enumerate(rows_of(given, where, faults, _MOST_ROWS)):
         place = f"{where}[{index}]"
         before = len(faults.found)
+        if table == "gnss":
+            placed = in_metres(row, place, names.plan.crs, faults)
+            if placed is None:
+                continue
+            row = dict(placed)
         check_keys(row, tuple(_COLUMNS[table]), place, faults)
         values = {
             name: _value(column, row.get(name), f"{place}.{name}", faults)
