@@ -100,19 +100,31 @@ def test_steps_after_a_position_are_parts_of_one_way():
 
 
 def test_steps_with_directions_or_before_any_position_stay_as_they_are():
-    for rows in (
-        [step()],
-        [step(turn_rad=0.0), step(turn_rad=0.0)],
-        [step(heading_rad=0.5), step()],
-        [step(0.0), step(turn_rad=0.1), step()],
-        [step(np.nan)],
+    unplaced, placed = UndirectedWay(), UndirectedWay(since_m=0.0)
+    for way, rows in (
+        (unplaced, [step(), step()]),
+        (placed, [step(turn_rad=0.0), step(turn_rad=0.0)]),
+        (placed, [step(heading_rad=0.5), step(heading_rad=0.6)]),
+        (placed, [step(0.0), step(turn_rad=0.1)]),
+        (placed, [step(np.nan)]),
     ):
-        way = UndirectedWay() if len(rows) == 1 and rows[0].step_m > 0 else UndirectedWay(since_m=0)
         for number, row in enumerate(rows):
             given = Epoch(float(number), (row,), fix=fix_at(0.0))
             way, epoch, unused = way.spread(given)
             assert (epoch, unused) == (given, [])
         assert not way.is_blind
+
+
+def test_few_rows_without_a_direction_leave_positions_as_they_are():
+    way, used = UndirectedWay(), []
+    for number in range(12):
+        row = step(heading_rad=0.5) if number == 0 else step()
+        way, epoch, _ = way.spread(Epoch(float(number), (row,), fix=fix_at(0.0)))
+        used.append(epoch.fix is not None)
+    # The sixth of them is the first one after 10 m of way; from 12.5 m on one is far enough.
+    assert used == [True] * 6 + [False] + [True] * 5
+    way, _, _ = way.spread(Epoch(20.0, (step(heading_rad=0.5),)))
+    assert (way.gone_m, way.is_blind) == (0.0, False)
 
 
 @pytest.mark.parametrize(
@@ -157,6 +169,19 @@ def test_a_live_session_gives_what_a_replay_gives(town):
     claimed = np.array([one[2] in FOUND for one in found])
     assert claimed.sum() > 200
     assert off_m[claimed].max() < 40
+
+
+def test_a_walk_whose_compass_dies_is_followed_by_its_fixes(town):
+    """From there on it fell behind: 240 m off, TRACKING."""
+    log = paced(1.4, 5.0, 500.0)
+    path = log.truth[["east_m", "north_m"]].diff().bfill()
+    headings_rad = np.arctan2(path["north_m"], path["east_m"])
+    motion = log.motion.assign(heading_rad=headings_rad.where(log.motion["time_s"] <= 150))
+    log = make_log(CRS, motion=motion, gnss=log.gnss, truth=log.truth)
+    track = mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW))
+    score = mf.score(track, log.truth)
+    assert score.error_mean_m < 12
+    assert score.within_95 > 0.8
 
 
 def test_a_known_start_is_left_by_steps_without_directions(town):

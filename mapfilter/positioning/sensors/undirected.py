@@ -1,10 +1,11 @@
-"""Motion of which no direction is known at all: speeds or step counts alone.
+"""Motion without any direction: speeds or step counts alone, or a compass that has died.
 
 The map filters spread a step without a heading to all sides, each on its own. Of one that is right;
 of many, which go the same way mostly, the sum would be a rest with a small radius, and positions
-that are all ahead of it would contradict it in the end. So where no row has had a direction, steps
-after a position are parts of one way, which goes on and on, and positions that are too near to the
-last one are left out. It is the same live and in a replay, as only the past is asked.
+that are all ahead of it would contradict it in the end. So steps without directions after a
+position, or after a step with one, are parts of one way, which goes on and on, and positions that
+are too near to the last one are left out. It is the same live and in a replay, as only the past is
+asked.
 """
 
 from __future__ import annotations
@@ -26,8 +27,13 @@ _NEAR_M = 30.0
 """Nearer positions are used if the next one seems to come after a longer way than this."""
 
 
+_FEW_M = 10.0
+"""Way without directions after others up to which positions are used as always: few rows lack
+one."""
+
+
 class UndirectedWay(NamedTuple):
-    """What is known of the directions of steps, and the way since a position.
+    """What is known of the directions of steps, and the way without any.
 
     Parameters
     ----------
@@ -36,11 +42,12 @@ class UndirectedWay(NamedTuple):
     directed : bool
         Whether a row had a heading, or one after the first a turn.
     since_m : float
-        Way since the last position that was used; NaN before there is one.
+        Way without directions since the last position that was used, or the last direction; NaN
+        before there is either.
     seen_m : float
-        Way since the last position that was reported.
+        The same since the last position that was reported.
     gone_m : float
-        Way without directions since the first position.
+        The same since the last direction; without any, since the first position.
     """
 
     rows: bool = False
@@ -52,25 +59,21 @@ class UndirectedWay(NamedTuple):
     @property
     def is_blind(self) -> bool:
         """Whether one moves, and nothing but positions and reports tells where to."""
-        return self.gone_m > 0 and not self.directed
+        return self.gone_m > (_FEW_M if self.directed else 0.0)
 
     def spread(self, epoch: Epoch) -> tuple[UndirectedWay, Epoch, list[UnusedReading]]:
         """Return it after an epoch, and the epoch with steps that are parts of one way.
 
         A position that is too near to the last one is left out of it, and returned as unused.
         """
-        if self.directed:
-            return self, epoch, []
-        after, steps = self, []
-        for step in epoch.motion:
+        after, steps, given = self, [], epoch.motion
+        for step in given:
             after, one = after._after(step)
             steps.append(one)
-        if not after.directed and after.gone_m > self.gone_m:
+        if any(one is not step for one, step in zip(steps, given, strict=True)):
             epoch = replace(epoch, motion=tuple(steps))
-        elif after.directed:
-            return after, epoch, []
         ranged = any(isfinite(one.range_m) for one in epoch.ranges)
-        if not after.gone_m or (epoch.fix is None and not ranged):
+        if not after.is_blind or (epoch.fix is None and not ranged):
             return after, epoch, []
         # Who comes as far again until the next one had better take this one.
         next_m, after = after.since_m + after.seen_m, after._replace(seen_m=0.0)
@@ -83,21 +86,24 @@ class UndirectedWay(NamedTuple):
 
     def positioned(self) -> UndirectedWay:
         """Return it after a position that was used."""
-        return self if self.directed else self._replace(since_m=0.0)
+        return self if self.since_m == 0 else self._replace(since_m=0.0)
 
     def _after(self, step: MotionStep) -> tuple[UndirectedWay, MotionStep]:
-        """Return it after a step, and the step as a part of the way since the last position."""
+        """Return it after a step, and the step as a part of the way."""
         turns = isfinite(step.turn_rad)
         # The first row turns by nothing.
-        if self.directed or isfinite(step.heading_rad) or (turns and self.rows):
-            return UndirectedWay(directed=True), step
+        if isfinite(step.heading_rad) or (turns and self.rows):
+            return _DIRECTED, step
         way_m = abs(step.step_m)
         if turns or not (isfinite(self.since_m) and way_m > 0):
-            return self._replace(rows=True), step
+            return self if self.rows else self._replace(rows=True), step
         if not isfinite(step.spread_m):
             step = headless_step(step.step_m, self.since_m)
         gone = (one + way_m for one in (self.since_m, self.seen_m, self.gone_m))
-        return UndirectedWay(True, False, *gone), step
+        return UndirectedWay(True, self.directed, *gone), step
+
+
+_DIRECTED = UndirectedWay(rows=True, directed=True, since_m=0.0)
 
 
 def _apart_m(fix: GnssFix | None) -> float:

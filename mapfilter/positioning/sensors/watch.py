@@ -86,9 +86,8 @@ class SensorWatch(NamedTuple):
         Of slow steps before it nothing remains to be shown. A counter that stands still stays in
         doubt: the next position may be far away.
         """
-        watch = self
-        if not self.undirected.directed and self.undirected.since_m != 0:
-            watch = self._replace(undirected=self.undirected.positioned())
+        way = self.undirected.positioned()
+        watch = self if way is self.undirected else self._replace(undirected=way)
         if self.rest is None or not self.rest.measured_m > 0:
             return watch
         return watch._moving(time_s)
