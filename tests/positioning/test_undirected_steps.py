@@ -115,14 +115,23 @@ def test_steps_with_directions_or_before_any_position_stay_as_they_are():
         assert not way.is_blind
 
 
-def test_few_rows_without_a_direction_leave_positions_as_they_are():
-    way, used = UndirectedWay(), []
-    for number in range(12):
-        row = step(heading_rad=0.5) if number == 0 else step()
-        way, epoch, _ = way.spread(Epoch(float(number), (row,), fix=fix_at(0.0)))
+@pytest.mark.parametrize(("heading_rad", "turn_rad"), [(0.5, np.nan), (np.nan, 0.5)])
+def test_a_direction_holds_for_some_metres(heading_rad, turn_rad):
+    way, _, _ = UndirectedWay().spread(Epoch(0.0, (step(0.0, turn_rad=0.0),)))
+    way, directions, used = (
+        way.spread(Epoch(1.0, (step(heading_rad=heading_rad, turn_rad=turn_rad),)))[0],
+        [],
+        [],
+    )
+    for number in range(2, 14):
+        way, epoch, _ = way.spread(Epoch(float(number), (step(),), fix=fix_at(0.0)))
+        (one,) = epoch.motion
+        directions.append((one.heading_rad, one.turn_rad))
         used.append(epoch.fix is not None)
-    # The sixth of them is the first one after 10 m of way; from 12.5 m on one is far enough.
-    assert used == [True] * 6 + [False] + [True] * 5
+    ahead, unknown = [(heading_rad, 0.0)] * 5, [(np.nan, np.nan)] * 7
+    np.testing.assert_array_equal(directions, ahead + unknown)
+    # Then the next position is that after 14 m, as 12.5 m apart is far enough.
+    assert used == [True] * 5 + [False] * 6 + [True]
     way, _, _ = way.spread(Epoch(20.0, (step(heading_rad=0.5),)))
     assert (way.gone_m, way.is_blind) == (0.0, False)
 

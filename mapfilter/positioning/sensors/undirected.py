@@ -2,10 +2,10 @@
 
 The map filters spread a step without a heading to all sides, each on its own. Of one that is right;
 of many, which go the same way mostly, the sum would be a rest with a small radius, and positions
-that are all ahead of it would contradict it in the end. So steps without directions after a
-position, or after a step with one, are parts of one way, which goes on and on, and positions that
-are too near to the last one are left out. It is the same live and in a replay, as only the past is
-asked.
+that are all ahead of it would contradict it in the end. So a direction holds for some metres; from
+there on, or after a position where there was none, steps are parts of one way, which goes on and
+on, and positions that are too near to the last one are left out. It is the same live and in a
+replay, as only the past is asked.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ _NEAR_M = 30.0
 
 
 _FEW_M = 10.0
-"""Way without directions after others up to which positions are used as always: few rows lack
-one."""
+"""Way for which the last direction holds: rows of steps are often more than those of a compass."""
 
 
 class UndirectedWay(NamedTuple):
@@ -42,12 +41,14 @@ class UndirectedWay(NamedTuple):
     directed : bool
         Whether a row had a heading, or one after the first a turn.
     since_m : float
-        Way without directions since the last position that was used, or the last direction; NaN
-        before there is either.
+        Way to all sides since the last position that was used, or since directions ended; NaN
+        before there is a position or a direction.
     seen_m : float
         The same since the last position that was reported.
     gone_m : float
-        The same since the last direction; without any, since the first position.
+        Way without directions since the last one; without any, since the first position.
+    heading_rad : float
+        Of the last row with a direction; NaN where that was a turn.
     """
 
     rows: bool = False
@@ -55,6 +56,7 @@ class UndirectedWay(NamedTuple):
     since_m: float = nan
     seen_m: float = 0.0
     gone_m: float = 0.0
+    heading_rad: float = nan
 
     @property
     def is_blind(self) -> bool:
@@ -93,14 +95,19 @@ class UndirectedWay(NamedTuple):
         turns = isfinite(step.turn_rad)
         # The first row turns by nothing.
         if isfinite(step.heading_rad) or (turns and self.rows):
-            return _DIRECTED, step
+            return _DIRECTED._replace(heading_rad=step.heading_rad), step
         way_m = abs(step.step_m)
         if turns or not (isfinite(self.since_m) and way_m > 0):
             return self if self.rows else self._replace(rows=True), step
+        if self.directed and self.gone_m + way_m <= _FEW_M and not isfinite(step.spread_m):
+            # Rows of other times than those of the compass, or a few that it lacks.
+            ahead = replace(step, heading_rad=self.heading_rad, turn_rad=0.0)
+            return self._replace(gone_m=self.gone_m + way_m), ahead
         if not isfinite(step.spread_m):
             step = headless_step(step.step_m, self.since_m)
-        gone = (one + way_m for one in (self.since_m, self.seen_m, self.gone_m))
-        return UndirectedWay(True, self.directed, *gone), step
+        since_m, seen_m, gone_m = self.since_m + way_m, self.seen_m + way_m, self.gone_m + way_m
+        after = self._replace(rows=True, since_m=since_m, seen_m=seen_m, gone_m=gone_m)
+        return after, step
 
 
 _DIRECTED = UndirectedWay(rows=True, directed=True, since_m=0.0)
