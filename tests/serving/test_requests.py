@@ -287,6 +287,7 @@ def test_other_paths_lead_nowhere(made, method, path, code):
     answer = answer_of(made, method, path)
     assert answer.code == code
     assert answer.json["error"]["code"] == code
+    assert (f"method for this path, found {method}" in str(answer.json)) == (code == 405)
 
 
 def test_a_report_is_located_as_locate_does_it(made, fitted, cross):
