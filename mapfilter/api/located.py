@@ -29,7 +29,7 @@ from mapfilter.evaluation.accuracy import (
 )
 from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
-from mapfilter.positioning.assumed_errors import assumed_note
+from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.integrity import DEFAULT_RISK
@@ -37,7 +37,6 @@ from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.positioning.log_lacks import NO_MOTION, advice_of, lack_of_log
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
-from mapfilter.positioning.undirected_steps import with_joined_steps
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -228,8 +227,7 @@ def locate(
     options, notes = fitted_to_log(given_filter, log)
     alone = database is not None and by_streets_alone(options, log, database)
     notes = (*notes, STREETS_ALONE) if alone else notes
-    given, undirected = with_joined_steps(log, options)
-    notes = (*notes, *undirected)
+    notes = (*notes, *undirected_notes(log, options))
     if database is None:
         bound: Filter[Any] = over_sites(options, plan)
     else:
@@ -237,7 +235,7 @@ def locate(
     notes = (*notes, *assumed_note(log, options, bound.uses))
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     trace = TraceRecorder(bound) if record else None
-    found = loop.locate(given, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)
+    found = loop.locate(log, bound, rng, snapshots=snapshots, risk=risk, recorder=trace)
     notes = _not_located(log, options, found.estimate, database)
     if database is not None and (alone or not database.cell_ids):
         notes += advice_of(log, options, found.estimate)

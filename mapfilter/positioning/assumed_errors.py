@@ -1,4 +1,4 @@
-"""What is assumed of fixes that state no error."""
+"""Notes on fixes: what is assumed of those that state no error, and which are left out."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.fixes import widened
 from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.sensors.undirected import APART_M, APART_SD
 from mapfilter.tracks.log import TrackLog
 
 
@@ -40,4 +41,27 @@ def assumed_note(log: TrackLog, options: Any, uses: Collection[str]) -> tuple[st
     return (
         f"gnss: {number_of(unstated, 'fix', 'fixes')} without an error: a standard deviation of "
         f"{assumed_m:g} m east and north is assumed ({by}in a CSV a column accuracy_m gives it)",
+    )
+
+
+def undirected_notes(log: TrackLog, options: Any) -> tuple[str, ...]:
+    """Return a note where a filter leaves out positions as no row of a log has a direction.
+
+    Parameters
+    ----------
+    log : TrackLog
+    options
+        Of the filter.
+    """
+    motion = log.motion
+    moves = bool((motion["step_m"].fillna(0.0) != 0).any())
+    # The first row turns by nothing.
+    turned = motion["turn_rad"].iloc[1:].notna().any() or motion["heading_rad"].notna().any()
+    placed = len(log.gnss) or len(log.pseudoranges)
+    if not isinstance(options, BayesFilter) or turned or not (moves and placed):
+        return ()
+    return (
+        "motion: no headings and no turns at all (a yaw rate, turns or a compass): of positions "
+        f"less than {APART_SD:g} of their deviations, or {APART_M:g} m, of way apart only the "
+        "first is used: without directions the others would be taken for errors that last",
     )

@@ -23,7 +23,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence, UnusedReading
 
-VERSION = 2
+VERSION = 3
 _META = b"mapfilter"
 _GPX = "http://www.topografix.com/GPX/1/1"
 _COLUMNS = tuple(TrackEstimate.of_fixes("", "", ()).to_dataframe())
@@ -49,7 +49,7 @@ def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
         "crs": estimate.crs,
         "filter": estimate.filter,
         "start_utc_s": None if np.isnan(estimate.start_utc_s) else estimate.start_utc_s,
-        "unused": [[u.time_s, u.kind, u.what, str(u.reason)] for u in estimate.unused],
+        "unused": [[u.time_s, u.kind, u.what, str(u.reason), u.readings] for u in estimate.unused],
     }
     with atomic_file(Path(path)) as temporary:
         frame.to_parquet(temporary, index=False)
@@ -92,7 +92,7 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
     faults = Faults()
     if meta["version"] > VERSION:
         faults.add(str(path), f"version <= {VERSION}", meta["version"], "a newer mapfilter")
-    old = _SINCE_2 if meta["version"] < VERSION else ()
+    old = _SINCE_2 if meta["version"] < 2 else ()
     for name in _COLUMNS:
         if name not in table.column_names and name not in old:
             faults.add(f"{path}, {name}", "a column of that name", "none")
@@ -124,9 +124,14 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
         tuple(Reason(r) for r in column["reason"]),
         column["radius_99_m"],
         column["protection_m"],
-        tuple(UnusedReading(t, kind, what, Reason(r)) for t, kind, what, r in meta["unused"]),
+        tuple(_unused(*one) for one in meta["unused"]),
         evidence,
     )
+
+
+def _unused(time_s: float, kind: str, what: str, reason: str, readings: int = 1) -> UnusedReading:
+    """Return a reading that was not used; files of before version 3 do not tell how many it is."""
+    return UnusedReading(time_s, kind, what, Reason(reason), readings)
 
 
 def write_gpx(estimate: TrackEstimate, path: str | Path, name: str = "mapfilter") -> None:
@@ -173,8 +178,12 @@ def write_geojson(estimate: TrackEstimate, path: str | Path) -> None:
 
 def _point_properties(estimate: TrackEstimate, index: int) -> dict[str, Any]:
     radius_m, level_m = float(estimate.radii_m[index, 2]), float(estimate.protection_m[index])
+    time_s = float(estimate.time_s[index])
+    known = np.isfinite(estimate.start_utc_s)
+    moment = {"time": _utc_text(estimate.start_utc_s + time_s)} if known else {}
     return {
-        "time_s": round(float(estimate.time_s[index]), 3),
+        **moment,
+        "time_s": round(time_s, 3),
         "status": str(estimate.status[index]),
         "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
         "protection_m": round(level_m, 2) if np.isfinite(level_m) else None,

@@ -113,9 +113,18 @@ def check_keys(
 
 
 def number(
-    value: object, where: str, expected: str, faults: Faults, low: float, high: float
+    value: object,
+    where: str,
+    expected: str,
+    faults: Faults,
+    low: float,
+    high: float,
+    hint: str = "",
 ) -> float | None:
-    """Return a finite number in a range; None, with a fault, for anything else."""
+    """Return a finite number in a range; None, with a fault, for anything else.
+
+    The hint is the likely mistake of a number beyond the range.
+    """
     if isinstance(value, int | float) and not isinstance(value, bool):
         try:
             found = float(value)
@@ -123,16 +132,27 @@ def number(
             found = float("inf")
         if isfinite(found) and low <= found <= high:
             return found
+        faults.add(where, expected, shown(value), hint)
+        return None
     faults.add(where, expected, shown(value))
     return None
 
 
 def whole(
-    value: object, where: str, expected: str, faults: Faults, low: int, high: int
+    value: object,
+    where: str,
+    expected: str,
+    faults: Faults,
+    low: int,
+    high: int,
+    hint: str = "",
 ) -> int | None:
     """Return a whole number in a range; None, with a fault, for anything else."""
-    if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
-        return value
+    if isinstance(value, int) and not isinstance(value, bool):
+        if low <= value <= high:
+            return value
+        faults.add(where, expected, shown(value), hint)
+        return None
     faults.add(where, expected, shown(value))
     return None
 

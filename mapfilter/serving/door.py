@@ -140,8 +140,8 @@ def refused(error: RequestError) -> Response:
 
 async def no_route(request: Request, error: Exception) -> Response:
     """Return the answer to a request for which there is no route."""
-    del request
     code = error.status_code if isinstance(error, HTTPException) else 500
-    words = {404: ("notFound", "there is nothing here"), 405: ("methodNotAllowed", "not this way")}
+    other = f"expected another method for this path, found {request.method[:20]}"
+    words = {404: ("notFound", "there is no such path"), 405: ("methodNotAllowed", other)}
     reason, text = words.get(code, ("badRequest", "bad request"))
     return refused(RequestError(code, reason, text))

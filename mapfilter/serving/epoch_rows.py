@@ -10,6 +10,7 @@ from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch, epoch_columns, make_epoch
+from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.radio.identities import LIMITS, TIMING_STEP_M
 from mapfilter.serving.documents import (
     RequestError,
@@ -20,6 +21,7 @@ from mapfilter.serving.documents import (
     text,
     whole,
 )
+from mapfilter.serving.places import in_metres
 from mapfilter.tracks.identify import PlanNames, ReportedCell
 from mapfilter.tracks.schema import (
     MISSING_SIGNS,
@@ -39,6 +41,9 @@ MOST_GAP_S = 86_400.0
 
 _OF_GAP = "another clock, or milliseconds for s; after a longer pause begin a new session"
 _MOST_ROWS = 200
+_PACED_ROWS, _SELDOM_S, _SOMEWHERE_M, _SLOW_MPS = 5, 50.0, 25.0, 0.04
+"""Rows of motion after which times that are milliseconds show, the time between these, the way, and
+the speed: what gets somewhere is faster."""
 _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
 _COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
@@ -79,7 +84,8 @@ def read_epochs(
         where = f"epochs[{index}]"
         check_keys(one, ("time_s", *_TABLES), where, faults)
         low, high = _TIME.low, _TIME.high
-        time_s = number(one.get("time_s"), f"{where}.time_s", _TIME.expected, faults, low, high)
+        place, expected = f"{where}.time_s", _TIME.expected
+        time_s = number(one.get("time_s"), place, expected, faults, low, high, _TIME.hint)
         rows = {
             name: _rows(name, one.get(name), f"{where}.{name}", names, faults, technology)
             for name in _TABLES
@@ -104,6 +110,22 @@ def read_epochs(
     return found
 
 
+def check_pace(pace: Pace, travelled_m: float) -> None:
+    """Check that times are no milliseconds, once rows of motion have come for some way.
+
+    Raises
+    ------
+    RequestError
+        Rows seldom come, and none of them was faster than anything that gets somewhere (400).
+    """
+    if pace.rows < _PACED_ROWS or pace.interval_s < _SELDOM_S or travelled_m < _SOMEWHERE_M:
+        return
+    if 0 < pace.fastest_mps < _SLOW_MPS:
+        got = f"{pace.interval_s:.0f} between rows of motion, hence {pace.fastest_mps:.2g} m/s"
+        hint = f"{_TIME.hint}; begin a new session"
+        raise one_fault("epochs, time_s", _TIME.expected, f"{got} at most", hint)
+
+
 def _rows(
     table: str, given: object, where: str, names: PlanNames, faults: Faults, technology: str
 ) -> list[tuple[Any, ...]]:
@@ -111,6 +133,11 @@ def _rows(
     for index, row in enumerate(rows_of(given, where, faults, _MOST_ROWS)):
         place = f"{where}[{index}]"
         before = len(faults.found)
+        if table == "gnss":
+            placed = in_metres(row, place, names.plan.crs, faults)
+            if placed is None:
+                continue
+            row = dict(placed)
         check_keys(row, tuple(_COLUMNS[table]), place, faults)
         values = {
             name: _value(column, row.get(name), f"{place}.{name}", faults)
@@ -141,13 +168,14 @@ def _value(column: Column, value: object, where: str, faults: Faults) -> Any:
         return text(value, where, column.expected, faults)
     if column.kind == "integer":
         low, high = int(column.low), int(column.high)
-        found = whole(value, where, column.expected, faults, low, high)
+        found = whole(value, where, column.expected, faults, low, high, column.hint)
         return missing if found is None else found
     if value in MISSING_SIGNS:
         hint = "a sign for a missing value; leave the field out"
         faults.add(where, column.expected, shown(value), hint)
         return missing
-    found_number = number(value, where, column.expected, faults, column.low, column.high)
+    least, most = column.low, column.high
+    found_number = number(value, where, column.expected, faults, least, most, column.hint)
     return missing if found_number is None else found_number
 
 

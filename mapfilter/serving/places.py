@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,11 @@ from mapfilter.tracks.misplaced import (
     misplaced_by,
     nearest_m,
 )
+from mapfilter.tracks.position_units import RADIUS_68
 
 _RANGES = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": MOST_SD_M}
+_AS_A_PHONE = ("lat_deg", "lon_deg", "accuracy_m")
+_MOST_ACCURACY_M = 1e5
 _MOST_DEG = 180.0
 _FAR_M = 100_000.0
 """No cells of an area are heard so far outside; nearer, its mirror image may be a true place."""
@@ -56,6 +60,45 @@ def start_of(
     place = float(east_m[0]), float(north_m[0]), sd_m
     check_place("start", *place, lattice, faults, f"latitude {lat_deg:g}, longitude {lon_deg:g}")
     return place if len(faults.found) == before else None
+
+
+def in_metres(
+    row: Mapping[str, Any], where: str, crs: str, faults: Faults
+) -> Mapping[str, Any] | None:
+    """Return a row of ``gnss`` in a CRS, also where it is as phones give it; None, with faults.
+
+    Parameters
+    ----------
+    row : mapping
+        With ``lat_deg``, ``lon_deg`` and ``accuracy_m``, the radius that holds 68 %, or with the
+        columns of a log, and then returned as it is.
+    """
+    if not any(key in row for key in _AS_A_PHONE):
+        return row
+    before = len(faults.found)
+    check_keys(row, _AS_A_PHONE, where, faults)
+    lat_deg, lon_deg = (
+        number(
+            row.get(key), f"{where}.{key}", f"degrees in -{most:g}..{most:g}", faults, -most, most
+        )
+        for key, most in (("lat_deg", _RANGES["lat_deg"]), ("lon_deg", _RANGES["lon_deg"]))
+    )
+    radius_m: float | None = 0.0
+    if row.get("accuracy_m") is not None:
+        place, expected = f"{where}.accuracy_m", f"metres in 0..{_MOST_ACCURACY_M:g}"
+        radius_m = number(row["accuracy_m"], place, expected, faults, 0.0, _MOST_ACCURACY_M)
+    if lat_deg is None or lon_deg is None or len(faults.found) > before:
+        return None
+    east_m, north_m = (float(one) for one in project(crs, lon_deg, lat_deg))
+    if not (isfinite(east_m) and isfinite(north_m)):
+        faults.add(where, f"a place that {crs} covers", "one beyond it")
+        return None
+    found = {"east_m": east_m, "north_m": north_m}
+    if not radius_m:
+        return found
+    variance_m2 = (radius_m / RADIUS_68) ** 2
+    both = {"var_east_m2": variance_m2, "var_north_m2": variance_m2, "cov_east_north_m2": 0.0}
+    return {**found, **both}
 
 
 def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -> None:

@@ -48,9 +48,10 @@ from mapfilter.positioning.sensors.pauses import RowTimes
 from mapfilter.positioning.sensors.places import Place, Places
 from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
 
-FORMAT, VERSION = "mapfilter session", 15
+FORMAT, VERSION = "mapfilter session", 16
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -94,6 +95,7 @@ _CLASSES: dict[str, type] = {
         StepOutput,
         TimingState,
         TrailFix,
+        UndirectedWay,
         UnusedReading,
         WanderFix,
     )

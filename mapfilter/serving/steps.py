@@ -19,7 +19,7 @@ from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.log_options import LogStatement
 from mapfilter.serving.documents import RequestError, check_keys, text, whole
-from mapfilter.serving.epoch_rows import read_epochs
+from mapfilter.serving.epoch_rows import check_pace, read_epochs
 from mapfilter.serving.events import fix_document, json_bytes
 from mapfilter.serving.filters import LOG, SessionFilter, statement_of
 from mapfilter.serving.places import check_fixes, start_of
@@ -106,6 +106,7 @@ def stepped(
         if watcher is not None:
             make = partial(_detail, watcher, held, epoch, drawn, state, output)
             details.append(shown_or(b"{}", make, faults))
+    check_pace(state.watch.pace, state.reckoning.travelled_m)
     progress = Progress(state, rng.bit_generator.state, count, epochs[-1].time_s, fixes[-1])
     belief = b""
     if watcher is not None:

@@ -8,7 +8,7 @@ from mapfilter.filters.contract import Reason
 
 REASONS: Mapping[Reason, str] = {
     Reason.USED: "used",
-    Reason.NOT_MOVED_ENOUGH: "too near to the last report that was used",
+    Reason.NOT_MOVED_ENOUGH: "too near to the last one that was used",
     Reason.NO_SERVING_CELL: "the report has no serving cell",
     Reason.SECOND_SERVING_CELL: "a second serving cell in one report; the first counts",
     Reason.UNKNOWN_CELL: "the database does not have this cell",

@@ -37,7 +37,7 @@ def run_film(result: Path, out: Path, *, run: int = 0, pictures: int = 150) -> d
     Raises
     ------
     MapfilterError
-        There is no such run, it has no belief, or the film cannot be written.
+        There is no such run, it has no epochs, or the film cannot be written.
     """
     if not 1 <= pictures <= MOST_PICTURES:
         raise fail(ConfigError, "--pictures", f"1 to {MOST_PICTURES}", pictures)
@@ -47,8 +47,8 @@ def run_film(result: Path, out: Path, *, run: int = 0, pictures: int = 150) -> d
         if not 0 <= run < len(bundle["runs"]):
             raise fail(ConfigError, "--run", f"a run of {len(bundle['runs'])}", run)
         chosen = bundle["runs"][run]
-        if chosen["belief"] is None:
-            raise fail(InputError, str(page), "a run with its belief", "none recorded")
+        if not chosen["epochs"]["count"]:
+            raise fail(InputError, str(page), "a run with epochs", "none")
         moments = _moments(bundle, chosen, pictures)
         base = _base(bundle, moments)
     except (KeyError, TypeError, ValueError, IndexError) as error:
@@ -64,8 +64,11 @@ def _moments(bundle: Mapping[str, Any], run: Mapping[str, Any], pictures: int) -
         name: unpacked(found[name])
         for name in ("time", "east", "north", "r95", "truth_east", "truth_north", "status")
     }
-    frame = {name: unpacked(belief[name]) for name in ("epoch", "first", "step", "col", "row")}
-    shade = unpacked(belief["mass"]) / 255.0
+    frame = {name: np.empty(0) for name in ("epoch", "first", "step", "col", "row", "mass")}
+    if belief is not None:
+        frame = {name: unpacked(belief[name]) for name in frame}
+    # Of a Kalman-type filter estimate and radius tell all.
+    shade = frame["mass"] / 255.0
     count = int(found["count"])
     at = np.unique(np.linspace(0, count - 1, min(pictures, count)).astype(np.int64))
     moments = []
@@ -104,4 +107,5 @@ def _base(bundle: Mapping[str, Any], moments: list[FilmMoment]) -> BaseMap:
     if places:
         low, high = np.min(places, axis=0) - _AROUND_M, np.max(places, axis=0) + _AROUND_M
         bounds = float(low[0]), float(low[1]), float(high[0]), float(high[1])
-    return BaseMap(bounds, tuple(line for line in lines if len(line) > 1))
+    shown = tuple(line for line in lines if len(line) > 1)
+    return BaseMap(bounds, shown, attribution=str(bundle["attribution"]))

@@ -20,7 +20,7 @@ from mapfilter.errors import ConfigError, fail, noted
 from mapfilter.evaluation.accuracy import Truth, accuracy, held_by_radius_95, truth_notes
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
-from mapfilter.positioning.assumed_errors import assumed_note
+from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
@@ -29,7 +29,6 @@ from mapfilter.positioning.kalman.siteless import without_cells
 from mapfilter.positioning.log_lacks import advice_of
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
-from mapfilter.positioning.undirected_steps import with_joined_steps
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
@@ -152,8 +151,7 @@ def run_replay(
         notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))
         if database is not None and by_streets_alone(fitted, log, database):
             notes = (*notes, STREETS_ALONE)
-        given, undirected = with_joined_steps(log, fitted)
-        notes = (*notes, *undirected)
+        notes = (*notes, *undirected_notes(log, fitted))
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
         notes = (*notes, *assumed_note(log, fitted, filter_.uses))
         log = replace(log, notes=(*log.notes, *notes))
@@ -174,7 +172,7 @@ def run_replay(
                 pictures.update(begin_belief(snapshots, has_evidence, truth, base, drawing))
 
         track = locate(
-            given,
+            log,
             filter_,
             rng,
             snapshots=drawn,
@@ -194,7 +192,7 @@ def run_replay(
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
         if truth is not None:
             log = replace(log, notes=(*log.notes, *truth_notes(track.estimate, truth)))
-        fixes = fixes_note(opened, log, given, config.track.truth, filter_.uses, track.estimate)
+        fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
         ends = early_end_note(opened, track.estimate, over_map=database is not None)
         pauses = pause_note(track.estimate)
         log = replace(log, notes=(*log.notes, *fixes, *pauses, *ends))

@@ -118,7 +118,6 @@ def columns_of_motion(opened: OpenedLog) -> str:
 def fixes_note(
     opened: OpenedLog,
     log: TrackLog,
-    given: TrackLog,
     truth: Collection[Path],
     uses: Collection[str],
     estimate: TrackEstimate,
@@ -131,8 +130,6 @@ def fixes_note(
         The log as it was opened.
     log : TrackLog
         Without what is hidden from the filter.
-    given : TrackLog
-        What of it the filter was given.
     truth : collection of Path
         Recordings whose positions are the truth.
     uses : collection of str
@@ -144,7 +141,7 @@ def fixes_note(
         return ()
     unused = sum(one.readings for one in estimate.unused if one.kind == "gnss")
     names = listed([one.path.name for one in placed], 2)
-    text = f"gnss: {len(given.gnss) - unused} of {len(log.gnss)} positions of {names} used as GNSS "
+    text = f"gnss: {len(log.gnss) - unused} of {len(log.gnss)} positions of {names} used as GNSS "
     text += "fixes; --without gnss leaves them out"
     return (text if len(log.truth) else f"{text}, --truth {placed[0].path.name} scores by them",)
 

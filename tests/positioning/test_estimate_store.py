@@ -65,6 +65,7 @@ def make_estimate(crs=CRS, places=PLACES):
     unused = [
         UnusedReading(0.0, "motion", "", Reason.NOT_STARTED),
         UnusedReading(0.48, "serving", 'Zelle "Ä/1"', Reason.UNKNOWN_CELL),
+        UnusedReading(0.0, "gnss", "", Reason.NOT_USED_BY_FILTER, 120),
     ]
     return TrackEstimate.of_fixes(
         crs, "candidate", fixes, start_utc_s=1_700_000_000.25, unused=unused
@@ -201,7 +202,7 @@ def test_other_files_are_refused(written):
 
 def test_a_newer_version_is_refused_with_what_to_do(written):
     with_meta(written, version=estimate_store.VERSION + 1)
-    assert refused(written, "version <= 2, found 3").faults[0].hint == "a newer mapfilter"
+    assert refused(written, "version <= 3, found 4").faults[0].hint == "a newer mapfilter"
 
 
 def test_missing_columns_are_all_named(written):
@@ -274,6 +275,13 @@ def test_gpx_of_an_unknown_start_has_no_times(tmp_path):
     assert "<time>" not in text
 
 
+def test_geojson_of_an_unknown_start_has_no_times(tmp_path):
+    write_geojson(replace(make_estimate(), start_utc_s=nan), tmp_path / "track.geojson")
+    points = [one["properties"] for one in strict_json(tmp_path / "track.geojson")["features"]]
+    assert all("time" not in one for one in points)
+    assert points[-1]["time_s"] == 0.48
+
+
 def strict_json(path):
     def never(name):
         raise AssertionError(f"{name} is no JSON")
@@ -292,8 +300,20 @@ def test_geojson_holds_a_line_and_the_located_epochs(tmp_path, crs, lon, lat):
     places = [point["geometry"]["coordinates"] for point in points]
     assert places == line["geometry"]["coordinates"]
     assert [point["properties"] for point in points] == [
-        {"time_s": 0.48, "status": "CONVERGED", "radius_95_m": 9.25, "protection_m": 21.25},
-        {"time_s": 0.48, "status": "TRACKING", "radius_95_m": None, "protection_m": None},
+        {
+            "time": "2023-11-14T22:13:20.730Z",
+            "time_s": 0.48,
+            "status": "CONVERGED",
+            "radius_95_m": 9.25,
+            "protection_m": 21.25,
+        },
+        {
+            "time": "2023-11-14T22:13:20.730Z",
+            "time_s": 0.48,
+            "status": "TRACKING",
+            "radius_95_m": None,
+            "protection_m": None,
+        },
     ]
     frame = geopandas.read_file(path)
     assert frame.crs.to_epsg() == 4326
@@ -314,7 +334,9 @@ def test_files_of_the_first_version_have_no_levels(tmp_path):
     write_estimate(make_estimate(), path)
     table = pq.read_table(path)
     meta = json.loads(table.schema.metadata[b"mapfilter"])
-    assert meta["version"] == 2
+    assert meta["version"] == 3
+    assert meta["unused"][-1][-1] == 120
+    meta = {**meta, "unused": [one[:4] for one in meta["unused"]]}
     old = table.drop_columns(["radius_99_m", "protection_m"]).replace_schema_metadata(
         {**table.schema.metadata, b"mapfilter": json.dumps({**meta, "version": 1}).encode()}
     )
@@ -322,6 +344,7 @@ def test_files_of_the_first_version_have_no_levels(tmp_path):
     found = read_estimate(path)
     assert np.isnan(found.protection_m).all()
     assert np.isnan(found.radius_99_m).all()
+    assert [one.readings for one in found.unused] == [1, 1, 1]
     assert np.array_equal(found.east_m, make_estimate().east_m, equal_nan=True)
     # A file of the present version without them is damaged.
     pq.write_table(old.replace_schema_metadata(table.schema.metadata), path)

@@ -19,6 +19,7 @@ from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
 
 FEW = ParticleOptions(max_particles=300, min_search_particles=200, min_particles=100)
@@ -51,7 +52,9 @@ def test_sensors_that_do_not_measure_are_told_with_their_rows(monkeypatch, motio
     watch = SensorWatch()
 
     def watched(before, epoch, step_unit_m):
-        assert (before, step_unit_m) == (SensorWatch(), 1.0)
+        # Of a known start a way leads off from there.
+        assert before.undirected.since_m == 0
+        assert (before._replace(undirected=UndirectedWay()), step_unit_m) == (SensorWatch(), 1.0)
         return watch, replace(epoch, radio=() if radio is not Reason.USED else epoch.radio), (
             motion, radio,
         )  # fmt: skip
@@ -64,7 +67,8 @@ def test_sensors_that_do_not_measure_are_told_with_their_rows(monkeypatch, motio
         expected += [("serving", "A", radio), ("neighbour", "ARFCN 61, BSIC 2", radio)]
     assert told(output) == expected
     assert output.fix.reason is radio
-    assert state.watch is watch
+    directed = UndirectedWay(rows=True, directed=True, since_m=0.0, heading_rad=0.0)
+    assert state.watch == watch._replace(undirected=directed)
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,10 @@ from block_town import CRS, LATTICE, STEP_M, STEP_S, drive, make_town
 import mapfilter as mf
 from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
+from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.positioning.undirected_steps import with_joined_steps
+from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
+from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.roads.route_points import RouteSource
 from mapfilter.tracks.log import make_log
 
@@ -58,7 +59,9 @@ def test_a_drive_without_turns_is_not_claimed_where_its_fixes_ended(town):
     """It was TRACKING for a minute, hundreds of metres behind the vehicle."""
     log = driven()
     track, error_m = claimed_errors_m(log, town)
-    assert 20 < len(error_m) < 60
+    # Fixes end with the 160th epoch.
+    assert 100 < len(error_m) < 200
+    assert error_m.index.max() < 200
     assert np.median(error_m) < 15
     assert error_m.max() < 60
     assert any("no headings and no turns at all" in note for note in track.log.notes)
@@ -72,34 +75,136 @@ def test_a_drive_without_turns_is_followed_by_its_fixes(town):
     assert error_m.max() < 40
 
 
-def test_steps_are_joined_between_positions_and_unknown_far_from_them():
-    log = driven()
-    given, (note,) = with_joined_steps(log, BayesFilter())
-    motion = given.motion
-    by_fixes = motion["time_s"] <= 39.0
-    assert motion["time_s"][by_fixes].tolist() == list(range(40))
-    np.testing.assert_allclose(motion["step_m"][by_fixes], [STEP_M, *[4 * STEP_M] * 39])
-    after = motion[~by_fixes]
-    # 15 steps of 2 m are one, and all others are rows without a length.
-    assert after["step_m"].iloc[0] == pytest.approx(30.0)
-    assert after["time_s"].iloc[0] == pytest.approx(39.0 + 15 * STEP_S)
-    assert after["step_m"].iloc[1:].isna().all()
-    assert len(after) == (log.motion["time_s"] > 39.0 + 15 * STEP_S).sum() + 1
-    assert "joined from each position to the next" in note
-    assert given.gnss is log.gnss
+def step(length_m=STEP_M, heading_rad=np.nan, turn_rad=np.nan):
+    return MotionStep(length_m, heading_rad, turn_rad)
 
 
-def test_motion_with_directions_or_without_positions_stays_as_it_is():
-    options, plain = BayesFilter(), driven()
-    for log in (
-        driven(turn_rad=0.0),
-        driven(heading_rad=0.5),
-        driven(fixes_s=0.0),
-        make_log(CRS, motion=plain.motion.assign(step_m=0.0), gnss=plain.gnss),
+def fix_at(east_m, sd_m=5.0):
+    return GnssFix(east_m, 0.0, sd_m**2, sd_m**2)
+
+
+def test_steps_after_a_position_are_parts_of_one_way():
+    way, far_m2 = UndirectedWay().positioned(), 0.0
+    for number in range(1, 101):
+        way, epoch, _ = way.spread(Epoch(float(number), (step(),)))
+        far_m2 += epoch.motion[0].spread_m ** 2
+        assert epoch.motion[0].step_m == STEP_M
+    gone_m = 100 * STEP_M
+    # A way whose direction is forgotten after 84 m, in closed form.
+    assert far_m2 == pytest.approx(2 * 84 * (gone_m - 84 * (1 - np.exp(-gone_m / 84))))
+    assert way.since_m == way.gone_m == pytest.approx(gone_m)
+    assert way.is_blind
+    way = way.positioned()
+    way, epoch, _ = way.spread(Epoch(200.0, (step(),)))
+    assert epoch.motion[0].spread_m == pytest.approx(STEP_M, rel=0.01)
+
+
+def test_steps_with_directions_or_before_any_position_stay_as_they_are():
+    unplaced, placed = UndirectedWay(), UndirectedWay(since_m=0.0)
+    for way, rows in (
+        (unplaced, [step(), step()]),
+        (placed, [step(turn_rad=0.0), step(turn_rad=0.0)]),
+        (placed, [step(heading_rad=0.5), step(heading_rad=0.6)]),
+        (placed, [step(0.0), step(turn_rad=0.1)]),
+        (placed, [step(np.nan)]),
     ):
-        assert with_joined_steps(log, options) == (log, ())
-    # These leave out such steps themselves.
-    assert with_joined_steps(plain, CandidateFilter()) == (plain, ())
+        for number, row in enumerate(rows):
+            given = Epoch(float(number), (row,), fix=fix_at(0.0))
+            way, epoch, unused = way.spread(given)
+            assert (epoch, unused) == (given, [])
+        assert not way.is_blind
+
+
+@pytest.mark.parametrize(("heading_rad", "turn_rad"), [(0.5, np.nan), (np.nan, 0.5)])
+def test_a_direction_holds_for_some_metres(heading_rad, turn_rad):
+    way, _, _ = UndirectedWay().spread(Epoch(0.0, (step(0.0, turn_rad=0.0),)))
+    way, directions, used = (
+        way.spread(Epoch(1.0, (step(heading_rad=heading_rad, turn_rad=turn_rad),)))[0],
+        [],
+        [],
+    )
+    for number in range(2, 14):
+        way, epoch, _ = way.spread(Epoch(float(number), (step(),), fix=fix_at(0.0)))
+        (one,) = epoch.motion
+        directions.append((one.heading_rad, one.turn_rad))
+        used.append(epoch.fix is not None)
+    ahead, unknown = [(heading_rad, 0.0)] * 5, [(np.nan, np.nan)] * 7
+    np.testing.assert_array_equal(directions, ahead + unknown)
+    # Then the next position is that after 14 m, as 12.5 m apart is far enough.
+    assert used == [True] * 5 + [False] * 6 + [True]
+    way, _, _ = way.spread(Epoch(20.0, (step(heading_rad=0.5),)))
+    assert (way.gone_m, way.is_blind) == (0.0, False)
+
+
+@pytest.mark.parametrize(
+    ("apart_m", "sd_m", "used"),
+    [
+        (2.0, 5.0, [14.0, 28.0, 42.0, 56.0]),
+        (2.0, 20.0, [26.0, 52.0]),
+        (10.0, 20.0, [30.0, 60.0]),
+        (18.0, 20.0, [18.0, 36.0, 54.0]),
+        (40.0, 20.0, [40.0]),
+    ],
+)
+def test_positions_less_than_some_deviations_of_way_apart_are_left_out(apart_m, sd_m, used):
+    way, found = UndirectedWay().positioned(), []
+    for number in range(1, 31):
+        at_m = number * STEP_M
+        has_fix = at_m % apart_m == 0
+        given = Epoch(float(number), (step(),), fix=fix_at(at_m, sd_m) if has_fix else None)
+        way, epoch, unused = way.spread(given)
+        if epoch.fix is not None:
+            found.append(at_m)
+            way = way.positioned()
+        left_out = has_fix and epoch.fix is None
+        assert [one.reason for one in unused] == [Reason.NOT_MOVED_ENOUGH] * left_out
+    assert found == used
+
+
+def test_a_live_session_gives_what_a_replay_gives(town):
+    """Steps were joined in the log alone: live, places hundreds of metres behind were claimed."""
+    log = paced(1.4, 5.0, 400.0)
+    bayes = BayesFilter(vehicle=False, **FEW).over(town)
+    state, rng, found = bayes.begin(), np.random.default_rng(0), []
+    for epoch in epochs(log):
+        state, output = bayes.step(state, epoch, rng)
+        found.append((output.fix.east_m, output.fix.north_m, output.fix.status))
+    track = mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW), seed=0).to_dataframe()
+    np.testing.assert_array_equal([one[0] for one in found], track["east_m"])
+    off_m = np.hypot(
+        [one[0] for one in found] - log.truth["east_m"],
+        [one[1] for one in found] - log.truth["north_m"],
+    )
+    claimed = np.array([one[2] in FOUND for one in found])
+    assert claimed.sum() > 200
+    assert off_m[claimed].max() < 40
+
+
+def test_a_walk_whose_compass_dies_is_followed_by_its_fixes(town):
+    """From there on it fell behind: 240 m off, TRACKING."""
+    log = paced(1.4, 5.0, 500.0)
+    path = log.truth[["east_m", "north_m"]].diff().bfill()
+    headings_rad = np.arctan2(path["north_m"], path["east_m"])
+    motion = log.motion.assign(heading_rad=headings_rad.where(log.motion["time_s"] <= 150))
+    log = make_log(CRS, motion=motion, gnss=log.gnss, truth=log.truth)
+    track = mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW))
+    score = mf.score(track, log.truth)
+    assert score.error_mean_m < 12
+    assert score.within_95 > 0.8
+
+
+def test_a_known_start_is_left_by_steps_without_directions(town):
+    """Small steps to all sides stayed there: TRACKING, hundreds of metres behind."""
+    log = paced(1.4, 5.0, 400.0)
+    bayes, rng = BayesFilter(vehicle=False, **FEW).over(town), np.random.default_rng(0)
+    first = log.truth.iloc[0]
+    state = bayes.begin_at(first["east_m"], first["north_m"], 10.0, rng)
+    for number, epoch in enumerate(epochs(log)):
+        state, output = bayes.step(state, replace(epoch, fix=None), rng)
+        fix, true_m = output.fix, log.truth.iloc[number]
+        off_m = np.hypot(fix.east_m - true_m["east_m"], fix.north_m - true_m["north_m"])
+        assert fix.status not in FOUND or off_m < 60
+    assert output.fix.status not in FOUND
 
 
 def paced(pace_mps, fix_sd_m, lasts_s):
@@ -129,7 +234,9 @@ def test_a_walk_of_lengths_alone_is_followed_by_its_fixes(town, fix_sd_m):
     score = mf.score(track, log.truth)
     assert score.error_mean_m < 2.5 * fix_sd_m
     assert score.within_95 > 0.8
-    assert any("m of way after another one" in note for note in track.log.notes)
+    assert any("of way apart only the first is used" in note for note in track.log.notes)
+    left_out = [one for one in track.estimate.unused if one.reason is Reason.NOT_MOVED_ENOUGH]
+    assert len(left_out) > 300
 
 
 @pytest.mark.parametrize("wrong", [1, 3, 20])
@@ -153,11 +260,12 @@ def test_positions_stay_where_the_way_between_them_is_not_known(town, fault):
     motion = log.motion.assign(step_m=step_m.mask(blind))
     motion = motion if fault == "no lengths" else motion[~blind]
     log = replace(log, motion=motion.reset_index(drop=True))
-    given, _ = with_joined_steps(log, BayesFilter())
-    kept_s = given.gnss["time_s"]
-    assert set(time_s[blind]) <= set(kept_s)
-    assert (kept_s <= 150).sum() < 20
-    score = mf.score(mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW)), log.truth)
+    track = mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW))
+    near_s = {one.time_s for one in track.estimate.unused if one.reason is Reason.NOT_MOVED_ENOUGH}
+    # Some seconds without rows are not known to be a way.
+    assert not near_s & set(time_s[blind & (time_s > 160)])
+    assert len([one for one in near_s if one <= 150]) > 100
+    score = mf.score(track, log.truth)
     assert score.error_mean_m < 40.0
 
 

@@ -207,7 +207,10 @@ def test_a_position_shows_a_stroll_but_no_counter_that_stands_still():
     assert (watch.moving_s, watch.known_s, watch.rest) == (101.0, 101.0, None)
     assert strolling(0.5).positioned(101.0).moving_s == 101.0
     still = strolling(0.0)
-    assert still.positioned(101.0) is still
+    after = still.positioned(101.0)
+    # But for the way to all sides, which a position ends.
+    assert after == still._replace(undirected=still.undirected._replace(since_m=0.0))
+    assert after.positioned(102.0) is after
     assert begun().positioned(101.0).moving_s == 0.0
 
 

@@ -170,6 +170,26 @@ def test_requests_of_one_session_follow_each_other_and_are_whole_or_not_at_all(
         asyncio.run(run())
 
 
+@pytest.mark.parametrize("at_once", [1, COUNT])
+def test_times_in_milliseconds_are_refused(positioner, cross, at_once):
+    """Rows came every 1000 s, and positions were claimed up to 273 m off."""
+    sent = [{**one, "time_s": 1000 * one["time_s"]} for one in documents(COUNT)[0]]
+
+    async def run(app):
+        session, answers = await begin(app), []
+        for first in range(0, COUNT, at_once):
+            part = {"epochs": sent[first : first + at_once]}
+            answers.append(await ask(app, "POST", f"/sessions/{session}/epochs", part))
+        shown = (await ask(app, "GET", f"/sessions/{session}")).json
+        return answers, shown["epochs"]
+
+    with service(positioner, cross.plan) as made:
+        answers, taken = asyncio.run(run(made.app()))
+    assert answers[-1].code == 400
+    assert "milliseconds for s" in answers[-1].json["error"]["message"]
+    assert taken < (30 if at_once == 1 else 1)
+
+
 def test_a_known_start_is_tracked_from_there(positioner, cross, whole):
     place = {name: whole[-1][name] for name in ("lat_deg", "lon_deg")}
     with service(positioner, cross.plan) as made:

@@ -13,6 +13,7 @@ import pytest
 from asking import JSON, SERVING, ask, documents, service
 from positioning.cross_world import CRS
 
+from mapfilter.geodesy import unproject
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.fingerprints.locating import locate_by
 from mapfilter.positioning.fingerprints.log_reports import reports_of_log
@@ -114,6 +115,50 @@ def test_epochs_with_a_fault_are_refused_with_its_place(cross, body):
     assert error.code == 400
     assert error.faults
     assert all(fault.where and fault.expected for fault in error.faults)
+
+
+@pytest.mark.parametrize(
+    ("body", "mistake"),
+    [
+        ({"epochs": [{"time_s": 1.7e12}]}, "milliseconds for s"),
+        (epoch(motion=[{"step_m": 1, "heading_rad": 90}]), "degrees given for radians"),
+        (epoch(radio=[{**SERVING, "level_dbm": 40}]), "raw RXLEV given for dBm"),
+        (epoch(radio=[{**SERVING, "timing_advance": 5000}]), "metres for steps"),
+    ],
+)
+def test_values_beyond_their_range_name_the_likely_mistake(cross, body, mistake):
+    """As the same values of a log do."""
+    with pytest.raises(RequestError, match=mistake):
+        read_epochs(body, PlanNames(cross.plan), nan)
+
+
+def test_positions_may_be_as_phones_give_them(cross):
+    row = {"lat_deg": 41.15, "lon_deg": -8.62, "accuracy_m": 7.575}
+    fix = read_epochs(epoch(gnss=[row]), PlanNames(cross.plan), nan)[0].fix
+    lon_deg, lat_deg = unproject(CRS, fix.east_m, fix.north_m)
+    assert (lat_deg, lon_deg) == pytest.approx((41.15, -8.62), abs=1e-9)
+    # 68 % of a circular normal distribution lie within 1.515 deviations.
+    assert (fix.var_east_m2, fix.var_north_m2) == pytest.approx((25.0, 25.0), rel=1e-3)
+    assert fix.cov_east_north_m2 == 0
+    bare = read_epochs(epoch(gnss=[{**row, "accuracy_m": None}]), PlanNames(cross.plan), nan)
+    assert np.isnan(bare[0].fix.var_east_m2)
+    assert bare[0].fix.east_m == fix.east_m
+
+
+@pytest.mark.parametrize(
+    ("changes", "where"),
+    [
+        ({"lat_deg": 91}, "epochs[0].gnss[0].lat_deg"),
+        ({"lon_deg": None}, "epochs[0].gnss[0].lon_deg"),
+        ({"accuracy_m": -1}, "epochs[0].gnss[0].accuracy_m"),
+        ({"east_m": 1.0}, "epochs[0].gnss[0]"),
+    ],
+)
+def test_faults_of_such_positions_are_named(cross, changes, where):
+    body = epoch(gnss=[{"lat_deg": 41.15, "lon_deg": -8.62, "accuracy_m": 7.0, **changes}])
+    with pytest.raises(RequestError) as caught:
+        read_epochs(body, PlanNames(cross.plan), nan)
+    assert [fault.where for fault in caught.value.faults] == [where]
 
 
 def test_all_faults_of_a_request_are_named_together(cross):
@@ -242,6 +287,7 @@ def test_other_paths_lead_nowhere(made, method, path, code):
     answer = answer_of(made, method, path)
     assert answer.code == code
     assert answer.json["error"]["code"] == code
+    assert (f"method for this path, found {method}" in str(answer.json)) == (code == 405)
 
 
 def test_a_report_is_located_as_locate_does_it(made, fitted, cross):

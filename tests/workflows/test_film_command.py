@@ -8,6 +8,7 @@ from viewing import made_bundle as made
 
 from mapfilter.errors import OutputError
 from mapfilter.viewing.page import write_page
+from mapfilter.workflows import film as film_module
 from mapfilter.workflows.film import run_film
 
 
@@ -44,3 +45,24 @@ def test_an_mp4_where_ffmpeg_is_there(page, tmp_path):
 def test_other_endings_are_named(page, tmp_path):
     with pytest.raises(OutputError, match=r"\.gif or \.mp4"):
         run_film(page, tmp_path / "walk.avi", pictures=2)
+
+
+def test_a_run_without_a_belief_is_filmed_by_its_estimate(tmp_path):
+    """Of Kalman-type filters no belief is recorded, and they were refused."""
+    bundle = made.replay_bundle()
+    for run in bundle["runs"]:
+        run["belief"] = None
+    write_page(bundle, tmp_path / "replay.html")
+    assert run_film(tmp_path / "replay.html", tmp_path / "walk.gif", pictures=3)["pictures"] == 3
+    with Image.open(tmp_path / "walk.gif") as film:
+        assert film.n_frames == 3
+
+
+def test_the_source_of_the_map_is_named(page, tmp_path, monkeypatch):
+    """Licences of maps ask for it."""
+    named = []
+    monkeypatch.setattr(
+        film_module, "write_film", lambda _, base, out, **__: (named.append(base), out.touch())
+    )
+    run_film(page, tmp_path / "walk.gif", pictures=2)
+    assert [base.attribution for base in named] == ["made by hand"]

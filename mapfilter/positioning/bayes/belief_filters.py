@@ -236,7 +236,8 @@ class BeliefFilters:
         return isfinite(gnss.used_at_m)
 
     def _is_led(self, state: BayesState) -> bool:
-        if not self.pulls.watched or state.belief is None:
+        # Without directions a belief without positions would soon be anywhere.
+        if not self.pulls.watched or state.belief is None or state.watch.undirected.is_blind:
             return False
         found = state.belief.status is Status.TRACKING
         if state.status not in (_FOLLOWED if found else _SOUGHT):

@@ -47,7 +47,8 @@ from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.known_start import check_start
-from mapfilter.positioning.sensors.watch import UNMEASURED, watched
+from mapfilter.positioning.sensors.undirected import UndirectedWay
+from mapfilter.positioning.sensors.watch import UNMEASURED, SensorWatch, watched
 
 _LEAST_AT_START = 0.8
 """Share of a known start within 50 m from which on it is one place, and tracked."""
@@ -152,7 +153,8 @@ class BayesPositioner(Filter[BayesState]):
         least = max(self.options.split_mass, _LEAST_AT_START)
         status = Status.TRACKING if near > least else Status.SEARCHING
         belief, known = replace(belief, status=status), status is Status.TRACKING
-        return replace(self.begin(), belief=belief, status=status, proven=known)
+        watch = SensorWatch(undirected=UndirectedWay(since_m=0.0))
+        return replace(self.begin(), belief=belief, status=status, proven=known, watch=watch)
 
     def step(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
@@ -173,11 +175,15 @@ class BayesPositioner(Filter[BayesState]):
         before, weighing = state.status, self._weighing
         heard = epoch.radio
         watch, epoch, (motion, radio) = watched(state.watch, epoch, hold.step_unit_m)
+        is_measured = motion not in UNMEASURED
+        way, epoch, left_out = watch.undirected.spread(epoch, is_measured=is_measured)
+        watch = watch if way is watch.undirected else watch._replace(undirected=way)
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         if radio is not Reason.USED:
             unused += [UnusedReading(epoch.time_s, row.role, row.name, radio) for row in heard]
+        unused += left_out
         if repeated:
             unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REPEATED_FIX))
         state, updates = weighing.collected(state, epoch, spacing_m)
@@ -218,7 +224,7 @@ class BayesPositioner(Filter[BayesState]):
         gnss = _gnss_of(state)
         if epoch.fix is not None and gnss.was_used(epoch.time_s):
             state = replace(state, last_fix=epoch.fix)
-        if gnss.was_used(epoch.time_s) and state.watch.rest is not None:
+        if gnss.was_used(epoch.time_s):
             state = replace(state, watch=state.watch.positioned(epoch.time_s))
         if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
@@ -238,8 +244,11 @@ class BayesPositioner(Filter[BayesState]):
         epoch, _ = _with_a_new_fix(state, epoch)
         spacing_m, state = state.particle_spacing_m, _tracked(state)
         watch, epoch, (motion, _) = watched(state.watch, epoch, state.hold.step_unit_m)
+        is_measured = motion not in UNMEASURED
+        way, epoch, _ = watch.undirected.spread(epoch, is_measured=is_measured)
+        watch = watch if way is watch.undirected else watch._replace(undirected=way)
         state, _ = moved(self.beliefs, state, watch, epoch, rng)
-        return *self._weighing.collected(state, epoch, spacing_m), motion not in UNMEASURED
+        return *self._weighing.collected(state, epoch, spacing_m), is_measured
 
     def for_scores(self) -> BayesPositioner:
         """Return the filter without ways, radii of 99 % and protection levels in its outputs."""

@@ -27,6 +27,7 @@ from mapfilter.positioning.sensors.places import Places
 from mapfilter.positioning.sensors.repeats import MotionRepeats, without_repeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.stale_radio import STALE_NATS, repeated_nats
+from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.unmeasured import unmeasured_step
 
 _STRETCH_M = 60.0
@@ -62,6 +63,8 @@ class SensorWatch(NamedTuple):
         When rows came.
     places : Places
         Positions since steps became fewer than usual.
+    undirected : UndirectedWay
+        Whether steps have directions, and the way since a position where they have none.
     """
 
     pace: Pace = Pace()
@@ -75,6 +78,7 @@ class SensorWatch(NamedTuple):
     repeats: MotionRepeats = MotionRepeats()
     times: RowTimes = RowTimes()
     places: Places = Places()
+    undirected: UndirectedWay = UndirectedWay()
 
     def positioned(self, time_s: float) -> SensorWatch:
         """Return the watch after a position was measured and used.
@@ -82,9 +86,11 @@ class SensorWatch(NamedTuple):
         Of slow steps before it nothing remains to be shown. A counter that stands still stays in
         doubt: the next position may be far away.
         """
+        way = self.undirected.positioned()
+        watch = self if way is self.undirected else self._replace(undirected=way)
         if self.rest is None or not self.rest.measured_m > 0:
-            return self
-        return self._moving(time_s)
+            return watch
+        return watch._moving(time_s)
 
     def carried(self) -> SensorWatch:
         """Return the watch of what goes on though no step is counted, as positions have shown.
