@@ -149,6 +149,9 @@ def test_fixes_that_are_led_away_are_no_jump():
         else:
             assert turns == 0
             assert led > 2
+            # Who stands is not led on by each further fix.
+            shown = replace(way, east_m=way.rows[-1].way_east_m, is_led=True)
+            assert not shown.at_fix(70.0, fix, (0.0, 0.0004), NONE_LASTS)[0].is_led
 
 
 def test_a_jump_is_done_with_once_all_fixes_lie_on_one_way():

@@ -140,7 +140,7 @@ class RecentWay:
             last = self.rows[-1]
             gone_m = hypot(self.east_m - last.way_east_m, self.north_m - last.way_north_m)
             if gone_m < _APART_M:
-                return self, None
+                return replace(self, is_led=False) if self.is_led else self, None
             mps = gone_m / max(time_s - last.time_s, 1e-3)
         stated_m = sqrt(variance_m2)
         variance_m2 = max(variance_m2, _LEAST_FIX_SD_M**2) + (_LATE_S * mps) ** 2
