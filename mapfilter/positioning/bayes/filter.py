@@ -174,10 +174,7 @@ class BayesPositioner(Filter[BayesState]):
         state = _tracked(state)
         before, weighing = state.status, self._weighing
         heard = epoch.radio
-        watch, epoch, (motion, radio) = watched(state.watch, epoch, hold.step_unit_m)
-        is_measured = motion not in UNMEASURED
-        way, epoch, left_out = watch.undirected.spread(epoch, is_measured=is_measured)
-        watch = watch if way is watch.undirected else watch._replace(undirected=way)
+        watch, epoch, (motion, radio), left_out = _watched(state.watch, epoch, hold.step_unit_m)
         state, unused = moved(self.beliefs, state, watch, epoch, rng)
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
@@ -243,12 +240,9 @@ class BayesPositioner(Filter[BayesState]):
         """
         epoch, _ = _with_a_new_fix(state, epoch)
         spacing_m, state = state.particle_spacing_m, _tracked(state)
-        watch, epoch, (motion, _) = watched(state.watch, epoch, state.hold.step_unit_m)
-        is_measured = motion not in UNMEASURED
-        way, epoch, _ = watch.undirected.spread(epoch, is_measured=is_measured)
-        watch = watch if way is watch.undirected else watch._replace(undirected=way)
+        watch, epoch, (motion, _), _ = _watched(state.watch, epoch, state.hold.step_unit_m)
         state, _ = moved(self.beliefs, state, watch, epoch, rng)
-        return *self._weighing.collected(state, epoch, spacing_m), is_measured
+        return *self._weighing.collected(state, epoch, spacing_m), motion not in UNMEASURED
 
     def for_scores(self) -> BayesPositioner:
         """Return the filter without ways, radii of 99 % and protection levels in its outputs."""
@@ -300,6 +294,21 @@ def _in_doubt(epoch: Epoch, unused: Sequence[UnusedReading]) -> list[UnusedReadi
 def _gnss_of(state: BayesState) -> GnssState:
     gnss: GnssState = state.sources[GnssSource.name]
     return gnss
+
+
+def _watched(
+    watch: SensorWatch, epoch: Epoch, step_unit_m: float
+) -> tuple[SensorWatch, Epoch, tuple[Reason, Reason], list[UnusedReading]]:
+    """Look at the sensors of an epoch, and at ways without directions.
+
+    Returns what :func:`mapfilter.positioning.sensors.watch.watched` does, and the positions that
+    are left out as they are too near to the last one.
+    """
+    watch, epoch, reasons = watched(watch, epoch, step_unit_m)
+    is_measured = reasons[0] not in UNMEASURED
+    way, epoch, left_out = watch.undirected.spread(epoch, is_measured=is_measured)
+    watch = watch if way is watch.undirected else watch._replace(undirected=way)
+    return watch, epoch, reasons, left_out
 
 
 def _with_a_new_fix(state: BayesState, epoch: Epoch) -> tuple[Epoch, bool]:
