@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.positioning.kalman.stretches import LEAST_FIX_SD_M
 
 _LIMIT = 13.8
 """Squared distance in deviations of the prediction that one in a thousand fixes exceeds."""
@@ -44,8 +45,8 @@ _LEAST_ROWS, _FEWEST_ROWS = 5, 3
 """Fixes that show a belief to be wrong, and those that do where they are far apart in time."""
 _MOVING_S, _MOVING_MPS, _SLOW_S, _SLOW_MPS = 5.0, 3.0, 10.0, 1.5
 """Times in which fixes that go on while steps say rest show it, and their least speeds."""
-_LEAST_SD_M, _MOST_MISFIT = 7.5, 2.0
-"""Least deviation of a fix beside a line; largest mean square beside it, in their variances."""
+_MOST_MISFIT = 2.0
+"""Largest mean square of fixes beside a line, in their variances."""
 
 
 class Ruling(Enum):
@@ -218,7 +219,7 @@ class FixRecord:
             return replace(self, agreed=0, rows=()), FixVerdict(Ruling.EITHER, squared / 2)
         if self.agreed < _YOUNG:
             return self._anew(), FixVerdict(Ruling.EITHER, squared / 2)
-        variance_m2 = max(float(np.trace(noise_m2)) / 2, _LEAST_SD_M**2)
+        variance_m2 = max(float(np.trace(noise_m2)) / 2, LEAST_FIX_SD_M**2)
         rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2, gone_m))
         patience_s = patience.usual_s
         jumped = rows[0].has_jumped

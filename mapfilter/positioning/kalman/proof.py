@@ -16,11 +16,9 @@ import numpy as np
 
 from mapfilter.positioning.gnss.wander import WanderFix
 from mapfilter.positioning.kalman.lasting import LEAST_WHITE
-from mapfilter.positioning.kalman.stretches import LEAST_ROWS, Stretches, WayFix
+from mapfilter.positioning.kalman.stretches import LEAST_FIX_SD_M, LEAST_ROWS, Stretches, WayFix
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 
-_LEAST_M2 = 7.5**2
-"""Fixes between houses are off to one side for a while, beyond what they state."""
 _WALKED, _DRIVEN, _DEVIATIONS = (0.15, 0.1), (0.04, 0.03), 1.5
 """Deviation of the length of the way by fixes, in lengths of that by steps, at which it is known,
 and what steps or wheels may be too short or long by; times of that deviation beyond it."""
@@ -60,7 +58,7 @@ def way_agrees(rows: tuple[WanderFix, ...], understated: float, lasting_s: float
         return None
     given = []
     for one in rows:
-        variance_m2 = max(understated * one.sd_m**2, _LEAST_M2)
+        variance_m2 = max(understated * one.sd_m**2, LEAST_FIX_SD_M**2)
         lasting_m = sqrt((1 - LEAST_WHITE) * variance_m2)
         place = one.way_east_m, one.way_north_m, one.east_m, one.north_m
         noise = LEAST_WHITE * variance_m2, 0.0, lasting_m

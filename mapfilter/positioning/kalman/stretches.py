@@ -16,8 +16,9 @@ import numpy as np
 
 from mapfilter._types import Floats
 
-LEAST_ROWS = 6
-"""Fixes of a stretch, at least."""
+LEAST_ROWS, LEAST_FIX_SD_M = 6, 7.5
+"""Fixes of a stretch, at least, and their deviation: between houses they are off to one side for a
+while, beyond what they state."""
 _NO_WAY_M2 = 1e-6
 """Sum of squares of a way about its middle up to which there is none."""
 _SHORTEST, _LONGEST, _MOST_MISFIT = 0.7, 1.4, 2.0

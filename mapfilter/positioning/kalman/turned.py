@@ -25,13 +25,18 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep
 from mapfilter.geodesy import wrap_rad
-from mapfilter.positioning.kalman.stretches import LEAST_ROWS, Stretches, WayFix, led_by
+from mapfilter.positioning.kalman.stretches import (
+    LEAST_FIX_SD_M,
+    LEAST_ROWS,
+    Stretches,
+    WayFix,
+    led_by,
+)
 
 _MOST_ROWS, _APART_M = 30, 5.0
 """Fixes that are kept, and the way between two of them."""
-_LEAST_FIX_SD_M, _LATE_S = 7.5, 2.0
-"""Fixes between houses are off to one side for a while, beyond what they state; and by the way of
-the time by which a receiver may be late, which a corner would turn."""
+_LATE_S = 2.0
+"""Time by which a receiver may be late: fixes are off by its way, which a corner would turn."""
 _LEAST_TURN_RAD, _FOLLOWED_RAD, _LEAST_NATS = radians(20.0), radians(10.0), 12.0
 """Smallest jump, the difference below which the belief has followed it, and the log-likelihood
 ratio at which it is one."""
@@ -143,7 +148,7 @@ class RecentWay:
                 return replace(self, is_led=False) if self.is_led else self, None
             mps = gone_m / max(time_s - last.time_s, 1e-3)
         stated_m = sqrt(variance_m2)
-        variance_m2 = max(variance_m2, _LEAST_FIX_SD_M**2) + (_LATE_S * mps) ** 2
+        variance_m2 = max(variance_m2, LEAST_FIX_SD_M**2) + (_LATE_S * mps) ** 2
         now_rad = turned[0] - self.by_rate_rad
         row = WayFix(
             *(time_s, self.east_m, self.north_m, east_m, north_m, variance_m2),
