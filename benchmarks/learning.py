@@ -20,7 +20,9 @@ from scipy.spatial import KDTree
 from mapfilter.config.load import load_config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.evaluation.accuracy import Truth, accuracy, score_claims
+from mapfilter.evaluation.accuracy import accuracy
+from mapfilter.evaluation.claims import score_claims
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.foreign import (
     VARIANTS,
     ForeignWorld,

@@ -21,12 +21,12 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.evaluation.accuracy import (
     Accuracy,
-    Truth,
     accuracy,
     held_by_radius_95,
     position_errors_m,
     share_of,
 )
+from mapfilter.evaluation.truth import Truth
 from mapfilter.options import Probability
 from mapfilter.positioning import filter as loop
 from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes

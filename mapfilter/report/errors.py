@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, accuracy, position_errors_m
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, accuracy, position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import HALO

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, accuracy, position_errors_m
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, accuracy, position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import (

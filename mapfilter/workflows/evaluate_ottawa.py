@@ -17,7 +17,7 @@ from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, StoreError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.accuracy_row import Row
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,

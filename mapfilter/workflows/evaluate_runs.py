@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from mapfilter._parallel import Progress, SerialExecutor, local_executor, ordered_results
-from mapfilter.evaluation.accuracy import RADII, Truth
+from mapfilter.evaluation.accuracy import RADII
 from mapfilter.evaluation.stanford import REGIONS, StanfordCounts
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.global_positioning import (
     Batch,

@@ -18,7 +18,7 @@ import numpy as np
 
 from mapfilter._parallel import begun
 from mapfilter._types import Floats
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.ground import MAX_PANELS, BaseMap

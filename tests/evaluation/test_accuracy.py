@@ -9,14 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.evaluation.accuracy import (
-    Truth,
     accuracy,
     held_by_radius_95,
     percentile_m,
     position_errors_m,
     share_of,
-    truth_notes,
 )
+from mapfilter.evaluation.truth import Truth, truth_notes
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded import kitti, mountain_view
 from mapfilter.experiments.recorded.least_squares import least_squares_positions
 from mapfilter.experiments.recorded.outages import (

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded import belgium, denver, mall, mountain_view, smartloc
 from mapfilter.experiments.recorded.benchmark import Task
 from mapfilter.experiments.recorded.rows import table_rows

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate

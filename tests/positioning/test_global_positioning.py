@@ -21,7 +21,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
-from mapfilter.evaluation.accuracy import Truth, accuracy, position_errors_m
+from mapfilter.evaluation.accuracy import accuracy, position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.candidate import CandidateSearch, Mode
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning import filter as filters

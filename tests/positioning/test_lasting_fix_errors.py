@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
-from mapfilter.evaluation.accuracy import Truth, position_errors_m
+from mapfilter.evaluation.accuracy import position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.fingerprints.lasting import _lag_sums, _stretches, fit_lasting

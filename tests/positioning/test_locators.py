@@ -6,7 +6,8 @@ from belief_events import Event, run
 from cross_world import make_database, walk_log
 
 from mapfilter.errors import ConfigError
-from mapfilter.evaluation.accuracy import Truth, accuracy
+from mapfilter.evaluation.accuracy import accuracy
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.candidate import CandidateSearch
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.gaussian import METHODS

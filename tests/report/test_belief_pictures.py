@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 from mapfilter.errors import InputError
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate, TrackEvidence
 from mapfilter.positioning.positioned_track import Snapshot

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
-from mapfilter.evaluation.accuracy import Truth
 from mapfilter.evaluation.stanford import StanfordCounts, stanford_bins, stanford_counts
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 from mapfilter.report.basemap import BaseMap

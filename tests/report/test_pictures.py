@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from mapfilter.errors import InputError, OutputError
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.lattice import Lattice

@@ -9,7 +9,7 @@ from command_line import mapfilter
 from scipy.io import savemat
 
 from mapfilter.errors import ConfigError, InputError, Stopped, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded import wifi
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.rows import Found

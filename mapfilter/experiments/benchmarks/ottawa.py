@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.ottawa_sessions import (
     ReckoningErrors,
     Session,

@@ -11,19 +11,18 @@ from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import (
     RADII,
     SUCCESS_RADIUS_M,
-    Truth,
     accuracy,
-    claims_of,
     percentile_m,
     position_errors_m,
-    score_claims,
 )
+from mapfilter.evaluation.claims import claims_of, score_claims
 from mapfilter.evaluation.stanford import (
     REGIONS,
     IntegrityOptions,
     stanford_bins,
     stanford_counts,
 )
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import WINDOW_S, Walk
 from mapfilter.experiments.sweep.journeys import truth_of

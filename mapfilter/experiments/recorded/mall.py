@@ -30,7 +30,7 @@ import shapely
 
 from mapfilter._inputs import json_value, read_input
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.single_reports import BASELINE, METHODS
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import open_ground, roads_alone
