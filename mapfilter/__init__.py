@@ -44,8 +44,6 @@ if TYPE_CHECKING:
     from mapfilter.positioning.candidate import CandidateFilter as CandidateFilter
     from mapfilter.positioning.epochs import Epoch as Epoch
     from mapfilter.positioning.epochs import epochs as epochs
-    from mapfilter.positioning.estimate import Fix as Fix
-    from mapfilter.positioning.estimate import StepOutput as StepOutput
     from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
     from mapfilter.positioning.filter import Filter as Filter
     from mapfilter.positioning.fingerprints.located import LocatedReports as LocatedReports
@@ -54,6 +52,8 @@ if TYPE_CHECKING:
         read_fingerprint_table as read_fingerprint_table,
     )
     from mapfilter.positioning.kalman.filter import KalmanFilter as KalmanFilter
+    from mapfilter.positioning.step_output import Fix as Fix
+    from mapfilter.positioning.step_output import StepOutput as StepOutput
     from mapfilter.radio.cells import CellPlan as CellPlan
     from mapfilter.radio.plan_files import read_cell_plan as read_cell_plan
     from mapfilter.rasters.opening import open_rasters as open_rasters
@@ -85,12 +85,13 @@ _NAMES = {
     "positioning.bayes.options": "BayesFilter GridFilter",
     "positioning.candidate": "CandidateFilter",
     "positioning.epochs": "Epoch epochs",
-    "positioning.estimate": "Fix StepOutput TrackEstimate",
+    "positioning.estimate": "TrackEstimate",
     "positioning.filter": "Filter",
     "positioning.fingerprints.located": "LocatedReports",
     "positioning.fingerprints.reports": "Reports",
     "positioning.fingerprints.tables": "read_fingerprint_table",
     "positioning.kalman.filter": "KalmanFilter",
+    "positioning.step_output": "Fix StepOutput",
     "radio.cells": "CellPlan",
     "radio.plan_files": "read_cell_plan",
     "rasters.opening": "open_rasters",

@@ -32,9 +32,9 @@ from mapfilter.filters.contract import (
 )
 from mapfilter.positioning.custom_filter import ADVICE
 from mapfilter.positioning.epochs import Epoch, epochs
-from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.filter import Filter, estimate_of, kinds_of, locate, usable_part
 from mapfilter.positioning.locators import as_filter
+from mapfilter.positioning.step_output import StepOutput
 from mapfilter.tracks.log import TrackLog
 
 _ROUNDING = 1e-9

@@ -23,10 +23,11 @@ from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import same_crs
 from mapfilter.positioning.epochs import Epoch, epochs
-from mapfilter.positioning.estimate import StepOutput, TrackEstimate, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_columns import EstimateColumns
 from mapfilter.positioning.integrity import DEFAULT_RISK, check_risk
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
+from mapfilter.positioning.step_output import StepOutput, UnusedReading
 from mapfilter.tracks.log import TrackLog, rows_by_kind
 from mapfilter.tracks.schema import ALL_KINDS as ALL_KINDS
 from mapfilter.tracks.schema import TABLES

@@ -12,7 +12,8 @@ from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import pixels
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
-from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING

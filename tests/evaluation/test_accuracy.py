@@ -17,7 +17,8 @@ from mapfilter.evaluation.accuracy import (
 )
 from mapfilter.evaluation.truth import Truth, truth_notes
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST
 

@@ -28,7 +28,8 @@ from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.gnss.sky import ecef_from_lonlat
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32632"

@@ -28,8 +28,9 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning import filter as filters
 from mapfilter.positioning.candidate import CandidateFilter, cell_points
 from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.log import make_log
 
 # 16 steps of 1.25 m: every match lands on a lattice point, so the walk is followed exactly.

@@ -9,7 +9,8 @@ from matplotlib.collections import QuadMesh
 from mapfilter.evaluation.stanford import StanfordCounts, stanford_bins, stanford_counts
 from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import figure_of, save
 from mapfilter.report.integrity import plot_coverage, plot_stanford, plot_worst_run

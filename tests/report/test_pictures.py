@@ -16,8 +16,9 @@ from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
+from mapfilter.positioning.step_output import Fix
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base, local_frame
 from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION, png_of, save

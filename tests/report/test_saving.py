@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from mapfilter.errors import InputError, OutputError
 from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLACK, BLUE, distinct_colours, save
 from mapfilter.report.cumulative import Distribution, plot_cumulative

@@ -14,7 +14,8 @@ from mapfilter.experiments.recorded import wifi
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.workflows import evaluate_recorded
 from mapfilter.workflows.evaluate_recorded import run_all, run_recorded
 

@@ -41,7 +41,6 @@ from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
@@ -49,6 +48,7 @@ from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.known_start import check_start
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import UNMEASURED, SensorWatch, watched
+from mapfilter.positioning.step_output import StepOutput, UnusedReading
 
 _LEAST_AT_START = 0.8
 """Share of a known start within 50 m from which on it is one place, and tracked."""

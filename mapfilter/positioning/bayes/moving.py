@@ -27,8 +27,8 @@ from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.unaided import without_positions
 from mapfilter.positioning.epochs import Epoch, headed
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.step_output import UnusedReading
 
 _FORKED, _MOVED, _AWAY = 1, 2, 4
 """Salts of the draws of beliefs in which the phone was turned, and of hypotheses carried on."""

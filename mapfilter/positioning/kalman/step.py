@@ -16,7 +16,6 @@ from mapfilter.models.motion import constant_velocity
 from mapfilter.models.signal_strength import with_errors
 from mapfilter.models.state import MOVING
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.kalman.alignment import Direction
 from mapfilter.positioning.kalman.disputed import Ruling
@@ -45,6 +44,7 @@ from mapfilter.positioning.kalman.redirected import jump_to, turned_to, turns_in
 from mapfilter.positioning.kalman.start import first_belief
 from mapfilter.positioning.kalman.state import KalmanState
 from mapfilter.positioning.kalman.turned import Turn
+from mapfilter.positioning.step_output import Fix, UnusedReading
 
 _LOST_NIS, _WINDOW = 5.0, 10
 _WALK_MPS = 1.5

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.sensors.unmeasured import headless_step
+from mapfilter.positioning.step_output import UnusedReading
 
 APART_SD, APART_M, _FIX_SD_M = 2.5, 25.0, 10.0
 """Way between positions that are used, in deviations of these, at most, and the deviation of those
