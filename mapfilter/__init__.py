@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from mapfilter.api.bounds import Bound as Bound
     from mapfilter.api.bounds import bound as bound
     from mapfilter.api.journeys import simulate as simulate
-    from mapfilter.api.located import Score as Score
     from mapfilter.api.located import Track as Track
     from mapfilter.api.located import locate as locate
-    from mapfilter.api.located import score as score
     from mapfilter.api.logs import read_log as read_log
     from mapfilter.api.pictures import save_picture as save_picture
     from mapfilter.api.reports import locate_reports as locate_reports
+    from mapfilter.api.scored import Score as Score
+    from mapfilter.api.scored import score as score
     from mapfilter.api.studies import Sweep as Sweep
     from mapfilter.api.studies import sweep as sweep
     from mapfilter.database.build import build as build
@@ -71,10 +71,11 @@ if TYPE_CHECKING:
 _NAMES = {
     "api.bounds": "Bound bound",
     "api.journeys": "simulate",
-    "api.located": "Score Track locate score",
+    "api.located": "Track locate",
     "api.logs": "read_log",
     "api.pictures": "save_picture",
     "api.reports": "locate_reports",
+    "api.scored": "Score score",
     "api.studies": "Sweep sweep",
     "database.build": "build",
     "database.radioroutes": "RadioRouteDatabase",
