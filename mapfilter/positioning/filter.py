@@ -28,7 +28,8 @@ from mapfilter.positioning.estimate_columns import EstimateColumns
 from mapfilter.positioning.integrity import DEFAULT_RISK, check_risk
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
 from mapfilter.positioning.step_output import StepOutput, UnusedReading
-from mapfilter.tracks.log import TrackLog, rows_by_kind
+from mapfilter.tracks.kinds import rows_by_kind
+from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import ALL_KINDS as ALL_KINDS
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.schema import Kind as Kind

@@ -36,7 +36,8 @@ from mapfilter.radio.plan_notes import assumed_notes
 from mapfilter.report.ground import BaseMap
 from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
-from mapfilter.tracks.log import TrackLog, leave_out
+from mapfilter.tracks.kinds import leave_out
+from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.store import is_log
