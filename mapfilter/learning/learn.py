@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.learning.fit import Learned, fit_network
 from mapfilter.learning.network import Finding
 from mapfilter.learning.patch import Change

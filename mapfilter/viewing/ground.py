@@ -11,8 +11,9 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Floats32
+from mapfilter.database.field import RadioField
 from mapfilter.database.points import Points
-from mapfilter.database.radioroutes import RadioField, RadioRouteDatabase
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.level_errors import roughness
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.radio.cells import CellPlan

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.database.build import build_roads
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import Bins

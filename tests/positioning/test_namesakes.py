@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from made_town import CRS, FLOOR_DBM, NAMES, WEST_M, Town, slowed, walk_log
 
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.filters.contract import Status
 from mapfilter.models.fingerprint import BoundReading, bound_table, weigh_by_bound
 from mapfilter.positioning.bayes.area_map import AreaMap
