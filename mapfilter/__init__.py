@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from mapfilter.positioning.bayes.options import GridFilter as GridFilter
     from mapfilter.positioning.candidate import CandidateFilter as CandidateFilter
     from mapfilter.positioning.epochs import Epoch as Epoch
-    from mapfilter.positioning.epochs import epochs as epochs
     from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
     from mapfilter.positioning.filter import Filter as Filter
     from mapfilter.positioning.fingerprints.located import LocatedReports as LocatedReports
@@ -52,6 +51,7 @@ if TYPE_CHECKING:
         read_fingerprint_table as read_fingerprint_table,
     )
     from mapfilter.positioning.kalman.filter import KalmanFilter as KalmanFilter
+    from mapfilter.positioning.merging import epochs as epochs
     from mapfilter.positioning.step_output import Fix as Fix
     from mapfilter.positioning.step_output import StepOutput as StepOutput
     from mapfilter.radio.cells import CellPlan as CellPlan
@@ -85,13 +85,14 @@ _NAMES = {
     "lattice": "Lattice",
     "positioning.bayes.options": "BayesFilter GridFilter",
     "positioning.candidate": "CandidateFilter",
-    "positioning.epochs": "Epoch epochs",
+    "positioning.epochs": "Epoch",
     "positioning.estimate": "TrackEstimate",
     "positioning.filter": "Filter",
     "positioning.fingerprints.located": "LocatedReports",
     "positioning.fingerprints.reports": "Reports",
     "positioning.fingerprints.tables": "read_fingerprint_table",
     "positioning.kalman.filter": "KalmanFilter",
+    "positioning.merging": "epochs",
     "positioning.step_output": "Fix StepOutput",
     "radio.cells": "CellPlan",
     "radio.plan_files": "read_cell_plan",

@@ -22,10 +22,11 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import same_crs
-from mapfilter.positioning.epochs import Epoch, epochs
+from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_columns import EstimateColumns
 from mapfilter.positioning.integrity import DEFAULT_RISK, check_risk
+from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
 from mapfilter.positioning.step_output import StepOutput, UnusedReading
 from mapfilter.tracks.kinds import rows_by_kind

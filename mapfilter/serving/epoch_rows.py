@@ -9,7 +9,8 @@ from typing import Any
 from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import wrap_rad
-from mapfilter.positioning.epochs import Epoch, epoch_columns, make_epoch
+from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.merging import epoch_columns, make_epoch
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.radio.identities import LIMITS, TIMING_STEP_M
 from mapfilter.serving.documents import (

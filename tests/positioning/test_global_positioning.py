@@ -27,9 +27,9 @@ from mapfilter.filters.candidate import CandidateSearch, Mode
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning import filter as filters
 from mapfilter.positioning.candidate import CandidateFilter, cell_points
-from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate
+from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.log import make_log
 

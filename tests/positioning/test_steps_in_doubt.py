@@ -19,7 +19,8 @@ from mapfilter.positioning.bayes.step_units import (
     log_odds_of_unit,
     unit_of_next_m,
 )
-from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch, watched

@@ -15,7 +15,7 @@ from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.belief_changes import turned_at_jump
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 
 TOWN = Town.of(1)
