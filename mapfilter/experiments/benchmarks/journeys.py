@@ -14,7 +14,7 @@ from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.gnss.almanacs import joined, nominal_galileo, nominal_gps
 from mapfilter.gnss.orbits import gps_time
-from mapfilter.gnss.sky import Skyline
+from mapfilter.gnss.skyline import Skyline
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
