@@ -21,7 +21,7 @@ from mapfilter.config.axes import parse_axis
 from mapfilter.config.load import load_config, load_keys
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.evaluation.success import (
+from mapfilter.evaluation.success_cells import (
     COORDINATES,
     HEADING,
     SuccessCell,

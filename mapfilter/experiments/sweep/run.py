@@ -203,7 +203,7 @@ def sweep_runs(
     -------
     pandas.DataFrame
         The columns of :data:`mapfilter.experiments.sweep.table.SCHEMA` and those of varied options.
-        :func:`mapfilter.evaluation.success.success_cells` gives success rates with intervals.
+        :func:`mapfilter.evaluation.success_cells.success_cells` gives success rates with intervals.
     """
     folders = {name: database.path for name, database in databases.items()}
     with tempfile.TemporaryDirectory(prefix="mapfilter-sweep-") as name:
