@@ -26,8 +26,8 @@ from mapfilter.experiments.benchmarks.worst_run import explain, worst_row
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
 from mapfilter.report.integrity import plot_coverage, plot_stanford, plot_worst_run
+from mapfilter.report.saving import save
 
 PICTURES = "pictures"
 POOLED = "pooled"

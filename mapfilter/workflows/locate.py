@@ -26,8 +26,9 @@ from mapfilter.positioning.fingerprints.locating import (
 from mapfilter.positioning.fingerprints.matches import locator
 from mapfilter.positioning.fingerprints.options import AUTO, Centroid, method_name
 from mapfilter.positioning.fingerprints.reports import Reports
-from mapfilter.report.canvas import BLUE, GREY, save
+from mapfilter.report.canvas import BLUE, GREY
 from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
+from mapfilter.report.saving import save
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.placeless import is_local_frame
 from mapfilter.workflows.fingerprints import read_database, read_reports

@@ -14,8 +14,10 @@ from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import BLUE, save
-from mapfilter.report.errors import plot_error_over_distance, plot_evidence
+from mapfilter.report.canvas import BLUE
+from mapfilter.report.errors import plot_error_over_distance
+from mapfilter.report.evidence import plot_evidence
+from mapfilter.report.saving import save
 from mapfilter.report.snapshots import plot_belief, story_bounds_m
 from mapfilter.workflows.track_pictures import choose_snapshots
 

@@ -12,8 +12,9 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import figure_of, save
+from mapfilter.report.canvas import figure_of
 from mapfilter.report.integrity import plot_coverage, plot_stanford, plot_worst_run
+from mapfilter.report.saving import save
 
 TIME_S = np.arange(200.0)
 TRUTH = Truth(TIME_S, 500_000.0 + 1.4 * TIME_S, np.full(200, 100.0))

@@ -10,7 +10,7 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
+from mapfilter.report.saving import save
 from mapfilter.report.snapshots import plot_candidates
 from mapfilter.report.track import plot_track
 

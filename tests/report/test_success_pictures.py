@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.evaluation.success_cells import SuccessCell
-from mapfilter.report.canvas import save
+from mapfilter.report.saving import save
 from mapfilter.report.success import (
     curve_axis,
     plot_run_distributions,
