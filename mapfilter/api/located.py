@@ -19,7 +19,7 @@ from mapfilter.api.motion import with_right_motion
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.truth import Truth
 from mapfilter.options import Probability
-from mapfilter.positioning import filter as loop
+from mapfilter.positioning import loop
 from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import Filter

@@ -24,11 +24,12 @@ from mapfilter.evaluation.truth import Truth, truth_notes
 from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
-from mapfilter.positioning.filter import Filter, FilterOptions, locate
+from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.siteless import without_cells
 from mapfilter.positioning.log_lacks import advice_of
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan

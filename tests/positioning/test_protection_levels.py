@@ -11,10 +11,10 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.integrity import sample_tail
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.place import belief_tail
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.step_output import Fix, StepOutput
 

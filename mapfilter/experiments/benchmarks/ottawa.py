@@ -27,7 +27,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.log import TrackLog
 

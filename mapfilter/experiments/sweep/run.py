@@ -25,7 +25,7 @@ from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import Radio, Run, SweepPlan
 from mapfilter.experiments.sweep.world import SweepWorld, opened_world, scored_filter, write_world
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import TrackLog
 
 RUNS = "runs.parquet"
