@@ -45,7 +45,6 @@ NETWORK_PICTURES = (
 
 _NEARLY_ALL = (1.0, 99.0)
 _IF_NONE_DBM = (-110.0, -50.0)
-_SQUARE_M = 5.0
 
 
 def clear_pictures(folder: Path, names: Iterable[str]) -> None:
