@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mapfilter._constants import HOUR_S
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.clock_notes import apart_note, zoneless_note
@@ -24,7 +25,7 @@ from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.speed_shift import best_shift, shift_note, speed_agreement, speeds_of_places
 
 _QUARTER_S = 900.0
-_MOST_ZONE_S, _HOUR_S = 14 * 3600.0, 3600.0
+_MOST_ZONE_S = 14 * HOUR_S
 _ZONE_QUARTERS = (*range(-48, 57, 4), -38, -14, -10, 14, 18, 22, 23, 26, 35, 38, 42, 51, 55)
 """Zones that are in use, in quarters of an hour ahead of UTC: whole hours, and others."""
 _MOST_SHIFTS = 4000
@@ -165,7 +166,7 @@ def _zone(
     # Where one of them lasts longer, both begin together, or both end.
     ends = np.abs(np.subtract(span_s(first), span_s(recording))[:, None] - good).min(axis=0)
     order = good[np.argsort(ends, kind="stable")]
-    others = [f"UTC{_clock(-shift)}" for shift in order[1:].tolist() if shift % _HOUR_S == 0]
+    others = [f"UTC{_clock(-shift)}" for shift in order[1:].tolist() if shift % HOUR_S == 0]
     also = f"; {' or '.join(others[:2])} would do as well: --zone" if others else ""
     return float(order[0]), f"local time is UTC{_clock(-order[0])} (by the overlap of times{also})"
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import MAD_TO_SD
 from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.step_counts import LATE_S, PAUSE_S, STEPS_PER_S, counted_steps
