@@ -15,8 +15,8 @@ from mapfilter.evaluation.accuracy import (
     Accuracy,
     accuracy,
     held_by_radius_95,
+    mean_of,
     position_errors_m,
-    share_of,
 )
 from mapfilter.evaluation.truth import Truth
 from mapfilter.positioning.estimate import TrackEstimate
@@ -105,5 +105,5 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
             raise fail(InputError, "truth", "two positions or more", got, hint)
         truth = known
     figures = asdict(accuracy(estimate, truth))
-    within_95 = share_of(held_by_radius_95(estimate, truth))
+    within_95 = mean_of(held_by_radius_95(estimate, truth))
     return Score(**figures, within_95=within_95, error_m=position_errors_m(estimate, truth))

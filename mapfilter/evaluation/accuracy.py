@@ -5,18 +5,15 @@ Success and errors after convergence are those of Khalaf-Allah 2007, section 6.2
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, nan
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mapfilter._types import Bools, Floats
 from mapfilter.evaluation.truth import Truth
 from mapfilter.positioning.estimate import TrackEstimate
-
-if TYPE_CHECKING:
-    pass
 
 SUCCESS_RADIUS_M = 50.0
 """An error of at most this at the switch counts as success (section 6.2)."""
@@ -84,9 +81,9 @@ def held_by_radius_95(estimate: TrackEstimate, truth: Truth) -> Bools:
     return np.asarray(errors_m[scored] <= radius_m[scored])
 
 
-def share_of(held: Bools) -> float:
-    """Return the share of what holds; NaN without any."""
-    return float(held.mean()) if held.size else nan
+def mean_of(values: Sequence[float] | Floats | Bools) -> float:
+    """Return the mean of numbers, or the share of what holds; NaN without any."""
+    return float(np.mean(values)) if len(values) else nan
 
 
 def percentile_m(errors_m: Floats, share: float) -> float:
@@ -120,7 +117,7 @@ def accuracy(estimate: TrackEstimate, truth: Truth) -> Accuracy:
         time_s,
         float(truth.distance_at(time_s)) if told else nan,
         error_m,
-        float(after_m.mean()) if after_m.size else nan,
+        mean_of(after_m),
         percentile_m(after_m, 0.67),
         percentile_m(after_m, 0.95),
         int(after_m.size),

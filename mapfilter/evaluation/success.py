@@ -11,7 +11,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Accuracy
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Accuracy, mean_of
 
 _Z_95 = 1.959963984540054
 
@@ -148,12 +148,8 @@ def summarise(
         low,
         high,
         len(wrong) / runs if runs else float("nan"),
-        _mean([score.switch_distance_m for score in switched]),
-        _mean([score.error_mean_m for score in right]),
-        _mean([score.error_67_m for score in right]),
-        _mean([score.error_95_m for score in right]),
+        mean_of([score.switch_distance_m for score in switched]),
+        mean_of([score.error_mean_m for score in right]),
+        mean_of([score.error_67_m for score in right]),
+        mean_of([score.error_95_m for score in right]),
     )
-
-
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values)) if values else float("nan")

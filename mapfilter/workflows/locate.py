@@ -16,6 +16,7 @@ from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.evaluation.accuracy import mean_of
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.fingerprints.located import LocatedReports, figures_of
 from mapfilter.positioning.fingerprints.locating import (
@@ -128,7 +129,7 @@ def run_locate(
         len(fitted.database),
         len(fitted.database.cell_ids),
         figures,
-        float(scored.mean()) if scored.size else float("nan"),
+        mean_of(scored),
         float(np.median(scored)) if scored.size else float("nan"),
         notes,
         round(time.perf_counter() - began_s, 3),

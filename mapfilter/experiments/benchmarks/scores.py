@@ -12,16 +12,12 @@ from mapfilter.evaluation.accuracy import (
     RADII,
     SUCCESS_RADIUS_M,
     accuracy,
+    mean_of,
     percentile_m,
     position_errors_m,
 )
 from mapfilter.evaluation.claims import claims_of, score_claims
-from mapfilter.evaluation.stanford import (
-    REGIONS,
-    IntegrityOptions,
-    stanford_bins,
-    stanford_counts,
-)
+from mapfilter.evaluation.stanford import REGIONS, IntegrityOptions, stanford_bins, stanford_counts
 from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import WINDOW_S, Walk
@@ -162,13 +158,9 @@ def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m:
 
 
 def _errors(errors_m: Floats) -> Row:
-    values = _mean(errors_m), percentile_m(errors_m, 0.67), percentile_m(errors_m, 0.95)
+    values = mean_of(errors_m), percentile_m(errors_m, 0.67), percentile_m(errors_m, 0.95)
     return dict(zip(_ERRORS, map(_finite, values), strict=True))
 
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _mean(values: Floats) -> float:
-    return float(np.mean(values)) if values.size else float("nan")
