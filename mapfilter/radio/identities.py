@@ -30,6 +30,11 @@ LIMITS: dict[str, dict[str, int]] = {
 PSC, PCI), areas ``lac`` (LAC, TAC), identities ``ci`` (CI, ECI, NCI) and timing advances.
 """
 
+IDENTITY = ("mcc", "mnc", "lac", "ci")
+"""Parts of a global cell identity."""
+UNIQUE_IN_NETWORK = ("LTE", "NR")
+"""Technologies whose cell identity is unique in a network, whatever the tracking area."""
+
 TIMING_STEP_M = {"GSM": LIGHT_MPS * 48 / 13e6 / 2, "LTE": LIGHT_MPS * 16 / 30.72e6 / 2}
 """Distance of a step of timing advance: 553.5 m and 78.07 m; in NR it depends on the numerology."""
 

@@ -19,11 +19,11 @@ import numpy as np
 from mapfilter._header_units import header_unit
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs, is_above_asu
-from mapfilter.radio.identities import technology
+from mapfilter.radio.identities import IDENTITY, technology
 from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
 from mapfilter.radio.tables import number
 from mapfilter.survey.measurement_lines import LONGEST_LINE, is_windows, lines_of
-from mapfilter.survey.measurement_rows import FIELDS, IDENTITY, REQUIRED, Rows
+from mapfilter.survey.measurement_rows import FIELDS, REQUIRED, Rows
 
 _UNAVAILABLE = 1e9
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")

@@ -14,9 +14,9 @@ from mapfilter.evaluation.intervals import rate_interval, share_interval, statis
 from mapfilter.evaluation.stanford import REGIONS
 from mapfilter.evaluation.success import wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.cases import Case
+from mapfilter.experiments.benchmarks.scores import ERRORS
 
 _NAN = float("nan")
-_ERRORS = ("error_mean_m", "error_67_m", "error_95_m")
 _MEANS = ("switch_mean_m", "error_mean_m", "error_95_m")
 
 
@@ -190,7 +190,7 @@ def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -
     converged = [int(row["converged"]) for row in rows]
     figures |= _share("wrong_converged", [int(row["wrong_converged"]) for row in rows], converged)
     figures |= _regions(rows) | _of_faults(rows)
-    for name in _ERRORS:
+    for name in ERRORS:
         figures[name] = mean_of(_known(good, name))
     figures["switch_mean_m"] = mean_of(switch_m)
     for name in _MEANS:
