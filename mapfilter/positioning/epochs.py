@@ -43,6 +43,10 @@ class ReportRow:
         return "" if self.arfcn is None else f"ARFCN {self.arfcn}, BSIC {bsic}"
 
 
+FIX_SD_M = 10.0
+"""Deviation, east and north, that is assumed of a fix that states none."""
+
+
 @dataclass(frozen=True, slots=True)
 class GnssFix:
     """A position by GNSS in the CRS of the database.
