@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mapfilter._constants import KMH_MPS
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
@@ -12,7 +13,6 @@ from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
 
-_KMH = 1 / 3.6
 _NEAR_S = 1.0
 _SPEEDS = ("speed_mps", "speed_kmh")
 _OF_PHONES = ("steps", "step_m", "level_dbm", "bars", "cell", "ci", "cgi", "acc_x")
@@ -97,7 +97,7 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
 def speeds_of(mapped: Mapped, name: str) -> Floats:
     """Return a speed in m/s, of a field for m/s or one for km/h; NaN where missing."""
     if mapped.has(f"{name}_kmh"):
-        return _KMH * mapped.number(f"{name}_kmh")
+        return KMH_MPS * mapped.number(f"{name}_kmh")
     return mapped.number(f"{name}_mps")
 
 
