@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
@@ -43,6 +44,32 @@ def survey(world, tmp_path_factory):
         'pictures = "none"\n'
     )
     return folder
+
+
+def test_what_fills_the_rows_of_cells_that_were_not_received_is_no_level(survey, tmp_path):
+    drives = tmp_path / "drives"
+    drives.mkdir()
+    filled = 0
+    for path in sorted((survey / "drives").iterdir()):
+        lines = path.read_text().splitlines()
+        for number, line in enumerate(lines[1:], start=1):
+            fields = line.split(",")
+            if float(fields[3]) < -70:
+                filled += 1
+                lines[number] = ",".join([*fields[:3], "-140", *fields[4:]])
+        (drives / path.name).write_text("\n".join(lines) + "\n")
+    more = settings(prediction__survey__files=json.dumps([str(drives)]))
+    config = survey / "survey.toml"
+    found = assert_done(
+        mapfilter("predict", "-c", config, "--out", tmp_path / "out", "--json", *more)
+    ).json
+    assert filled > 100
+    assert found["measurements"] == 1350 - filled
+    assert any(f"{filled} of 1350 rows left out" in note for note in found["notes"])
+    level = open_rasters(tmp_path / "out" / "rxlev.tif").read()
+    assert np.nanmin(level) > -90
+    readings = pq.read_table(tmp_path / "out" / "rxlev-readings.parquet")
+    assert min(readings["level_dbm"].to_pylist()) > -75
 
 
 def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):
