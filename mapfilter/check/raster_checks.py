@@ -18,7 +18,6 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.files import check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters, in_other_case
-from mapfilter.rasters.undeclared import nodata_taken_as_level
 
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
 
@@ -151,9 +150,9 @@ def sampled(
         except InputError as error:
             findings.add_faults(error, "rasters-invalid")
             continue
-        if (taken := nodata_taken_as_level(sample.values, rasters.factor)) is not None:
-            nodata.append((cell_id, *taken))
-            kept = np.where(sample.values == np.float32(taken[0]), np.nan, sample.values)
+        if sample.nodata is not None:
+            nodata.append((cell_id, *sample.nodata))
+            kept = np.where(sample.values == np.float32(sample.nodata[0]), np.nan, sample.values)
             sample = replace(sample, values=kept.astype(np.float32))
             if not sample.known.size:
                 continue
@@ -170,7 +169,7 @@ def sampled(
     if nodata:
         worst = max(nodata, key=lambda one: one[2])
         ids = listed([one[0] for one in nodata])
-        share = f"{worst[2]:.1%}" if worst[2] >= 0.01 else f"{worst[2]:.2%}"
+        share = f"{worst[2]:.1%}" if worst[2] >= 0.01 else f"{100 * worst[2]:.2g} %"
         evidence = f"{worst[1]:g} stands in up to {share} of the pixels, as a number."
         findings.add("nodata-as-level", f"{where}, cells {ids}", evidence)
     if empty:

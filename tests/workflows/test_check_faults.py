@@ -64,6 +64,13 @@ def holed(values, number):
     return values
 
 
+def dotted(values, number):
+    """A number in three pixels, at odd places of a lattice that is looked at by samples."""
+    values = values.copy()
+    values[100:103, 57] = number
+    return values
+
+
 def weakest(levels, number):
     """Levels, a number in place of the weaker half."""
     return np.where(levels < np.median(levels), number, levels)
@@ -158,6 +165,7 @@ ERRORS = [
     ("nodata-as-level", lambda w: w.levels.update(S1C=holed(w.levels["S1C"], 0))),
     ("nodata-as-level", lambda w: w.levels.update(S1C=weakest(w.levels["S1C"], -1))),
     ("nodata-as-level", lambda w: w.each(lambda v: weakest(v, -200))),
+    ("nodata-as-level", lambda w: w.levels.update(S1C=dotted(w.levels["S1C"], -1))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: whole(v, 255)))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: whole(v, 65535)))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: holed(v, -9999)))),
