@@ -56,6 +56,9 @@ REMEDIES = {
     "landuse-invalid": "Correct the land-use raster or its table.",
     "landuse-outside": "Take the land-use raster of this area.",
     "level-as-loss": 'Set rasters.quantity = "level".',
+    "levels-without-sign": 'Levels in dBm whose sign was lost: set rasters.quantity = "level" and '
+    "rasters.factor = -1. Losses that include the gain of the antenna: take it out of the plan's "
+    "EIRP, too.",
     "levels-above-eirp": "Check the EIRP, or what the rasters hold.",
     "log-cells-unknown": "Take the plan of the network that was received, with mcc, mnc, lac and "
     "ci, or name the cells in the log by the plan's ids.",

@@ -132,6 +132,8 @@ ERRORS = [
     ("axes-swapped", lambda w: w.each(lambda v: v[:, ::-1].copy())),
     ("loss-as-level", lambda w: loss(w, "level")),
     ("level-as-loss", lambda w: setattr(w, "quantity", "loss")),
+    ("levels-without-sign", lambda w: w.each(np.negative)),
+    ("levels-without-sign", lambda w: (setattr(w, "quantity", "loss"), w.each(np.negative))),
     ("rxlev-as-level", lambda w: w.each(quantised)),
     ("field-strength", lambda w: w.each(lambda v: v + 142.3)),
     ("azimuth-radians", lambda w: w.change("azimuth_deg", lambda a: round(np.radians(a), 4))),
