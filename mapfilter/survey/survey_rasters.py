@@ -119,7 +119,13 @@ def predicted_levels(rasters: RxLevRasters, plan: CellPlan | None) -> dict[str, 
 
     The plan is needed for losses only. The functions raise InputError where a number that means no
     data would be taken for a level.
+
+    Raises
+    ------
+    InputError
+        The rasters hold deviations.
     """
+    rasters.check_holds_levels()
     return {cell_id: partial(_predicted, rasters, plan, cell_id) for cell_id in rasters.cell_ids}
 
 

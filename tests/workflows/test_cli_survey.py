@@ -46,6 +46,37 @@ def survey(world, tmp_path_factory):
     return folder
 
 
+def test_cells_that_a_calibration_loses_and_drives_that_do_not_meet_are_noted(
+    survey, world, tmp_path
+):
+    """Two drives, each with the cell C alone, in opposite corners."""
+    rasters = open_rasters(world.rasters)
+    lattice = rasters.lattice
+    for number, corner in enumerate(((0, 0), (lattice.rows - 10, lattice.cols - 10))):
+        row, col = (np.mgrid[:10, :10].reshape(2, -1).T + corner).T
+        lon, lat = unproject(lattice.crs, *lattice.east_north(row, col))
+        level = rasters.read(cells=("C",))[0, row, col]
+        lines = [
+            f"C,{lat[i]:.7f},{lon[i]:.7f},{level[i]:.1f},{1.6e9 + 2 * i},5\n" for i in range(100)
+        ]
+        (tmp_path / f"drive-{number}.csv").write_text(HEADER + "".join(lines))
+    more = settings(
+        prediction__survey__files=json.dumps([str(tmp_path)]),
+        prediction__survey__calibrate=world.rasters,
+        prediction__survey__reach_m=20,
+    )
+    config = survey / "survey.toml"
+    found = assert_done(
+        mapfilter("predict", "-c", config, "--out", tmp_path / "out", "--json", *more)
+    ).json
+    assert found["cells"] == 1
+    assert found["validation"]["predicted"] == 0
+    notes = " ".join(found["notes"])
+    assert "2 of 3 cells of the prediction are not in the result" in notes
+    assert "not measured: A, B; build them" in notes
+    assert "not validated: no two sessions have measurements of one cell within 20 m" in notes
+
+
 def test_what_fills_the_rows_of_cells_that_were_not_received_is_no_level(survey, tmp_path):
     drives = tmp_path / "drives"
     drives.mkdir()
