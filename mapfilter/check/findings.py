@@ -40,6 +40,7 @@ REMEDIES = {
     "eirp-missing": "Name the column of the EIRP in cells.columns.eirp_dbm, or set cells.eirp_dbm, "
     "which is then taken for all cells without one.",
     "eirp-watts": "Turn watts into dBm, 10 log10(1000 W), antenna gain included.",
+    "feet-for-metres": "Give metres: a foot is 0.3048 m, and a US survey foot 0.3048006 m.",
     "field-strength": "Export received levels in dBm, not field strengths (dBµV/m).",
     "frequency-unit": "Give the frequency in MHz.",
     "half-pixel-shift": "Find out whether the exporter wrote centres for corners of pixels; if so, "
@@ -121,6 +122,7 @@ _BY_HINT = {
     "metres given for degrees": "metres-for-degrees",
     "degrees given for metres": "degrees-for-metres",
     "east and north swapped, or another CRS": "east-north-swapped",
+    "feet given for metres": "feet-for-metres",
     "radians given for degrees": "azimuth-radians",
     "watts or milliwatts given for dBm": "eirp-watts",
     "GHz given for MHz": "frequency-unit",

@@ -279,6 +279,9 @@ def _moved_from_sites(rows: list[Row], table: Arranged) -> tuple[str, ...]:
     return (f"{some} beside the place of the site, by {names}, up to {farthest_m:.3g} m",)
 
 
+_FOOT_M = 0.3048
+
+
 def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | None:
     expected, got = f"metres where {crs} is used", f"{east:g}, {north:g}"
     if max(abs(east), abs(north)) <= 180 and (_near(crs, east, north) or _near(crs, north, east)):
@@ -286,6 +289,10 @@ def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | 
     lon_deg, lat_deg = unproject(crs, east, north)
     if _near(crs, float(lon_deg), float(lat_deg)):
         return None
+    places = ((north, east), (_FOOT_M * east, _FOOT_M * north))
+    swapped, in_feet = (_near(crs, *map(float, unproject(crs, *place))) for place in places)
+    if in_feet and not swapped:
+        return expected, got, "feet given for metres"
     return expected, got, "east and north swapped, or another CRS"
 
 

@@ -107,6 +107,12 @@ def move_site(world, beside=None):
         put(world, f"S3{sector}", lat=lat, lon=lon)
 
 
+def in_feet(world):
+    world.in_metres()
+    for name in ("east", "north"):
+        world.change(name, lambda metres: round(metres / 0.3048, 1))
+
+
 def drop_cells(world):
     world.rows = [row for row in world.rows if row["cell"] != "S1B"]
 
@@ -158,6 +164,7 @@ ERRORS = [
     ("lon-lat-swapped", swap_degrees),
     ("lon-lat-swapped", lambda w: w.set("--set=area.bbox=60.17,24.93,60.18,24.96")),
     ("east-north-swapped", swap_metres),
+    ("feet-for-metres", in_feet),
     ("eirp-watts", lambda w: w.change("eirp_dbm", lambda _: 500)),
     ("eirp-watts", lambda w: (in_watts(w), w.each(lambda v: v + 20))),
     ("frequency-unit", lambda w: w.change("frequency_mhz", lambda f: f / 1000)),
