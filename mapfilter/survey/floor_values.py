@@ -55,6 +55,24 @@ def without_floor_values(measurements: Measurements) -> Measurements:
     )
 
 
+def fillers(level_dbm: Floats) -> Bools:
+    """Return which levels fill in for cells that were not received, where squares are not known.
+
+    That is the lowest one of ten rows or more, 10 dB below the next. NaN is ignored.
+
+    Examples
+    --------
+    >>> levels = np.array([-140.0] * 12 + [*range(-110, -60, 5)])
+    >>> int(fillers(levels).sum()), int(fillers(levels[12:]).sum())
+    (12, 0)
+    """
+    values, count = np.unique(level_dbm[np.isfinite(level_dbm)], return_counts=True)
+    if len(values) <= _LEAST_VALUES or count[0] < _FEWEST_SQUARES:
+        return np.zeros(len(level_dbm), dtype=np.bool_)
+    far = values[1] - values[0] >= _FAR_DB
+    return np.asarray((level_dbm == values[0]) & far)
+
+
 def _squares(measurements: Measurements) -> Ints:
     """Return the number of the cell and square of each row: who stands still counts once."""
     places = np.column_stack([measurements.east_m, measurements.north_m])
