@@ -135,7 +135,7 @@ _BY_HINT = {
     "raster of another zone": "crs-mixed",
     "a CRS of another region": "crs-mixed",
     "a CRS of another region, or Web Mercator": "crs-mixed",
-    "a raster upside down or mirrored": "raster-upside-down",
+    "a raster upside down or mirrored; gdalwarp turns it": "raster-upside-down",
     "set quantity = level or loss": "quantity-unknown",
     "misspelt, or no folder of antennas": "antenna-missing",
     "a class left out, or colours blended by compression or resampling": "landuse-classes",
