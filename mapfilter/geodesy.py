@@ -141,9 +141,18 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
         axis.unit_name not in ("metre", "meter") or axis.direction == "west" for axis in horizontal
     ):
         axes = ", ".join(f"{axis.unit_name} {axis.direction}" for axis in horizontal) or "no unit"
-        raise fail(InputError, where, "metres east and north", f"{crs.name} ({axes})")
+        hint = _metres_about(crs) if "foot" in axes else ""
+        raise fail(InputError, where, "metres east and north", f"{crs.name} ({axes})", hint)
     authority = crs.to_authority(min_confidence=100)
     return f"{authority[0]}:{authority[1]}" if authority else str(crs.to_wkt())
+
+
+def _metres_about(crs: CRS) -> str:
+    """Return what to do with coordinates in feet."""
+    area, target = crs.area_of_use, "and a UTM zone"
+    if area is not None:
+        target = utm_crs((area.west + area.east) / 2, (area.south + area.north) / 2)
+    return f"coordinates in feet; project them, as by gdalwarp or ogr2ogr -t_srs {target}"
 
 
 _LONGEST_MEANT = 40

@@ -40,6 +40,7 @@ REMEDIES = {
     "eirp-missing": "Name the column of the EIRP in cells.columns.eirp_dbm, or set cells.eirp_dbm, "
     "which is then taken for all cells without one.",
     "eirp-watts": "Turn watts into dBm, 10 log10(1000 W), antenna gain included.",
+    "feet-for-metres": "Give metres: a foot is 0.3048 m, and a US survey foot 0.3048006 m.",
     "field-strength": "Export received levels in dBm, not field strengths (dBµV/m).",
     "frequency-unit": "Give the frequency in MHz.",
     "half-pixel-shift": "Find out whether the exporter wrote centres for corners of pixels; if so, "
@@ -56,6 +57,9 @@ REMEDIES = {
     "landuse-invalid": "Correct the land-use raster or its table.",
     "landuse-outside": "Take the land-use raster of this area.",
     "level-as-loss": 'Set rasters.quantity = "level".',
+    "levels-without-sign": 'Levels in dBm whose sign was lost: set rasters.quantity = "level" and '
+    "rasters.factor = -1. Losses that include the gain of the antenna: take it out of the plan's "
+    "EIRP, too.",
     "levels-above-eirp": "Check the EIRP, or what the rasters hold.",
     "log-cells-unknown": "Take the plan of the network that was received, with mcc, mnc, lac and "
     "ci, or name the cells in the log by the plan's ids.",
@@ -118,6 +122,7 @@ _BY_HINT = {
     "metres given for degrees": "metres-for-degrees",
     "degrees given for metres": "degrees-for-metres",
     "east and north swapped, or another CRS": "east-north-swapped",
+    "feet given for metres": "feet-for-metres",
     "radians given for degrees": "azimuth-radians",
     "watts or milliwatts given for dBm": "eirp-watts",
     "GHz given for MHz": "frequency-unit",
@@ -130,7 +135,7 @@ _BY_HINT = {
     "raster of another zone": "crs-mixed",
     "a CRS of another region": "crs-mixed",
     "a CRS of another region, or Web Mercator": "crs-mixed",
-    "a raster upside down or mirrored": "raster-upside-down",
+    "a raster upside down or mirrored; gdalwarp turns it": "raster-upside-down",
     "set quantity = level or loss": "quantity-unknown",
     "misspelt, or no folder of antennas": "antenna-missing",
     "a class left out, or colours blended by compression or resampling": "landuse-classes",

@@ -18,7 +18,6 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.files import check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters, in_other_case
-from mapfilter.rasters.undeclared import nodata_taken_as_level
 
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
 
@@ -96,6 +95,7 @@ def above_free_space_db(sample: RasterSample, cell: Cell) -> float:
 
 
 _FALLS = 0.3
+_TOO_SMALL_DB = 10.0
 
 
 def is_surveyed(rasters: RxLevRasters) -> bool:
@@ -151,9 +151,9 @@ def sampled(
         except InputError as error:
             findings.add_faults(error, "rasters-invalid")
             continue
-        if (taken := nodata_taken_as_level(sample.values, rasters.factor)) is not None:
-            nodata.append((cell_id, *taken))
-            kept = np.where(sample.values == np.float32(taken[0]), np.nan, sample.values)
+        if sample.nodata is not None:
+            nodata.append((cell_id, *sample.nodata))
+            kept = np.where(sample.values == np.float32(sample.nodata[0]), np.nan, sample.values)
             sample = replace(sample, values=kept.astype(np.float32))
             if not sample.known.size:
                 continue
@@ -170,7 +170,7 @@ def sampled(
     if nodata:
         worst = max(nodata, key=lambda one: one[2])
         ids = listed([one[0] for one in nodata])
-        share = f"{worst[2]:.1%}" if worst[2] >= 0.01 else f"{worst[2]:.2%}"
+        share = f"{worst[2]:.1%}" if worst[2] >= 0.01 else f"{100 * worst[2]:.2g} %"
         evidence = f"{worst[1]:g} stands in up to {share} of the pixels, as a number."
         findings.add("nodata-as-level", f"{where}, cells {ids}", evidence)
     if empty:
@@ -194,8 +194,11 @@ def sampled(
     for kind, samples in kinds.items():
         _check_copies(samples, where, findings)
         falls = kind == "loss" and _falls_away(samples, plan)
-        if falls or kind not in (rasters.quantity, "empty"):
+        below_db = 0.0 if falls or kind != "loss" else _below_free_space_db(samples, plan)
+        unsigned = below_db > _TOO_SMALL_DB
+        if falls or unsigned or kind not in (rasters.quantity, "empty"):
             code = "field-strength" if falls else f"{kind}-as-{rasters.quantity}"
+            code = "levels-without-sign" if unsigned else code
             # A negative factor turns levels into what looks like losses, and losses into levels.
             if kind == "unclear" or (rasters.factor < 0 and kind in ("level", "loss")):
                 code = "values-implausible"
@@ -205,6 +208,8 @@ def sampled(
                 f"Declared {rasters.quantity}; {len(samples)} of {len(rasters.cell_ids)} rasters "
                 f"hold {low:.5g}..{high:.5g}, median {middle:.5g}"
             )
+            if unsigned:
+                evidence += f": as losses {below_db:.0f} dB less than those of free space"
             evidence += ", which become less away from the sites." if falls else "."
             ids = listed([sample.cell_id for sample in samples])
             findings.add(code, f"{where}, cells {ids}", evidence)
@@ -244,6 +249,21 @@ def _check_copies(samples: Sequence[RasterSample], where: str, findings: Finding
         if len(same) > 1:
             evidence = f"The same numbers in all pixels of {len(same)} rasters."
             findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
+
+
+def _below_free_space_db(samples: Sequence[RasterSample], plan: CellPlan | None) -> float:
+    """Return by how much numbers, if they are losses, are less than those of free space.
+
+    That of the middle one of the cells; no obstacle makes a loss less. Minus infinity where it is
+    not known.
+    """
+    known = [(s, plan[s.cell_id]) for s in samples if plan is not None and s.cell_id in plan]
+    below_db = [
+        above_free_space_db(replace(s, values=-s.values), replace(cell, eirp_dbm=0.0))
+        for s, cell in known
+        if not cell.indoor
+    ]
+    return float(np.median(below_db)) if below_db else -np.inf
 
 
 def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:

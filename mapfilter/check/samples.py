@@ -13,6 +13,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.resampling import read_on
+from mapfilter.rasters.undeclared import nodata_taken_as_level
 
 MOST_PX = 1 << 22
 """Larger rasters are looked at in a square of so many pixels about the site."""
@@ -31,12 +32,16 @@ class RasterSample:
         As stored, times the declared factor; NaN without data.
     checksum : str
         Of all pixels looked at, before sampling.
+    nodata : (float, float) or None
+        A number that means no data though the file does not state it, and its share of all pixels
+        looked at (:func:`~mapfilter.rasters.undeclared.nodata_taken_as_level`).
     """
 
     cell_id: str
     lattice: Lattice
     values: Floats32
     checksum: str
+    nodata: tuple[float, float] | None = None
 
     @property
     def known(self) -> Floats32:
@@ -60,12 +65,17 @@ class RasterSample:
 
 
 def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> RasterSample:
-    """Read a sample of one cell's raster, of a large one about its site or else its middle."""
+    """Read a sample of one cell's raster, of a large one about its site or else its middle.
+
+    Numbers are those of the nearest pixels, whatever resampling the rasters have.
+    """
     file = next(file for file in rasters.files if cell_id in file.cell_ids)
     band = file.cell_ids.index(cell_id)
     window = _window(rasters.lattice, cell)
-    values = read_on(file, [band], rasters.lattice, window, rasters.resampling)[0]
+    values = read_on(file, [band], rasters.lattice, window, "nearest")[0]
     checksum = hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+    values = values * np.float32(rasters.factor)
+    nodata = nodata_taken_as_level(values, rasters.factor)
     step = max(1, -(-max(values.shape) // _SAMPLED_SIDE_PX))
     first = step // 2
     values = values[first::step, first::step] if min(values.shape) > first else values
@@ -76,7 +86,7 @@ def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> Ras
     lattice = Lattice(
         part.crs, part.west_m + shift_m, part.north_m - shift_m, side_m * step, *values.shape
     )
-    return RasterSample(cell_id, lattice, values * np.float32(rasters.factor), checksum)
+    return RasterSample(cell_id, lattice, values, checksum, nodata)
 
 
 def _window(lattice: Lattice, cell: Cell | None) -> tuple[int, int, int, int]:

@@ -129,7 +129,13 @@ def merge(
         list[Path], typer.Argument(metavar="DB...", help="Databases, one or more.")
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="DB", help="The merged database.", callback=given_path)
+        Path,
+        typer.Option(
+            "--out",
+            metavar="DB",
+            help="The merged database: a folder of its own.",
+            callback=given_path,
+        ),
     ],
     without: Annotated[
         list[str] | None,

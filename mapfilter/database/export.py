@@ -16,6 +16,7 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, Geomet
 from rasterio.windows import Window as RasterWindow
 
 from mapfilter._io import atomic_file
+from mapfilter.database.exported import BANDS, CELLS_TAG, WRITTEN, check_export_replaceable
 from mapfilter.database.manifest import apart
 from mapfilter.database.parquet import WindowReader, read_columns
 from mapfilter.database.points import Points
@@ -24,28 +25,24 @@ from mapfilter.database.tiles import tile_windows
 from mapfilter.errors import InputError, OutputError, fail
 from mapfilter.rasters.geotiff_writer import new_geotiff
 
-BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
-CELLS_TAG = "CELLS"
-
 _TILE_PX = 512
 _WRITE_ERRORS = (DataSourceError, DataLayerError, FeatureError, GeometryError)
-# GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
-_WRITTEN = "2000-01-01T00:00:00.000Z"
 
 
 def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
     """Write best server and margin as a cloud-optimised GeoTIFF on the database's lattice.
 
     Bands: ``best_server`` (index into the JSON list in the tag ``CELLS``), ``best_level_dbm`` and
-    ``margin_db``; NaN where there is no point. ``path`` ends in .tif; an older file is replaced.
+    ``margin_db``; NaN where there is no point. ``path`` ends in .tif; an older export is replaced.
 
     Raises
     ------
     InputError
         The database is of roads alone.
     OutputError
-        The file cannot be written.
+        The file cannot be written, or holds something else than an export.
     """
+    check_export_replaceable(Path(path))
     if not database.cell_ids:
         hint = "a database of roads alone; export it to .gpkg"
         raise fail(InputError, str(database.path), "cells", "none", hint)
@@ -75,7 +72,7 @@ def export_geopackage(
 ) -> None:
     """Write a database as GeoPackage: layers ``points`` and, with cells, ``cells`` and those named.
 
-    ``path`` ends in .gpkg; an older file is replaced. The points of ``cells``, within the
+    ``path`` ends in .gpkg; an older export is replaced. The points of ``cells``, within the
     database's margin, become a layer each.
 
     Raises
@@ -83,11 +80,12 @@ def export_geopackage(
     InputError
         The database has no such cell.
     OutputError
-        The file cannot be written.
+        The file cannot be written, or holds something else than an export, or one that was edited.
     """
     path = Path(path)
     if path.suffix.lower() != ".gpkg":
         raise fail(OutputError, str(path), "a name that ends in .gpkg", path.suffix or "no suffix")
+    check_export_replaceable(path)
     crs = database.lattice.crs
     # A column without any value has no type that a GeoPackage knows.
     layers = {"points": _points(database)}
@@ -136,7 +134,7 @@ def _points(database: RadioRouteDatabase) -> gpd.GeoDataFrame:
 @contextmanager
 def _fixed_date() -> Iterator[None]:
     before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
-    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": _WRITTEN})
+    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": WRITTEN})
     try:
         yield
     finally:

@@ -9,6 +9,7 @@ from typing import Any
 
 from pyproj import CRS
 
+from mapfilter._constants import FOOT_M
 from mapfilter._words import number_of
 from mapfilter.errors import Faults
 from mapfilter.geodesy import degree_fault, project, unproject
@@ -66,6 +67,10 @@ def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | 
     lon_deg, lat_deg = unproject(crs, east, north)
     if _near(crs, float(lon_deg), float(lat_deg)):
         return None
+    places = ((north, east), (FOOT_M * east, FOOT_M * north))
+    swapped, in_feet = (_near(crs, *map(float, unproject(crs, *place))) for place in places)
+    if in_feet and not swapped:
+        return expected, got, "feet given for metres"
     return expected, got, "east and north swapped, or another CRS"
 
 

@@ -20,7 +20,7 @@ Window = tuple[int, int, int, int]
 Quantity = Literal["level", "loss", "deviation"]
 
 _PLAUSIBLE: dict[Quantity, tuple[float, float, str]] = {
-    "level": (-300.0, 60.0, "path losses, or raw RXLEV, given for levels"),
+    "level": (-300.0, 60.0, "path losses, or raw RXLEV, given for levels; or a sign lost"),
     "loss": (0.0, 400.0, "levels given for path losses"),
     "deviation": (0.0, 100.0, "levels or path losses given for deviations"),
 }

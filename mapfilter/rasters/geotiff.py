@@ -131,7 +131,10 @@ def _lattice(
     elif t.b != 0 or t.d != 0:
         faults.add(f"{where}, transform", "rows that run east", "a rotated raster")
     elif t.e >= 0 or t.a <= 0:
-        got, hint = f"pixels of {t.a:g} x {t.e:g}", "a raster upside down or mirrored"
+        got, hint = (
+            f"pixels of {t.a:g} x {t.e:g}",
+            "a raster upside down or mirrored; gdalwarp turns it",
+        )
         faults.add(f"{where}, transform", "row 0 in the north, column 0 in the west", got, hint)
     elif abs(t.a + t.e) > _SQUARE_TOLERANCE * t.a:
         faults.add(f"{where}, transform", "square pixels", f"{t.a:g} m x {-t.e:g} m")

@@ -108,14 +108,21 @@ def _read(
     rasters = places[numbers[0]].rasters
     box = _box([places[number].window for number in numbers])
     values = read_on(file, bands, rasters.lattice, box, rasters.resampling)
+    stored = values
+    if rasters.resampling != "nearest":
+        # A number that means no data is one no longer where it was weighed with its neighbours.
+        stored = read_on(file, bands, rasters.lattice, box, "nearest")
     if rasters.factor != 1.0:
-        values = values * np.float32(rasters.factor)
+        values, stored = (one * np.float32(rasters.factor) for one in (values, stored))
     ids = [file.cell_ids[band] for band in bands]
     for number in numbers:
         one = places[number]
         top, left, height, width = one.window
-        inside = values[:, top - box[0] :, left - box[1] :][:, :height, :width]
-        check_nodata_stated(inside, ids, rasters.quantity, rasters.factor, file.path)
+        inside, held = (
+            all_of[:, top - box[0] :, left - box[1] :][:, :height, :width]
+            for all_of in (values, stored)
+        )
+        check_nodata_stated(held, ids, rasters.quantity, rasters.factor, file.path)
         for band in inside:
             check_plausible(band, rasters.quantity, file.path)
         wanted = [n for n, cell in enumerate(ids) if cell in rows[number]]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from mapfilter._types import Floats32
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
 from mapfilter.rasters.files import Quantity
 
@@ -23,6 +25,8 @@ _LARGEST_OF_TYPES = (255.0, 32767.0, 65535.0)
 _FAR_DB = 20.0
 _MANY_TIMES = 10
 _FEWEST = 20
+_MARKERS = (0.0, -1.0, 1.0)
+"""Stored numbers that mean no data in a hole of any size, where all about it is far from them."""
 
 
 def nodata_taken_as_level(values: Floats32, factor: float = 1.0) -> tuple[float, float] | None:
@@ -31,11 +35,12 @@ def nodata_taken_as_level(values: Floats32, factor: float = 1.0) -> tuple[float,
     That is one and the same number, beyond all levels (such as -9999), exactly 0 among levels
     that are below it, the largest number of an integer type, far above all others, or any number
     that hardly a level or loss reaches (-1, -200), in 20 pixels or more and far from all others.
+    On a lattice it is also a stored 0, -1 or 1 far from the pixels beside it, be it a single one.
 
     Parameters
     ----------
     values : ndarray of float32
-        NaN without data.
+        NaN without data; of shape (rows, cols) on a lattice.
     factor : float
         By which the stored numbers were multiplied.
 
@@ -63,11 +68,13 @@ def nodata_taken_as_level(values: Floats32, factor: float = 1.0) -> tuple[float,
         return float(beyond[0]), beyond.size / known.size
     zero, others = int((known == 0).sum()), known[known != 0]
     if not known.size or zero < _TELLING_SHARE * known.size:
-        return _far_from_others(known)
+        return _far_from_others(known) or _hole(values, known.size, factor)
     # Zero means no data where nothing comes near it.
     near = int((np.abs(others) < _NEAR_ZERO).sum())
     apart = bool((others < 0).all() or (others >= _LEAST_LOSS_DB).all())
-    return (0.0, zero / known.size) if apart and zero > _MANY_TIMES * near else None
+    if apart and zero > _MANY_TIMES * near:
+        return 0.0, zero / known.size
+    return _hole(values, known.size, factor)
 
 
 def check_nodata_stated(
@@ -93,9 +100,14 @@ def check_nodata_stated(
     faults = Faults()
     for cell_id, band in zip(cells, values, strict=True):
         number, share = nodata_taken_as_level(band, factor) or (np.nan, 0.0)
-        if low < number < high and share * np.count_nonzero(~np.isnan(band)) >= _FEWEST:
-            part = f"{share:.0%}" if share >= _TELLING_SHARE else f"{share:.2%}"
-            got = f"{number:g} in {part} of the pixels of a tile"
+        known = int(np.count_nonzero(~np.isnan(band)))
+        if share * known < _FEWEST:
+            number, share = _hole(band, known, factor) or (np.nan, 0.0)
+        if low < number < high:
+            part = number_of(round(share * known), "pixel")
+            if share >= _TELLING_SHARE and share * known >= _FEWEST:
+                part = f"{share:.0%} of the pixels"
+            got = f"{number:g} in {part} of a tile"
             hint = f"{number:g} means no data, and the file does not state it; set nodata"
             faults.add(f"{path} pixels, cell {cell_id}", f"a {quantity}, or no data", got, hint)
     faults.raise_if_any(InputError)
@@ -119,6 +131,26 @@ def _far_from_others(known: Floats32) -> tuple[float, float] | None:
         near = np.count_nonzero(np.abs(known - number) < _FAR_DB) - count
         if _FEWEST <= count < known.size and count > _MANY_TIMES * near:
             return number, float(count) / known.size
+    return None
+
+
+def _hole(values: Floats32, known: int, factor: float) -> tuple[float, float] | None:
+    """Return a stored 0, -1 or 1 that is far from all pixels beside it, and its share."""
+    if values.ndim != 2:
+        return None
+    for marker in _MARKERS:
+        number = np.float32(marker * factor)
+        marked = values == number
+        if marked.any():
+            # What is beyond the edge, and the marked ones themselves, are far from nothing.
+            padded = np.pad(np.where(marked, np.nan, values), 1, constant_values=np.nan)
+            nearest_db = np.inf
+            for row, col in product(range(3), repeat=2):
+                beside = padded[row : row + len(values), col : col + values.shape[1]][marked]
+                away_db = np.abs(beside[~np.isnan(beside)] - number)
+                nearest_db = min(nearest_db, away_db.min(initial=np.inf))
+            if _FAR_DB <= nearest_db < np.inf:
+                return float(number), np.count_nonzero(marked) / known
     return None
 
 

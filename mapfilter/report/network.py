@@ -42,6 +42,7 @@ from mapfilter.report.basemap import (
 )
 from mapfilter.report.canvas import (
     BLACK,
+    GREY,
     Look,
     distinct_colours,
     grouped,
@@ -180,7 +181,12 @@ def plot_best_server(
             named_at = frame(*lattice.east_north(row + window[0].start, col + window[1].start))
         groups.add(index, f"{100 * count / best_server.size:.1f} %", named_at)
     finish_map(axes, base, plan, title)
-    side_legend(axes, "cell: share of area", groups.handles, groups.counts, network_legend(plan))
+    marks = network_legend(plan)
+    without = best_server.size - sum(counts)
+    if without:
+        share = f"no cell: {100 * without / best_server.size:.1f} %"
+        marks = [mark(share, "s", 7, color="white", markeredgecolor=GREY), *marks]
+    side_legend(axes, "cell: share of area", groups.handles, groups.counts, marks)
     return axes
 
 

@@ -89,14 +89,23 @@ def surroundings(
         positions = fixes_m
     if not len(positions):
         return None
+    return bounds_about(positions, LEAST_MARGIN_M, _MARGIN_SHARE)
+
+
+def bounds_about(positions: Floats, margin_m: float, margin_share: float = 0.0) -> Bounds:
+    """Return the extent of positions, (n, 2), with a margin, and room for a scale bar below.
+
+    The margin is at least ``margin_share`` of the longer side. Few positions that lie several times
+    as far away as all others do not count.
+    """
     positions = _without_strays(positions)
     low, high = positions.min(axis=0), positions.max(axis=0)
-    margin_m = max(LEAST_MARGIN_M, _MARGIN_SHARE * float((high - low).max()))
+    margin_m = max(margin_m, margin_share * float((high - low).max()))
     # No side is shorter than half the other one: a straight track still shows its surroundings.
     half = np.maximum((high - low) / 2, 0.25 * float((high - low).max())) + margin_m
     middle = (low + high) / 2
     west, south = (middle - half).tolist()
-    south -= 0.05 * 2 * float(half[1])  # room for the scale bar
+    south -= 0.05 * 2 * float(half[1])
     east, north = (middle + half).tolist()
     return west, south, east, north
 

@@ -17,7 +17,7 @@ from threadpoolctl import ThreadpoolController
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import InputError, fail, listed
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.exchanged_sectors import CALIBRATION
 from mapfilter.survey.level_trend import (
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 _ROUNDS = 2
+_NAMED = 3
 _LOCATED_FROM = 300
 
 
@@ -170,13 +171,17 @@ def fit_survey(
     notes = []
     if predicted is not None:
         strange = [cell_id for cell_id in found if cell_id not in predicted]
+        example = next(iter(predicted), "none")
         if len(strange) == len(found):
-            expected = f"cells of the prediction, such as {next(iter(predicted), 'none')}"
+            expected = f"cells of the prediction, such as {example}"
             got = f"none in {number_of(len(found), 'cell')}, such as {strange[0]}"
-            hint = "other names or identities, or another network"
-            raise fail(InputError, "measurements", expected, got, hint)
+            raise fail(InputError, "measurements", expected, got, _renamed(strange, predicted))
         if strange:
-            notes.append(f"{number_of(len(strange), 'cell')} left out: not in the prediction")
+            notes.append(
+                f"{number_of(len(strange), 'cell')} left out: not in the prediction, which has "
+                f"such as {example}: {listed(strange, _NAMED)} (likely: "
+                f"{_renamed(strange, predicted)})"
+            )
         found = {
             cell_id: some.some(np.isfinite(predicted[cell_id](some.east_m, some.north_m)))
             for cell_id, some in found.items()
@@ -249,3 +254,11 @@ def fit_survey(
         )
     weakest, kinds = weakest_reported(measurements), measurements.technologies
     return Survey(measurements.crs, options, shadowing, cells, weakest, kinds, tuple(notes))
+
+
+def _renamed(strange: Collection[str], predicted: Collection[str]) -> str:
+    """Return why cells are likely not among those of a prediction."""
+    forms = {cell_id.casefold() for cell_id in predicted}
+    if any(cell_id.casefold() in forms for cell_id in strange):
+        return "names that differ in upper and lower case only"
+    return "other names or identities, or another network"

@@ -19,6 +19,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.undeclared import check_nodata_stated
 from mapfilter.survey.level_trend import Covariate
 from mapfilter.survey.measured_map import Survey, SurveyedCell
 from mapfilter.survey.measurement_rows import Identity
@@ -116,8 +117,15 @@ def surveyed_plan(
 def predicted_levels(rasters: RxLevRasters, plan: CellPlan | None) -> dict[str, Covariate]:
     """Return each cell's predicted level as a function of place, for a survey to calibrate.
 
-    The plan is needed for losses only.
+    The plan is needed for losses only. The functions raise InputError where a number that means no
+    data would be taken for a level.
+
+    Raises
+    ------
+    InputError
+        The rasters hold deviations.
     """
+    rasters.check_holds_levels()
     return {cell_id: partial(_predicted, rasters, plan, cell_id) for cell_id in rasters.cell_ids}
 
 
@@ -131,11 +139,11 @@ def _predicted(
     if on.any():
         top, left = int(row[on].min()), int(col[on].min())
         window = (top, left, int(row[on].max()) - top + 1, int(col[on].max()) - left + 1)
-        if plan is None or rasters.quantity == "level":
-            values = rasters.read(window, (cell_id,))[0]
-        else:
-            values = rasters.read_levels_dbm(plan, window, (cell_id,))[0]
-        level_dbm[on] = values[row[on] - top, col[on] - left]
+        values = rasters.read(window, (cell_id,))
+        check_nodata_stated(values, (cell_id,), rasters.quantity, rasters.factor, rasters.path)
+        if plan is not None and rasters.quantity != "level":
+            values = rasters.levels_dbm(values, plan, (cell_id,))
+        level_dbm[on] = values[0, row[on] - top, col[on] - left]
     return level_dbm
 
 

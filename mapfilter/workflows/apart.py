@@ -40,13 +40,16 @@ def check_no_input_replaced(config: Config, *outputs: Path) -> None:
     faults.raise_if_any(OutputError)
 
 
-def check_out_apart(out: Path, inputs: Sequence[Path]) -> None:
-    """Raise ConfigError where results would lie in a database, a log, or another input folder."""
+def check_out_apart(out: Path, inputs: Sequence[Path], option: str = "--out") -> None:
+    """Raise ConfigError where results would lie in a database, a log, or another input folder.
+
+    ``option`` names them in the message.
+    """
     faults, place = Faults(), out.resolve()
     for path in inputs:
         if path.is_dir() and place.is_relative_to(path.resolve()):
             hint = "results need a folder of their own"
-            faults.add("--out", f"a folder outside {path}, which is an input", str(out), hint)
+            faults.add(option, f"a folder outside {path}, which is an input", str(out), hint)
     faults.raise_if_any(ConfigError)
 
 

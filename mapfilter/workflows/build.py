@@ -10,6 +10,9 @@ from typing import Any
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, executor_of, made_ready
 from mapfilter._partial import nothing_left
+from mapfilter._words import number_of
+from mapfilter.check.findings import Findings
+from mapfilter.check.identity_checks import check_identities
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.build_job import TASKS_A_WORKER
@@ -20,7 +23,7 @@ from mapfilter.database.measured import Readings, read_checked_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import get_ready_to_read
-from mapfilter.errors import ConfigError, StoreError, fail
+from mapfilter.errors import ConfigError, StoreError, fail, listed
 from mapfilter.rasters.geotiff import READINGS_TAG, tag_of
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -32,6 +35,8 @@ from mapfilter.workflows.world import (
     raster_cover,
     raster_world,
 )
+
+_NAMED = 6
 
 
 @dataclass(frozen=True)
@@ -108,9 +113,34 @@ def run_build(
         routable_points=sum(map(int, counts.values())),
         database=target,
         seconds=time.perf_counter() - began_s,
-        notes=(*rasters.notes, *plan.notes, *floor, *cover, *world.streets.notes),
+        notes=(
+            *rasters.notes,
+            *plan.notes,
+            *_cells_notes(database),
+            *floor,
+            *cover,
+            *world.streets.notes,
+        ),
         pictures=_draw(config, rasters, database, world),
     )
+
+
+def _cells_notes(database: RadioRouteDatabase) -> list[str]:
+    """Return notes on cells that are received nowhere, and on those with one identity."""
+    notes = []
+    received = database.level_parts
+    silent = [cell_id for cell_id in database.cell_ids if cell_id not in received]
+    if silent:
+        notes.append(
+            f"{number_of(len(silent), 'cell')} received at no point: {listed(silent, _NAMED)} "
+            f"(likely: no data in the raster, or levels below database.floor_dbm = "
+            f"{database.floor_dbm:g})"
+        )
+    found = Findings()
+    check_identities(database.plan, "plan", found)
+    errors = [one for one in found.found if one.severity == "error"]
+    repeated = [one.evidence for one in errors if one.code == "identity-repeated"]
+    return [*notes, *(evidence.removesuffix(".") for evidence in repeated)]
 
 
 def _build_roads(config: Config, progress: Progress | None) -> BuildResult:

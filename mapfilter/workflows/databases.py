@@ -14,6 +14,7 @@ from mapfilter.database.merge import merge
 from mapfilter.database.merge_notes import merge_notes
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
+from mapfilter.workflows.apart import check_out_apart
 
 
 def run_merge(
@@ -23,8 +24,15 @@ def run_merge(
     without: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Merge databases; within its area a later one overrides earlier ones in its own cells."""
+    """Merge databases; within its area a later one overrides earlier ones in its own cells.
+
+    Raises
+    ------
+    MapfilterError
+        The databases do not fit, cannot be read, or the merged one would replace one of them.
+    """
     began_s = time.perf_counter()
+    check_out_apart(out, databases)
     opened = [open_database(path, verify="full") for path in databases]
     with nothing_left(out.parent):
         ensure_writable_folder(out.parent)
@@ -43,6 +51,7 @@ def run_export(database: Path, to: Path) -> dict[str, Any]:
     if kind not in (".gpkg", ".tif", ".tiff"):
         expected = "a name that ends in .gpkg or .tif"
         raise fail(ConfigError, f"--to {to}", expected, to.suffix or "no suffix")
+    check_out_apart(to, [database], "--to")
     opened = open_database(database, verify="full")
     if kind == ".gpkg":
         export_geopackage(opened, to)

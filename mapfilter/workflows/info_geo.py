@@ -57,7 +57,7 @@ def _layer_info(place: VectorSource, layer: str, kind: str | None) -> dict[str, 
 def tiff_info(path: Path) -> dict[str, Any]:
     """Describe a GeoTIFF: levels or losses, what mapfilter wrote, or any other."""
     # Here, as the second one imports numba.
-    from mapfilter.database.export import BANDS, CELLS_TAG
+    from mapfilter.database.exported import BANDS, CELLS_TAG
     from mapfilter.evaluation.map_bound import BANDS as BOUND_BANDS
 
     names, tags = _described(path)

@@ -15,7 +15,7 @@ from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.database.floor import floor_of
 from mapfilter.database.measured import Readings, readings_parquet
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, fail, listed
 from mapfilter.radio.cells import CellPlan, write_cell_plan
 from mapfilter.rasters.geotiff import READINGS_TAG
 from mapfilter.rasters.opening import open_rasters
@@ -30,6 +30,8 @@ from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, wri
 from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.survey_inputs import survey_inputs
 from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
+
+_NAMED = 6
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,8 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
             *measurements.notes,
             *survey.notes,
             *plan_faults(survey, plan, predicted),
+            *_unmeasured(inputs.predicted, ids),
+            *_unvalidated(validation, options.reach_m),
             *(_unfilled(survey, ids) if section.fill else ()),
             *_advice(survey, factor, floor_dbm),
         ),
@@ -162,6 +166,30 @@ def _predicted(
         hint = "levels are the EIRP of each cell less its loss"
         raise fail(ConfigError, "cells.plan", "the plan of the losses to calibrate", "none", hint)
     return predicted_levels(rasters, plan)
+
+
+def _unmeasured(predicted: RxLevRasters | None, ids: Sequence[str]) -> list[str]:
+    """Return a note on cells of a prediction that its calibration does not have."""
+    held = set(ids)
+    missing = [one for one in predicted.cell_ids if one not in held] if predicted else []
+    if not missing:
+        return []
+    return [
+        f"{len(missing)} of {number_of(len(missing) + len(held), 'cell')} of the prediction "
+        f"are not in the result, as they were not measured: {listed(missing, _NAMED)}; build them "
+        "from the prediction, and merge the databases, where they are needed"
+    ]
+
+
+def _unvalidated(validation: Validation | None, reach_m: float) -> list[str]:
+    """Return a note where no measurement that was left out could be compared with the others."""
+    if validation is None or validation.predicted:
+        return []
+    apart = "sessions" if validation.by_session else "parts of the session"
+    return [
+        f"not validated: no two {apart} have measurements of one cell within {reach_m:g} m of each "
+        "other, so that errors and deviations are those that the model assumes"
+    ]
 
 
 def _unfilled(survey: Survey, ids: Sequence[str]) -> list[str]:

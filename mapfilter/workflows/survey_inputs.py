@@ -14,6 +14,7 @@ from mapfilter.lattice import Lattice, outside_m
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.far_cells import check_cells_near
 from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.survey.floor_values import without_floor_values
 from mapfilter.survey.measurements import Measurements, named_after
 from mapfilter.survey.options import SurveyOptions
 from mapfilter.tracks.foreign_cells import foreign_cells
@@ -73,6 +74,7 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
     if not len(found):
         expected = f"positions accurate to {section.max_accuracy_m:g} m"
         raise fail(InputError, "measurements", expected, "none")
+    found = without_floor_values(found)
     if config.cells.plan is None:
         return found, None
     plan = planned_cells(config, found.crs)

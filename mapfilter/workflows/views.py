@@ -28,6 +28,7 @@ VIEW_HTML = "view.html"
 
 BOUND_TIF = "bound.tif"
 
+_USUAL_NAME = "database"
 _BOUND_LAYERS = {
     "levels_to_fix_m": "Metres to convergence by levels, at best",
     "cells_to_fix_m": "Metres to convergence by cells, at best",
@@ -104,8 +105,10 @@ def _bounded(bundle: Mapping[str, Any], path: Path) -> dict[str, Any]:
 
 
 def database_view(database: RadioRouteDatabase) -> dict[str, Any]:
-    """Return the bundle of a database."""
-    return database_bundle(f"Database {database.path.name}", database)
+    """Return the bundle of a database, with its name as title, or that of its folder."""
+    path = database.path.absolute()
+    name = path.parent.name if path.name == _USUAL_NAME else path.name
+    return database_bundle(f"Database {name}", database)
 
 
 def view_figures(bundle: Mapping[str, Any], file: Path) -> dict[str, Any]:

@@ -214,7 +214,16 @@ def test_systems_of_other_axis_order_are_taken():
         ("", "none", "CRS left out on export"),
         ("EPSG:4326", "WGS 84", "degrees given for metres"),
         (4258, "ETRS89", "degrees given for metres"),
-        ("EPSG:2225", "NAD83 / California zone 1 (ftUS) (US survey foot", ""),
+        (
+            "EPSG:2225",
+            "NAD83 / California zone 1 (ftUS) (US survey foot",
+            "coordinates in feet; project them, as by gdalwarp or ogr2ogr -t_srs EPSG:32610",
+        ),
+        (
+            "+proj=utm +zone=35 +datum=WGS84 +units=us-ft",
+            "unknown (US survey foot",
+            "coordinates in feet; project them, as by gdalwarp or ogr2ogr -t_srs and a UTM zone",
+        ),
         ("EPSG:2048", "Hartebeesthoek94 / Lo19 (metre west, metre south)", ""),
         ("EPSG:5513", "S-JTSK / Krovak (metre south, metre west)", ""),
         ("EPSG:4978", "WGS 84 (metre", ""),

@@ -8,7 +8,8 @@ import rasterio
 from small_world import IDS, LATTICE, make_database, make_world
 
 from mapfilter.database import export
-from mapfilter.database.export import CELLS_TAG, export_cog
+from mapfilter.database.export import export_cog
+from mapfilter.database.exported import CELLS_TAG
 
 
 @pytest.fixture(scope="module")

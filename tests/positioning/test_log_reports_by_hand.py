@@ -70,3 +70,23 @@ def test_beacons_among_others_count_by_their_mean_level():
     found = reports_of_log(given)
     assert [found.cell_ids[k] for k in found.cell] == ["t", "w"]
     assert found.level_dbm.tolist() == [-65.0, -50.0]
+
+
+def test_levels_that_fill_in_for_cells_that_were_not_received_are_none():
+    """Tables of some programs have each cell at each time."""
+    times_s = np.repeat(5.0 * np.arange(12), 2)
+    level = np.where(np.arange(24) % 2, -140.0, -60.0 - np.arange(24))
+    columns = {"role": ["serving", "neighbour"] * 12, "cell": ["a", "b"] * 12}
+    found = reports_of_log(log(times_s, [], level_dbm=level, **columns))
+    np.testing.assert_array_equal(found.level_dbm, level[::2])
+    assert found.cell_ids == ("a",)
+    assert found.notes == (
+        "12 readings left out: -140 dBm, far below all others (likely: what stands for a cell "
+        "that was not received)",
+    )
+    # Weak ones that go on below others, and a few far below, are levels.
+    near = np.where(level == -140, -86.0, level)
+    few = np.where(np.arange(24) < 18, near, level)
+    for kept in (near, few):
+        found = reports_of_log(log(times_s, [], level_dbm=kept, **columns))
+        np.testing.assert_array_equal(np.sort(found.level_dbm), np.sort(kept))

@@ -156,6 +156,43 @@ def test_a_number_for_no_data_is_an_error_where_it_is_strong(quantity, number, r
         levels_at(places)
 
 
+@pytest.mark.parametrize(
+    ("quantity", "number", "pixels"),
+    [("level", 0, "1 pixel"), ("level", -1, "3 pixels"), ("loss", 0, "2 pixels")],
+)
+def test_a_hole_of_a_few_pixels_is_found_beside_strong_levels(quantity, number, pixels, tmp_path):
+    """Levels near the mast are as strong as the number, so that all of a tile tell nothing."""
+
+    def spoilt(values):
+        values[4:12, 3:6] = -12.0 if quantity == "level" else 12.0
+        values[5, 10 : 10 + int(pixels[0])] = number
+        return values
+
+    places = places_in(rasters_of(tmp_path / "rasters", quantity, {"D": spoilt}))
+    with pytest.raises(InputError, match=f"cell D: .*found {number} in {pixels} of a tile"):
+        levels_at(places)
+
+
+def test_a_strong_pixel_among_strong_ones_is_a_level(tmp_path):
+    def strong(values):
+        values[4:9, 4:9] = -18.0
+        values[6, 6] = 0.0
+        return values
+
+    levels_at(places_in(rasters_of(tmp_path / "rasters", values={"D": strong})))
+
+
+def test_a_number_for_no_data_is_found_before_it_is_weighed_with_its_neighbours(tmp_path):
+    def spoilt(values):
+        values[20:23, 20:23] = 0
+        return values
+
+    finer = {"resolution_m": 2.5, "resampling": "bilinear"}
+    rasters = rasters_of(tmp_path / "rasters", values={"D": spoilt}, **finer)
+    with pytest.raises(InputError, match=r"cell D: .*0 means no data"):
+        levels_at(places_in(rasters, [(32, 32, 40, 40)]))
+
+
 def test_deviations_are_no_levels(tmp_path):
     rasters = rasters_of(tmp_path / "rasters", "deviation", dict.fromkeys(CUTS, np.abs))
     with pytest.raises(InputError, match="levels or losses"):

@@ -234,6 +234,17 @@ def test_cells_that_were_not_predicted_are_told():
     told = r"cells of the prediction, such as B, found none in 1 cell, such as A \(likely: other"
     with pytest.raises(InputError, match=told):
         fit_survey(rows, SurveyOptions(), predicted={"B": lambda e, _: e})
+    with pytest.raises(InputError, match="names that differ in upper and lower case only"):
+        fit_survey(rows, SurveyOptions(), predicted={"a": lambda e, _: e})
+    cell = np.arange(len(rows)) % 2
+    two = measured(
+        rows.east_m, rows.north_m, rows.level_dbm, cell=cell, cell_ids=("A", "Helsinki_1")
+    )
+    notes = fit_survey(two, SurveyOptions(), predicted={"A": law}).notes
+    assert notes[0] == (
+        "1 cell left out: not in the prediction, which has such as A: Helsinki_1 "
+        "(likely: other names or identities, or another network)"
+    )
 
 
 def test_who_stands_still_does_not_count_more():

@@ -246,6 +246,17 @@ def test_a_predicted_raster_is_calibrated(tmp_path):
     assert abs(np.nanmean(error)) < 1.0
 
 
+def test_a_number_for_no_data_is_no_prediction_to_calibrate(tmp_path):
+    rows, _ = shadowed(deviation_db=5.0)
+    predicted = law(*centres(LATTICE))
+    predicted[40:44, 90:93] = 0.0
+    path = tmp_path / "predicted.tif"
+    write_rasters(path, LATTICE, [("A", predicted)], ("A",))
+    levels = predicted_levels(open_rasters(path), None)
+    with pytest.raises(InputError, match=r"cell A: .*0 in 12 pixels of a tile"):
+        fit_survey(rows, SurveyOptions(), predicted=levels)
+
+
 def test_losses_are_calibrated_with_the_plans_eirp(tmp_path):
     east_m, north_m = somewhere(80)
     plan = CellPlan(CRS, (Cell("A", "A", *ANTENNA, 30.0, None, 50.0, 1800.0, "omni"),))

@@ -17,7 +17,7 @@ from mapfilter.report import basemap
 from mapfilter.report.basemap import BaseMap, draw_base, largest
 from mapfilter.report.canvas import BLUE, ORANGE, new_figure
 from mapfilter.report.coverage import plot_landuse, plot_margin
-from mapfilter.report.network import plot_points_per_cell
+from mapfilter.report.network import plot_best_server, plot_points_per_cell
 from mapfilter.report.saving import png_of, save
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.route_points import route_lattice_from_landuse
@@ -167,6 +167,26 @@ def network(tmp_path_factory):
     routes = route_lattice_from_landuse(walkable, LATTICE, None)
     database = build(rasters, plan, routes, folder / "database", attribution="nobody's")
     return rasters, database
+
+
+@pytest.mark.parametrize("uncovered", [0, 500])
+def test_shares_of_the_area_add_up(uncovered):
+    """Pixels where no cell is received are a part of the area, too."""
+    server = np.zeros(2000, dtype=np.int16)
+    server[700:] = 1
+    server[2000 - uncovered :] = -1
+    lattice = Lattice(CRS, 385_000.0, 6_672_000.0, 5.0, 40, 50)
+    axes = plot_best_server(
+        server.reshape(40, 50),
+        ("S1A", "S1B"),
+        lattice,
+        plan_of("S1A", "S1B"),
+        BaseMap(lattice.bounds_m),
+    )
+    (legend,) = axes.figure.legends
+    words = [text.get_text() for text in legend.get_texts() if "%" in text.get_text()]
+    assert sum(float(text.split()[-2]) for text in words) == pytest.approx(100.0)
+    assert ("no cell: 25.0 %" in words) == bool(uncovered)
 
 
 def test_best_servers_are_those_of_the_points(network):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from browser import Watched, opened
 
-from mapfilter.viewing.arrays import packed, unpacked
+from mapfilter.viewing.arrays import packed, places, starts, unpacked
 from mapfilter.viewing.here import Place, Report, report_terms
 from mapfilter.viewing.page import write_page
 
@@ -207,6 +207,38 @@ def test_a_database_shows_levels_at_a_place(browser, database):
         level = made.level_rasters()[1, floor((300 - 81) / 5), 68]
         assert f"{level:.1f}".replace("-", "−") in view.page.inner_text(".levels tbody tr >> nth=0")
         assert "Predicted level of B" in view.page.inner_text(".legend")
+
+
+@pytest.mark.parametrize("streets", [True, False])
+def test_a_database_in_a_corner_of_its_area_is_shown_large(browser, tmp_path, streets):
+    """As where a planner's rasters cover a country, and are empty but for a town."""
+    bundle = made.database_bundle()
+    bundle["frame"] |= {"size": [30_000.0, 30_000.0]}
+    if not streets:
+        none = {"first": starts([]), "east": places([]), "north": places([])}
+        bundle["background"]["streets"] |= none | {"way": packed([], "u4")}
+    write_page(bundle, tmp_path / "database.html")
+    with page(browser, tmp_path / "database.html") as view:
+        width_m = view.page.evaluate("MF.page.maps[0].view.width / MF.page.camera.scale")
+        assert 400 < width_m < 1200
+
+
+def test_without_a_map_and_cells_the_legend_names_neither(browser, tmp_path):
+    bundle = made.replay_bundle() | {"cells": [], "levels": None, "why": None}
+    none = {"first": starts([]), "east": places([]), "north": places([]), "way": packed([], "u4")}
+    bundle["background"] |= {"streets": none, "points": None, "best": None}
+    one = made.run("walk, ekf", explained=False) | {"filter": "ekf", "belief": None}
+    epochs = one["epochs"] | {"runner_mass": packed(np.zeros(made.EPOCHS), "f4")}
+    bundle["runs"] = [one | {"epochs": epochs, "readings": None}]
+    write_page(bundle, tmp_path / "ekf.html")
+    with page(browser, tmp_path / "ekf.html") as view:
+        view.page.locator(".legend").first.evaluate("(one) => { one.open = true; }")
+        text = view.page.locator(".legend").first.inner_text()
+        assert "estimate, tracking" in text
+        assert "ground truth" in text
+        for words in ("cell", "site", "runner-up", "belief"):
+            assert words not in text
+        assert view.page.is_hidden("#layer")
 
 
 def test_a_damaged_page_says_so(browser, replay, tmp_path):

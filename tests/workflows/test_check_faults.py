@@ -64,6 +64,13 @@ def holed(values, number):
     return values
 
 
+def dotted(values, number):
+    """A number in three pixels, at odd places of a lattice that is looked at by samples."""
+    values = values.copy()
+    values[100:103, 57] = number
+    return values
+
+
 def weakest(levels, number):
     """Levels, a number in place of the weaker half."""
     return np.where(levels < np.median(levels), number, levels)
@@ -100,6 +107,12 @@ def move_site(world, beside=None):
         put(world, f"S3{sector}", lat=lat, lon=lon)
 
 
+def in_feet(world):
+    world.in_metres()
+    for name in ("east", "north"):
+        world.change(name, lambda metres: round(metres / 0.3048, 1))
+
+
 def drop_cells(world):
     world.rows = [row for row in world.rows if row["cell"] != "S1B"]
 
@@ -125,6 +138,8 @@ ERRORS = [
     ("axes-swapped", lambda w: w.each(lambda v: v[:, ::-1].copy())),
     ("loss-as-level", lambda w: loss(w, "level")),
     ("level-as-loss", lambda w: setattr(w, "quantity", "loss")),
+    ("levels-without-sign", lambda w: w.each(np.negative)),
+    ("levels-without-sign", lambda w: (setattr(w, "quantity", "loss"), w.each(np.negative))),
     ("rxlev-as-level", lambda w: w.each(quantised)),
     ("field-strength", lambda w: w.each(lambda v: v + 142.3)),
     ("azimuth-radians", lambda w: w.change("azimuth_deg", lambda a: round(np.radians(a), 4))),
@@ -149,6 +164,7 @@ ERRORS = [
     ("lon-lat-swapped", swap_degrees),
     ("lon-lat-swapped", lambda w: w.set("--set=area.bbox=60.17,24.93,60.18,24.96")),
     ("east-north-swapped", swap_metres),
+    ("feet-for-metres", in_feet),
     ("eirp-watts", lambda w: w.change("eirp_dbm", lambda _: 500)),
     ("eirp-watts", lambda w: (in_watts(w), w.each(lambda v: v + 20))),
     ("frequency-unit", lambda w: w.change("frequency_mhz", lambda f: f / 1000)),
@@ -158,6 +174,7 @@ ERRORS = [
     ("nodata-as-level", lambda w: w.levels.update(S1C=holed(w.levels["S1C"], 0))),
     ("nodata-as-level", lambda w: w.levels.update(S1C=weakest(w.levels["S1C"], -1))),
     ("nodata-as-level", lambda w: w.each(lambda v: weakest(v, -200))),
+    ("nodata-as-level", lambda w: w.levels.update(S1C=dotted(w.levels["S1C"], -1))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: whole(v, 255)))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: whole(v, 65535)))),
     ("nodata-as-level", lambda w: (loss(w, "loss"), w.each(lambda v: holed(v, -9999)))),

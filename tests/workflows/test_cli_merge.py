@@ -1,7 +1,9 @@
 """Merging and exporting databases, and building them on a cluster, from the command line."""
 
 import json
+import shutil
 
+import geopandas as gpd
 import pytest
 import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter
@@ -18,10 +20,11 @@ def test_a_database_without_a_cell(world, tmp_path):
     assert (
         assert_done(mapfilter("info", out, "--json")).json["counts"]["points_off_rasters"] is None
     )
-    back = assert_done(mapfilter("merge", out, world.database, "--out", out, "--json")).json
+    again = tmp_path / "again"
+    back = assert_done(mapfilter("merge", out, world.database, "--out", again, "--json")).json
     whole = open_database(world.database)
     assert back["points"] == len(whole.points())
-    assert set(open_database(out).cell_ids) == set(whole.cell_ids)
+    assert set(open_database(again).cell_ids) == set(whole.cell_ids)
 
 
 def test_databases_that_cannot_be_merged(world, tmp_path):
@@ -29,6 +32,40 @@ def test_databases_that_cannot_be_merged(world, tmp_path):
     assert_refused(mapfilter("merge", tmp_path / "none", world.database, *out), "none")
     assert_refused(mapfilter("merge", world.database, "--without-cell=X", *out), "'X'")
     assert not (tmp_path / "db").exists()
+
+
+@pytest.mark.parametrize("inside", ["", "merged"])
+def test_no_database_is_merged_into_one_of_its_inputs(own_world, tmp_path, inside):
+    before = contents(own_world.database)
+    link = tmp_path / "link"
+    link.symlink_to(own_world.database)
+    for out in (own_world.database / inside, link / inside):
+        refused = mapfilter("merge", own_world.database, "--without-cell", "B", "--out", out)
+        assert_refused(refused, "--out: expected a folder outside", "which is an input")
+    assert contents(own_world.database) == before
+
+
+def test_an_export_replaces_an_export_and_nothing_else(own_world, tmp_path):
+    database = own_world.database
+    for name in ("points.gpkg", "best.tif"):
+        assert_done(mapfilter("export", database, "--to", tmp_path / name))
+        first = (tmp_path / name).read_bytes()
+        assert_done(mapfilter("export", database, "--to", tmp_path / name))
+        assert (tmp_path / name).read_bytes() == first
+    edited = gpd.read_file(tmp_path / "points.gpkg", layer="cells")
+    edited["height_m"] += 1
+    edited.to_file(tmp_path / "points.gpkg", layer="cells")
+    gpd.GeoDataFrame(geometry=[], crs="EPSG:32635").to_file(tmp_path / "roads.gpkg")
+    shutil.copy(own_world.rasters, tmp_path / "rxlev.tif")
+    (tmp_path / "notes.tif").write_text("no raster")
+    (tmp_path / "folder.gpkg").mkdir()
+    before = contents(tmp_path)
+    for name in ("points.gpkg", "roads.gpkg", "rxlev.tif", "notes.tif", "folder.gpkg"):
+        refused = mapfilter("export", database, "--to", tmp_path / name)
+        assert_refused(refused, f"{name}: expected nothing yet, or an older export")
+    assert contents(tmp_path) == before
+    inside = mapfilter("export", database, "--to", database / "points.gpkg")
+    assert_refused(inside, "--to: expected a folder outside", "which is an input")
 
 
 def test_best_server_as_geotiff(world, tmp_path):

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
@@ -43,6 +44,63 @@ def survey(world, tmp_path_factory):
         'pictures = "none"\n'
     )
     return folder
+
+
+def test_cells_that_a_calibration_loses_and_drives_that_do_not_meet_are_noted(
+    survey, world, tmp_path
+):
+    """Two drives, each with the cell C alone, in opposite corners."""
+    rasters = open_rasters(world.rasters)
+    lattice = rasters.lattice
+    for number, corner in enumerate(((0, 0), (lattice.rows - 10, lattice.cols - 10))):
+        row, col = (np.mgrid[:10, :10].reshape(2, -1).T + corner).T
+        lon, lat = unproject(lattice.crs, *lattice.east_north(row, col))
+        level = rasters.read(cells=("C",))[0, row, col]
+        lines = [
+            f"C,{lat[i]:.7f},{lon[i]:.7f},{level[i]:.1f},{1.6e9 + 2 * i},5\n" for i in range(100)
+        ]
+        (tmp_path / f"drive-{number}.csv").write_text(HEADER + "".join(lines))
+    more = settings(
+        prediction__survey__files=json.dumps([str(tmp_path)]),
+        prediction__survey__calibrate=world.rasters,
+        prediction__survey__reach_m=20,
+    )
+    config = survey / "survey.toml"
+    found = assert_done(
+        mapfilter("predict", "-c", config, "--out", tmp_path / "out", "--json", *more)
+    ).json
+    assert found["cells"] == 1
+    assert found["validation"]["predicted"] == 0
+    notes = " ".join(found["notes"])
+    assert "2 of 3 cells of the prediction are not in the result" in notes
+    assert "not measured: A, B; build them" in notes
+    assert "not validated: no two sessions have measurements of one cell within 20 m" in notes
+
+
+def test_what_fills_the_rows_of_cells_that_were_not_received_is_no_level(survey, tmp_path):
+    drives = tmp_path / "drives"
+    drives.mkdir()
+    filled = 0
+    for path in sorted((survey / "drives").iterdir()):
+        lines = path.read_text().splitlines()
+        for number, line in enumerate(lines[1:], start=1):
+            fields = line.split(",")
+            if float(fields[3]) < -70:
+                filled += 1
+                lines[number] = ",".join([*fields[:3], "-140", *fields[4:]])
+        (drives / path.name).write_text("\n".join(lines) + "\n")
+    more = settings(prediction__survey__files=json.dumps([str(drives)]))
+    config = survey / "survey.toml"
+    found = assert_done(
+        mapfilter("predict", "-c", config, "--out", tmp_path / "out", "--json", *more)
+    ).json
+    assert filled > 100
+    assert found["measurements"] == 1350 - filled
+    assert any(f"{filled} of 1350 rows left out" in note for note in found["notes"])
+    level = open_rasters(tmp_path / "out" / "rxlev.tif").read()
+    assert np.nanmin(level) > -90
+    readings = pq.read_table(tmp_path / "out" / "rxlev-readings.parquet")
+    assert min(readings["level_dbm"].to_pylist()) > -75
 
 
 def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):

@@ -1,14 +1,19 @@
 """Films of a page: as GIF, as MP4 where ffmpeg is there, and what is said where it is not."""
 
 import shutil
+from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from matplotlib import animation
 from PIL import Image
 from viewing import made_bundle as made
 
 from mapfilter.errors import OutputError
+from mapfilter.report import film
+from mapfilter.viewing.arrays import packed, places, starts
 from mapfilter.viewing.page import write_page
-from mapfilter.workflows import film as film_module
 from mapfilter.workflows.film import run_film
 
 
@@ -22,8 +27,8 @@ def page(tmp_path_factory):
 def test_a_gif_has_its_pictures(page, tmp_path):
     found = run_film(page, tmp_path / "walk.gif", pictures=4)
     assert found["pictures"] == 4
-    with Image.open(tmp_path / "walk.gif") as film:
-        assert film.n_frames == 4
+    with Image.open(tmp_path / "walk.gif") as moving:
+        assert moving.n_frames == 4
 
 
 def test_without_ffmpeg_an_mp4_is_refused_in_one_sentence(page, tmp_path, monkeypatch):
@@ -54,15 +59,121 @@ def test_a_run_without_a_belief_is_filmed_by_its_estimate(tmp_path):
         run["belief"] = None
     write_page(bundle, tmp_path / "replay.html")
     assert run_film(tmp_path / "replay.html", tmp_path / "walk.gif", pictures=3)["pictures"] == 3
-    with Image.open(tmp_path / "walk.gif") as film:
-        assert film.n_frames == 3
+    with Image.open(tmp_path / "walk.gif") as moving:
+        assert moving.n_frames == 3
 
 
-def test_the_source_of_the_map_is_named(page, tmp_path, monkeypatch):
+@pytest.fixture
+def seen(monkeypatch):
+    """What the pictures of a film show: texts, words of the legend, and the trail's lines."""
+    found = []
+
+    class Caught(animation.AbstractMovieWriter):
+        @classmethod
+        def isAvailable(cls):  # noqa: N802
+            return True
+
+        def setup(self, fig, outfile, dpi=None):
+            super().setup(fig, outfile, dpi)
+
+        def grab_frame(self, **_):
+            (axes,) = self.fig.axes
+            trails = [one for one in axes.collections if one.get_zorder() == 4]
+            truth = [one for one in axes.lines if one.get_zorder() == 2.5]
+            found.append(
+                SimpleNamespace(
+                    title=axes.get_title(),
+                    texts=[text.get_text() for text in axes.texts],
+                    legend=[text.get_text() for one in self.fig.legends for text in one.texts],
+                    trail=[segment for one in trails for segment in one.get_segments()],
+                    colors=[tuple(c) for one in trails for c in one.get_colors()],
+                    truth=[line.get_xydata() for line in truth],
+                    limits=(axes.get_xlim(), axes.get_ylim()),
+                )
+            )
+
+        def finish(self):
+            Path(self.outfile).touch()
+
+    animation.writers.register("caught")(Caught)
+    monkeypatch.setitem(film.FILM_FORMATS, ".gif", "caught")
+    return found
+
+
+def of_epochs(bundle, **columns):
+    """Give the runs other columns, and no belief."""
+    for run in bundle["runs"]:
+        run["belief"] = None
+        for name, values in columns.items():
+            run["epochs"][name] = packed(np.asarray(values), "u1" if name == "status" else "f4")
+    return bundle
+
+
+def filmed(bundle, folder, **options):
+    bundle["background"]["streets"] |= {
+        "first": starts([]),
+        "east": places([]),
+        "north": places([]),
+    }
+    bundle["attribution"] = ""
+    write_page(bundle, folder / "replay.html")
+    run_film(folder / "replay.html", folder / "walk.gif", **options)
+
+
+def test_the_source_of_the_map_is_on_every_picture(page, tmp_path, seen):
     """Licences of maps ask for it."""
-    named = []
-    monkeypatch.setattr(
-        film_module, "write_film", lambda _, base, out, **__: (named.append(base), out.touch())
+    run_film(page, tmp_path / "walk.gif", pictures=3)
+    assert len(seen) == 3
+    assert all("made by hand" in one.texts for one in seen)
+
+
+def test_a_film_without_a_map_has_trails_and_a_legend(tmp_path, seen):
+    """The way so far; not where the filter searches or is lost, nor across a leap."""
+    statuses = made.replay_bundle()["statuses"]
+    searching, tracking, lost = map(statuses.index, ("SEARCHING", "TRACKING", "LOST"))
+    status = np.full(made.EPOCHS, tracking)
+    status[:10], status[100:] = searching, lost
+    east = 2.0 * np.arange(made.EPOCHS)
+    east[60:] += 500.0
+    straight = {"east": east, "north": np.full(made.EPOCHS, 100.0), "status": status}
+    truth = {"truth_east": east - 3, "truth_north": np.full(made.EPOCHS, 101.0)}
+    filmed(of_epochs(made.replay_bundle(), **straight, **truth), tmp_path, pictures=made.EPOCHS)
+    assert seen[0].legend == [
+        "truth",
+        "estimate",
+        "while searching",
+        "lost or outside",
+        "95 % radius",
+    ]
+    assert [len(one.trail) for one in seen[:12]] == [0] * 11 + [1]
+    assert len(seen[50].trail) == 40
+    # 50 steps before the leap, which is none, and 39 after it; none where it is lost.
+    assert len(seen[-1].trail) == 49 + 39
+    assert [len(line) for one in (seen[0], seen[70]) for line in one.truth] == [1, 71]
+    assert seen[-1].title.endswith("119 s  lost")
+    (left, right), (low, high) = seen[0].limits
+    assert high - low > 0.4 * (right - left)
+
+
+def test_a_film_names_only_what_is_in_it(tmp_path, seen):
+    statuses = made.replay_bundle()["statuses"]
+    unknown = np.full(made.EPOCHS, np.nan)
+    status = np.full(made.EPOCHS, statuses.index("TRACKING"))
+    bundle = of_epochs(
+        made.replay_bundle(), status=status, truth_east=unknown, truth_north=unknown, r95=unknown
     )
-    run_film(page, tmp_path / "walk.gif", pictures=2)
-    assert [base.attribution for base in named] == ["made by hand"]
+    filmed(bundle, tmp_path, pictures=2)
+    assert seen[-1].legend == ["estimate"]
+    assert seen[-1].truth == []
+    assert len(seen[-1].trail) > 100
+
+
+def test_a_stray_position_does_not_shrink_the_film(tmp_path, seen):
+    bundle = made.replay_bundle()
+    east = 2.0 * np.arange(made.EPOCHS)
+    east[0] = 200_000.0
+    filmed(
+        of_epochs(bundle, east=east, truth_east=2.0 * np.arange(made.EPOCHS)), tmp_path, pictures=1
+    )
+    (left, right), _ = seen[0].limits
+    assert right - left < 1000.0

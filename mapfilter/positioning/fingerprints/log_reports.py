@@ -8,6 +8,7 @@ import pandas as pd
 from mapfilter._types import Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
+from mapfilter.survey.floor_values import fillers
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.scans import SCAN_S, advertised, scan_of_rows
 from mapfilter.tracks.schema import SERVING
@@ -21,18 +22,28 @@ def reports_of_log(log: TrackLog, block: int = -1) -> Reports:
 
     See :func:`mapfilter.tracks.scans.scan_of_rows`. Of beacons that advertise several times in a
     scan the mean level counts. Rows without the cell's id, such as neighbours known by carrier and
-    BSIC alone, are left out.
+    BSIC alone, are left out, and levels that fill in for cells that were not received
+    (:func:`mapfilter.survey.floor_values.fillers`).
     """
     report = scan_of_rows(log.radio)
     count = int(report.max(initial=-1)) + 1
     time_s = _mean_times(log.radio["time_s"].to_numpy(np.float64), report, count)
     radio, report = _without_repeats(log.radio, report)
-    known = radio["cell"].notna().to_numpy(np.bool_)
+    level_dbm = radio["level_dbm"].to_numpy(np.float64)
+    filled = fillers(level_dbm)
+    named = radio["cell"].notna().to_numpy(np.bool_)
+    known = named & ~filled
     notes = list(log.notes)
     if count < log.radio["time_s"].nunique():
         notes.append(f"readings of one scan, less than {SCAN_S:g} s apart, are one report")
-    if not known.all():
-        notes.append(f"{number_of(int((~known).sum()), 'reading')} left out: cell unknown")
+    if not named.all():
+        notes.append(f"{number_of(int((~named).sum()), 'reading')} left out: cell unknown")
+    if filled.any():
+        some = number_of(int(filled.sum()), "reading")
+        notes.append(
+            f"{some} left out: {level_dbm[filled][0]:g} dBm, far below all others (likely: what "
+            "stands for a cell that was not received)"
+        )
     cell = radio["cell"].to_numpy(object)
     is_serving = known & (radio["role"] == SERVING).to_numpy(np.bool_)
     serving = np.full(count, "", dtype=object)
@@ -44,7 +55,7 @@ def reports_of_log(log: TrackLog, block: int = -1) -> Reports:
         log.crs,
         report[known],
         cell[known].astype(str),
-        radio["level_dbm"].to_numpy(np.float64)[known],
+        level_dbm[known],
         count=count,
         places=_true_places(log.truth, time_s),
         time_s=time_s,

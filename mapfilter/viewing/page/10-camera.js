@@ -44,7 +44,8 @@
   };
 
   // What a run covers: its truth and its estimates, else the area.
-  MF.boxOfRuns = (runs, frame) => {
+  // What there is to see: the runs, or else the streets, or the squares where a cell is received.
+  MF.boxOfRuns = (runs, frame, ground) => {
     const box = { east0: Infinity, east1: -Infinity, north0: Infinity, north1: -Infinity };
     const add = (east, north) => {
       if (!Number.isFinite(east) || !Number.isFinite(north)) return;
@@ -56,6 +57,13 @@
     for (const run of runs) {
       for (let i = 0; i < run.count; i += 1) add(run.epochs.east[i], run.epochs.north[i]);
       if (run.hasTruth) run.truth.east.forEach((east, i) => add(east, run.truth.north[i]));
+    }
+    if (!Number.isFinite(box.east0)) ground.streets?.east.forEach((east, i) => add(east, ground.streets.north[i]));
+    if (!Number.isFinite(box.east0) && ground.best) {
+      const { grid, server } = ground.best;
+      server.raw.forEach((one, i) => {
+        if (one >= 0) add(grid.west + (i % grid.cols + 0.5) * grid.step, grid.north - (Math.floor(i / grid.cols) + 0.5) * grid.step);
+      });
     }
     if (!Number.isFinite(box.east0)) return { east0: 0, north0: 0, east1: frame.size[0], north1: frame.size[1] };
     return box;

@@ -32,18 +32,23 @@
       pen.path([[2, 8], [32, 8]], { stroke: color.truth, width: 5, alpha: 0.4 });
       pen.path([[17, 2], [23, 8], [17, 14], [11, 8]], { fill: color.card, stroke: color.truth, width: 2 }, true);
     }), "ground truth"]);
-    list.push([sign((pen) => pen.rect(11, 2, 12, 12, { fill: color.card, stroke: color.there, width: 2.2 })), "runner-up, with its mass"]);
+    if (run.epochs.runner_mass?.some((one) => one > 0)) {
+      list.push([sign((pen) => pen.rect(11, 2, 12, 12, { fill: color.card, stroke: color.there, width: 2.2 })), "runner-up, with its mass"]);
+    }
     if (run.epochs.alt_lead?.some(Number.isFinite)) {
       list.push([sign((pen) => pen.path([[17, 2], [24, 14], [10, 14]], { fill: color.card, stroke: color.alternative, width: 2.2 }, true)), "alternative hypothesis"]);
     }
     if (run.epochs.way?.some((one) => one > 0)) list.push([line({ stroke: color.accent, width: 7, alpha: 0.3 }), "matched way"]);
-    list.push([line({ stroke: color.accent, width: 2 }), "serving cell"]);
-    list.push([line({ stroke: color.soft, width: 1.2, dash: [3, 4] }), "neighbour cells of the report"]);
+    if (bundle.cells.length) {
+      list.push([line({ stroke: color.accent, width: 2 }), "serving cell"]);
+      list.push([line({ stroke: color.soft, width: 1.2, dash: [3, 4] }), "neighbour cells of the report"]);
+    }
     return list;
   };
 
   const SHOWN = [["belief", "belief"], ["regions", "regions"], ["hypotheses", "hypotheses"], ["radio", "cells heard"]];
-  const switches = (store) => MF.h("p", { class: "switches" }, SHOWN.map(([key, words]) => {
+  const isThere = { belief: (bundle, run) => Boolean(run.belief), radio: (bundle) => bundle.cells.length > 0 };
+  const switches = (store, bundle, run) => MF.h("p", { class: "switches" }, SHOWN.filter(([key]) => isThere[key]?.(bundle, run) ?? true).map(([key, words]) => {
     const box = MF.h("input", { type: "checkbox" });
     box.checked = store.state.show[key];
     box.addEventListener("change", () => store.set({ show: { ...store.state.show, [key]: box.checked } }));
@@ -52,7 +57,9 @@
 
   MF.fillLegend = (legend, { bundle, run, layer, store }) => {
     const items = run ? signs(bundle, run) : [];
-    items.push([sign((pen) => pen.path([[17, 14], [11, 3], [17, 1], [23, 3]], { fill: MF.color.card, stroke: MF.color.soft, width: 1.4 }, true)), "site and sector"]);
+    if (bundle.cells.length) {
+      items.push([sign((pen) => pen.path([[17, 14], [11, 3], [17, 1], [23, 3]], { fill: MF.color.card, stroke: MF.color.soft, width: 1.4 }, true)), "site and sector"]);
+    }
     const parts = [MF.h("summary", {}, "Legend")];
     if (layer && !layer.plain) {
       parts.push(MF.h("h3", {}, layer.title + (layer.unit ? ` / ${layer.unit}` : "")));
@@ -66,7 +73,7 @@
           MF.h("span", {}, MF.h("i", { style: { background: color } }), name))));
       }
     }
-    parts.push(MF.h("ul", {}, items.map(([canvas, words]) => MF.h("li", {}, canvas, words))), run ? switches(store) : "");
+    parts.push(MF.h("ul", {}, items.map(([canvas, words]) => MF.h("li", {}, canvas, words))), run ? switches(store, bundle, run) : "");
     legend.replaceChildren(...parts);
   };
 })();

@@ -3,7 +3,7 @@
 (() => {
   const layersOf = (page) => {
     const { ground } = page;
-    const list = [["none", "Streets only"]];
+    const list = [["none", ground.streets ? "Streets only" : "None"]];
     if (ground.best) list.push(["best", "Best server"], ["strength", "Level of the best server"], ["margin", "Margin"]);
     if (ground.points) list.push(["points", "Points"]);
     ground.bounds.forEach((one, number) => list.push([`bound ${number}`, one.name]));
@@ -21,7 +21,7 @@
       if (changed.has("layer") || changed.has("layerCell")) select.value = layer === "level" || layer === "bound" ? `${layer} ${layerCell}` : layer;
     });
     select.value = page.store.state.layer;
-    return MF.h("label", { class: "field" }, "Layer", select);
+    return MF.h("label", { class: "field", hidden: select.length < 2 }, "Layer", select);
   };
 
   const runField = (page) => {

@@ -32,7 +32,7 @@
       page.lookedAt = known ? here : null;
     } else if (time < page.start) page.store.set({ time: page.start });
     const signs = JSON.stringify([[...new Set(run.epochs.status)], Boolean(run.belief), ["protection", "alt_lead"].map((key) => run.epochs[key].some(Number.isFinite)),
-      run.epochs.way.some((one) => one > 0)]);
+      ["way", "runner_mass"].map((key) => run.epochs[key].some((one) => one > 0))]);
     if (signs !== page.signs) page.maps.forEach((map) => map.refreshLegend());
     page.signs = signs;
     page.redrawAll();

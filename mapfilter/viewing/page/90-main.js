@@ -54,7 +54,7 @@
         MF.say("Place set at the map's center. Click on the map to choose another.");
       } else page.store.set({ against });
     };
-    page.fit = () => page.camera.fit(MF.boxOfRuns(runs, bundle.frame), page.maps[0].view);
+    page.fit = () => page.camera.fit(MF.boxOfRuns(runs, bundle.frame, ground), page.maps[0].view);
     page.center = () => {
       const here = page.active().place(page.active().at(page.store.state.time));
       if (Number.isFinite(here.east)) page.camera.goTo(here.east, here.north);
