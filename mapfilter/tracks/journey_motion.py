@@ -12,7 +12,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.geodesy import wrap_rad
-from mapfilter.tracks.exchanged import check_columns
+from mapfilter.tracks.exchanged import check_columns, check_turning
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -25,6 +25,7 @@ from mapfilter.tracks.moved import (
 )
 from mapfilter.tracks.parted_odometry import parted_odometry, with_turns
 from mapfilter.tracks.pdr.counted import reckon_counted
+from mapfilter.tracks.pdr.mounted import turning_of_mounted
 from mapfilter.tracks.pdr.options import WalkOptions, without_effect
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
@@ -90,7 +91,7 @@ def journey_motion(
     """
     for recording in recordings:
         notes += check_columns(recording)
-    moved = _recorded(recordings, frame, notes)
+    moved = _recorded(recordings, sensors, frame, notes)
     if moved is None and course_motion:
         moved = _course([*recordings, *true], sensors, frame, notes)
     if moved is not None:
@@ -99,7 +100,12 @@ def journey_motion(
     return Moved() if walk is None else _walked(sensors, walk, frame, notes)
 
 
-def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -> Moved | None:
+def _recorded(
+    recordings: Sequence[Recording],
+    sensors: Mapping[str, pd.DataFrame],
+    frame: Frame,
+    notes: list[str],
+) -> Moved | None:
     """Return motion that a recording holds as such, odometry or poses; None without any."""
     for name in ("motion", "odometry", "poses"):
         having = [r for r in recordings if name in r.tables]
@@ -116,7 +122,13 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
         if name == "odometry":
             _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))
             rows, joined = with_turns(rows, turns)
-            moved, imu, words = reckon_odometry(rows)
+            turning = None
+            if rows["yaw_rate_radps"].isna().all():
+                turning, of_phone = turning_of_mounted(sensors)
+                joined = (*joined, *of_phone)
+            if turning is not None:
+                check_turning(rows, turning, ", ".join(r.path.name for r in recordings))
+            moved, imu, words = reckon_odometry(rows, turning)
             notes += [*joined, *words]
             return Moved(moved, imu, vehicle=True, source=source)
         poses, compass = name == "poses", False
