@@ -26,8 +26,8 @@ from mapfilter.tracks.turn_drift import turn_drift_radps
 from mapfilter.viewing.words import REASONS
 
 _MOTION_COLUMNS = (
-    "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps "
-    "or wheel_speed_kmh"
+    "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps, "
+    "wheel_speed_kmh, odometer_m or odometer_km"
 )
 
 _EARLY_S, _EARLY_SHARE = 30.0, 0.1

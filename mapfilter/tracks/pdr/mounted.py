@@ -98,11 +98,12 @@ def _unit(vectors: Floats) -> Floats:
 def _mean(vectors: Floats) -> Floats:
     """Return the running mean of vectors, over seconds without any, too."""
     rolling = pd.DataFrame(vectors).rolling(2 * _AROUND + 1, center=True, min_periods=1)
-    return rolling.mean().to_numpy(dtype=np.float64)
+    return np.asarray(rolling.mean(), dtype=np.float64)
 
 
 def _angle(one: Floats, other: Floats) -> Floats:
-    return np.arccos(np.clip(np.sum(_unit(one) * _unit(other), axis=1), -1.0, 1.0))
+    cosine = np.sum(_unit(one) * _unit(other), axis=1)
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def _cuts(direction: Floats) -> Ints:

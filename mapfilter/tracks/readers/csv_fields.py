@@ -12,7 +12,7 @@ from mapfilter.errors import Faults
 _ALIKE, _ALIKE_SHORT = 0.8, 0.85
 _SHORT = 4
 """Names of so many letters resemble others that differ in one; shorter ones by chance only."""
-_UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_m")
+_UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_km", "_m")
 _UNIT_WORDS = {
     "_mps": "m/s",
     "_kmh": "km/h",
@@ -20,8 +20,10 @@ _UNIT_WORDS = {
     "_degps": "deg/s",
     "_rad": "radians",
     "_deg": "degrees",
+    "_km": "km",
     "step_m": "metres each",
     "steps": "a counter",
+    "odometer_m": "m",
 }
 """Units of fields by their endings, in words."""
 FIELDS: Mapping[str, tuple[str, ...]] = {
@@ -54,6 +56,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
         *("wheel_speed_kmh", "vehicle_speed_kmh"),
         *("wheel speed (km/h)", "vehicle speed (km/h)"),
     ),
+    "odometer_m": ("odometer_m", "odo_m"),
+    "odometer_km": ("odometer_km", "odo_km"),
     "role": ("role",),
     "technology": ("technology", "radio", "rat", "network_type"),
     "cell": ("cell",),
@@ -97,9 +101,9 @@ def usual_fields(names: Collection[str]) -> dict[str, str]:
 
 MOTION_FIELDS = (
     *("step_m", "steps", "compass_deg", "heading_rad", "turn_rad", "turn_deg", "yaw_rate_radps"),
-    *("yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh"),
+    *("yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh", "odometer_m", "odometer_km"),
 )
-"""Fields of which motion is made; step_m, steps or a wheel speed among them."""
+"""Fields of which motion is made; step_m, steps, a wheel speed or an odometer among them."""
 
 
 def meant(column: str, taken: Collection[str] = ()) -> str:
