@@ -14,24 +14,20 @@ from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import MAD_TO_SD
+from mapfilter.tracks.pdr.batches import parted, spread
 from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS
 from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.pdr.step_counts import LATE_S, PAUSE_S, STEPS_PER_S, steps_of_rows
 from mapfilter.tracks.pdr.turns import turning_of
 from mapfilter.tracks.pdr.walk import DECLINATION_SD_RAD
 from mapfilter.tracks.pdr.walk_noise import SCALE, STEP_SHARE
 
-_STEPS_PER_S = 5.0
-"""More than these nobody walks or runs."""
-_LATE_S, _JITTER = 10.0, 20.0
-"""Counters are read up to so many seconds late; falls of fewer steps are of rows out of order."""
-_FALLING = 0.5
-_NEAR_S, _PAUSE_S = 2.0, 30.0
+_NEAR_S = 2.0
 _TURNED = 0.9
 _COUNTED_LATE = 0.5
 _LEAST_HEADING_DEG, _MOST_HEADING_DEG = 3.0, 45.0
 _CARRIED_SD_DEG = 15.0
 _CORRELATION_S = 6.0
-_OWN_COUNTS = "counted in each row"
 _NO_COURSE = (
     "steps are counted, but no compass and no turns are beside them (a column compass_deg, "
     "turn_rad or yaw_rate_radps, or a gyroscope): which way they went is unknown, so there is no "
@@ -67,9 +63,9 @@ def reckon_counted(
     ----------
     sensors : mapping of str to pandas.DataFrame
         ``steps`` (time_s, count: since some start, or in each row, see
-        :func:`are_own_counts`) and ``compass`` (time_s, magnetic_deg,
-        clockwise from magnetic north); without a compass ``turns``, or ``gyroscope`` with
-        ``gravity`` or ``accelerometer``: see :func:`mapfilter.tracks.pdr.turns.turning_of`.
+        :func:`mapfilter.tracks.pdr.step_counts.are_own_counts`) and ``compass`` (time_s,
+        magnetic_deg, clockwise from magnetic north); without a compass ``turns``, or ``gyroscope``
+        with ``gravity`` or ``accelerometer``: see :func:`mapfilter.tracks.pdr.turns.turning_of`.
     options : WalkOptions, optional
         Of which the length of a step and the magnetic declination are used.
     convergence_rad : float
@@ -97,9 +93,12 @@ def reckon_counted(
     options = options or WalkOptions()
     if "steps" not in sensors:
         return None, None, ()
-    rows = sensors["steps"].sort_values("time_s", kind="stable").drop_duplicates("time_s")
+    rows = sensors["steps"].sort_values("time_s", kind="stable")
+    rows = rows.drop_duplicates("time_s", keep="last")
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
-    counted, how = _counted(time_s, rows["count"].to_numpy(dtype=np.float64))
+    counted, how = steps_of_rows(time_s, rows["count"].to_numpy(dtype=np.float64))
+    counted, batches = spread(time_s, counted)
+    time_s, counted = parted(time_s, counted, _times_of_directions(sensors))
     unknown = int(np.isnan(counted).sum())
     if not np.nansum(counted) > 0:
         return None, None, (_without_steps(time_s, counted),)
@@ -123,6 +122,9 @@ def reckon_counted(
     if unknown:
         some = number_of(unknown, "row")
         notes.append(f"motion unknown in {some}: the counter jumped, or paused for 30 s")
+    if batches:
+        some = number_of(batches, "batch", "batches")
+        notes.append(f"steps came late, in {some}: spread over the time since the step before")
     aimless = motion["heading_rad"].isna() & motion["turn_rad"].isna() & (motion["step_m"] > 0)
     # Before the first row there is no turn.
     without = int(aimless.iloc[0 if "compass" in sensors else 1 :].sum())
@@ -131,16 +133,25 @@ def reckon_counted(
     return motion, _errors(motion, options, course.walk_rad), (*notes, *course.notes)
 
 
+def _times_of_directions(sensors: Mapping[str, pd.DataFrame]) -> Floats:
+    """Return the times at which a compass, else turns or a gyroscope, were read."""
+    for name in ("compass", "turns", "gyroscope"):
+        if name in sensors:
+            known = sensors[name].set_index("time_s").notna().any(axis=1)
+            return np.unique(known.index[known].to_numpy(dtype=np.float64))
+    return np.zeros(0)
+
+
 def _without_steps(time_s: Floats, counted: Floats) -> str:
     """Return why there is no motion where no row has a step: all stand still, or are unknown."""
     reason, unknown = "stands still in", np.isnan(counted[1:])
     if unknown.any():
         apart_s = float(np.median(np.diff(time_s)[unknown]))
-        if apart_s > _PAUSE_S:
-            used = f"and used in rows up to {_PAUSE_S:g} s apart"
+        if apart_s > PAUSE_S:
+            used = f"and used in rows up to {PAUSE_S:g} s apart"
             return f"steps are counted in rows {apart_s:.3g} s apart, {used}: no motion"
         reason = (
-            f"begins anew, or grows by more than {_STEPS_PER_S:g} steps/s, in {unknown.sum()} of"
+            f"begins anew, or grows by more than {STEPS_PER_S:g} steps/s, in {unknown.sum()} of"
         )
     rows = number_of(len(counted), "row")
     return (
@@ -194,54 +205,6 @@ def _by_turns(time_s: Floats, sensors: Mapping[str, pd.DataFrame]) -> tuple[_Cou
     return _Course(nothing, turn, whole, walk_rad, source, "no turn known in", notes), ""
 
 
-def are_own_counts(time_s: Floats, count: Floats) -> bool:
-    """Return whether counts are the steps of each row, and not those since some start.
-
-    They fall, and are those of a walk: each, or in the mean where they fall nearly as often as they
-    rise, as steps that come in batches do. A counter that begins anew now and then mostly rises.
-
-    Parameters
-    ----------
-    time_s, count : (N,) array
-
-    Examples
-    --------
-    >>> are_own_counts(np.arange(6.0), np.array([9.0, 0.0, 0.0, 9.0, 0.0, 0.0]))
-    True
-    >>> are_own_counts(np.arange(6.0), np.array([8.0, 9.0, 0.0, 1.0, 3.0, 4.0]))
-    False
-    """
-    change = np.diff(count)
-    if not (change < 0).any():
-        return False
-    most = _STEPS_PER_S * max(float(np.median(np.diff(time_s))), 1.0)
-    batches = np.sum(change < 0) >= _FALLING * np.sum(change > 0)
-    return bool(count.max() <= most or (batches and count.mean() <= most))
-
-
-def _counted(time_s: Floats, count: Floats) -> tuple[Floats, str]:
-    """Return the steps of each row, NaN where unknown, and what the counts were taken for."""
-    lasted_s = np.diff(time_s)
-    is_own = are_own_counts(time_s, count)
-    if is_own:
-        change, how = count[1:], _OWN_COUNTS
-    else:
-        # A counter begins anew when a phone is started.
-        change, how = np.diff(_without_jitter(count)), "by a counter"
-    walkable = (change >= 0) & (change <= _STEPS_PER_S * np.maximum(lasted_s, _LATE_S))
-    # Where a counter is written only when it grows, a few steps end a long rest.
-    paused = (lasted_s > _PAUSE_S) & (change > _JITTER)
-    steps = np.where(walkable & ~paused, change, np.nan)
-    return np.concatenate([count[:1] if is_own else [0.0], steps]), how
-
-
-def _without_jitter(count: Floats) -> Floats:
-    """Return a counter that grows: small falls are of rows out of order, large ones stay."""
-    begins = np.concatenate([[True], np.diff(count) < -_JITTER])
-    grown = [np.maximum.accumulate(part) for part in np.split(count, np.flatnonzero(begins)[1:])]
-    return np.concatenate(grown)
-
-
 def _mean_direction(time_s: Floats, compass: pd.DataFrame) -> tuple[Floats, Floats]:
     """Return the mean azimuth of each row (degrees), and the chord of its way over its length.
 
@@ -256,7 +219,7 @@ def _mean_direction(time_s: Floats, compass: pd.DataFrame) -> tuple[Floats, Floa
     sums = np.concatenate([np.zeros((1, 2)), np.cumsum([np.cos(turn), np.sin(turn)], axis=1).T])
     begin_s = np.concatenate([time_s[:1] - _NEAR_S, time_s[:-1]])
     lasted_s = time_s - begin_s
-    begin_s = np.where(lasted_s > _PAUSE_S, time_s - _LATE_S, begin_s)
+    begin_s = np.where(lasted_s > PAUSE_S, time_s - LATE_S, begin_s)
     first, last = (np.searchsorted(at_s, edge_s, side="right") for edge_s in (begin_s, time_s))
     inside = sums[last] - sums[first]
     mean = np.degrees(np.arctan2(inside[:, 1], inside[:, 0]))

@@ -1,0 +1,64 @@
+"""Steps of each row by a counter, or by rows that count their own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapfilter._types import Floats
+
+STEPS_PER_S = 5.0
+"""More than these nobody walks or runs."""
+LATE_S, _JITTER = 10.0, 20.0
+"""Counters are read up to so many seconds late; falls of fewer steps are of rows out of order."""
+_FALLING = 0.5
+PAUSE_S = 30.0
+"""Motion since a row so long before is not known."""
+_OWN_COUNTS = "counted in each row"
+
+
+def are_own_counts(time_s: Floats, count: Floats) -> bool:
+    """Return whether counts are the steps of each row, and not those since some start.
+
+    They fall, and are those of a walk: each, or in the mean where they fall nearly as often as they
+    rise, as steps that come in batches do. A counter that begins anew now and then mostly rises.
+
+    Parameters
+    ----------
+    time_s, count : (N,) array
+
+    Examples
+    --------
+    >>> are_own_counts(np.arange(6.0), np.array([9.0, 0.0, 0.0, 9.0, 0.0, 0.0]))
+    True
+    >>> are_own_counts(np.arange(6.0), np.array([8.0, 9.0, 0.0, 1.0, 3.0, 4.0]))
+    False
+    """
+    change = np.diff(count)
+    if not (change < 0).any():
+        return False
+    most = STEPS_PER_S * max(float(np.median(np.diff(time_s))), 1.0)
+    batches = np.sum(change < 0) >= _FALLING * np.sum(change > 0)
+    return bool(count.max() <= most or (batches and count.mean() <= most))
+
+
+def steps_of_rows(time_s: Floats, count: Floats) -> tuple[Floats, str]:
+    """Return the steps of each row, NaN where unknown, and what the counts were taken for."""
+    lasted_s = np.diff(time_s)
+    is_own = are_own_counts(time_s, count)
+    if is_own:
+        change, how = count[1:], _OWN_COUNTS
+    else:
+        # A counter begins anew when a phone is started.
+        change, how = np.diff(_without_jitter(count)), "by a counter"
+    walkable = (change >= 0) & (change <= STEPS_PER_S * np.maximum(lasted_s, LATE_S))
+    # Where a counter is written only when it grows, a few steps end a long rest.
+    paused = (lasted_s > PAUSE_S) & (change > _JITTER)
+    steps = np.where(walkable & ~paused, change, np.nan)
+    return np.concatenate([count[:1] if is_own else [0.0], steps]), how
+
+
+def _without_jitter(count: Floats) -> Floats:
+    """Return a counter that grows: small falls are of rows out of order, large ones stay."""
+    begins = np.concatenate([[True], np.diff(count) < -_JITTER])
+    grown = [np.maximum.accumulate(part) for part in np.split(count, np.flatnonzero(begins)[1:])]
+    return np.concatenate(grown)
