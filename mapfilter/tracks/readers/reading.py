@@ -47,8 +47,9 @@ _SEVERAL = ("radio", "satellites", "ephemerides")
 class Reading:
     """Collects the tables, bad rows and notes of one file while it is read.
 
-    ``last_s`` is the last time of the file's rows, used or not; ``columns`` are the names in the
-    file of columns without a usual name, by field.
+    ``last_s`` is the last time of the file's rows, used or not, and ``passed_s`` that of the parts
+    read so far, of formats without ``last_s``; ``columns`` are the names in the file of columns
+    without a usual name, by field.
     """
 
     path: Path
@@ -64,6 +65,7 @@ class Reading:
     named: tuple[str, ...] = ()
     tallies: Tallies = field(default_factory=Tallies)
     last_s: float = -inf
+    passed_s: float = -inf
     columns: dict[str, str] = field(default_factory=dict)
     _firsts: dict[str, str] = field(default_factory=dict)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
