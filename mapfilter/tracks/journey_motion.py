@@ -221,7 +221,8 @@ def _course(
         return Moved(turned[0], turned[1], source=OF_RECEIVER)
     placed = [(r, rows) for r in recordings if (rows := _placed(r)) is not None]
     for recording, rows in placed:
-        if "course_deg" in rows and rows["course_deg"].notna().any():
+        moving = ["speed_mps", "course_deg"]
+        if set(moving) <= set(rows) and rows[moving].notna().all(axis=1).any():
             motion = motion_from_course(rows, frame.convergence_rad)
             imu = course_errors(motion, *frame.east_north(rows, recording.crs))
             told = "speed and course of its fixes", "as they differ from its positions"

@@ -28,7 +28,7 @@ from mapfilter.tracks.pdr.gyroscope import (
 from mapfilter.tracks.pdr.heading import Compass, YawOffset, yaw_offset
 from mapfilter.tracks.pdr.odometry_rows import usable_rows
 from mapfilter.tracks.pdr.signals import inertial_signals
-from mapfilter.tracks.pdr.turns import Turning
+from mapfilter.tracks.pdr.turns import Turning, turning_of_rate
 
 _STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
 _SETTLING_S = 0.4
@@ -40,6 +40,8 @@ _SPEED_SD_MPS = 0.05
 _SCALE = 0.02
 _COURSE_BIAS_DEG = 2.0
 _MOST_SPANS = 50_000
+_DENSE = 1.5
+"""So many times as many yaw rates as speeds are integrated by themselves."""
 _UNSEEN_BIAS_DEG_PER_S = 0.05
 """Error of the bias that standing does not show: of 0.02 deg/s a count, and of warming up."""
 
@@ -67,7 +69,9 @@ def reckon_odometry(
     imu : ImuNoise
     notes : tuple of str
     """
-    rows, unusable = usable_rows(rows.drop_duplicates("time_s"))
+    rows = rows.drop_duplicates("time_s")
+    turning = _dense_turning(rows) if turning is None else turning
+    rows, unusable = usable_rows(rows)
     motion = motion_from_odometry(rows)
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     speed = rows["speed_mps"].to_numpy(dtype=np.float64)
@@ -158,6 +162,18 @@ def reckon_velocity(
     )
     notes = (*_notes(found, int(standing.sum()), has_rate=True), *error_notes(walk_rad))
     return motion, _noise(time_s, found, walk_rad, _SPEED_SD_MPS), notes
+
+
+def _dense_turning(rows: pd.DataFrame) -> Turning | None:
+    """Return the turns by yaw rates that come more often than speeds; None of others.
+
+    Those at the times of speeds alone would be samples of their noise.
+    """
+    rate = rows["yaw_rate_radps"].to_numpy(dtype=np.float64)
+    known = np.isfinite(rate)
+    if known.sum() < _DENSE * rows["speed_mps"].notna().sum():
+        return None
+    return turning_of_rate(rows["time_s"].to_numpy(dtype=np.float64)[known], rate[known], "")
 
 
 def _turned(motion: pd.DataFrame, turning: Turning) -> tuple[pd.DataFrame, Floats]:

@@ -40,7 +40,16 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "turn_rad": ("turn", "turn angle", "heading change"),
     "compass_deg": ("compass", "heading", "azimuth", "compass heading"),
     "yaw_rate_radps": ("yaw rate", "turn rate", "turning rate"),
-    "level_dbm": ("level", "rsrp", "rscp", "rssi", "signal", "signal level", "signal strength"),
+    "level_dbm": (
+        "level",
+        "rsrp",
+        "rscp",
+        "rssi",
+        "signal",
+        "signal level",
+        "signal strength",
+        "serving rsrp",
+    ),
     "pressure_hpa": ("pressure", "air pressure", "barometer", "barometric pressure"),
     **{
         f"{sensor}_{axis}": tuple(f"{word} {axis}" for word in words)

@@ -67,7 +67,9 @@ def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
 
 def unused_note(unread: tuple[str, ...]) -> str:
     """Return a note on columns that are not used, with an option that names one of them."""
-    guessed = next((one for one in unread if one.endswith("?)")), "")
+    guesses = [one for one in unread if one.endswith("?)")]
+    # A height serves for little.
+    guessed = next((one for one in guesses if "altitude_m" not in one), "".join(guesses[:1]))
     if not guessed:
         return f"columns not used: {listed(unread)}; see --column"
     name, _, fields = guessed[:-2].rpartition(" (")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shlex
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -73,10 +74,14 @@ _FIELD_OF_UNIT = {
     "dbm": "level_dbm",
 }
 """Fields that a column whose name is of another language may be, by its unit."""
+_KINDS = ("pid", "signal", "signal_name", "signal name", "name", "sensor", "parameter", "variable")
+_TIMES = ("time", "timestamp", "timestamps", "seconds", "time_s", "t")
+"""Columns of a table with a row for each value, as of loggers of a vehicle's bus."""
 _NOT_READ = {
     ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
     ".dt1": "a Nemo log of version 1; export it as CSV, and map the columns",
     ".trp": "a binary TEMS log; export it as tab-delimited text",
+    ".ntm": "a list of cells of NetMonster, no journey; as [cells] plan with names of its columns",
     ".kml": "KML; export GPX, or a table as CSV",
     ".kmz": "KML; export GPX, or a table as CSV",
     ".geojson": "GeoJSON; export GPX, or a table as CSV",
@@ -188,6 +193,9 @@ def _other_separators(path: Path, text: Text) -> str:
     """Return the hint for a file that would be of a known format with other separators."""
     head = "\n".join(text.head)
     for own, other in itertools.permutations("\t;, ", 2):
+        if own == " " and any(one in text.first_line for one in _SEPARATORS if one != own):
+            # Blanks between words of a table's header separate nothing.
+            continue
         found = find_format(Text(path, head.replace(own, other).encode()))
         if own in head and found is not None:
             return f"{found.title} with {_SEPARATORS[own]} where {_SEPARATORS[other]} should be"
@@ -203,11 +211,26 @@ def _unknown(path: Path, text: Text) -> MapfilterError:
     if text.first_line.lstrip().startswith(_JSON):
         hint = hint or _NOT_READ[".json"]
     if is_table and not hint:
-        hint = _other_names(names)
+        hint = _other_table(names) or _other_names(names)
     got = f"none of them; it begins with {text.first_line[:60]!r}"
     if is_table:
         got = f"none of them, but a table with the columns {listed([n for n in names if n])}"
     return fail(InputError, str(path), f"a recording in a known format ({_LIST})", got, hint)
+
+
+def _other_table(names: Sequence[str]) -> str:
+    """Return the hint for a table whose rows or first line no map of columns mends; "" for none."""
+    if names[0].startswith("wiglewifi"):
+        columns = ("time=FirstSeen", "lat_deg=CurrentLatitude", "lon_deg=CurrentLongitude")
+        options = " ".join(f"--column {one}" for one in (*columns, "cgi=MAC", "technology=Type"))
+        return f"WiGLE, whose names of columns are in the second line: delete the first, {options}"
+    value = next((name for name in names if name in ("value", "values")), "")
+    kind = next((name for name in names if name in _KINDS), "")
+    if value and kind:
+        time = next((name for name in names if name in _TIMES), "time")
+        pivot = f"pandas.pivot_table(rows, values={value!r}, index={time!r}, columns={kind!r})"
+        return f"a row for each value: make a column of each {kind}, as by {pivot}"
+    return ""
 
 
 def _other_names(names: Sequence[str]) -> str:
@@ -216,7 +239,17 @@ def _other_names(names: Sequence[str]) -> str:
     found = {*usual, *stated}
     others = [name for name in names if name and name not in (*usual.values(), *stated.values())]
     likely = {name: fields for name in others if (fields := likely_fields(name, found))}
-    such = [_pairs(name, fields) for name, fields in likely.items()]
+    several = Counter(tuple(fields) for fields in likely.values())
+    such = [
+        _pairs(name, fields)
+        for name, fields in likely.items()
+        if several[tuple(fields)] == 1 or fields[0] == "time"
+    ]
+    such += [
+        f"{fields[0]}= one of {', '.join(name for name in likely if tuple(likely[name]) == fields)}"
+        for fields, count in several.items()
+        if count > 1 and fields[0] != "time"
+    ]
     such += [
         shlex.quote(f"{_FIELD_OF_UNIT[unit]}={name}")
         for name in others
