@@ -6,7 +6,9 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.csv_headers import likely_fields
+from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 
 START_S = 1_778_666_400.0
@@ -221,3 +223,47 @@ def test_rates_of_physics_toolbox(tmp_path):
     columns = {"time": TIME_S, "gFz": 1.0, "wx": 0.1, "wy": 0.2, "wz": 0.3}
     found = read_recording(written(tmp_path, columns)).tables["gyroscope"]
     np.testing.assert_array_equal(found[["x_radps", "y_radps", "z_radps"]].iloc[0], [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize("parts", [False, True])
+@pytest.mark.parametrize("named", [False, True])
+def test_lines_above_a_header_are_left_out(tmp_path, monkeypatch, named, parts):
+    """As by RaceChrono and OBDLink, also in a folder; the file was refused by its first line."""
+    speed = "tempo" if named else "Vehicle speed (km/h)"
+    path = written(tmp_path, {"Time (sec)": TIME_S, speed: 3.6 * SPEED_MPS, "deg": "x"})
+    title = "This file was written by an app.\nFormat,3\n# StartTime = 05/13/2026 10:00:00 AM\n\n"
+    rows = path.read_text().splitlines()
+    rows[100] = "99.0,17.5"
+    path.write_text(title + "\n".join(rows))
+    if parts:
+        monkeypatch.setattr(text, "_PART_BYTES", 512)
+    columns = {"wheel_speed_kmh": speed, "time": "Time (sec)"} if named else {}
+    found = read_recording(path, options=ReadOptions(columns=columns))
+    kept = np.arange(120) != 99
+    np.testing.assert_allclose(found.tables["odometry"]["speed_mps"], SPEED_MPS[kept])
+    assert "4 lines above the header left out" in found.notes
+    (bad,) = found.unusable
+    assert bad.lines == (105,)
+    assert named or len(mf.read_log(tmp_path).motion) == 119
+
+
+def test_raw_frames_of_a_bus_are_named(tmp_path):
+    candump = "".join(f"(1778666400.{k:06d}) can0 1A0#0011223344556677\n" for k in range(50))
+    css = (
+        "TimestampEpoch;BusChannel;ID;IDE;DLC;DataBytes\n1778666400.1;1;1A0;0;8;0011223344556677\n"
+    )
+    for name, content in (("a.log", candump), ("b.csv", css), ("c.asc", "base hex\n 0.1 1 1A0 Rx")):
+        (tmp_path / name).write_text(content)
+        with pytest.raises(InputError, match=r"raw frames of a bus; decode them by its DBC"):
+            read_recording(tmp_path / name)
+
+
+def test_a_compass_of_sensor_logger_gives_steps_a_direction(tmp_path):
+    """Its file was left out, and steps had no direction."""
+    ns = ((START_S + TIME_S) * 1e9).astype(np.int64)
+    common = {"time": ns, "seconds_elapsed": TIME_S}
+    written(tmp_path, common | {"magneticBearing": COURSE_DEG}, "Compass.csv")
+    written(tmp_path, common | {"steps": (1.8 * TIME_S).astype(int)}, "Pedometer.csv")
+    log = mf.read_log(tmp_path)
+    assert log.motion["heading_rad"].notna().all()
+    assert log.motion["step_m"].sum() == pytest.approx(0.7 * 214, abs=1)
