@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -26,7 +26,9 @@ from mapfilter.tracks.moved import (
 from mapfilter.tracks.parted_odometry import parted_odometry, with_turns
 from mapfilter.tracks.pdr.counted import reckon_counted
 from mapfilter.tracks.pdr.mounted import turning_of_mounted
+from mapfilter.tracks.pdr.mounted_clock import clock_shift_s
 from mapfilter.tracks.pdr.options import WalkOptions, without_effect
+from mapfilter.tracks.pdr.turns import AXES, Turning, samples
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.position_motion import motion_from_positions
@@ -35,6 +37,7 @@ from mapfilter.tracks.readers.recording import Recording
 
 _LONGEST_GAP_S = 3600.0
 _SUMMER_HOURS = 1.1
+_FEWEST = 3
 OF_RECEIVER = "motion comes from GNSS"
 
 
@@ -127,6 +130,8 @@ def _recorded(
                 turning, of_phone = turning_of_mounted(sensors)
                 joined = (*joined, *of_phone)
             if turning is not None:
+                turning, late = _on_the_clock_of(having[0], rows, turning, sensors, recordings)
+                joined = (*joined, *late)
                 check_turning(rows, turning, ", ".join(r.path.name for r in recordings))
             moved, imu, words = reckon_odometry(rows, turning)
             notes += [*joined, *words]
@@ -147,6 +152,31 @@ def _recorded(
             notes.append(f"motion: {lacking}: {UNDIRECTED}")
         return Moved(moved, source=source, compass=compass)
     return None
+
+
+def _on_the_clock_of(
+    wheels: Recording,
+    rows: pd.DataFrame,
+    turning: Turning,
+    sensors: Mapping[str, pd.DataFrame],
+    recordings: Sequence[Recording],
+) -> tuple[Turning, tuple[str, ...]]:
+    """Return a phone's turns on the clock of a vehicle's speeds, and a note where it is another."""
+    phones = [r.path.name for r in recordings if "gyroscope" in r.tables and r is not wheels]
+    force = samples(sensors, "accelerometer", AXES) or samples(sensors, "linear_acceleration", AXES)
+    speed = rows.dropna(subset=["speed_mps"])
+    if not phones or force is None or len(speed) < _FEWEST:
+        return turning, ()
+    speeds = speed["time_s"].to_numpy(np.float64), speed["speed_mps"].to_numpy(np.float64)
+    shift_s, best, now = clock_shift_s(speeds, force)
+    if not shift_s:
+        return turning, ()
+    note = (
+        f"{listed(phones)}: accelerations agree with the speeds of {wheels.path.name} best "
+        f"{shift_s:+.1f} s shifted (explained: {best:.2f}, not {now:.2f}); its turns are shifted, "
+        "--offset shifts all of it"
+    )
+    return replace(turning, time_s=turning.time_s + shift_s), (note,)
 
 
 def _walked(

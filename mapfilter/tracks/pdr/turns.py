@@ -11,6 +11,8 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.tracks.pdr.gyroscope import WALK_RAD_PER_SQRT_S, sample_noise
 
+AXES = ("x_mps2", "y_mps2", "z_mps2")
+"""Columns of forces."""
 _LONGEST_S = 2.0
 """Rates that lie farther apart say nothing about what is between them."""
 _GRAVITY_S = 1.0
@@ -98,7 +100,7 @@ def turning_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Turning | None, str
 def force_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats, str] | None:
     """Return times, the (N, 3) force of gravity or the accelerometer, and which; None without."""
     for name in ("gravity", "accelerometer"):
-        if (rows := samples(sensors, name, ("x_mps2", "y_mps2", "z_mps2"))) is not None:
+        if (rows := samples(sensors, name, AXES)) is not None:
             return *rows, name
     return None
 
