@@ -24,8 +24,9 @@ from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.epochs import Epoch, epochs
-from mapfilter.positioning.filter import locate, usable_part
+from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.loop import locate, usable_part
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.store import read_log, write_log
 

@@ -27,7 +27,7 @@ from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench_filter import make_world

@@ -20,7 +20,9 @@ from scipy.spatial import KDTree
 from mapfilter.config.load import load_config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.evaluation.accuracy import Truth, accuracy, score_claims
+from mapfilter.evaluation.accuracy import accuracy
+from mapfilter.evaluation.claims import score_claims
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.foreign import (
     VARIANTS,
     ForeignWorld,
@@ -30,7 +32,7 @@ from mapfilter.experiments.benchmarks.foreign import (
 from mapfilter.experiments.benchmarks.world_cases import HARSH
 from mapfilter.learning.patch import Change, read_patch
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.simulation.worlds.faults import TURNED_DEG, GivenInputs
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log

@@ -23,7 +23,8 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import Filter, locate
+from mapfilter.positioning.filter import Filter
+from mapfilter.positioning.loop import locate
 from mapfilter.roads.raster import raster_lattice, read_raster_ways
 from mapfilter.roads.route_points import RouteSource
 from mapfilter.tracks.log import TrackLog, make_log

@@ -35,7 +35,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.tiled_area import TiledArea
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.roads.index import HALF_WIDTH_M
 from mapfilter.roads.network import street_network

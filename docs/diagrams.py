@@ -11,17 +11,9 @@ from mapfilter.evaluation.intervals import share_interval
 from mapfilter.evaluation.stanford import stanford_bins, stanford_counts
 from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.integrity import sample_tail
-from mapfilter.report.canvas import (
-    BLUE,
-    GREY,
-    ORANGE,
-    VERMILLION,
-    new_figure,
-    save,
-    styled,
-    tidy,
-)
+from mapfilter.report.canvas import BLUE, GREY, ORANGE, VERMILLION, new_figure, styled, tidy
 from mapfilter.report.integrity import plot_coverage, plot_stanford
+from mapfilter.report.saving import save
 from mapfilter.workflows.evaluate_foreign import load_foreign, run_foreign
 
 SMALL_CITY = (

@@ -26,9 +26,9 @@ from mapfilter.config.load import load_config
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.evaluation.accuracy import Truth
-from mapfilter.positioning.filter import locate
+from mapfilter.evaluation.truth import Truth
 from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.report.basemap import BaseMap

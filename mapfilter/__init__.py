@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from mapfilter.api.bounds import Bound as Bound
     from mapfilter.api.bounds import bound as bound
     from mapfilter.api.journeys import simulate as simulate
-    from mapfilter.api.located import Score as Score
     from mapfilter.api.located import Track as Track
     from mapfilter.api.located import locate as locate
-    from mapfilter.api.located import score as score
     from mapfilter.api.logs import read_log as read_log
     from mapfilter.api.pictures import save_picture as save_picture
     from mapfilter.api.reports import locate_reports as locate_reports
+    from mapfilter.api.scored import Score as Score
+    from mapfilter.api.scored import score as score
     from mapfilter.api.studies import Sweep as Sweep
     from mapfilter.api.studies import sweep as sweep
     from mapfilter.database.build import build as build
@@ -43,9 +43,6 @@ if TYPE_CHECKING:
     from mapfilter.positioning.bayes.options import GridFilter as GridFilter
     from mapfilter.positioning.candidate import CandidateFilter as CandidateFilter
     from mapfilter.positioning.epochs import Epoch as Epoch
-    from mapfilter.positioning.epochs import epochs as epochs
-    from mapfilter.positioning.estimate import Fix as Fix
-    from mapfilter.positioning.estimate import StepOutput as StepOutput
     from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
     from mapfilter.positioning.filter import Filter as Filter
     from mapfilter.positioning.fingerprints.located import LocatedReports as LocatedReports
@@ -54,6 +51,9 @@ if TYPE_CHECKING:
         read_fingerprint_table as read_fingerprint_table,
     )
     from mapfilter.positioning.kalman.filter import KalmanFilter as KalmanFilter
+    from mapfilter.positioning.merging import epochs as epochs
+    from mapfilter.positioning.step_output import Fix as Fix
+    from mapfilter.positioning.step_output import StepOutput as StepOutput
     from mapfilter.radio.cells import CellPlan as CellPlan
     from mapfilter.radio.plan_files import read_cell_plan as read_cell_plan
     from mapfilter.rasters.opening import open_rasters as open_rasters
@@ -71,10 +71,11 @@ if TYPE_CHECKING:
 _NAMES = {
     "api.bounds": "Bound bound",
     "api.journeys": "simulate",
-    "api.located": "Score Track locate score",
+    "api.located": "Track locate",
     "api.logs": "read_log",
     "api.pictures": "save_picture",
     "api.reports": "locate_reports",
+    "api.scored": "Score score",
     "api.studies": "Sweep sweep",
     "database.build": "build",
     "database.radioroutes": "RadioRouteDatabase",
@@ -84,13 +85,15 @@ _NAMES = {
     "lattice": "Lattice",
     "positioning.bayes.options": "BayesFilter GridFilter",
     "positioning.candidate": "CandidateFilter",
-    "positioning.epochs": "Epoch epochs",
-    "positioning.estimate": "Fix StepOutput TrackEstimate",
+    "positioning.epochs": "Epoch",
+    "positioning.estimate": "TrackEstimate",
     "positioning.filter": "Filter",
     "positioning.fingerprints.located": "LocatedReports",
     "positioning.fingerprints.reports": "Reports",
     "positioning.fingerprints.tables": "read_fingerprint_table",
     "positioning.kalman.filter": "KalmanFilter",
+    "positioning.merging": "epochs",
+    "positioning.step_output": "Fix StepOutput",
     "radio.cells": "CellPlan",
     "radio.plan_files": "read_cell_plan",
     "rasters.opening": "open_rasters",

@@ -7,15 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
 
-_KMH, _MPH, _KNOT, _FOOT, _DEGREE, _G = 1 / 3.6, 0.44704, 1852 / 3600, 0.3048, pi / 180, 9.80665
+from mapfilter._constants import FOOT_M, GRAVITY_MPS2, KMH_MPS, KNOT_MPS, MPH_MPS
+
+_DEGREE = pi / 180
 
 UNITS: Mapping[str, Mapping[str, float]] = {
     "speed": {
         "m/s": 1.0,
-        "km/h": _KMH,
-        "mph": _MPH,
-        "knots": _KNOT,
-        "ft/s": _FOOT,
+        "km/h": KMH_MPS,
+        "mph": MPH_MPS,
+        "knots": KNOT_MPS,
+        "ft/s": FOOT_M,
         "cm/s": 0.01,
         "mm/s": 0.001,
     },
@@ -33,7 +35,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
         "km": 1000.0,
         "cm": 0.01,
         "mm": 0.001,
-        "ft": _FOOT,
+        "ft": FOOT_M,
         "in": 0.0254,
         "mi": 1609.344,
     },
@@ -47,7 +49,13 @@ UNITS: Mapping[str, Mapping[str, float]] = {
         "mmhg": 1.333224,
         "inhg": 33.86389,
     },
-    "acceleration": {"m/s2": 1.0, "g": _G, "mg": 0.001 * _G, "cm/s2": 0.01, "mm/s2": 0.001},
+    "acceleration": {
+        "m/s2": 1.0,
+        "g": GRAVITY_MPS2,
+        "mg": 0.001 * GRAVITY_MPS2,
+        "cm/s2": 0.01,
+        "mm/s2": 0.001,
+    },
     "magnetic field": {"ut": 1.0, "nt": 0.001, "mt": 1000.0, "gauss": 100.0, "mgauss": 0.1},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
 }

@@ -242,9 +242,14 @@ def _place_in(
     raise fail(InputError, str(path), expected, names, hint)
 
 
+def most_unpacked_bytes(size_bytes: int) -> int:
+    """Return the most bytes that a packed file of a size may have when unpacked."""
+    return _LARGEST_RATIO * size_bytes + _ALWAYS_ALLOWED_BYTES
+
+
 def _check_extent(path: Path, entries: Sequence[zipfile.ZipInfo], size_bytes: int) -> None:
     unpacked_bytes = sum(entry.file_size for entry in entries)
-    allowed_bytes = _LARGEST_RATIO * size_bytes + _ALWAYS_ALLOWED_BYTES
+    allowed_bytes = most_unpacked_bytes(size_bytes)
     if unpacked_bytes > allowed_bytes or len(entries) > _MOST_ENTRIES:
         expected = f"at most {allowed_bytes >> 20} MB when unpacked"
         got, hint = f"{unpacked_bytes >> 20} MB", "possible decompression bomb"

@@ -33,10 +33,10 @@ from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_worl
 from mapfilter.lattice import Lattice
 from mapfilter.learning.patch import Change, Patch, read_patch, write_patch
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.estimate_store import read_estimate, write_estimate
 from mapfilter.positioning.fingerprints.locating import fit_locator
 from mapfilter.positioning.fingerprints.sources import reports_of_database
+from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.serving.documents import RequestError, read_object
 from mapfilter.serving.epoch_rows import read_epochs

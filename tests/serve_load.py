@@ -168,7 +168,7 @@ async def faults(port: int, ids: list[str]) -> dict:
 
 def city(folder: Path) -> tuple[Path, list[dict]]:
     """A made city with its database, and the epochs of a walk in it."""
-    from mapfilter.positioning.epochs import epochs
+    from mapfilter.positioning.merging import epochs
     from mapfilter.tracks.store import read_log
     from mapfilter.workflows.demo import run_demo
 

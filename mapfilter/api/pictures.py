@@ -34,7 +34,7 @@ def save_picture(picture: Axes | Figure, path: Path | str | os.PathLike[str]) ->
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from mapfilter.report.canvas import save
+    from mapfilter.report.saving import save
 
     check_arguments(
         "save_picture",

@@ -31,7 +31,7 @@ from mapfilter.api.journeys import (
 )
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.evaluation.success import HEADING, READING, success_cells
+from mapfilter.evaluation.success_cells import HEADING, READING, success_cells
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
     GYRO_ERRORS,
@@ -83,8 +83,8 @@ class Sweep:
     def to_dataframe(self) -> pd.DataFrame:
         """Return success rates with 95 % intervals and mean errors, one row for each grid cell.
 
-        Columns are those of :class:`mapfilter.evaluation.success.SuccessCell`, with one for each
-        varied option in place of ``varied``, named by its key as in ``runs``.
+        Columns are those of :class:`mapfilter.evaluation.success_cells.SuccessCell`, with one for
+        each varied option in place of ``varied``, named by its key as in ``runs``.
         """
         return pd.DataFrame([cell.row for cell in success_cells(self.runs)])
 

@@ -9,10 +9,8 @@ import numpy as np
 from mapfilter.check.findings import Findings
 from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.identities import parse_cgi
+from mapfilter.radio.identities import UNIQUE_IN_NETWORK, parse_cgi
 
-_UNIQUE_IN_NETWORK = ("LTE", "NR")
-"""Technologies whose cell identity is unique in a network, whatever the tracking area."""
 _SITES_ABOUT = 6
 _NEAR_M, _ROUNDED_M = 10_000.0, 2.0
 
@@ -29,7 +27,7 @@ def check_identities(plan: CellPlan, where: str, findings: Findings) -> None:
         if len(cells) > 1:
             shown = "-".join(str(part) for part in (*network, ci) if part is not None)
             # Without network and area other cells of the world have the same number, too.
-            needed = network[:2] if technology in _UNIQUE_IN_NETWORK else network
+            needed = network[:2] if technology in UNIQUE_IN_NETWORK else network
             is_whole = None not in needed
             stated.setdefault(is_whole, []).append(f"{listed(cells, 3)} have {shown}")
             held.setdefault(is_whole, []).extend(cells)
@@ -48,7 +46,7 @@ def _by_identity(plan: CellPlan) -> dict[tuple[int | str | None, ...], list[str]
         if ci is None and (parts := parse_cgi(cell.id)) is not None:
             mcc, mnc, lac, ci = parts
         if ci is not None:
-            counts = cell.technology not in _UNIQUE_IN_NETWORK or mnc is None
+            counts = cell.technology not in UNIQUE_IN_NETWORK or mnc is None
             key = ci, mcc, mnc, lac if counts else None, cell.technology
             found.setdefault(key, []).append(cell.id)
     return found

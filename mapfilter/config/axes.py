@@ -10,8 +10,8 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from mapfilter._annotations import expected, fits, plain_types
+from mapfilter.config.field_faults import faults_of
 from mapfilter.config.fields import field_annotation
-from mapfilter.config.load import faults_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults, MapfilterError, fail
 

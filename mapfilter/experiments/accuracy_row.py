@@ -9,6 +9,7 @@ from math import isfinite, nan
 import numpy as np
 
 from mapfilter._types import Bools, Floats
+from mapfilter.evaluation.accuracy import mean_of
 from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
 
 
@@ -126,8 +127,3 @@ def quantile_of(values: Floats, share: float) -> float:
     above = float(np.quantile(values, share, method="higher"))
     # Between a finite and an infinite error there is no interpolation.
     return float(np.quantile(values, share)) if isfinite(above) else above
-
-
-def mean_of(values: Floats) -> float:
-    """Return the mean; NaN without values."""
-    return float(np.mean(values)) if values.size else nan

@@ -21,15 +21,13 @@ from mapfilter.filters._square_root import (
     cholesky_lanes,
     correct_lanes,
     covariance_lanes,
-    drop_absent,
     evidence_lanes,
     kernel,
-    noise_lanes,
     predict_lanes,
     solve_lanes,
     through_lanes,
-    whiten_lanes,
 )
+from mapfilter.filters._whitening import drop_absent, noise_lanes, whiten_lanes
 from mapfilter.filters.gaussian import Method
 
 _CONVERGED = 1e-9

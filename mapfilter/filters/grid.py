@@ -24,7 +24,8 @@ from mapfilter.filters.belief_models import Cloud, PriorT, ReadingT, WeighingMod
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.grid_transport import shifted, taps, turned
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
-from mapfilter.filters.particle import ParticleOptions, switched
+from mapfilter.filters.particle import ParticleOptions
+from mapfilter.filters.switch_rule import switched
 
 _LEAST_MASS = 1e-9
 _NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -296,10 +297,9 @@ class GridFilter(Generic[PriorT, ReadingT]):
             belief.agreement_start_m,
             agrees=weighed.summary.mass_50m >= self.options.switch_mass
             and self.model.can_converge(weighed.summary, reading),
+            splits=weighed.summary.mass_50m < self.options.split_mass,
             hold_m=self.options.switch_hold_m,
         )
-        if status is not Status.SEARCHING and weighed.summary.mass_50m < self.options.split_mass:
-            status, agreement_start_m = Status.SEARCHING, nan
         now = replace(weighed, status=status, agreement_start_m=agreement_start_m)
         return now, UpdateInfo(Reason.USED, status, int(mass.size))
 

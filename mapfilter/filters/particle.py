@@ -31,6 +31,7 @@ from mapfilter.filters.resampling import (
     systematic_by,
     taken,
 )
+from mapfilter.filters.switch_rule import switched
 from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 _LEAST_WEIGHT = np.finfo(np.float32).tiny
@@ -88,29 +89,6 @@ class ParticleOptions(Options):
             found = f"{self.min_particles} and {self.max_particles}"
             where = "ParticleOptions, min_particles and max_particles"
             faults.add(where, "min_particles <= max_particles", found)
-
-
-def switched(
-    status: Status, travelled_m: float, agreement_start_m: float, *, agrees: bool, hold_m: float
-) -> tuple[Status, float]:
-    """Return the status after an update, and at which distance the switch rule began to hold.
-
-    The distance is NaN where the rule does not hold; ``agrees`` is whether it holds now, ``hold_m``
-    for how many metres it must.
-
-    Examples
-    --------
-    >>> switched(Status.SEARCHING, 100.0, 85.0, agrees=True, hold_m=14.0)
-    (<Status.CONVERGED: 'CONVERGED'>, 85.0)
-    """
-    if status is not Status.SEARCHING:
-        converged = status is Status.CONVERGED
-        return (Status.TRACKING if converged else status), agreement_start_m
-    if not agrees:
-        return Status.SEARCHING, nan
-    since_m = agreement_start_m if isfinite(agreement_start_m) else travelled_m
-    held = travelled_m - since_m >= hold_m
-    return (Status.CONVERGED if held else Status.SEARCHING), since_m
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,10 +230,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             agrees=belief.status is Status.SEARCHING
             and summary.mass_50m >= options.switch_mass
             and self.model.can_converge(summary, reading),
+            splits=summary.mass_50m < options.split_mass,
             hold_m=options.switch_hold_m,
         )
-        if status is not Status.SEARCHING and summary.mass_50m < options.split_mass:
-            status, agreement_start_m = Status.SEARCHING, nan
         searching = status is Status.SEARCHING
         if searching and options.mass_exponent < 1:
             weight = flattened(state, weight, belief.bins, options.mass_exponent)

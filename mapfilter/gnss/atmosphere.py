@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._constants import DAY_S, LIGHT_MPS
 from mapfilter._types import Floats
-from mapfilter.gnss.earth_rotation import LIGHT_MPS
 
 _LEAST_ELEVATION_RAD = 0.05
 _ZENITH_S = 5e-9
 _LOCAL_NOON_S = 50_400.0
-_DAY_S = 86_400.0
 
 
 def troposphere_m(elevation_rad: ArrayLike, altitude_m: float = 0.0) -> Floats:
@@ -68,7 +67,7 @@ def ionosphere_m(
     lat = np.clip(lat_deg / 180.0 + angle * np.cos(azimuth_rad), -0.416, 0.416)
     lon = lon_deg / 180.0 + angle * np.sin(azimuth_rad) / np.cos(lat * np.pi)
     magnetic = lat + 0.064 * np.cos((lon - 1.617) * np.pi)
-    local_s = np.mod(43_200.0 * lon + np.asarray(tow_s, dtype=np.float64), _DAY_S)
+    local_s = np.mod(43_200.0 * lon + np.asarray(tow_s, dtype=np.float64), DAY_S)
     powers = magnetic[..., np.newaxis] ** np.arange(4)
     amplitude = np.maximum(powers @ np.asarray(alpha, dtype=np.float64), 0.0)
     period = np.maximum(powers @ np.asarray(beta, dtype=np.float64), 72_000.0)

@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from mapfilter._constants import DAY_S, LIGHT_MPS
 from mapfilter._types import Floats, Ints
-from mapfilter.gnss.earth_rotation import LIGHT_MPS, in_frame_of_reception
+from mapfilter.gnss.earth_rotation import in_frame_of_reception
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, LEAPS_UTC_S
 
 GPS_EPOCH_UTC_S = 315_964_800.0
@@ -18,7 +19,6 @@ _GRAVITY = {"G": 3.986005e14, "J": 3.986005e14, "E": 3.986004418e14, "C": 3.9860
 _EARTH_RATE = {"C": 7.292115e-5}
 _RELATIVITY = -4.442807633e-10
 _OLDEST_S = 4 * 3600.0
-_DAY_S = 86_400.0
 UNPLACED = "without an ephemeris within 4 h"
 """In the note on satellites that stay without a place."""
 
@@ -153,7 +153,7 @@ def _days(rows: pd.DataFrame, ephemerides: pd.DataFrame) -> str:
     if not len(ephemerides) or not len(rows):
         return ""
     middles = float(ephemerides["toe_s"].median()), float(gps_from_utc_s(rows["time_s"].median()))
-    if abs(middles[0] - middles[1]) <= _DAY_S:
+    if abs(middles[0] - middles[1]) <= DAY_S:
         return ""
     of, measured = (
         pd.Timestamp(GPS_EPOCH_UTC_S + seconds, unit="s").date().isoformat() for seconds in middles

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Floats
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S
-
-LIGHT_MPS = 299_792_458.0
 
 
 def in_frame_of_reception(sent_m: ArrayLike, range_m: ArrayLike) -> Floats:

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._constants import GPS_EPOCH_S
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.gnss.almanacs import WEEK_S, Almanac
@@ -18,7 +19,6 @@ EARTH_RATE_RAD_S = 7.2921151467e-5
 OLDEST_DAYS = 180.0
 """Farther from its time of applicability an almanac is too inaccurate."""
 
-_GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
 LEAPS_UTC_S = tuple(
     datetime(year, month, 1, tzinfo=UTC).timestamp()
     for month, years in (
@@ -42,10 +42,10 @@ def gps_time(utc_s: float) -> tuple[int, float]:
     >>> gps_time(datetime(2017, 1, 1, tzinfo=UTC).timestamp())
     (1930, 18.0)
     """
-    if not (np.isfinite(utc_s) and utc_s >= _GPS_EPOCH_S):
+    if not (np.isfinite(utc_s) and utc_s >= GPS_EPOCH_S):
         hint = "seconds since another start than 1970" if np.isfinite(utc_s) else ""
         raise fail(InputError, "utc_s", "Unix time from 6 January 1980 on", utc_s, hint)
-    elapsed = utc_s - _GPS_EPOCH_S + sum(utc_s >= leap for leap in LEAPS_UTC_S)
+    elapsed = utc_s - GPS_EPOCH_S + sum(utc_s >= leap for leap in LEAPS_UTC_S)
     week = int(elapsed // WEEK_S)
     return week, elapsed - week * WEEK_S
 

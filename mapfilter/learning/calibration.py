@@ -15,7 +15,8 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.learning.likelihood import report_log_likelihood
 
 REFERENCE_M = 300.0
-_NEAREST_M = 20.0
+NEAREST_M = 20.0
+"""Shorter distances from a mast count as this one."""
 _LEAST, _MOST = 20, 3000
 _OFFSET_SD_DB, _SLOPE_SD_DB = 5.0, 8.0
 _FEW_CELLS, _START_DB = 6, 9.0
@@ -45,7 +46,7 @@ class Calibration:
 
 def log_distance(distance_m: Floats) -> Floats:
     """Return the decades of distance beyond 300 m."""
-    return np.asarray(np.log10(np.maximum(distance_m, _NEAREST_M) / REFERENCE_M))
+    return np.asarray(np.log10(np.maximum(distance_m, NEAREST_M) / REFERENCE_M))
 
 
 def calibrate(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Floats, Ints
 from mapfilter.learning.calibration import Calibration, calibrate
 from mapfilter.learning.cell_evidence import Explanation, Scene
@@ -95,7 +96,7 @@ def fit_network(visits: Visits, patterns: Patterns, place: Ints, journeys: int) 
         used = visits.received & np.isfinite(expected) & (trust[visits.journey] > 0.5)
         if used.any():
             left = (visits.level_dbm - expected)[used]
-            sd_db = float(np.clip(1.4826 * np.median(np.abs(left - np.median(left))), *_SD_DB))
+            sd_db = float(np.clip(MAD_TO_SD * np.median(np.abs(left - np.median(left))), *_SD_DB))
         trust = _trust(visits, expected, base, sd_db, journeys)
     return Learned(network, classes[False], classes[True], phone, trust, sd_db)
 
@@ -106,7 +107,7 @@ def _scatter_db(cells: tuple[Explanation, ...]) -> float:
     usual, few = LevelNoise.cells_sd_db, _USUAL_CELLS
     if not offsets.size:
         return usual
-    robust = 1.4826 * float(np.median(np.abs(offsets)))
+    robust = MAD_TO_SD * float(np.median(np.abs(offsets)))
     variance = (few * usual**2 + offsets.size * robust**2) / (few + offsets.size)
     return float(np.clip(np.sqrt(variance), 1.5, 6.0))
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapfilter._types import Bools, Floats, Ints
-from mapfilter.database.radioroutes import RadioField
+from mapfilter._types import Bools, Ints
+from mapfilter.database.field import RadioField
 from mapfilter.learning.fit import Learned, fit_network
 from mapfilter.learning.network import Finding
 from mapfilter.learning.patch import Change
@@ -140,11 +140,3 @@ def _change(one: Finding, offsets_db: dict[str, float]) -> Change:
         journeys=one.journeys,
         agreeing=one.agreeing,
     )
-
-
-def offsets_of(learned: Learned, plan: CellPlan) -> Floats:
-    """Return the offset of each cell of a plan, NaN of dead ones."""
-    alive = [state.kind != "dead" for state in learned.network.cells]
-    found = [state.offset_db for state in learned.network.cells]
-    assert len(found) == len(plan)
-    return np.where(alive, found, np.nan)

@@ -15,7 +15,7 @@ import shapely
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.errors import InputError
 from mapfilter.learning.patch import Change
 from mapfilter.learning.tracks import JourneyTrack

@@ -16,11 +16,11 @@ import numpy as np
 
 from mapfilter._types import Floats, Ints
 from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, unproject
+from mapfilter.learning.calibration import NEAREST_M
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
 
 _SAME_MAST_M = 1.0
-_NEAREST_M = 20.0
 _LEAST_POINTS = 30
 
 
@@ -56,7 +56,7 @@ class Patterns:
         one = self.plan.cells[cell]
         distance = np.hypot(self.east_m - east_m, self.north_m - north_m)
         at_100_m, slope = self._fall_off[one.indoor]
-        level = one.eirp_dbm + at_100_m - slope * np.log10(np.maximum(distance, _NEAREST_M) / 100)
+        level = one.eirp_dbm + at_100_m - slope * np.log10(np.maximum(distance, NEAREST_M) / 100)
         if one.azimuth_deg is not None:
             level = level + self.gain_db(one, one.azimuth_deg, (east_m, north_m))
         return np.asarray(np.maximum(level, self.floor_dbm - 20.0))
@@ -123,7 +123,7 @@ class Patterns:
             cell, level = self.plan.cells[c], self.level_dbm[:, c]
             known = level >= self.floor_dbm
             distance = np.hypot(self.east_m - cell.east_m, self.north_m - cell.north_m)
-            logs.append(np.log10(np.maximum(distance, _NEAREST_M) / 100)[known])
+            logs.append(np.log10(np.maximum(distance, NEAREST_M) / 100)[known])
             gain = self.gain_db(cell, cell.azimuth_deg or 0.0)
             losses.append((level - cell.eirp_dbm - gain)[known])
         x, y = np.concatenate(logs), np.concatenate(losses)

@@ -9,8 +9,8 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.learning.visits import Placed
-from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import TrackLog
 
 TRUTH_RADIUS_M = 5.0

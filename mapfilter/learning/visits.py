@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.schema import SERVING

@@ -14,11 +14,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.options import NotNegative, Options
-
-SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +69,7 @@ def clock_noise(
     bias = h0 * t / 2 + 2 * h1 * t**2 + 2 / 3 * np.pi**2 * h2 * t**3
     cross = 2 * h1 * t + np.pi**2 * h2 * t**power
     drift = h0 / (2 * t) + 2 * h1 + 8 / 3 * np.pi**2 * h2 * t
-    return np.array([[bias, cross], [cross, drift]]) * SPEED_OF_LIGHT_MPS**2
+    return np.array([[bias, cross], [cross, drift]]) * LIGHT_MPS**2
 
 
 @dataclass(frozen=True, eq=False)

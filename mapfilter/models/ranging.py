@@ -27,11 +27,11 @@ from mapfilter.models.gaussian import (
     places,
     terms,
 )
-from mapfilter.models.motion import SPEED_OF_LIGHT_MPS
 from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import COMPONENT, DIFFERENCE, RANGE
+from mapfilter.radio.identities import TIMING_STEP_M
 
-GSM_STEP_M = SPEED_OF_LIGHT_MPS * 48 / 13 * 1e-6 / 2
+GSM_STEP_M = TIMING_STEP_M["GSM"]
 """About 553 m; in LTE a step is 78.1 m."""
 
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from mapfilter._words import number_of
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import GnssFix
-from mapfilter.positioning.gnss.fixes import widened
+from mapfilter.positioning.epochs import FIX_SD_M
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.sensors.undirected import APART_M, APART_SD
 from mapfilter.tracks.log import TrackLog
@@ -37,7 +35,7 @@ def assumed_note(log: TrackLog, options: Any, uses: Collection[str]) -> tuple[st
     if isinstance(options, KalmanFilter):
         assumed_m, by = options.fix_sd_m, "filter.kalman.fix_sd_m; "
     else:
-        assumed_m, by = sqrt(widened(GnssFix(0.0, 0.0), 1.0).var_east_m2), ""
+        assumed_m, by = FIX_SD_M, ""
     return (
         f"gnss: {number_of(unstated, 'fix', 'fixes')} without an error: a standard deviation of "
         f"{assumed_m:g} m east and north is assumed ({by}in a CSV a column accuracy_m gives it)",

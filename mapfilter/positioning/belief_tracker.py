@@ -23,8 +23,8 @@ from mapfilter.filters.contract import (
 )
 from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
+from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 from mapfilter.tracks.schema import SERVING
 
 _SILENT = (Reason.USED, Reason.NOT_MOVED_ENOUGH)

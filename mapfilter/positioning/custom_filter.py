@@ -29,8 +29,8 @@ from mapfilter.filters.contract import ReturnTypeError, checked_pair
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
 from mapfilter.positioning.candidate import cell_points, startable
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind, Smoother
+from mapfilter.positioning.step_output import StepOutput
 
 ADVICE = "mapfilter.testing.check_filter names the clause of the contract that it breaks"
 """Hint of errors in the code of a custom filter."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import StepOutput, TrackEstimate, TrackEvidence, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence
+from mapfilter.positioning.step_output import StepOutput, UnusedReading
 
 _NUMBERS = 14
 """Numbers of a fix in the order of :meth:`EstimateColumns.add`."""

@@ -21,7 +21,8 @@ from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
-from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence
+from mapfilter.positioning.step_output import UnusedReading
 
 VERSION = 3
 _META = b"mapfilter"

@@ -29,13 +29,13 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import ConfigError, fail
+from mapfilter.filters.hypotheses import RINGS_PER_SQRT_M
 
 DEFAULT_RISK = 1e-3
 """Probability, at each epoch, that the error exceeds the protection level."""
 
 _F = np.float32
 _Z_95 = 1.6448536269514722
-_RINGS_PER_SQRT_M = 30.0
 _RINGS = 4096
 _SILVERMAN = 1.06
 _HALF_PER_SD = 0.75
@@ -149,7 +149,7 @@ def _rings(
     count = weight.size
     of_ring, ring_of = np.zeros(_RINGS + 1), np.empty(count, dtype=np.int32)
     squares, total, last = 0.0, 0.0, 0
-    cx, cy, per_root, most = _F(x), _F(y), _RINGS_PER_SQRT_M, float(_RINGS)
+    cx, cy, per_root, most = _F(x), _F(y), RINGS_PER_SQRT_M, float(_RINGS)
     for i in range(count):
         dx, dy = east[i] - cx, north[i] - cy
         ring = per_root * np.sqrt(np.sqrt(dx * dx + dy * dy))
@@ -168,7 +168,7 @@ def _rings(
     edge, mass, at, held, half = np.empty(rings), np.empty(rings), 0, 0.0, 0.0
     for k in range(last + 1):
         if of_ring[k] > 0:
-            edge[at], mass[at] = ((k + 1) / _RINGS_PER_SQRT_M) ** 2, of_ring[k] / total
+            edge[at], mass[at] = ((k + 1) / RINGS_PER_SQRT_M) ** 2, of_ring[k] / total
             if held < 0.5:
                 half = edge[at]
             held += mass[at]

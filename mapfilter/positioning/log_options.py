@@ -9,30 +9,26 @@ from typing import Annotated, Any, Literal, TypeVar
 import numpy as np
 from annotated_types import Ge, Le
 
-from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.options import Options
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.kalman.models import KalmanOptions
-from mapfilter.positioning.sensors.pace import WALKERS_MPS
+from mapfilter.positioning.logged_errors import (
+    by_typical_step,
+    has_long_rows,
+    standing_errors,
+    stated_errors,
+    turn_drift_deg_per_s,
+)
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_fault import fault_notes
-from mapfilter.tracks.speeds import FASTEST_MPS, speed_fault
-from mapfilter.tracks.turn_drift import turn_drift_radps
-from mapfilter.tracks.turn_noise import turns_at_standstill
+from mapfilter.tracks.speeds import speed_fault
 
 STREETS_ALONE = "no cells in the log: located by streets, and by positions where it has some"
 
 OptionsT = TypeVar("OptionsT")
-
-_LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG = 0.05, 0.5
-"""Least errors that a filter assumes: particles need some spread."""
-_STANDING_MPS = 0.2
-_LONG_ROW_M = 15.0
-"""Rows that are usually longer are no steps, whatever their speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,38 +87,30 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
     Options that are no dataclass, lack these fields, or have other values than the defaults, are
     not changed.
     """
-    default = _defaults(options)
     changes, notes = _stated_changes(options, LogStatement.of_log(log))
     if log.vehicle is None and has_default(options, "vehicle"):
         vehicle, note = _motion_by_signs(log)
         if vehicle is not None:
             changes["vehicle"] = vehicle
         notes += [note] if note else []
-    stated, units = _motion_errors(log), {}
-    if isinstance(options, BayesFilter) and stated and _has_long_rows(log):
-        stated["step_sd_m"] = _by_typical_step(stated["step_sd_m"], log)
+    stated, units = stated_errors(log), {}
+    if isinstance(options, BayesFilter) and stated and has_long_rows(log):
+        stated["step_sd_m"] = by_typical_step(stated["step_sd_m"], log)
         units["step_sd_m"] = f" (of a step of {MotionErrors().typical_step_m:g} m)"
-    measured = {
-        name: value
-        for name, value in stated.items()
-        if has_default(options, name) and value != default[name]
-    }
+    measured = _in_place_of_defaults(options, stated)
     if measured:
         shown = ", ".join(
             f"{name} = {value:.3g}{units.get(name, '')}" for name, value in measured.items()
         )
         notes.append(f"errors of motion as the log states them: {shown}")
         changes |= measured
-    standing = {
-        name: value
-        for name, value in _standing_errors(log).items()
-        if has_default(options, name) and value != default[name]
-    }
+    standing = _in_place_of_defaults(options, standing_errors(log))
     if standing:
         shown = ", ".join(f"{name} = {value:.3g}" for name, value in standing.items())
         notes.append(f"errors of turns as they are at standstill: {shown}")
         changes |= standing
-    drift_deg_per_s = _turn_drift_deg_per_s(options, log)
+    may_drift = has_default(options, "turn_rate_sd_deg_per_s")
+    drift_deg_per_s = turn_drift_deg_per_s(log) if may_drift else 0.0
     if drift_deg_per_s > changes.get("turn_rate_sd_deg_per_s", 0.0):
         changes["turn_rate_sd_deg_per_s"] = drift_deg_per_s
         notes.append(
@@ -163,6 +151,16 @@ def has_default(options: Any, name: str) -> bool:
     return name in default and bool(getattr(options, name) == default[name])
 
 
+def _in_place_of_defaults(options: Any, found: dict[str, float]) -> dict[str, float]:
+    """Return those of some values that are other than defaults which options have."""
+    default = _defaults(options)
+    return {
+        name: value
+        for name, value in found.items()
+        if has_default(options, name) and value != default[name]
+    }
+
+
 def _changed(options: OptionsT, changes: dict[str, Any]) -> OptionsT:
     return replace(options, **changes) if changes else options  # type: ignore[type-var]
 
@@ -196,97 +194,6 @@ def _motion_by_signs(log: TrackLog) -> tuple[bool | None, str]:
         signs.vehicle or None,
         f"motion: turns without headings, {signs}: taken for {whose} (filter.bayes.vehicle)",
     )
-
-
-def _motion_errors(log: TrackLog) -> dict[str, float]:
-    """Return the errors of dead reckoning that a log states, by the names of a filter's options.
-
-    The random walk of the heading is by distance there, at the log's median speed.
-    """
-    imu = log.imu
-    if imu is None:
-        return {}
-    found = {"step_sd_m": max(imu.sigma_trans_m, _LEAST_STEP_SD_M), "scale": imu.scale}
-    walk_deg = imu.drift_deg_per_sqrt_s
-    if imu.turns == "headings":
-        found["heading_sd_deg"] = max(imu.sigma_orient_deg, _LEAST_HEADING_SD_DEG)
-        found["bias_sd_deg"] = imu.bias_sd_deg
-    else:
-        walk_deg = hypot(walk_deg, imu.gyro_noise_deg_per_sqrt_s)
-        found["turn_rate_sd_deg_per_s"] = imu.gyro_bias_deg_per_s
-    usual_mps = _usual_mps(log)
-    if walk_deg > 0 and usual_mps > 0:
-        found["drift_deg_per_sqrt_m"] = walk_deg / usual_mps**0.5
-        if imu.turns == "gyro":
-            found["turn_drift_deg_per_sqrt_m"] = found["drift_deg_per_sqrt_m"]
-    return found
-
-
-def _standing_errors(log: TrackLog) -> dict[str, float]:
-    """Return the errors of a vehicle's turns as they are at standstill, where the log states none.
-
-    The bias there is what the rate is assumed to be off by at least; it is not taken out.
-    """
-    usual_mps = _usual_mps(log)
-    has_headings = bool(log.motion["heading_rad"].notna().any())
-    if log.imu is not None or has_headings or usual_mps <= WALKERS_MPS:
-        return {}
-    found = turns_at_standstill(log.motion)
-    if found is None:
-        return {}
-    rate_deg_per_s = abs(float(np.degrees(found.bias_radps)))
-    walk_deg = float(np.degrees(found.walk_rad_per_sqrt_s))
-    return {
-        "turn_drift_deg_per_sqrt_m": walk_deg / usual_mps**0.5,
-        "turn_rate_sd_deg_per_s": max(rate_deg_per_s, KalmanOptions().turn_rate_sd_deg_per_s),
-    }
-
-
-def _turn_drift_deg_per_s(options: Any, log: TrackLog) -> float:
-    """Return how fast turns drift beside the fixes, where headings are their sums; else 0."""
-    has_headings = bool(log.motion["heading_rad"].notna().any())
-    if has_headings or not has_default(options, "turn_rate_sd_deg_per_s"):
-        return 0.0
-    return abs(float(np.degrees(turn_drift_radps(log.motion, log.gnss))))
-
-
-def _has_long_rows(log: TrackLog) -> bool:
-    """Return whether rows of motion are longer than the map filter's typical step, and no steps.
-
-    They are a vehicle's by what the log states, or by a speed that is no walker's, or are longer
-    than a walker's rows, which count as steps.
-    """
-    row_m = _usual_row_m(log)
-    driven = bool(log.vehicle) or _usual_mps(log) > FASTEST_MPS
-    return row_m > (MotionErrors().typical_step_m if driven else _LONG_ROW_M)
-
-
-def _by_typical_step(row_sd_m: float, log: TrackLog) -> float:
-    """Return the deviation of the map filter's typical step, by that of longer rows.
-
-    The filter's white error grows with the root of the distance from that of a typical step; a row
-    of a vehicle may be 50 m long.
-    """
-    share = float((MotionErrors().typical_step_m / _usual_row_m(log)) ** 0.5)
-    return max(share * row_sd_m, _LEAST_STEP_SD_M)
-
-
-def _usual_row_m(log: TrackLog) -> float:
-    """Return the median length of rows that move; 0 without any."""
-    step_m = log.motion["step_m"].abs().to_numpy()
-    return _median(step_m[step_m > _LEAST_STEP_SD_M])
-
-
-def _usual_mps(log: TrackLog) -> float:
-    """Return the median speed of rows that move; 0 without any."""
-    step_m, time_s = log.motion["step_m"].to_numpy(), log.motion["time_s"].to_numpy()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        speed_mps = np.abs(step_m[1:]) / np.diff(time_s)
-    return _median(speed_mps[np.isfinite(speed_mps) & (speed_mps > _STANDING_MPS)])
-
-
-def _median(values: Floats) -> float:
-    return float(np.median(values)) if values.size else 0.0
 
 
 def _timing_technology(log: TrackLog) -> Literal["GSM", "LTE"] | None:

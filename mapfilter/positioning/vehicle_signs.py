@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Floats
 from mapfilter.tracks.log import TrackLog
 
 _USUAL_S, _TOP_SHARE = 10.0, 0.9
 _PERSON_MPS, _MOTOR_MPS = 5.0, 12.0
 _GAIN_S, _GAIN_MPS, _GAINS = 3.0, 4.0, 3
-_SWAY_S, _SWAY_MPS, _MAD_TO_SD = 0.5, 3.0, 1.4826
+_SWAY_S, _SWAY_MPS = 0.5, 3.0
 _STEADY_RADPS = np.radians(1.5)
 _MOVING_MPS = 0.5
 _MOST_SPANS = 1_000_000
@@ -103,7 +104,7 @@ def _sway_radps(time_s: Floats, along_m: Floats, heading_rad: Floats) -> float:
     moving = speed > _SWAY_MPS
     change = np.abs(rate[1:-1] - (rate[:-2] + rate[2:]) / 2)
     change = change[moving[1:-1] & moving[:-2] & moving[2:]]
-    return _MAD_TO_SD * float(np.median(change)) if change.size else float("nan")
+    return MAD_TO_SD * float(np.median(change)) if change.size else float("nan")
 
 
 def _sharpest_rad(time_s: Floats, step_m: Floats, turn_rad: Floats) -> float:

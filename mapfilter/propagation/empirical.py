@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Floats
 
 Environment = Literal["large_city", "city", "suburban", "open"]
@@ -120,7 +121,6 @@ def large_city_mobile_db(frequency_mhz: float, mobile_height_m: float) -> float:
     return float(3.2 * np.log10(11.75 * mobile_height_m) ** 2 - 4.97)
 
 
-SPEED_OF_LIGHT_MPS = 299_792_458.0
 SHORTEST_FREE_DISTANCE_M = 1.0
 """Shorter distances count as this one in free space: nearer, an antenna has no far field."""
 
@@ -137,7 +137,7 @@ def friis_db(distance_m: ArrayLike, frequency_mhz: float) -> Floats:
     [97.55, 103.57]
     """
     distance = np.maximum(np.asarray(distance_m, dtype=np.float64), SHORTEST_FREE_DISTANCE_M)
-    wavelength_m = SPEED_OF_LIGHT_MPS / (frequency_mhz * 1e6)
+    wavelength_m = LIGHT_MPS / (frequency_mhz * 1e6)
     return np.asarray(20 * np.log10(4 * np.pi * distance / wavelength_m))
 
 

@@ -8,11 +8,8 @@ import numpy as np
 
 from mapfilter.errors import listed
 from mapfilter.lattice import Lattice
-from mapfilter.propagation.models import (
-    PredictionModel,
-    outside_published_range,
-    shortest_distance_m,
-)
+from mapfilter.propagation.models import PredictionModel, shortest_distance_m
+from mapfilter.propagation.published_ranges import outside_published_range
 from mapfilter.propagation.surroundings import Antennas
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -23,7 +23,7 @@ from mapfilter.radio.cell_layouts import (
 )
 from mapfilter.radio.cell_rules import TECHNOLOGIES, technology_faults
 from mapfilter.radio.headings import Heading, doubtful_units, places_named, resembling, unit_of
-from mapfilter.radio.identities import parse_cgi, parted_network, technology
+from mapfilter.radio.identities import IDENTITY, parse_cgi, parted_network, technology
 from mapfilter.radio.reported_power import ASSUMABLE, REPORTED_SHARE_DB, reported_eirp_dbm
 from mapfilter.radio.tables import Table
 from mapfilter.radio.transmitter_lists import is_inactive, stated_otherwise
@@ -33,7 +33,6 @@ UNUSED_COLUMNS = "columns not used that resemble fields"
 _LONGEST_SHOWN = 200
 _NOT_RESEMBLED = ("technology", "assumed", "crs", "cgi", *OFFSETS)
 _RADIOS = {"GSM", "UMTS", "LTE", "CDMA", "NR"}
-_IDENTITY = ("mcc", "mnc", "lac", "ci")
 _MADE_OF = (("frequency_mhz", "band"), ("ci", "cell_number", "enodeb"))
 """Fields, and columns of planning tools that they are made of."""
 
@@ -81,10 +80,10 @@ def arrange(
     picked = _pick(table, header, layout, columns)
     headings = [Heading.of(name) for name in header]
     fields = [*picked, *(name for name in defaults if name not in picked)]
-    fields += [name for name in _IDENTITY if "cgi" in picked and name not in fields]
+    fields += [name for name in IDENTITY if "cgi" in picked and name not in fields]
     fields += [name for name, by, *_ in _MADE_OF if by in picked and name not in fields]
     fields = [name for name in fields if name != "cgi" and name not in HELPERS]
-    composed = "cell" not in fields and all(name in fields for name in _IDENTITY)
+    composed = "cell" not in fields and all(name in fields for name in IDENTITY)
     implied = [IMPLIED.get(heading.words.replace(" ", "_")) for heading in headings]
     if any(implied[i] for at in picked.values() for i in at) and "technology" not in fields:
         fields.append("technology")
@@ -124,7 +123,7 @@ def arrange(
         if "eirp_dbm" in assumed and float(values["eirp_dbm"]) != defaults["eirp_dbm"]:
             lowered[technology(values["technology"]) or ""] += 1
         if composed:
-            parts = (values[name] for name in _IDENTITY)
+            parts = (values[name] for name in IDENTITY)
             values["cell"] = "-".join(part for part in parts if part)
         found.append((line, [values.get(name, "") for name in names]))
     if inactive and not found:
@@ -234,7 +233,7 @@ def _by_technology(values: dict[str, str], implied: list[str | None]) -> None:
     """Fill in the parts of a CGI, and the technology that columns with values imply."""
     identity = parse_cgi(parted_network(values.pop("cgi", "")))
     if identity is not None:
-        for name, part in zip(_IDENTITY, identity, strict=True):
+        for name, part in zip(IDENTITY, identity, strict=True):
             values[name] = values.get(name) or ("" if part is None else str(part))
     if not values.get("technology"):
         values["technology"] = next(filter(None, implied), "")

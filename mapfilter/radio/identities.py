@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Floats
 
 LIMITS: dict[str, dict[str, int]] = {
@@ -29,7 +30,12 @@ LIMITS: dict[str, dict[str, int]] = {
 PSC, PCI), areas ``lac`` (LAC, TAC), identities ``ci`` (CI, ECI, NCI) and timing advances.
 """
 
-TIMING_STEP_M = {"GSM": 299_792_458 * 48 / 13e6 / 2, "LTE": 299_792_458 * 16 / 30.72e6 / 2}
+IDENTITY = ("mcc", "mnc", "lac", "ci")
+"""Parts of a global cell identity."""
+UNIQUE_IN_NETWORK = ("LTE", "NR")
+"""Technologies whose cell identity is unique in a network, whatever the tracking area."""
+
+TIMING_STEP_M = {"GSM": LIGHT_MPS * 48 / 13e6 / 2, "LTE": LIGHT_MPS * 16 / 30.72e6 / 2}
 """Distance of a step of timing advance: 553.5 m and 78.07 m; in NR it depends on the numerology."""
 
 BARS_DBM: dict[str, tuple[float, float, float, float]] = {

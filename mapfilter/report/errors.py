@@ -1,4 +1,4 @@
-"""Errors of tracks along the way or over time, and the evidence of a filter that has any."""
+"""Errors of tracks along the way or over time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, accuracy, position_errors_m
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, accuracy, position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import HALO
@@ -34,7 +35,6 @@ from mapfilter.report.canvas import (
 )
 
 _SIZE_IN = (9.0, 4.8)
-_EVIDENCE_IN = (9.0, 5.6)
 _SHADES = {
     Status.SEARCHING: "#eeeeee",
     Status.UNCERTAIN: "#fbf3d0",
@@ -45,7 +45,6 @@ _SPANS = tuple(_SHADES.values())
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, GREY)
 _WIDE, _LEAST_M = 12.0, 0.3
 _NEARLY_ALL = 0.9
-_SQUARE_M, _SQUARE_S = 25.0, 20.0
 _PANEL_IN, _PANELS_WIDE = (4.4, 2.3), 2
 
 
@@ -122,7 +121,7 @@ def plot_error_over_distance(
         text = axes.text(0.5, 0.55, "never switched to tracking", transform=axes.transAxes)
         text.set(ha="center", color=GREY, fontsize=12, path_effects=HALO)
     axes.set(xlabel="distance travelled / m", ylabel="position error / m")
-    if not _covers(truth, estimate):
+    if not covers(truth, estimate):
         axes.set_xlabel(f"distance travelled / m, in the {_covered(truth, estimate)}")
     axes.set_title(title or f"Filter: {estimate.filter}")
     tidy(axes, grid=False)
@@ -206,47 +205,6 @@ def plot_errors_apart(
     return figure
 
 
-@styled
-def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = "") -> Figure:
-    """Draw entropy, the leading hypothesis's and the runner-up's shares, and the status.
-
-    Over the true distance travelled; over seconds where the truth is not known, or that of a part
-    only. The entropy is counted over squares of 25 m and rises by up to a bit wherever the belief
-    lies across two of them, so its mean over as long a way (or over 20 s) is drawn. Without a title
-    it is the filter's name.
-
-    Raises
-    ------
-    InputError
-        The filter holds no probabilities, or there is no epoch.
-    """
-    evidence = estimate.evidence
-    if evidence is None or not len(estimate):
-        raise fail(InputError, "estimate, evidence", "epochs with probabilities", "none")
-    along, across, window, mean = estimate.time_s, "time / s", _SQUARE_S, f"{_SQUARE_S:g} s"
-    if truth is not None and truth.time_s.size and _covers(truth, estimate):
-        along, across = truth.distance_at(estimate.time_s), "distance travelled / m"
-        window, mean = _SQUARE_M, f"{_SQUARE_M:g} m"
-    figure = new_figure(*_EVIDENCE_IN)
-    above, below = figure.subplots(2, 1, sharex=True)
-    entropy_bits = running_mean(along, evidence.entropy_bits, window)
-    above.plot(along, entropy_bits, color=BLUE, linewidth=1.5, label=f"entropy, mean over {mean}")
-    above.set_ylabel("entropy over 25 m squares / bit")
-    above.set_ylim(bottom=0.0)
-    within = f"within {SUCCESS_RADIUS_M:.0f} m of the leading hypothesis"
-    below.plot(along, 100 * estimate.mass_50m, color=VERMILLION, linewidth=1.5, label=within)
-    runner_up = 100 * evidence.runner_up_mass
-    below.plot(along, runner_up, color=ORANGE, linewidth=1.2, label="runner-up")
-    below.set(xlabel=across, ylabel="probability / %", ylim=(0.0, 104.0))
-    below.set_xlim(float(along[0]), max(float(np.max(along)), float(along[0]) + 1.0))
-    for axes in (above, below):
-        shade_statuses(axes, estimate, along, named=axes is above)
-        tidy(axes, grid=False)
-    above.set_title(title or f"Filter: {estimate.filter}")
-    bottom_legend(figure, 5)
-    return figure
-
-
 def distance_along_m(estimate: TrackEstimate, truth: Truth) -> Floats:
     """Return the true distance travelled at each epoch; NaN before and after the truth."""
     covered = _during(truth, estimate)
@@ -258,7 +216,7 @@ def _during(truth: Truth, estimate: TrackEstimate) -> Bools:
     return np.asarray((estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1]))
 
 
-def _covers(truth: Truth, estimate: TrackEstimate) -> bool:
+def covers(truth: Truth, estimate: TrackEstimate) -> bool:
     """Return whether there is a truth at nearly all epochs."""
     return not len(estimate) or bool(_during(truth, estimate).mean() >= _NEARLY_ALL)
 
@@ -266,27 +224,6 @@ def _covers(truth: Truth, estimate: TrackEstimate) -> bool:
 def _covered(truth: Truth, estimate: TrackEstimate) -> str:
     known_s, whole_s = np.ptp(truth.time_s), np.ptp(estimate.time_s)
     return f"{known_s:.0f} of {whole_s:.0f} s with a truth"
-
-
-def running_mean(along: Floats, values: Floats, width: float) -> Floats:
-    """Return the mean of the values within half a width to both sides of each place.
-
-    ``along`` does not decrease. Values that are not finite count nowhere, and their places and
-    those without any other are NaN.
-
-    Examples
-    --------
-    >>> running_mean(np.arange(5.0), np.array([0.0, 3.0, 0.0, 3.0, 0.0]), 2.0).tolist()
-    [1.5, 1.0, 2.0, 1.0, 1.5]
-    """
-    finite = np.isfinite(values)
-    sums = np.concatenate([[0.0], np.cumsum(np.where(finite, values, 0.0))])
-    counts = np.concatenate([[0], np.cumsum(finite)])
-    low = np.searchsorted(along, along - width / 2, side="left")
-    high = np.searchsorted(along, along + width / 2, side="right")
-    with np.errstate(invalid="ignore"):
-        means = (sums[high] - sums[low]) / (counts[high] - counts[low])
-    return np.where(finite, means, np.nan)
 
 
 def shade_statuses(

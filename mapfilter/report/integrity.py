@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from numpy.typing import ArrayLike
 
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, position_errors_m
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, position_errors_m
 from mapfilter.evaluation.stanford import BINS, StanfordCounts
+from mapfilter.evaluation.truth import Truth
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import HALO, BaseMap, LocalFrame, local_frame
 from mapfilter.report.canvas import (

@@ -14,7 +14,8 @@ from matplotlib.lines import Line2D
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.basemap import (

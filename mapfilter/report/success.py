@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
-from mapfilter.evaluation.success import HEADING, READING, SuccessCell, axes_of
+from mapfilter.evaluation.success_cells import HEADING, READING, SuccessCell, axes_of
 from mapfilter.report.canvas import (
     BLACK,
     GREY,

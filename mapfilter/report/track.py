@@ -7,17 +7,12 @@ from matplotlib.axes import Axes
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, accuracy, position_errors_m
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, accuracy, position_errors_m
+from mapfilter.evaluation.claims import claims_of
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.report.basemap import (
-    HALO,
-    BaseMap,
-    Bounds,
-    attribute,
-    draw_base,
-    map_height_in,
-)
+from mapfilter.report.basemap import HALO, BaseMap, Bounds, attribute, draw_base, map_height_in
 from mapfilter.report.canvas import (
     BLACK,
     BLUE,
@@ -38,7 +33,6 @@ _MAP_IN = 8.0
 _NOWHERE_M = (0.0, 0.0, 2 * LEAST_MARGIN_M, 2 * LEAST_MARGIN_M)
 """Extent without a map and without a position."""
 _TRUTH = "#868686"
-_CLAIMED = (Status.CONVERGED, Status.TRACKING)
 _GONE = (Status.LOST, Status.OUTSIDE)
 
 
@@ -90,7 +84,7 @@ def plot_track(
     if fixes_m is not None and len(fixes_m):
         plus = Look(marker="+", color=BLACK, s=45.0, linewidths=0.7, zorder=4.5)
         axes.scatter(*frame(*fixes_m.T), label="positions of the log", **plus)
-    claimed = np.array([status in _CLAIMED for status in estimate.status], dtype=bool)
+    claimed = claims_of(estimate)
     tracked = located & claimed
     groups = (
         (tracked & ~off, Look(marker="o", color=BLUE, s=9.0, zorder=6), "estimate"),

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mapfilter._types import Floats
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import HALO, Bounds

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rasterio.features import rasterize
 from rasterio.transform import Affine
 
+from mapfilter._constants import FOOT_M
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError
 from mapfilter.lattice import Lattice
@@ -20,7 +21,6 @@ from mapfilter.roads.elements import Query
 from mapfilter.roads.maps import read_elements
 from mapfilter.roads.ways import Bounds, Buildings, Geometries, polygons_inside
 
-_FOOT_M = 0.3048
 _HIGHEST_M = 1000.0
 
 # A roof on posts stops neither walkers nor waves; the others are no buildings any more.
@@ -153,7 +153,7 @@ def _numbers(text: NDArray[np.object_] | None, count: int) -> Floats:
             number = float(entry)
         elif entry is not None and (match := _NUMBER.match(str(entry))):
             number = float(match[1].replace(",", "."))
-            number *= _FOOT_M if match[2] in ("ft", "'") else 1.0
+            number *= FOOT_M if match[2] in ("ft", "'") else 1.0
         if 0 < number < _HIGHEST_M:
             values[i] = number
     return values

@@ -24,13 +24,11 @@ from pyogrio.errors import DataLayerError, DataSourceError
 from shapely.errors import GEOSException
 
 from mapfilter._inputs import open_input
-from mapfilter._ogr import sealed_gdal
+from mapfilter._ogr import most_unpacked_bytes, sealed_gdal
 from mapfilter.errors import InputError, fail
 from mapfilter.roads.elements import CUT_OFF, BoxDeg, Query
 
 _CHUNK_BYTES = 1 << 20
-_LARGEST_RATIO = 60
-_ALWAYS_ALLOWED_BYTES = 64 << 20
 _MOST_NODES_IN_MEMORY_MB = 100
 # Keys whose closed ways are areas; closed highways are lines here unless area=yes.
 _AREA_KEYS = "building,landuse,natural,place,water,waterway"
@@ -114,7 +112,7 @@ def _checked(path: Path, folder: Path) -> Path:
     """Parse the whole file, and return where it lies unpacked."""
     packed = path.suffix.lower() == ".gz"
     plain = folder / "map.osm" if packed else path
-    allowed_bytes = _LARGEST_RATIO * path.stat().st_size + _ALWAYS_ALLOWED_BYTES
+    allowed_bytes = most_unpacked_bytes(path.stat().st_size)
     parser, size_bytes = _Head().parser, 0
     with _faults_of(path), contextlib.ExitStack() as stack:
         stream = stack.enter_context(_opened(path))

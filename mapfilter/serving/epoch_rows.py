@@ -9,9 +9,10 @@ from typing import Any
 from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import wrap_rad
-from mapfilter.positioning.epochs import Epoch, epoch_columns, make_epoch
+from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.merging import epoch_columns, make_epoch
 from mapfilter.positioning.sensors.pace import Pace
-from mapfilter.radio.identities import LIMITS, TIMING_STEP_M
+from mapfilter.radio.identities import IDENTITY, LIMITS, TIMING_STEP_M
 from mapfilter.serving.documents import (
     RequestError,
     check_keys,
@@ -48,7 +49,6 @@ _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
 _COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
 _LEAST_PLACE_M, _MOST_PLACE_M = 2.0e7, 5.5e7
-_IDENTITY = ("mcc", "mnc", "lac", "ci")
 
 
 def read_epochs(
@@ -180,7 +180,7 @@ def _value(column: Column, value: object, where: str, faults: Faults) -> Any:
 
 
 def _reported(values: Mapping[str, Any]) -> ReportedCell:
-    keys = ("role", "cell", "technology", *_IDENTITY, "arfcn", "bsic")
+    keys = ("role", "cell", "technology", *IDENTITY, "arfcn", "bsic")
     return ReportedCell(**{name: values[name] for name in keys})
 
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from starlette.types import Receive, Scope, Send
 
 from mapfilter.geodesy import unproject
-from mapfilter.positioning.estimate import StepOutput
+from mapfilter.positioning.step_output import StepOutput
 
 KEPT_FIXES = 120
 """Fixes that a session keeps for listeners that come back."""

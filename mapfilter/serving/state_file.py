@@ -36,7 +36,6 @@ from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.state import BayesState, Reported
 from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.epochs import GnssFix, ReportRow
-from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.gnss.state import GnssState
@@ -50,6 +49,7 @@ from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 
 FORMAT, VERSION = "mapfilter session", 16
 

@@ -16,8 +16,8 @@ from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.log_options import LogStatement
+from mapfilter.positioning.step_output import StepOutput
 from mapfilter.serving.documents import RequestError, check_keys, text, whole
 from mapfilter.serving.epoch_rows import check_pace, read_epochs
 from mapfilter.serving.events import fix_document, json_bytes

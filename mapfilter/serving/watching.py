@@ -12,7 +12,7 @@ import numpy as np
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import StepOutput
+from mapfilter.positioning.step_output import StepOutput
 from mapfilter.radio.cells import CellPlan
 from mapfilter.serving.events import json_bytes
 from mapfilter.viewing.arrays import packed

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import comb, log_ndtr
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.gnss.noise import correlated_along
-from mapfilter.models.motion import SPEED_OF_LIGHT_MPS
 from mapfilter.propagation.tr38901 import hidden_loss_db, seen_loss_db
 from mapfilter.radio.antenna import sector_gain_db
 
@@ -213,7 +213,7 @@ class ArrivalModel:
     @property
     def cells(self) -> int:
         """Number of resolution cells, c / B each, in the window."""
-        return round(self.window_m * self.bandwidth_hz / SPEED_OF_LIGHT_MPS)
+        return round(self.window_m * self.bandwidth_hz / LIGHT_MPS)
 
     def sigma_m(self, sinr_db: ArrayLike) -> Floats:
         """Return the deviation of a measured time, the Cramér-Rao bound and the floor together.
@@ -227,7 +227,7 @@ class ArrivalModel:
         """
         power = 10 ** (np.asarray(sinr_db, dtype=np.float64) / 10)
         spread_hz2 = self.bandwidth_hz**2 / 12
-        bound = SPEED_OF_LIGHT_MPS**2 / (8 * np.pi**2 * spread_hz2 * self.samples * power)
+        bound = LIGHT_MPS**2 / (8 * np.pi**2 * spread_hz2 * self.samples * power)
         return np.asarray(np.sqrt(bound + self.floor_m**2))
 
     def wrong_peak(self, sinr_db: ArrayLike) -> Floats:

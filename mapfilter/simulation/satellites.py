@@ -21,7 +21,8 @@ from mapfilter.geodesy import unproject
 from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.noise import correlated_along, multipath_bias_m
 from mapfilter.gnss.orbits import gps_time, satellite_positions_m
-from mapfilter.gnss.sky import Directions, GridFrame, Skyline, directions, ecef_from_lonlat
+from mapfilter.gnss.sky import Directions, GridFrame, directions, ecef_from_lonlat
+from mapfilter.gnss.skyline import Skyline
 from mapfilter.models.motion import clock_noise
 from mapfilter.options import NotNegative, Options, Positive
 from mapfilter.simulation.journeys import ticks_s

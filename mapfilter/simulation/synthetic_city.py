@@ -28,7 +28,6 @@ from mapfilter.simulation.city_blocks import (
     blocks_of,
     clear_of_streets,
     connected,
-    houses,
     inner_ways,
     noded,
     uses_of,
@@ -37,6 +36,7 @@ from mapfilter.simulation.city_blocks import (
     without_small_blocks,
     without_stubs,
 )
+from mapfilter.simulation.city_houses import houses
 from mapfilter.simulation.city_streets import PARK, bend, quarters, skeleton, streets
 
 _SIZES_M = (200.0, 50_000.0)

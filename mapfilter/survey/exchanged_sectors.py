@@ -27,7 +27,6 @@ _CLEAR, _EACH, _FEWEST = 12.0, 3.0, 2
 """Log odds of a site, and of each of the cells that are exchanged: one alone is never."""
 _APART_DEG = 45.0
 _LEAST_POINTS, _MOST_POINTS = 10, 300
-_PHONE_HEIGHT_M = 1.5
 _BEHIND_DB = 20.0
 """Streets reflect: no more than this is lost behind an antenna."""
 
@@ -88,7 +87,7 @@ def sector_level(cell: Cell) -> Covariate:
 
     Grid north is taken for true north: they differ by some two degrees at most.
     """
-    loss = DistanceLoss(cell.east_m, cell.north_m, max(cell.height_m - _PHONE_HEIGHT_M, 1.0))
+    loss = DistanceLoss.of_cell(cell)
     azimuth_rad, width_rad = np.radians(float(cell.azimuth_deg or 0.0)), float(cell.beamwidth_deg)
 
     def level_db(east_m: Floats, north_m: Floats) -> Floats:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.radio.cells import Cell
 from mapfilter.survey.measured_points import Points
 
 Covariate = Callable[[Floats, Floats], Floats]
@@ -29,6 +30,7 @@ _SEARCH_BEYOND_M = 800.0
 _GRID = 25
 _ROUNDS = 4
 _ANTENNA_ABOVE_PHONE_M = 25.0
+_PHONE_HEIGHT_M = 1.5
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,11 @@ class DistanceLoss:
     east_m: float
     north_m: float
     above_phone_m: float = _ANTENNA_ABOVE_PHONE_M
+
+    @classmethod
+    def of_cell(cls, cell: Cell) -> DistanceLoss:
+        """Return that of a cell of the plan."""
+        return cls(cell.east_m, cell.north_m, max(cell.height_m - _PHONE_HEIGHT_M, 1.0))
 
     def __call__(self, east_m: Floats, north_m: Floats) -> Floats:
         """Return the covariate at places."""

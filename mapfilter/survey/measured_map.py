@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 
 _ROUNDS = 2
 _LOCATED_FROM = 300
-_PHONE_HEIGHT_M = 1.5
 
 
 @cache
@@ -209,9 +208,7 @@ def fit_survey(
             prior = Prior(level_dbm, **CALIBRATION)
             covariate = predicted[points.cell_id]
         elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
-            cell = plan[points.cell_id]
-            above_m = max(cell.height_m - _PHONE_HEIGHT_M, 1.0)
-            covariate = DistanceLoss(cell.east_m, cell.north_m, above_m)
+            covariate = DistanceLoss.of_cell(plan[points.cell_id])
         elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
             some = points.thinned(_LOCATED_FROM)
             covariate = locate_antenna(some, shadowing.covariance_db2(some), prior)

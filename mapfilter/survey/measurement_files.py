@@ -1,4 +1,4 @@
-"""Files of measured levels: CSV of any columns, of OpenCellID and Tower Collector, and logs.
+"""CSV files of measured levels: of any columns, of OpenCellID and of Tower Collector.
 
 A bad row is counted and located, and loses nothing else: a quote that is never closed ends with its
 line, a wrong byte spoils one field, a line of another length is refused alone.
@@ -8,32 +8,25 @@ from __future__ import annotations
 
 import csv
 import difflib
-import io
-import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import NamedTuple
 
 import numpy as np
 
 from mapfilter._header_units import header_unit
-from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
-from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs, is_above_asu
-from mapfilter.radio.identities import technology
+from mapfilter.radio.identities import IDENTITY, technology
 from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
 from mapfilter.radio.tables import number
-from mapfilter.survey.measurement_rows import FIELDS, IDENTITY, REQUIRED, Rows
+from mapfilter.survey.measurement_lines import LONGEST_LINE, is_windows, lines_of
+from mapfilter.survey.measurement_rows import FIELDS, REQUIRED, Rows
 
-_LONGEST_LINE = _HEAD_BYTES = 1 << 16
 _UNAVAILABLE = 1e9
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
-_KEY = re.compile(r'(\w[\w ]{0,31}+)=\s{0,9}("[^"]{0,4000}"|[^,]{0,4000})')
-_LEVEL = re.compile(r"^(>?)\s*(-?\d+)\s*dBm$")
 
 
 class Dialect(NamedTuple):
@@ -90,10 +83,9 @@ DIALECTS: Mapping[str, Dialect] = {
 def read_csv(path: Path, dialect: Dialect) -> Rows:
     """Read a file of measurements; bad rows are refused one by one."""
     rows = Rows(path)
-    with open_input(path) as stream:
-        if _is_windows(stream.read(_HEAD_BYTES)):
-            rows.remarks.append("no UTF-8; read as Windows-1252")
-    lines = _lines(path)
+    if is_windows(path):
+        rows.remarks.append("no UTF-8; read as Windows-1252")
+    lines = lines_of(path)
     separator, header = _header(lines)
     if not header:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "no text file")
@@ -103,7 +95,7 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
             continue
         rows.read += 1
         if text is None:
-            rows.refuse(line, "line", f"at most {_LONGEST_LINE} characters", "more")
+            rows.refuse(line, "line", f"at most {LONGEST_LINE} characters", "more")
             continue
         fields = _split(text, separator)
         if len(fields) < len(header) or any(fields[len(header) :]):
@@ -166,7 +158,7 @@ class _Signs:
 
 def header_of(path: Path) -> list[str]:
     """Return the names in the first line of a file, in lower case."""
-    return _header(_lines(path))[1]
+    return _header(lines_of(path))[1]
 
 
 def _header(lines: Iterator[tuple[int, str | None]]) -> tuple[str, list[str]]:
@@ -184,21 +176,6 @@ def _from_asu(text: str, technology: str) -> float | None:
     if technology in _GSM and 0 <= asu <= 31:
         return -113.0 + 2 * asu
     return asu - 140.0 if technology in _LTE and 0 <= asu <= 97 else None
-
-
-def _lines(path: Path) -> Iterator[tuple[int, str | None]]:
-    """Yield line numbers and texts; None for a line too long to be one."""
-    with _open_text(path) as stream:
-        line = 0
-        while text := stream.readline(_LONGEST_LINE):
-            line += 1
-            if len(text) < _LONGEST_LINE or text.endswith("\n"):
-                text = text.rstrip("\r\n")
-                yield line, without_separator_line(text) if line == 1 else text
-                continue
-            while (more := stream.readline(_LONGEST_LINE)) and not more.endswith("\n"):
-                pass
-            yield line, None
 
 
 def _split(text: str, separator: str) -> list[str]:
@@ -238,80 +215,3 @@ def _places(path: Path, header: Sequence[str], dialect: Dialect) -> dict[str, tu
             faults.add(where, f"one column {column}", f"{header.count(column)}")
     faults.raise_if_any(InputError)
     return places
-
-
-def read_antennas_log(path: Path) -> Rows:
-    """Read a log of *Antennas*: records of a serving cell, up to six neighbours, and one position.
-
-    A level written with ``>`` is a bound, no level: it is counted and left out.
-    """
-    rows = Rows(path)
-    time, operator = "", ""
-    received: list[tuple[int, dict[str, str]]] = []
-
-    def drop_unplaced() -> None:
-        for at, _ in received:
-            rows.refuse(at, "Best Location", "a position after the cells", "none", "cut off")
-        received.clear()
-
-    for line, text in _lines(path):
-        kind, pairs = (text or "").split(",", 1)[0].strip(), _KEY.findall(text or "")
-        values = {key.strip(): value.strip(' "\r\n') for key, value in pairs}
-        if kind == "Record":
-            drop_unplaced()
-            time, operator = values.get("Time", ""), values.get("Operator", "")
-        elif kind in ("ACTIVE GSM", "GSM"):
-            rows.read += 1
-            received.append((line, values | {"neighbour": "0" if kind == "ACTIVE GSM" else "1"}))
-        elif kind == "Best Location":
-            found = dict.fromkeys(FIELDS, "") | {"time": _iso(time)}
-            found |= {"lat": values.get("Lat", ""), "lon": values.get("Lon", "")}
-            for at, cell in received:
-                _add_logged(rows, at, cell, operator, found)
-            received.clear()
-    drop_unplaced()
-    return rows
-
-
-def _add_logged(
-    rows: Rows, line: int, cell: dict[str, str], operator: str, found: Mapping[str, str]
-) -> None:
-    texts = (operator[:3], operator[3:], cell.get("LAC", ""), cell.get("CID", ""))
-    name, signal = rows.identify(line, "", texts), cell.get("Signal", "")
-    level = _LEVEL.match(signal)
-    if name and level is None:
-        rows.refuse(line, "Signal", "a level such as -67dBm", repr(signal[:40]))
-    elif name and level is not None and level[1]:
-        rows.aside["levels given only as bounds (>)"] += 1
-    elif name and level is not None:
-        neighbour = cell["neighbour"]
-        rows.technologies[name] = "GSM"
-        rows.add(line, name, {**found, "level_dbm": level[2], "neighbour": neighbour})
-
-
-def _iso(time: str) -> str:
-    """Return a time such as ``2014-09-24 19:21:42:61 GMT+05:30`` in ISO 8601, else as it is."""
-    text = re.sub(r":(\d{1,3}) GMT", lambda found: f".{found[1]:0>3} ", time)
-    try:
-        return datetime.strptime(text, "%Y-%m-%d %H:%M:%S.%f %z").isoformat()
-    except ValueError:
-        return time
-
-
-def _open_text(path: Path) -> TextIO:
-    """Open a file as text in which an invalid byte invalidates only its own row."""
-    with open_input(path) as stream:
-        head = stream.read(_HEAD_BYTES)
-    if not head:
-        raise fail(InputError, str(path), "measurements", "an empty file")
-    if wide := wide_encoding(head):
-        raise fail(InputError, str(path), "text in UTF-8", wide, "saved as Unicode by Excel")
-    if head.startswith(b"\x1f\x8b"):
-        raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
-    encoding = "cp1252" if _is_windows(head) else "utf-8-sig"
-    return io.TextIOWrapper(open_input(path), encoding=encoding, errors="replace")
-
-
-def _is_windows(head: bytes) -> bool:
-    """Return whether the names of columns are in Windows-1252; a wrong byte below is only that."""
-    return first_foreign_byte(head.lstrip().split(b"\n", 1)[0]) >= 0

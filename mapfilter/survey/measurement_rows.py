@@ -19,6 +19,7 @@ from mapfilter.errors import Fault
 from mapfilter.geodesy import degree_fault
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, is_above_asu
 from mapfilter.radio.cell_rules import RANGES, id_fault
+from mapfilter.radio.identities import IDENTITY
 from mapfilter.radio.tables import number
 
 _FAULTS_KEPT = 20
@@ -30,7 +31,6 @@ _MOST_STEPS = 3846.0
 """Timing advances: of NR 0 to 3846, fewer of older technologies."""
 _YES = ("1", "true", "yes", "neighbour", "neighbor")
 _NO = ("0", "false", "no", "serving")
-IDENTITY = ("mcc", "mnc", "lac", "ci")
 """Fields that name a cell together."""
 REQUIRED = ("lat", "lon", "level_dbm")
 """Fields without which a row is of no use."""

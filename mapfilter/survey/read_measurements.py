@@ -14,13 +14,8 @@ from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter._words import counted, number_of
 from mapfilter.errors import Fault, InputError, fail, listed
 from mapfilter.geodesy import project, projected_crs, utm_crs
-from mapfilter.survey.measurement_files import (
-    DIALECTS,
-    header_of,
-    mapped,
-    read_antennas_log,
-    read_csv,
-)
+from mapfilter.survey.antennas_log import read_antennas_log
+from mapfilter.survey.measurement_files import DIALECTS, header_of, mapped, read_csv
 from mapfilter.survey.measurement_rows import Rows
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SESSION_GAP_S

@@ -21,7 +21,8 @@ _CHUNK = 4096
 _LEARNT_FROM = 250
 _LEARNT_FROM_CELLS = 40
 _BOUNDS = np.log([[1.0, 400.0], [10.0, 1000.0], [0.5, 200.0]])
-_SOFTENING_M = 20.0
+SOFTENING_M = 20.0
+"""Added to distances, over which neighbours are weighed."""
 _PRIOR_WEIGHT = 4.0
 
 
@@ -173,7 +174,7 @@ class _Nearest:
         most = len(self._values) - (places is None)
         count = min(self._search.n_neighbors, most)
         distance_m, index = self._search.kneighbors(places, n_neighbors=count)
-        weights = 1 / (distance_m + _SOFTENING_M)
+        weights = 1 / (distance_m + SOFTENING_M)
         return np.average(self._values[index], axis=1, weights=weights), index, weights
 
 

@@ -16,12 +16,12 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.residual_field import SOFTENING_M
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 _REPORTS = 8
-_SOFTENING_M = 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class WeakestReported:
             distance_upper_bound=np.nextafter(within_m, np.inf),
         )
         found = np.isfinite(distance_m)
-        weight = 1 / (distance_m + _SOFTENING_M)
+        weight = 1 / (distance_m + SOFTENING_M)
         total = (weight * self.level_dbm[np.where(found, index, 0)]).sum(axis=1)
         some = found[:, 0]
         bound_dbm = np.full(len(total), np.inf)

@@ -7,34 +7,34 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
+from mapfilter._constants import HOUR_S
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import unproject
 from mapfilter.tracks.clock_notes import apart_note, zoneless_note
 from mapfilter.tracks.gps_dates import early_dates, later, span_s, week_start_s
 from mapfilter.tracks.misplaced import FAR_APART, FAR_M
-from mapfilter.tracks.position_units import METRES_PER_DEGREE
+from mapfilter.tracks.position_shift import (
+    COMMON_SHARE,
+    TimedPlaces,
+    best_place_shift,
+    median_apart_m,
+    places_of,
+)
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.speed_shift import best_shift, shift_note, speed_agreement, speeds_of_places
 
 _QUARTER_S = 900.0
-_MOST_ZONE_S, _HOUR_S = 14 * 3600.0, 3600.0
+_MOST_ZONE_S = 14 * HOUR_S
 _ZONE_QUARTERS = (*range(-48, 57, 4), -38, -14, -10, 14, 18, 22, 23, 26, 35, 38, 42, 51, 55)
 """Zones that are in use, in quarters of an hour ahead of UTC: whole hours, and others."""
-_MOST_POINTS = 400
 _MOST_SHIFTS = 4000
-_COMMON_SHARE = 0.5
 _NEAR_M = 100.0
 _MOVED_M = 50.0
-_FINE_S = 0.1
 _SEARCH_S = 30.0
 _RATE_HZ = 5.0
 _LEAST_CORRELATION = 0.5
 _REMARKABLE_S = 1.5
-
-_Track = tuple[Floats, Floats, Floats]
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _reference(recordings: Sequence[Recording]) -> int:
 
 def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
     """Return the seconds to add to a recording's times, and a note."""
-    one, other = _track(first), _track(recording)
+    one, other = places_of(first), places_of(recording)
     clock = recording.clock
     same = clock.kind == first.clock.kind and clock.kind != "utc"
     if clock.absolute or (same and clock.kind == "local"):
@@ -106,13 +106,13 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
         return 0.0, _disagreement(first.path.name, one, other)
     if clock.kind == "local":
         return _zone(recording, first, one, other)
-    if same and _common(recording, first) >= _COMMON_SHARE:
-        far = one is not None and other is not None and _apart_m(one, other, 0.0, 0.1) > FAR_M
+    if same and _common(recording, first) >= COMMON_SHARE:
+        far = one is not None and other is not None and median_apart_m(one, other, 0.0, 0.1) > FAR_M
         return 0.0, _disagreement(first.path.name, one, other) if far else ""
     if one is not None and other is not None:
         low, high = one[0][0] - other[0][-1], one[0][-1] - other[0][0]
         step_s = max(1.0, (high - low) / _MOST_SHIFTS)
-        shift_s, apart_m = _best_shift(one, other, np.arange(low, high + step_s, step_s))
+        shift_s, apart_m = best_place_shift(one, other, np.arange(low, high + step_s, step_s))
         if apart_m < _NEAR_M:
             return shift_s, f"{shift_s:+.1f} s, by positions (median {apart_m:.1f} m apart)"
     speeds = _speed(first), _speed(recording)
@@ -140,12 +140,12 @@ def _common(recording: Recording, first: Recording, shift_s: float = 0.0) -> flo
 
 
 def _zone(
-    recording: Recording, first: Recording, one: _Track | None, other: _Track | None
+    recording: Recording, first: Recording, one: TimedPlaces | None, other: TimedPlaces | None
 ) -> tuple[float, str]:
     """Return the shift of local times by whole quarters of an hour."""
     shifts = np.arange(-_MOST_ZONE_S, _MOST_ZONE_S + 1, _QUARTER_S)
     if one is not None and other is not None:
-        apart = np.array([_apart_m(one, other, shift, 0.1) for shift in shifts])
+        apart = np.array([median_apart_m(one, other, shift, 0.1) for shift in shifts])
         # Positions of two places do not tell a zone.
         if (apart <= FAR_M).any():
             shift_s = float(shifts[np.nanargmin(apart)])
@@ -166,7 +166,7 @@ def _zone(
     # Where one of them lasts longer, both begin together, or both end.
     ends = np.abs(np.subtract(span_s(first), span_s(recording))[:, None] - good).min(axis=0)
     order = good[np.argsort(ends, kind="stable")]
-    others = [f"UTC{_clock(-shift)}" for shift in order[1:].tolist() if shift % _HOUR_S == 0]
+    others = [f"UTC{_clock(-shift)}" for shift in order[1:].tolist() if shift % HOUR_S == 0]
     also = f"; {' or '.join(others[:2])} would do as well: --zone" if others else ""
     return float(order[0]), f"local time is UTC{_clock(-order[0])} (by the overlap of times{also})"
 
@@ -176,15 +176,15 @@ def _clock(shift_s: float) -> str:
     return f"{sign}{int(abs(shift_s)) // 3600:02d}:{int(abs(shift_s)) % 3600 // 60:02d}"
 
 
-def _disagreement(first: str, one: _Track | None, other: _Track | None) -> str:
+def _disagreement(first: str, one: TimedPlaces | None, other: TimedPlaces | None) -> str:
     """Return a note where positions of two clocks agree better some seconds apart."""
     if one is None or other is None or not (_moved(one) and _moved(other)):
         return ""
-    now_m = _apart_m(one, other, 0.0, 0.1)
+    now_m = median_apart_m(one, other, 0.0, 0.1)
     if not np.isfinite(now_m):
         return ""
     shifts = np.arange(-_SEARCH_S, _SEARCH_S + 0.5, 0.5)
-    shift_s, apart_m = _best_shift(one, other, shifts)
+    shift_s, apart_m = best_place_shift(one, other, shifts)
     if now_m > FAR_M and apart_m > FAR_M:
         return (
             f"positions lie {now_m / 1000:.1f} {FAR_APART} in {first} (median) (likely: another "
@@ -198,57 +198,8 @@ def _disagreement(first: str, one: _Track | None, other: _Track | None) -> str:
     )
 
 
-def _moved(track: _Track) -> bool:
+def _moved(track: TimedPlaces) -> bool:
     return float(np.hypot(np.ptp(track[1]), np.ptp(track[2]))) > _MOVED_M
-
-
-def _track(recording: Recording) -> _Track | None:
-    """Return times and positions (degrees scaled to metres), or None where there are few."""
-    for name in ("positions", "truth"):
-        if name in recording.tables and len(recording.tables[name]) >= 3:
-            rows = recording.tables[name]
-            return _degrees(rows["time_s"], rows["lon_deg"], rows["lat_deg"])
-    for name in ("places", "true_places"):
-        if recording.crs and name in recording.tables and len(recording.tables[name]) >= 3:
-            rows = recording.tables[name]
-            lon, lat = unproject(recording.crs, rows["east_m"], rows["north_m"])
-            return _degrees(rows["time_s"], lon, lat)
-    return None
-
-
-def _degrees(time_s: pd.Series, lon_deg: object, lat_deg: object) -> _Track:
-    time, first = np.unique(time_s.to_numpy(dtype=np.float64), return_index=True)
-    lon = np.asarray(lon_deg, dtype=np.float64)[first]
-    lat = np.asarray(lat_deg, dtype=np.float64)[first]
-    # One scale for both tracks: whole degrees of latitude give the same one nearly everywhere.
-    wide = np.cos(np.radians(np.round(np.median(lat))))
-    return time, METRES_PER_DEGREE * wide * lon, METRES_PER_DEGREE * lat
-
-
-def _apart_m(one: _Track, other: _Track, shift_s: float, least: float) -> float:
-    """Return the median distance of a shifted track; NaN where little of it is in common."""
-    step = max(1, len(other[0]) // _MOST_POINTS)
-    time = other[0][::step] + shift_s
-    inside = (time >= one[0][0]) & (time <= one[0][-1])
-    if inside.sum() < 3 or inside.mean() < least:
-        return float("nan")
-    east = np.interp(time[inside], one[0], one[1]) - other[1][::step][inside]
-    north = np.interp(time[inside], one[0], one[2]) - other[2][::step][inside]
-    return float(np.median(np.hypot(east, north)))
-
-
-def _best_shift(one: _Track, other: _Track, shifts: Floats) -> tuple[float, float]:
-    """Return the shift of the least median distance, and that distance."""
-    least = min(_COMMON_SHARE, 0.9 * np.ptp(one[0]) / max(np.ptp(other[0]), 1e-9) * _COMMON_SHARE)
-    apart = np.array([_apart_m(one, other, shift, least) for shift in shifts])
-    if not np.isfinite(apart).any():
-        return 0.0, float("inf")
-    best, step = float(shifts[np.nanargmin(apart)]), float(shifts[1] - shifts[0])
-    fine = best + np.arange(-step, step + _FINE_S, _FINE_S)
-    apart = np.array([_apart_m(one, other, shift, least) for shift in fine])
-    if not np.isfinite(apart).any():
-        return best, float("inf")
-    return float(fine[np.nanargmin(apart)]), float(np.nanmin(apart))
 
 
 def _speed(recording: Recording) -> tuple[Floats, Floats] | None:
@@ -265,7 +216,7 @@ def _speed(recording: Recording) -> tuple[Floats, Floats] | None:
         rows = tables["poses"]
         step = np.sqrt((rows[["x_m", "y_m", "z_m"]].diff().to_numpy()[1:] ** 2).sum(axis=1))
         return _rate(rows["time_s"].to_numpy(), step)
-    track = _track(recording)
+    track = places_of(recording)
     if track is None or len(track[0]) < 10:
         return None
     return speeds_of_places(*track)
@@ -304,7 +255,7 @@ def _by_speed(
         spread_a = lagged(a**2, ones_b) - sum_a**2 / count
         spread_b = lagged(ones_a, b**2) - sum_b**2 / count
         correlation = shared / np.sqrt(np.maximum(spread_a * spread_b, 1e-12))
-    correlation[count < max(10, _COMMON_SHARE * min(len(a), len(b)))] = -1.0
+    correlation[count < max(10, COMMON_SHARE * min(len(a), len(b)))] = -1.0
     best = int(np.nanargmax(correlation))
     shift_s = (best - (len(b) - 1)) / _RATE_HZ + one[0][0] - other[0][0]
     return float(shift_s), float(min(correlation[best], 1.0))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from mapfilter._constants import DAY_S, HOUR_S
 from mapfilter.errors import listed
 from mapfilter.tracks.gps_dates import ERA_S, span_s
 from mapfilter.tracks.readers.recording import Recording
 
-_HOUR_S = 3600.0
-_APART_S = _HOUR_S
-_DAY_S = 86_400.0
+_APART_S = HOUR_S
 
 
 def zoneless_note(recordings: Sequence[Recording]) -> list[str]:
@@ -52,7 +51,7 @@ def week_fault(gap_s: float) -> str:
     Old receivers count weeks of GPS from 0 to 1023, and not how often.
     """
     anew = round(gap_s / ERA_S)
-    if not anew or abs(gap_s - anew * ERA_S) >= _DAY_S:
+    if not anew or abs(gap_s - anew * ERA_S) >= DAY_S:
         return ""
     seconds = anew * ERA_S
     return f"the date of a receiver whose week number began anew: --offset FILE={seconds:.0f}"
@@ -61,6 +60,6 @@ def week_fault(gap_s: float) -> str:
 def _hours_off(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Return whether most of the shorter of two spans lies in the other one some hours earlier."""
     apart_s = other[0] - one[0]
-    hours = round(apart_s / _HOUR_S)
+    hours = round(apart_s / HOUR_S)
     shorter_s = min(end - begin for begin, end in (one, other))
-    return hours > 0 and abs(apart_s - hours * _HOUR_S) < 0.5 * shorter_s
+    return hours > 0 and abs(apart_s - hours * HOUR_S) < 0.5 * shorter_s

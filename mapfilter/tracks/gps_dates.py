@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from mapfilter._constants import DAY_S, GPS_EPOCH_S
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.orbits import gps_time
 from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.readers.times import GPS_EPOCH_S, utc_from_gps_s, utc_from_week_s
+from mapfilter.tracks.readers.times import utc_from_gps_s, utc_from_week_s
 
 ERA_S = 1024 * WEEK_S
-_DAY_S = 86_400.0
 _COMMON = 0.5
 _LEAST_TOW_S = 3600.0
 """Recordings from an unknown start begin at 0 or soon after."""
@@ -97,7 +97,7 @@ def _misread_beside(recording: Recording, others: Sequence[Recording]) -> Misrea
         return None
     spans = [span_s(one) for one in others if one is not recording and one.clock.absolute]
     mine = span_s(recording)
-    if any(_common(mine, other) > -_DAY_S for other in spans):
+    if any(_common(mine, other) > -DAY_S for other in spans):
         return None
     for mistake in _mistakes(mine[0]):
         moved = mine[0] + mistake.late_s, mine[1] + mistake.late_s
@@ -145,7 +145,7 @@ def _doubtful_dates(recording: Recording, given: Collection[Path]) -> list[str]:
     if (named_s := _named_s(recording.path.name)) is not None:
         for mistake in _mistakes(begin_s):
             early_s = named_s - (end_s + mistake.late_s), begin_s + mistake.late_s - named_s
-            if early_s[0] <= _DAY_S and early_s[1] <= 2 * _DAY_S:
+            if early_s[0] <= DAY_S and early_s[1] <= 2 * DAY_S:
                 why = f"of {day}, but {_day(named_s)} by its name"
                 return [_doubt(recording, why, [mistake])]
     for technology, since_s in _SINCE.items():

@@ -12,14 +12,11 @@ import pandas as pd
 from mapfilter._words import number_of
 from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.identities import parse_cgi
+from mapfilter.radio.identities import IDENTITY, UNIQUE_IN_NETWORK, parse_cgi
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING
 
-_IDENTITY = ("mcc", "mnc", "lac", "ci")
-_KEYS = ("technology", *_IDENTITY, "arfcn", "bsic")
-_UNIQUE_IN_NETWORK = ("LTE", "NR")
-"""Technologies whose cell identity is unique in a network, whatever the tracking area."""
+_KEYS = ("technology", *IDENTITY, "arfcn", "bsic")
 _SHORT_CI = 1 << 16
 
 
@@ -183,7 +180,7 @@ def _fits(cell: Cell, reported: ReportedCell) -> bool:
         return False
     names = ["mcc", "mnc", "lac"]
     by_network = cell.mnc is not None and reported.mnc is not None
-    if by_network and (reported.technology or cell.technology) in _UNIQUE_IN_NETWORK:
+    if by_network and (reported.technology or cell.technology) in UNIQUE_IN_NETWORK:
         names.remove("lac")
     pairs = [(getattr(cell, name), getattr(reported, name)) for name in names]
     return all(one is None or other is None or one == other for one, other in pairs)

@@ -64,6 +64,11 @@ def check_clocks(
         faults.add(f"{whole}, time_s", "tables that overlap in time", spans, hint)
 
 
+def ends_early(before_s: float, whole_s: float) -> bool:
+    """Return whether rows that end some time before the others look cut off."""
+    return before_s > max(_EARLY_S, _EARLY_SHARE * whole_s)
+
+
 def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
     """Return a note where motion or radio ends long before the other one, as if cut off."""
     filled = [table for table in ("motion", "radio") if len(tables[table])]
@@ -72,7 +77,7 @@ def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
         return ()
     (first, first_s), (last, last_s) = sorted(ends_s.items(), key=lambda end: end[1])
     begin_s = min(float(rows["time_s"].iloc[0]) for rows in tables.values() if len(rows))
-    if last_s - first_s <= max(_EARLY_S, _EARLY_SHARE * (last_s - begin_s)):
+    if not ends_early(last_s - first_s, last_s - begin_s):
         return ()
     return (f"{first}: ends {last_s - first_s:.0f} s before {last}, as if cut off",)
 

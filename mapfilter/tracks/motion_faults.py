@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import FOOT_M, KMH_MPS, KNOT_MPS, MPH_MPS
 from mapfilter._types import Bools, Complexes, Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.headings import heading_fault
@@ -38,14 +39,13 @@ _A_SECOND = 1.2
 
 _LONG_STEPS = "steps are {} times as long as the way between positions"
 
-_FOOT_M, _KMH_MPS, _MPH_MPS, _KNOT_MPS = 0.3048, 1 / 3.6, 0.44704, 1852 / 3600
 _UNITS: Mapping[str, float] = {
-    "feet for metres": 1 / _FOOT_M,
-    "metres taken for feet": _FOOT_M,
-    "km/h for m/s": 1 / _KMH_MPS,
-    "m/s taken for km/h": _KMH_MPS,
-    "mph for m/s": 1 / _MPH_MPS,
-    "knots for m/s": 1 / _KNOT_MPS,
+    "feet for metres": 1 / FOOT_M,
+    "metres taken for feet": FOOT_M,
+    "km/h for m/s": 1 / KMH_MPS,
+    "m/s taken for km/h": KMH_MPS,
+    "mph for m/s": 1 / MPH_MPS,
+    "knots for m/s": 1 / KNOT_MPS,
     "inches for metres": 1 / 0.0254,
     "centimetres for metres": 100.0,
     "millimetres for metres": 1000.0,
@@ -56,8 +56,8 @@ _UNITS: Mapping[str, float] = {
 _SPEEDS: Mapping[str, float] = {
     "m/s": 1.0,
     "km/h": 3.6,
-    "mph": 1 / _MPH_MPS,
-    "knots": 1 / _KNOT_MPS,
+    "mph": 1 / MPH_MPS,
+    "knots": 1 / KNOT_MPS,
 }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -14,7 +15,6 @@ _USUAL_INTERVALS = 3
 _LEAST_GAP_S, _ROWS_OF_A_GAP = 3.0, 5.0
 _STANDING_MPS = 0.3
 """Least time and usual intervals without rows that are a gap, if it moved at an end of it."""
-MAD_TO_SD = 1.4826
 LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG = 0.05, 1.0, 90.0
 _COURSE_BIAS_DEG = 1.0
 UNDIRECTED = "directions are unknown, so that uncertainty grows to all sides by the way gone"

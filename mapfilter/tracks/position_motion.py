@@ -5,15 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Bools, Floats
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import (
-    LEAST_STEP_SD_M,
-    MAD_TO_SD,
-    MOVING_SD,
-    chords,
-    receiver_noise,
-)
+from mapfilter.tracks.moved import LEAST_STEP_SD_M, MOVING_SD, chords, receiver_noise
 
 _PART_S, _LONGEST_WAY_S = 1.0, 30.0
 _CHORD_SCALE = 0.1

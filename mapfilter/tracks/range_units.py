@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import same_crs
 from mapfilter.radio.cells import CellPlan
@@ -25,8 +26,8 @@ _FEWEST_STEPS = 2.0
 _OFTEN_GSM = 63
 _UNITS: Mapping[str, float] = {
     "the sign the other way round: how much farther the reference is?": -1.0,
-    "nanoseconds for metres?": 1e9 / 299_792_458,
-    "microseconds for metres?": 1e6 / 299_792_458,
+    "nanoseconds for metres?": 1e9 / LIGHT_MPS,
+    "microseconds for metres?": 1e6 / LIGHT_MPS,
     "kilometres for metres?": 1e-3,
 }
 """What differences in metres are multiplied by, by the mistake."""

@@ -13,11 +13,9 @@ from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.atmosphere import directions, ionosphere_m, receiver_m, troposphere_m
 from mapfilter.gnss.broadcast import gps_from_utc_s, place_by_broadcast
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.schema import HIGHEST_M, LOWEST_M, PLACE
 
-PLACE = ("x_m", "y_m", "z_m")
 _COLUMNS = ("time_s", "satellite", "pseudorange_m", "sigma_m", *PLACE)
-LOWEST_M, HIGHEST_M = 2.0e7, 5.5e7
-"""Distances of satellites from the earth's centre."""
 
 _FEW = 10
 _SAME_CLOCK_M = 3.0

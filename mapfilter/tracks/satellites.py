@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.gnss.almanacs import Almanac
-from mapfilter.gnss.earth_rotation import LIGHT_MPS, in_frame_of_reception
+from mapfilter.gnss.earth_rotation import in_frame_of_reception
 from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.tracks.schema import PLACE
 

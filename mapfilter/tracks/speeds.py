@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import FOOT_M
+
 SLOWEST_MPS, FASTEST_MPS, MOTOR_MPS = 0.6, 2.6, 8.0
 """Bounds of the mean speed of a walker that moves; speed from which on it is not a walker's even if
 lengths are in feet."""
 
 _STANDING_MPS, _LEAST_ROWS, _LONGEST_S = 0.1, 30, 10.0
-_FOOT_M = 0.3048
 
 
 def walkers_unit_m(speed_mps: float) -> float:
@@ -27,8 +28,8 @@ def walkers_unit_m(speed_mps: float) -> float:
     [3.2808, 1.0, 0.3048, 1.0]
     """
     if speed_mps < SLOWEST_MPS:
-        return 1 / _FOOT_M
-    return _FOOT_M if FASTEST_MPS < speed_mps < MOTOR_MPS else 1.0
+        return 1 / FOOT_M
+    return FOOT_M if FASTEST_MPS < speed_mps < MOTOR_MPS else 1.0
 
 
 def speed_fault(motion: pd.DataFrame) -> str:

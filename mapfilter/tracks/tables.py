@@ -18,9 +18,17 @@ from mapfilter.radio.identities import LIMITS
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
 from mapfilter.tracks.cut_times import cut_times
 from mapfilter.tracks.repeated_readings import repeated_readings
-from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SATELLITE, SCHEMA, SERVING, Column
+from mapfilter.tracks.schema import (
+    HIGHEST_M,
+    LOWEST_M,
+    NEIGHBOUR,
+    PLACE,
+    SATELLITE,
+    SCHEMA,
+    SERVING,
+    Column,
+)
 
-_LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
 _SELDOM_S = 10.0
 _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
@@ -135,7 +143,7 @@ def _check_satellites(rows: pd.DataFrame, found: TableFaults) -> None:
     some = known.any(axis=1) & ~known.all(axis=1)
     found.add_rows(some, field, "all three, or none", lambda _: "some of them", lambda _: "")
     away_m = np.sqrt(np.sum(place**2, axis=1))
-    bad = known.all(axis=1) & ~((away_m >= _LOWEST_M) & (away_m <= _HIGHEST_M))
+    bad = known.all(axis=1) & ~((away_m >= LOWEST_M) & (away_m <= HIGHEST_M))
     found.add_rows(
         bad,
         field,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from mapfilter.tracks.moved import MAD_TO_SD
+from mapfilter._constants import MAD_TO_SD
 from mapfilter.tracks.pdr.gyroscope import WALK_RAD_PER_SQRT_S
 
 _LEAST_ROWS, _LEAST_S, _LONGEST_S = 20, 20.0, 5.0

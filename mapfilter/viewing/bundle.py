@@ -19,15 +19,9 @@ from mapfilter.geodesy import unproject
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.radio.cells import CellPlan
+from mapfilter.roads.ways import Bounds
 from mapfilter.viewing.explain import TERMS
-from mapfilter.viewing.ground import (
-    Bounds,
-    ViewFrame,
-    background,
-    cells_of,
-    empty_background,
-    level_fields,
-)
+from mapfilter.viewing.ground import ViewFrame, background, cells_of, empty_background, level_fields
 from mapfilter.viewing.here import constants
 from mapfilter.viewing.readings import REASONS, LevelAt, level_on
 from mapfilter.viewing.runs import STATUSES, ViewedRun, run_of, thresholds, tracks_bounds

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import nan
+from math import isfinite, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
+from mapfilter.filters.resampling import log_sum
 from mapfilter.models.fingerprint import pixels
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, RadioReading
@@ -172,10 +173,8 @@ def _near(state: Floats32, place_m: tuple[float, float]) -> Bools:
 def _log_sum(log_weight: Floats, some: Bools) -> float:
     """Return the logarithm of the sum of some weights; NaN without any."""
     chosen = log_weight[some] if some.size == log_weight.size else log_weight[:0]
-    most = chosen.max(initial=-np.inf)
-    if not np.isfinite(most):
-        return nan
-    return float(most + np.log(np.sum(np.exp(chosen - most))))
+    total = log_sum(chosen)
+    return total if isfinite(total) else nan
 
 
 def _streets(before: MapBelief, moved: MapBelief, sets: Sequence[Bools]) -> list[tuple[float, ...]]:

@@ -11,11 +11,13 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Floats32
+from mapfilter.database.field import RadioField
 from mapfilter.database.points import Points
-from mapfilter.database.radioroutes import RadioField, RadioRouteDatabase
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.level_errors import roughness
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.radio.cells import CellPlan
+from mapfilter.roads.ways import Bounds
 from mapfilter.viewing.arrays import cell_numbers, packed, places, starts
 from mapfilter.viewing.streets import middle_lines
 
@@ -27,8 +29,6 @@ _MOST_BEST_PX, _MOST_POINTS, _MOST_PX = 512, 400_000, 12_000_000
 _FILLED_PX = 3
 _STEPS = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100)
 _LARGEST_STEP_M = 25.0
-
-Bounds = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,10 @@ from mapfilter._types import Floats, Ints
 from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import pixels
 from mapfilter.positioning.bayes.area_frame import AreaFrame
-from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
-from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.merging import epochs
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING

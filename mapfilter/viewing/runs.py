@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from mapfilter._types import Ints
-from mapfilter.evaluation.accuracy import Truth, position_errors_m
+from mapfilter.evaluation.accuracy import position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.estimate import TrackEstimate

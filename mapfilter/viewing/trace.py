@@ -13,8 +13,8 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.filter import Filter, Hypotheses
+from mapfilter.positioning.step_output import StepOutput
 from mapfilter.viewing.explain import Explanation, explain
 
 MOST_FRAMES, MOST_EXPLAINED = 1500, 4000

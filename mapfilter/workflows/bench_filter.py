@@ -36,8 +36,8 @@ from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.bench import median_seconds

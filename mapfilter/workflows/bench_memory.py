@@ -20,7 +20,7 @@ from mapfilter.experiments.papers.khalaf_allah_2007 import MAP_SETTINGS, plans
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench import build_made, made_rasters
 from mapfilter.workflows.bench_filter import JITTER, make_world, step_inputs, whole_step

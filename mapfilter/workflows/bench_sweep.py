@@ -21,7 +21,7 @@ from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, 
 from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.workflows.bench import median_seconds
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict

@@ -22,8 +22,8 @@ from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, bound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
 from mapfilter.report.coverage import plot_point_values, plot_twins
+from mapfilter.report.saving import save
 
 NOTES = (
     "exact for the error model: the bound from given gradients; bits by the serving cell",

@@ -14,6 +14,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.misplaced import AWAY_M
 from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
@@ -23,7 +24,6 @@ from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
 
-_AWAY_M = 5000.0
 _MANY = 0.2
 _OF_COLUMNS = {"heading_rad": "log-headings", "turn_rad": "log-turns", "step_m": "log-steps"}
 
@@ -97,7 +97,7 @@ def _is_near(path: Path, log: TrackLog, lattice: Lattice, findings: Findings) ->
         if places.empty:
             continue
         away_m = outside_m(places["east_m"].to_numpy(), places["north_m"].to_numpy(), lattice)
-        if away_m.min() > _AWAY_M:
+        if away_m.min() > AWAY_M:
             evidence = f"All positions ({table}) lie {away_m.min() / 1000:.0f} km or more outside."
             findings.add("log-outside-area", str(path), evidence)
             return False

@@ -17,11 +17,11 @@ from mapfilter.geodesy import project, projected_crs, same_crs, unproject, utm_z
 from mapfilter.lattice import Lattice, outside_m
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.roads.elements import BoxDeg
 from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg
 from mapfilter.roads.ways import Ways
 from mapfilter.workflows.world import area_lattice
 
-BoxDeg = tuple[float, float, float, float]
 Move = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 _HALF_TOLERANCE_PX = 0.02

@@ -21,7 +21,6 @@ from mapfilter.tracks.recordings import read_recordings, with_measured
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import check_log_replaceable, write_log
 
-_GAPS_SHOWN = 3
 _GAP_FACTOR = 5.0
 _LEAST_GAP_S = 2.0
 

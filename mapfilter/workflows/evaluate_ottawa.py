@@ -17,7 +17,7 @@ from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, StoreError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.accuracy_row import Row
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,
@@ -45,8 +45,9 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
 )
 from mapfilter.experiments.recorded.benchmark import Journey
 from mapfilter.experiments.row_intervals import RowInterval
-from mapfilter.report.canvas import BLUE, GREEN, GREY, save
+from mapfilter.report.canvas import BLUE, GREEN, GREY
 from mapfilter.report.cumulative import Distribution, plot_cumulative
+from mapfilter.report.saving import save
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.recorded_pictures import WorstUnit, draw_journey
 from mapfilter.workflows.result_text import to_jsonable

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from mapfilter._parallel import Progress, SerialExecutor, local_executor, ordered_results
-from mapfilter.evaluation.accuracy import RADII, Truth
+from mapfilter.evaluation.accuracy import RADII
 from mapfilter.evaluation.stanford import REGIONS, StanfordCounts
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.global_positioning import (
     Batch,
@@ -25,8 +26,8 @@ from mapfilter.experiments.benchmarks.worst_run import explain, worst_row
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
 from mapfilter.report.integrity import plot_coverage, plot_stanford, plot_worst_run
+from mapfilter.report.saving import save
 
 PICTURES = "pictures"
 POOLED = "pooled"

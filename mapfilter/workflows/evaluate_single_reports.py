@@ -28,8 +28,9 @@ from mapfilter.experiments.benchmarks.single_reports import (
 from mapfilter.geodesy import utm_crs
 from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.options import AUTO
-from mapfilter.report.canvas import BLACK, GREEN, GREY, ORANGE, PURPLE, SKY, save
+from mapfilter.report.canvas import BLACK, GREEN, GREY, ORANGE, PURPLE, SKY
 from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
+from mapfilter.report.saving import save
 from mapfilter.workflows.evaluate_ottawa import session_files
 from mapfilter.workflows.result_text import to_jsonable
 

@@ -32,9 +32,9 @@ from mapfilter.models.way_map import all_inside, weight_inside
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.estimate import protected_m
 from mapfilter.positioning.fingerprints.likelihood_kernel import add_reading
 from mapfilter.positioning.integrity import sample_tail
+from mapfilter.positioning.step_output import protected_m
 
 WORKERS = 2
 """Processes that compile beside this one."""

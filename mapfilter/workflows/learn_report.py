@@ -14,8 +14,8 @@ from mapfilter._io import atomic_file
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.learning.learn import Lesson
 from mapfilter.learning.patch import Change
-from mapfilter.report.canvas import save
 from mapfilter.report.learned import plot_learned
+from mapfilter.report.saving import save
 from mapfilter.workflows.learn_study import Taught
 from mapfilter.workflows.served import served_points, street_map
 

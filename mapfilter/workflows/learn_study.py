@@ -34,8 +34,9 @@ from mapfilter.learning.patch import Patch
 from mapfilter.learning.phone import PhoneNoise, phone_noise
 from mapfilter.learning.tracks import JourneyTrack, placed
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import Filter, FilterOptions, locate
+from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.positioning.loop import locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog

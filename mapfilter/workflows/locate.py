@@ -16,6 +16,7 @@ from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.evaluation.accuracy import mean_of
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.fingerprints.located import LocatedReports, figures_of
 from mapfilter.positioning.fingerprints.locating import (
@@ -26,8 +27,9 @@ from mapfilter.positioning.fingerprints.locating import (
 from mapfilter.positioning.fingerprints.matches import locator
 from mapfilter.positioning.fingerprints.options import AUTO, Centroid, method_name
 from mapfilter.positioning.fingerprints.reports import Reports
-from mapfilter.report.canvas import BLUE, GREY, save
+from mapfilter.report.canvas import BLUE, GREY
 from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
+from mapfilter.report.saving import save
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.placeless import is_local_frame
 from mapfilter.workflows.fingerprints import read_database, read_reports
@@ -127,7 +129,7 @@ def run_locate(
         len(fitted.database),
         len(fitted.database.cell_ids),
         figures,
-        float(scored.mean()) if scored.size else float("nan"),
+        mean_of(scored),
         float(np.median(scored)) if scored.size else float("nan"),
         notes,
         round(time.perf_counter() - began_s, 3),

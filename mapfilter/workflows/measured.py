@@ -10,6 +10,7 @@ import pandas as pd
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
+from mapfilter.radio.identities import IDENTITY
 from mapfilter.survey.measurement_rows import Rows
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers.format import ReadOptions
@@ -19,7 +20,6 @@ from mapfilter.tracks.store import is_log, read_log
 
 _LONGEST_S = 10.0
 _UNKNOWN = -1.0
-_IDENTITY = ("mcc", "mnc", "lac", "ci")
 _EXPECTED = "levels of cells, and positions"
 
 
@@ -72,7 +72,7 @@ def _log_rows(path: Path) -> Rows:
     degrees = {"lat_deg": lat_deg, "lon_deg": lon_deg, "accuracy_m": accuracy_m}
     positions = pd.DataFrame({"time_s": places["time_s"].to_numpy() + start_s, **degrees})
     radio = log.radio.assign(time_s=log.radio["time_s"] + start_s)
-    missing = [name for name in _IDENTITY if name not in radio]
+    missing = [name for name in IDENTITY if name not in radio]
     radio = radio.assign(**{name: pd.array([pd.NA] * len(radio), "Int64") for name in missing})
     rows = Rows(path, read=len(radio))
     _add(rows, radio, positions, absolute=bool(np.isfinite(log.start_utc_s)))
@@ -107,7 +107,7 @@ def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: 
     level_dbm = radio["level_dbm"].to_numpy(dtype=np.float64)
     columns = [time_s, *places[:2], level_dbm, places[2], advance, serving]
     rows.values.frombytes(np.ascontiguousarray(np.stack(columns)[:, kept].T).tobytes())
-    parts = radio[list(_IDENTITY)].fillna(_UNKNOWN).to_numpy(dtype=np.int64)[kept]
+    parts = radio[list(IDENTITY)].fillna(_UNKNOWN).to_numpy(dtype=np.int64)[kept]
     whole = (parts >= 0).all(axis=1)
     for cell, identity in zip(cells[whole], parts[whole].tolist(), strict=True):
         mcc, mnc, lac, ci = identity

@@ -17,9 +17,10 @@ from mapfilter.errors import OutputError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import BLUE, ORANGE, Drawn, save
+from mapfilter.report.canvas import BLUE, ORANGE, Drawn
 from mapfilter.report.coverage import plot_landuse, plot_level, plot_margin
 from mapfilter.report.network import plot_best_server, plot_points_per_cell
+from mapfilter.report.saving import save
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.ways import Buildings
@@ -44,7 +45,6 @@ NETWORK_PICTURES = (
 
 _NEARLY_ALL = (1.0, 99.0)
 _IF_NONE_DBM = (-110.0, -50.0)
-_SQUARE_M = 5.0
 
 
 def clear_pictures(folder: Path, names: Iterable[str]) -> None:

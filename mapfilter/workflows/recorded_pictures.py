@@ -19,8 +19,8 @@ from mapfilter.experiments.recorded.kept import read_journey, read_report
 from mapfilter.experiments.recorded.rows import Found, worst_of
 from mapfilter.experiments.recorded.worst_report import WorstReport
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
 from mapfilter.report.integrity import plot_worst_run
+from mapfilter.report.saving import save
 from mapfilter.report.worst_report import plot_worst_report
 from mapfilter.workflows.served import served_points, street_map
 

@@ -17,17 +17,19 @@ from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail, noted
-from mapfilter.evaluation.accuracy import Truth, accuracy, held_by_radius_95, truth_notes
+from mapfilter.evaluation.accuracy import accuracy, held_by_radius_95
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
+from mapfilter.evaluation.truth import Truth, truth_notes
 from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
-from mapfilter.positioning.filter import Filter, FilterOptions, locate
+from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.siteless import without_cells
 from mapfilter.positioning.log_lacks import advice_of
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
@@ -35,7 +37,8 @@ from mapfilter.radio.plan_notes import assumed_notes
 from mapfilter.report.ground import BaseMap
 from mapfilter.tracks.foreign_cells import foreign_cells
 from mapfilter.tracks.identify import name_by_plan
-from mapfilter.tracks.log import TrackLog, leave_out
+from mapfilter.tracks.kinds import leave_out
+from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.tracks.store import is_log

@@ -12,7 +12,7 @@ import numpy as np
 from mapfilter._types import Bools, Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError
-from mapfilter.evaluation.accuracy import percentile_m
+from mapfilter.evaluation.accuracy import mean_of, percentile_m
 from mapfilter.positioning.fingerprints.censoring import Bounds, bounds_of
 from mapfilter.positioning.fingerprints.locating import (
     ReportLocator,
@@ -56,7 +56,7 @@ class SingleReports:
     @property
     def figures(self) -> dict[str, Any]:
         """Counts, median and 95 % of the errors, and the share within the 95 % radius."""
-        share = float(self.within_95.mean()) if self.within_95.size else float("nan")
+        share = mean_of(self.within_95)
         return {
             "method": f"single reports, {method_name(Probabilistic())}",
             "reports": self.reports,

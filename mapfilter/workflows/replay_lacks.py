@@ -18,6 +18,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.log_lacks import NO_MOTION, lack_of_log
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.log_checks import ends_early
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
@@ -30,7 +31,6 @@ _MOTION_COLUMNS = (
     "wheel_speed_kmh, odometer_m or odometer_km"
 )
 
-_EARLY_S, _EARLY_SHARE = 30.0, 0.1
 _UNLOCATED = {
     Status.SEARCHING: "as several places are possible",
     Status.LOST: "as the readings contradict the position",
@@ -179,7 +179,7 @@ def early_end_note(
     if status.is_followed:
         ends_s = [float(rows["time_s"].iloc[-1]) for rows in opened.sensors.values() if len(rows)]
         end_s = max([end_s, *ends_s])
-    if end_s - last_s <= max(_EARLY_S, _EARLY_SHARE * (end_s - begin_s)):
+    if not ends_early(end_s - last_s, end_s - begin_s):
         return ()
     text = f"located until {last_s:.0f} s, rows go on until {end_s:.0f} s: "
     if status.is_followed:

@@ -11,7 +11,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, noted
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.kalman.siteless import needs_sites
-from mapfilter.tracks.log import leave_out
+from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame

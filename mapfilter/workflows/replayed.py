@@ -14,7 +14,7 @@ import numpy as np
 
 from mapfilter._types import Bools
 from mapfilter._words import number_of
-from mapfilter.evaluation.accuracy import Accuracy, share_of
+from mapfilter.evaluation.accuracy import Accuracy, mean_of
 from mapfilter.evaluation.outcome import Outcome
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason, Status
@@ -84,7 +84,7 @@ class ReplayedLog:
         """Outcome, notes and, with ground truth, the score beside that of single reports."""
         score = {}
         if self.accuracy is not None:
-            score = asdict(self.accuracy) | {"within_95": share_of(self.held_95)}
+            score = asdict(self.accuracy) | {"within_95": mean_of(self.held_95)}
         return {**asdict(self.outcome), "notes": self.notes, **score, **_beside(self.baseline)}
 
 
@@ -154,7 +154,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
     outcomes = [log.outcome for log in result.logs]
     scores = {}
     if result.summary is not None:
-        held = share_of(np.concatenate([log.held_95 for log in result.logs]))
+        held = mean_of(np.concatenate([log.held_95 for log in result.logs]))
         scores = asdict(result.summary) | {"within_95": held}
     return {
         "logs": len(outcomes),

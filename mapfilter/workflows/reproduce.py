@@ -21,7 +21,7 @@ from mapfilter.experiments.papers.paper import PaperSettings
 from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
-from mapfilter.report.canvas import save
+from mapfilter.report.saving import save
 from mapfilter.report.table import write_table
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict

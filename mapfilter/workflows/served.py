@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
-from mapfilter.database.parquet import WindowReader
+from mapfilter.database.parquet import Window, WindowReader
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import same_crs
@@ -30,8 +30,6 @@ _NEARLY_ALL = (0.01, 0.99)
 _AROUND = 0.15
 _LEAST_PX = 20
 _COLUMNS = ("row", "col", "best_server", "best_level_dbm", "margin_db", "on_square")
-
-Window = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)

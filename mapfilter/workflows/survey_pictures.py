@@ -12,7 +12,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.lattice import outside_m
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
+from mapfilter.report.saving import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 from mapfilter.survey.leave_out import LeftOut
 from mapfilter.survey.measurements import Measurements

@@ -21,7 +21,7 @@ from mapfilter.config.axes import parse_axis
 from mapfilter.config.load import load_config, load_keys
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.evaluation.success import (
+from mapfilter.evaluation.success_cells import (
     COORDINATES,
     HEADING,
     SuccessCell,
@@ -32,7 +32,8 @@ from mapfilter.evaluation.success import (
 from mapfilter.experiments.sweep.plan import NOISE_AXES
 from mapfilter.experiments.sweep.run import run_batch, seconds_per_run, sweep
 from mapfilter.experiments.sweep.table import read_runs
-from mapfilter.report.canvas import Drawn, save
+from mapfilter.report.canvas import Drawn
+from mapfilter.report.saving import save
 from mapfilter.report.success import (
     place_words,
     plot_run_distributions,

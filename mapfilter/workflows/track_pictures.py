@@ -18,7 +18,7 @@ import numpy as np
 
 from mapfilter._parallel import begun
 from mapfilter._types import Floats
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.ground import MAX_PANELS, BaseMap
@@ -47,8 +47,9 @@ def drawn_beside() -> Iterator[Executor]:
 
 def get_ready_to_draw() -> None:
     """Import what draws, and load the fonts, which is done once in each process."""
-    from mapfilter.report import errors, snapshots, track  # noqa: F401
-    from mapfilter.report.canvas import new_figure, png_of
+    from mapfilter.report import errors, evidence, snapshots, track  # noqa: F401
+    from mapfilter.report.canvas import new_figure
+    from mapfilter.report.saving import png_of
 
     png_of(new_figure(1.0, 1.0).subplots())
 
@@ -150,7 +151,7 @@ def _in_order(handed: Handed) -> Handed:
 
 def draw_picture(shown: TrackPictures, name: str, single_reports_m: Floats | None = None) -> bytes:
     """Return one picture of a located log as PNG."""
-    from mapfilter.report.canvas import png_of
+    from mapfilter.report.saving import png_of
 
     return png_of(_drawn(shown, name, single_reports_m))
 
@@ -159,7 +160,7 @@ def draw_snapshots(
     name: str, snapshots: Sequence[Snapshot], truth: Truth | None, base: BaseMap
 ) -> bytes:
     """Return the picture of a belief as PNG."""
-    from mapfilter.report.canvas import png_of
+    from mapfilter.report.saving import png_of
     from mapfilter.report.snapshots import plot_belief, plot_candidates
 
     plot = plot_candidates if name == _CANDIDATES else plot_belief
@@ -167,7 +168,8 @@ def draw_snapshots(
 
 
 def _drawn(shown: TrackPictures, name: str, single_reports_m: Floats | None) -> Drawn:
-    from mapfilter.report.errors import plot_error_over_distance, plot_evidence
+    from mapfilter.report.errors import plot_error_over_distance
+    from mapfilter.report.evidence import plot_evidence
     from mapfilter.report.track import plot_track
 
     estimate, truth, base = shown.estimate, shown.truth, shown.base

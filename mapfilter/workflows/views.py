@@ -10,6 +10,7 @@ from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
 from mapfilter._inputs import shown
+from mapfilter.database.checked import MANIFEST
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import Faults, InputError, fail
@@ -27,7 +28,6 @@ VIEW_HTML = "view.html"
 
 BOUND_TIF = "bound.tif"
 
-_MANIFEST = "manifest.json"
 _BOUND_LAYERS = {
     "levels_to_fix_m": "Metres to convergence by levels, at best",
     "cells_to_fix_m": "Metres to convergence by cells, at best",
@@ -64,7 +64,7 @@ def run_view(
     file = (out or Path(VIEW_HTML)).absolute()
     bounds = [path for path in paths if (path / BOUND_TIF).is_file()]
     rest = [path for path in paths if path not in bounds]
-    if len(rest) == 1 and (rest[0] / _MANIFEST).is_file():
+    if len(rest) == 1 and (rest[0] / MANIFEST).is_file():
         bundle = database_view(open_database(rest[0]))
     else:
         pages = pages_of(rest or paths)
@@ -132,7 +132,7 @@ def pages_of(paths: Sequence[Path]) -> list[Path]:
     for path in paths:
         pages = [path] if path.is_file() else sorted(path.glob(REPLAY_HTML))
         pages = pages or sorted(path.glob(f"*/{REPLAY_HTML}"))
-        if (path / _MANIFEST).is_file():
+        if (path / MANIFEST).is_file():
             expected = f"results with {REPLAY_HTML} alone, or one database alone"
             hint = "each database is a page of its own; mapfilter merge makes one of several"
             faults.add(shown(str(path)), expected, "a database beside others", hint)

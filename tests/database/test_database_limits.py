@@ -10,6 +10,7 @@ from small_world import CRS, LATTICE, make_database, make_world
 
 from mapfilter._json_files import sealed
 from mapfilter.database.build import check_parameters
+from mapfilter.database.field import fill_field
 from mapfilter.database.manifest import (
     InputFile,
     apart,
@@ -18,7 +19,6 @@ from mapfilter.database.manifest import (
     read_manifest,
 )
 from mapfilter.database.parts import levels_rows, points_table
-from mapfilter.database.radioroutes import fill_field
 from mapfilter.database.sources import check_aligned, overlap, pixels_between
 from mapfilter.database.tiles import TileLevels, TileRows, received_levels, tile_windows, z_order
 from mapfilter.errors import InputError, StoreError

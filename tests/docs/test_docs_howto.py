@@ -12,7 +12,8 @@ import typer
 
 from mapfilter.cli import app
 from mapfilter.config.load import load_config
-from mapfilter.propagation.models import PUBLISHED, ModelName
+from mapfilter.propagation.models import ModelName
+from mapfilter.propagation.published_ranges import PUBLISHED
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = sorted((DOCS / "howto").glob("*.rst"))

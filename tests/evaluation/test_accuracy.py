@@ -9,16 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.evaluation.accuracy import (
-    Truth,
     accuracy,
     held_by_radius_95,
+    mean_of,
     percentile_m,
     position_errors_m,
-    share_of,
-    truth_notes,
 )
+from mapfilter.evaluation.truth import Truth, truth_notes
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST
 
@@ -95,8 +95,8 @@ def test_the_share_within_the_radius_is_of_scored_epochs_with_one():
     # Before the switch; 5 m in 5 m; 1 m in 2 m; 3 m in 2 m; 2 m without a radius; held; no truth.
     found.radii_m[:, -1] = [9.0, 5.0, 2.0, 2.0, nan, 1.0, 1e9]
     assert held_by_radius_95(found, TRUTH).tolist() == [True, True, False, True]
-    assert share_of(held_by_radius_95(found, TRUTH)) == 0.75
-    assert isnan(share_of(held_by_radius_95(estimate(rows[:1]), TRUTH)))
+    assert mean_of(held_by_radius_95(found, TRUTH)) == 0.75
+    assert isnan(mean_of(held_by_radius_95(estimate(rows[:1]), TRUTH)))
 
 
 def test_positions_before_the_switch_do_not_count():

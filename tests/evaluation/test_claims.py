@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from mapfilter.evaluation.accuracy import Truth, score_claims
+from mapfilter.evaluation.claims import score_claims
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 
 STATUS = {
     "S": Status.SEARCHING,

@@ -9,7 +9,8 @@ import pytest
 from mapfilter.evaluation.outcome import outcome, pauses_s
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
-from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix, UnusedReading
 
 CRS = "EPSG:32635"
 

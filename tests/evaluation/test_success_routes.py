@@ -8,12 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.evaluation.success import (
-    COORDINATES,
-    success_cells,
-    wilson_interval,
-    wilson_interval_of_routes,
-)
+from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
+from mapfilter.evaluation.success_cells import COORDINATES, success_cells
 
 
 def test_one_run_a_route_is_almost_the_plain_interval():

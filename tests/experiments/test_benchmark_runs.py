@@ -12,8 +12,9 @@ from mapfilter.experiments.benchmarks.global_positioning import Batch, informed,
 from mapfilter.experiments.benchmarks.plain_runs import PlainCity
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import PositionedTrack
+from mapfilter.positioning.step_output import Fix
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.satellites import ReceptionModel

@@ -10,7 +10,8 @@ from walked_line import estimate, line, truth_of
 from mapfilter.experiments.benchmarks.causes import causes_of, turning_deg
 from mapfilter.experiments.benchmarks.worst_run import explain
 from mapfilter.filters.contract import Reason
-from mapfilter.positioning.estimate import TrackEvidence, UnusedReading
+from mapfilter.positioning.estimate import TrackEvidence
+from mapfilter.positioning.step_output import UnusedReading
 
 COUNT = 60
 

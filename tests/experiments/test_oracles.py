@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded import locating, smartloc
 from mapfilter.experiments.recorded.locating import OpenMap, with_white_ranges
 from mapfilter.experiments.recorded.oracles import (

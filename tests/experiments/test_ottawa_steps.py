@@ -18,7 +18,8 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
 )
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.tracks.sampling import sampling_sd_m
 
 # On the central meridian grid north is north.

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded import kitti, mountain_view
 from mapfilter.experiments.recorded.least_squares import least_squares_positions
 from mapfilter.experiments.recorded.outages import (
@@ -28,7 +28,8 @@ from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.gnss.sky import ecef_from_lonlat
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32632"

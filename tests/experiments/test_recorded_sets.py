@@ -12,14 +12,15 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded import belgium, denver, mall, mountain_view, smartloc
 from mapfilter.experiments.recorded.benchmark import Task
 from mapfilter.experiments.recorded.rows import table_rows
 from mapfilter.experiments.recorded.street_graph import match_points, read_graph
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32613"

@@ -9,7 +9,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks import journeys as satellites
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.journeys import SPOOFED_S, Walk, spoofer_of, with_satellites
-from mapfilter.gnss.sky import Skyline
+from mapfilter.gnss.skyline import Skyline
 from mapfilter.simulation.reflections import NlosModel
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.tracks.log import make_log

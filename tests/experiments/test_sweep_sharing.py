@@ -12,7 +12,7 @@ from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import opened_filter, scored_filter
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.sweep import load_sweep

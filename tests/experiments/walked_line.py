@@ -3,11 +3,12 @@
 import numpy as np
 import pandas as pd
 
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import PositionedTrack
+from mapfilter.positioning.step_output import Fix
 
 CRS = "EPSG:32629"
 STATUS = {

@@ -24,8 +24,9 @@ from mapfilter.filters.gaussian import (
 )
 from mapfilter.filters.gaussian_sum import split
 from mapfilter.filters.kalman import smooth
-from mapfilter.filters.particle import ParticleOptions, switched
+from mapfilter.filters.particle import ParticleOptions
 from mapfilter.filters.rao_blackwell import REGULARISED, SIR, SirOptions, init
+from mapfilter.filters.switch_rule import switched
 from mapfilter.filters.trials import problem_of, run_trials
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import POSITION
@@ -142,8 +143,10 @@ def test_a_split_keeps_mean_and_variance():
 
 
 def test_what_switches():
-    def told(status, travelled_m, agreement_start_m, agrees=True):
-        return switched(status, travelled_m, agreement_start_m, agrees=agrees, hold_m=14.0)
+    def told(status, travelled_m, agreement_start_m, agrees=True, splits=False):
+        return switched(
+            status, travelled_m, agreement_start_m, agrees=agrees, splits=splits, hold_m=14.0
+        )
 
     assert told(Status.SEARCHING, 100.0, 86.0) == (Status.CONVERGED, 86.0)
     assert told(Status.SEARCHING, 100.0, 86.1) == (Status.SEARCHING, 86.1)
@@ -153,6 +156,11 @@ def test_what_switches():
     assert told(Status.CONVERGED, 100.0, 86.0, agrees=False) == (Status.TRACKING, 86.0)
     for status in (Status.TRACKING, Status.LOST):
         assert told(status, 100.0, 5.0, agrees=False) == (status, 5.0)
+    # A belief in several places is searched again, also one that agreed for long enough.
+    for status in (Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST):
+        status, since_m = told(status, 100.0, 5.0, splits=True)
+        assert (status, isnan(since_m)) == (Status.SEARCHING, True)
+    assert told(Status.SEARCHING, 100.0, 99.0, splits=True) == (Status.SEARCHING, 99.0)
 
 
 def test_what_lies_on_the_border_is_taken():

@@ -4,14 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.atmosphere import directions, ionosphere_m, receiver_m, troposphere_m
-from mapfilter.gnss.broadcast import (
-    LIGHT_MPS,
-    gps_from_utc_s,
-    place_by_broadcast,
-    satellite_states,
-)
+from mapfilter.gnss.broadcast import gps_from_utc_s, place_by_broadcast, satellite_states
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, satellite_positions_m
 from mapfilter.tracks.readers.times import utc_from_gps_s
 

@@ -15,13 +15,8 @@ from mapfilter.errors import InputError
 from mapfilter.gnss.almanacs import Almanac, nominal_gps
 from mapfilter.gnss.noise import correlated_along, elevation_sigma_m, multipath_bias_m
 from mapfilter.gnss.orbits import gps_time, satellite_positions_m
-from mapfilter.gnss.sky import (
-    Directions,
-    LocalFrame,
-    Skyline,
-    directions,
-    ecef_from_lonlat,
-)
+from mapfilter.gnss.sky import Directions, LocalFrame, directions, ecef_from_lonlat
+from mapfilter.gnss.skyline import Skyline
 
 GEODETIC = Transformer.from_crs("EPSG:4978", "EPSG:4979", always_xy=True)
 CASES = json.loads((Path(__file__).parents[1] / "fusion_cases.json").read_text(encoding="utf-8"))

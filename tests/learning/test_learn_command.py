@@ -20,7 +20,8 @@ from mapfilter.geodesy import unproject
 from mapfilter.learning.blank import EVERYWHERE, blank_database, blank_log
 from mapfilter.learning.patch import read_patch
 from mapfilter.radio.cells import CellPlan
-from mapfilter.tracks.log import leave_out, make_log
+from mapfilter.tracks.kinds import leave_out
+from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import write_log
 from mapfilter.workflows import learn_study
 from mapfilter.workflows.check_suspects import run_check_suspects

@@ -8,7 +8,7 @@ import pytest
 import shapely
 from learning_world import CRS, EAST, NORTH
 
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.lattice import Lattice
 from mapfilter.learning.missing_ways import LEAST_JOURNEYS, missing_ways
 from mapfilter.learning.phone import phone_noise

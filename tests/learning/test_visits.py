@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from learning_world import CRS, EAST, NORTH
 
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.lattice import Lattice
 from mapfilter.learning.learn import unlisted_cells
 from mapfilter.learning.visits import Placed, predicted_dbm, visits_of

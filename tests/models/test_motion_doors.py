@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.models.motion import (
     QUARTZ,
-    SPEED_OF_LIGHT_MPS,
     LinearMotion,
     Oscillator,
     clock_motion,
@@ -24,7 +24,7 @@ I2 = np.eye(2)
 
 
 def test_the_clock_term_by_term():
-    assert SPEED_OF_LIGHT_MPS == 299_792_458.0
+    assert LIGHT_MPS == 299_792_458.0
     assert Oscillator(9.4e-20, 1.8e-19, 3.8e-21) == QUARTZ
     c2, pi2 = 299_792_458.0**2, math.pi**2
     white = clock_noise(4.0, Oscillator(1.0, 0.0, 0.0), "textbook") / c2

@@ -12,7 +12,7 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.state import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.step_output import UnusedReading
 
 AREA = make_area()
 A, B, C, D = BANDS.values()

@@ -6,7 +6,7 @@ level. Levels are quarters of a dB, which the kernels' tables hold exactly.
 
 import numpy as np
 
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.level_errors import LevelErrors

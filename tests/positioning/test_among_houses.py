@@ -9,8 +9,8 @@ from made_town import CRS, Town, slowed, walk_log
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.loop import locate
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import make_log
 

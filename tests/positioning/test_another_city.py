@@ -12,7 +12,7 @@ from mapfilter.models.street_motion import OFF, STATES
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 
 CLAIMED = (Status.CONVERGED, Status.TRACKING)
 TOWN, OTHERS = Town.of(1), (Town.of(2), Town.of(3))

@@ -21,9 +21,9 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.timing import TimingSource
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.filter import estimate_of, locate
+from mapfilter.positioning.loop import estimate_of, locate
+from mapfilter.positioning.merging import epochs
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.testing import ContractError, check_belief_filter
 from mapfilter.tracks.log import make_log
 

@@ -15,7 +15,7 @@ from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.radio import EvidenceOptions
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 
 # Wide enough that a pixel of 5 m resolves what one step adds.

@@ -13,8 +13,8 @@ from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes.alternative import AlternativeRules, NullHypothesis
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
 
 FEW = BayesFilter(max_particles=4000, min_search_particles=2000, min_particles=500)
 

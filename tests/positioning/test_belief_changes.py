@@ -13,6 +13,7 @@ from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, NORTH, STATES, MotionErrors
+from mapfilter.positioning.bayes.belief_changes import carried_on, remounted, turned_at_jump
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.model import BayesModel
@@ -54,7 +55,7 @@ def carried(gone_s, *, left=1.0, pace_mps=1.5, measured_m=0.0):
     left_nats = log(left / (1 - left)) if 0 < left < 1 else copysign(inf, left - 0.5)
     rest = Rest(0.0, left_nats=left_nats, pace_mps=pace_mps, measured_m=measured_m)
     rng = np.random.default_rng(5)
-    return FILTERS.carried_on(with_rest(rest), belief(), gone_s, rng).state
+    return carried_on(belief(), rest, gone_s, rng).state
 
 
 @pytest.mark.parametrize(
@@ -82,12 +83,9 @@ def test_only_the_hypotheses_that_left_are_carried_on(left):
     assert gone.mean() == pytest.approx(left, abs=0.01)
 
 
-def test_without_a_rest_and_on_a_grid_nothing_is_carried_on():
-    rng = np.random.default_rng(1)
-    given, mass = belief(), on_grid(3)
-    assert FILTERS.carried_on(with_rest(None), given, 40.0, rng) is given
-    rest = Rest(0.0, left_nats=inf, pace_mps=1.5)
-    assert FILTERS.carried_on(with_rest(rest), mass, 40.0, rng) is mass
+def test_on_a_grid_nothing_is_carried_on():
+    mass, rest = on_grid(3), Rest(0.0, left_nats=inf, pace_mps=1.5)
+    assert carried_on(mass, rest, 40.0, np.random.default_rng(1)) is mass
 
 
 HOLDS = HoldRules(probability=0.2, around_probability=0.7)
@@ -101,7 +99,7 @@ HOLDS = HoldRules(probability=0.2, around_probability=0.7)
 def test_a_search_turns_the_phone_of_some_hypotheses_at_a_jump(changed_deg, share):
     changed_rad = np.radians(changed_deg)
     given = belief(bias_rad=3.0)
-    found = replace(FILTERS, holds=HOLDS).turned(given, changed_rad, np.random.default_rng(2))
+    found = turned_at_jump(given, HOLDS, changed_rad, np.random.default_rng(2))
     turned = found.state[BIAS] != given.state[BIAS]
     assert turned.mean() == pytest.approx(share, abs=0.01)
     # They walk straight on: what the heading changes by, the error takes back.
@@ -109,14 +107,14 @@ def test_a_search_turns_the_phone_of_some_hypotheses_at_a_jump(changed_deg, shar
     np.testing.assert_allclose(found.state[BIAS, turned], expected, atol=1e-6)
     assert (given.state[BIAS] == 3.0).all()
     mass = on_grid(3)
-    assert FILTERS.turned(mass, changed_rad, np.random.default_rng(2)) is mass
+    assert turned_at_jump(mass, HOLDS, changed_rad, np.random.default_rng(2)) is mass
 
 
 @pytest.mark.parametrize("length_m", [0.5, 20.0])
 def test_a_tracked_phone_is_remounted_by_the_metre(length_m):
     motion = MotionErrors(remounts_per_m=0.04)
-    filters = BeliefFilters(BayesModel(make_area(), motion))
-    found = filters.remounted(belief(Status.TRACKING), length_m, np.random.default_rng(3))
+    given = belief(Status.TRACKING)
+    found = remounted(given, motion, length_m, np.random.default_rng(3))
     # Some are drawn twice.
     share = 1 - exp(-(1 - exp(-0.04 * length_m)))
     assert np.mean(found.state[BIAS] != 0.0) == pytest.approx(share, rel=0.06)
@@ -128,10 +126,10 @@ def test_a_tracked_phone_is_remounted_by_the_metre(length_m):
      (Status.TRACKING, 20.0, 0.0), (Status.TRACKING, 1e-9, 0.04)],
 )  # fmt: skip
 def test_no_phone_is_remounted_otherwise(status, length_m, per_m):
-    filters = BeliefFilters(BayesModel(make_area(), MotionErrors(remounts_per_m=per_m)))
+    motion = MotionErrors(remounts_per_m=per_m)
     given, mass, rng = belief(status), on_grid(3), np.random.default_rng(3)
-    assert filters.remounted(given, length_m, rng) is given
-    assert filters.remounted(mass, 20.0, rng) is mass
+    assert remounted(given, motion, length_m, rng) is given
+    assert remounted(mass, motion, 20.0, rng) is mass
     if length_m != 1e-9:
         # Nothing is drawn for it.
         assert rng.random() == np.random.default_rng(3).random()

@@ -12,7 +12,7 @@ from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, Upd
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
-from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.step_output import UnusedReading
 
 RNG = np.random.default_rng(0)
 STEP = MotionStep(1.0, 0.0)

@@ -20,7 +20,7 @@ from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 
 STILL = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0,

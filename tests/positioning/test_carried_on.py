@@ -11,8 +11,8 @@ from made_town import CRS, Town, slowed, walk_log
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.gnss.fixes import FixTerm, RejectedFixTerm
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.sensors.places import Places
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch, watched

@@ -8,19 +8,17 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.positioning import epochs as tested
+from mapfilter.positioning import merging as tested
 from mapfilter.positioning.epochs import (
     Difference,
     Epoch,
     GnssFix,
     Pseudorange,
     ReportRow,
-    epoch_columns,
-    epochs,
     headed,
-    make_epoch,
     serving_cell,
 )
+from mapfilter.positioning.merging import epoch_columns, epochs, make_epoch
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32632"

@@ -19,7 +19,7 @@ from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 
 OPTIONS = BayesFilter(max_particles=2000, min_search_particles=1000, min_particles=500)
 LEFT_OUT = ["way_id", "way_probability", "radius_99_m", "protection_m"]

@@ -8,13 +8,8 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import (
-    Fix,
-    StepOutput,
-    TrackEstimate,
-    TrackEvidence,
-    UnusedReading,
-)
+from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence
+from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 
 
 def fix(time_s, status=Status.SEARCHING, east_m=nan):

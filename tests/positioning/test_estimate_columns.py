@@ -3,8 +3,8 @@
 import numpy as np
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.estimate_columns import EstimateColumns
+from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 
 CRS = "EPSG:32629"
 

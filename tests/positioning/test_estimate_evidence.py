@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate, TrackEvidence
+from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence
 from mapfilter.positioning.estimate_store import read_estimate, write_estimate
+from mapfilter.positioning.step_output import Fix
 
 NAMES = [one.name for one in fields(TrackEvidence)]
 

@@ -11,13 +11,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_store import (
     read_estimate,
     write_estimate,
     write_geojson,
     write_gpx,
 )
+from mapfilter.positioning.step_output import Fix
 
 
 def fix(time_s, east_m, north_m, status=Status.TRACKING):

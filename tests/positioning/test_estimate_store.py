@@ -17,13 +17,14 @@ from mapfilter.errors import OutputError, StoreError
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning import estimate_store
-from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_store import (
     read_estimate,
     write_estimate,
     write_geojson,
     write_gpx,
 )
+from mapfilter.positioning.step_output import Fix, UnusedReading
 
 CRS = "EPSG:32629"
 UNKNOWN = np.full((2, 2), nan), np.full(3, nan)

@@ -16,8 +16,9 @@ from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.filter import Hypotheses, locate
+from mapfilter.positioning.filter import Hypotheses
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
 from mapfilter.viewing import explain as module
 from mapfilter.viewing.explain import explain
 from mapfilter.viewing.here import Place, Report, constants, report_terms

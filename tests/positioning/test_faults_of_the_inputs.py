@@ -16,7 +16,7 @@ from faulty_town import TOWN, OffWays, moved, other, turned, walk, without_stree
 
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.merging import epochs
 
 AREA = TOWN.area()
 NO_CELL_IS_AT_FAULT = {"fault_probability": 1e-6}

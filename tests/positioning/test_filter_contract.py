@@ -11,8 +11,8 @@ from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Estimate, Reason, Status, UpdateInfo
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.positioning.estimate import Fix, StepOutput
 from mapfilter.positioning.locators import BUILT_IN
+from mapfilter.positioning.step_output import Fix, StepOutput
 from mapfilter.testing import ContractError, check_filter
 
 

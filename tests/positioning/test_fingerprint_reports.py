@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from made_fingerprints import CRS, reports_at
 
 from mapfilter.errors import InputError
+from mapfilter.positioning.fingerprints.joining import joined_reports
 from mapfilter.positioning.fingerprints.log_reports import reports_of_log
-from mapfilter.positioning.fingerprints.reports import joined_reports, make_reports
+from mapfilter.positioning.fingerprints.reports import make_reports
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.scans import SCAN_S, scan_of_rows
 

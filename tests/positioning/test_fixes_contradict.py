@@ -17,10 +17,10 @@ from mapfilter.positioning.bayes.contradicted import hold_of_next, misreads
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import make_log
 
 AHEAD = Contradiction(0.1, radians(5.0), 4, goes_on=True)

@@ -13,7 +13,7 @@ from cross_world import make_database, walk_log
 from matplotlib.figure import Figure
 
 import mapfilter as mf
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.locators import as_filter
 

@@ -14,10 +14,10 @@ from mapfilter.filters.trials import run_trials
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import MOVING, POSITION
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels, compiled
+from mapfilter.positioning.loop import locate
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log

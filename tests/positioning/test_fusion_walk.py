@@ -17,6 +17,7 @@ from mapfilter.positioning.kalman.level_errors import CellSlots, with_levels
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.positioning.kalman.reckoning import RECKONED
+from mapfilter.positioning.kalman.report_model import aged, report_model
 from mapfilter.positioning.kalman.start import first_belief
 from mapfilter.positioning.kalman.state import KalmanState
 from mapfilter.positioning.kalman.step import KalmanStep
@@ -211,17 +212,14 @@ def test_where_a_belief_starts():
 
 
 def test_errors_that_last_are_told_once():
-    made = walk()
     model = SITES.of(POSITION, ("A",), ("B",))
     sigma = hypot(200.0, KalmanOptions().timing_step_m / 12**0.5)
     np.testing.assert_allclose(model.noise, np.diag([64.0, sigma**2]))
     # Before the first report nothing has been told.
-    np.testing.assert_allclose(made._aged(model, [100.0, 500.0]).noise, model.noise)
-    made.moved_m = 25.0
-    aged = made._aged(model, [100.0, 500.0]).noise
-    np.testing.assert_allclose(aged, np.diag([64.0 * 4, sigma**2 * 20]))
-    made.moved_m = 0.0
-    assert made._aged(model, [100.0, 500.0]).noise[0, 0] == pytest.approx(64.0 * 1000)
+    np.testing.assert_allclose(aged(model, [100.0, 500.0], inf).noise, model.noise)
+    after = aged(model, [100.0, 500.0], 25.0).noise
+    np.testing.assert_allclose(after, np.diag([64.0 * 4, sigma**2 * 20]))
+    assert aged(model, [100.0, 500.0], 0.0).noise[0, 0] == pytest.approx(64.0 * 1000)
 
 
 def test_errors_of_more_cells_than_are_kept_are_noise():
@@ -245,13 +243,15 @@ def test_errors_of_cells_that_are_not_kept_last_longer_than_noise():
     heard = (-70.0, -80.0)
     made._move(Epoch(0.0), ("B", "A"))
     given = SiteReadings(("B", "A"), heard, (), (), ())
-    np.testing.assert_allclose(made._radio_model(given).noise, np.diag([64.0, 64.0 + 144.0]))
+    known = SITES, made.layout, given
+    first = report_model(*known, made.slots, made.growth, made.moved_m)
+    np.testing.assert_allclose(first.noise, np.diag([64.0, 64.0 + 144.0]))
     made.moved_m = 30.0
     made.slots = replace(made.slots, ago_m={"B": 30.0, "A": 30.0})
     made._move(Epoch(0.0), ("B", "A"))
-    np.testing.assert_allclose(
-        made._radio_model(given).noise, np.diag([64.0 * 40 / 30, 64.0 * 40 / 30 + 144.0 * 20])
-    )
+    second = report_model(*known, made.slots, made.growth, made.moved_m)
+    lasting_db2 = 64.0 * 40 / 30
+    np.testing.assert_allclose(second.noise, np.diag([lasting_db2, lasting_db2 + 144.0 * 20]))
 
 
 def test_noise_of_fixes():

@@ -21,14 +21,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
-from mapfilter.evaluation.accuracy import Truth, accuracy, position_errors_m
+from mapfilter.evaluation.accuracy import accuracy, position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.candidate import CandidateSearch, Mode
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning import filter as filters
+from mapfilter.positioning import loop
 from mapfilter.positioning.candidate import CandidateFilter, cell_points
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate
+from mapfilter.positioning.merging import epochs
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.log import make_log
 
 # 16 steps of 1.25 m: every match lands on a lattice point, so the walk is followed exactly.
@@ -50,7 +52,7 @@ def cross_points(cross_database):
 def locate(cross_database):
     def located(log, options=OPTIONS):
         rng = np.random.default_rng(0)
-        return filters.locate(log, options.over(cross_database), rng, snapshots=True)
+        return loop.locate(log, options.over(cross_database), rng, snapshots=True)
 
     return located
 
@@ -181,7 +183,7 @@ def test_a_live_stream_gives_the_same_as_a_replay(locate, cross_database, cross_
 def test_the_same_input_gives_the_same_bytes(locate, cross_database, tmp_path):
     for name in "ab":
         rng = np.random.default_rng(ord(name))
-        track = filters.locate(walk_log(), OPTIONS.over(cross_database), rng)
+        track = loop.locate(walk_log(), OPTIONS.over(cross_database), rng)
         write_estimate(track.estimate, tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
     write_estimate(
@@ -349,7 +351,7 @@ def test_a_cell_of_one_point_is_a_position_at_once(cross_database):
     rng = np.random.default_rng(0)
     tracker = OPTIONS.over(cross_database)
     one = replace(tracker, filter=CandidateSearch(lambda _: One(), OPTIONS))
-    track = filters.locate(log, one, rng, snapshots=True)
+    track = loop.locate(log, one, rng, snapshots=True)
     assert track.estimate.status[:3] == (C, T, T)
     assert [s.status for s in track.snapshots] == [C]
 

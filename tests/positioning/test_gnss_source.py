@@ -13,13 +13,13 @@ from mapfilter.gnss.sky import GridFrame
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.gate import GnssComparison
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import Receiver
 from mapfilter.positioning.gnss.source import FirstFix, FirstRanges, GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import FixTrail
+from mapfilter.positioning.step_output import UnusedReading
 
 CRS = "EPSG:32632"
 EAST_M, NORTH_M = (float(one) for one in project(CRS, 9.3, 48.5))

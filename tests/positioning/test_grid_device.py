@@ -17,8 +17,8 @@ from mapfilter.filters.grid import GridBelief
 from mapfilter.positioning.bayes.device_step import DeviceStep
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import GridFilter
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 
 DEVICE = Device("gpu", strict_arrays)

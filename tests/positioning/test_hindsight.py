@@ -13,8 +13,9 @@ from mapfilter.models.street_motion import STATES, STRETCH, TURN, MotionErrors
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.bayes.smoothing import BayesSmoother, Kept
-from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_columns import EstimateColumns
+from mapfilter.positioning.step_output import Fix, StepOutput
 
 AREA = make_area()
 ERRORS = MotionErrors(

@@ -5,7 +5,7 @@ import pytest
 from made_town import Town, slowed, walk_log
 
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import make_log
 
 FOOT_M = 0.3048

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
-from mapfilter.evaluation.accuracy import Truth, position_errors_m
+from mapfilter.evaluation.accuracy import position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.models.state import MOVING, POSITION
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.fingerprints.lasting import _lag_sums, _stretches, fit_lasting
 from mapfilter.positioning.fingerprints.reports import make_reports
 from mapfilter.positioning.kalman.belief import SumBelief
@@ -22,6 +22,7 @@ from mapfilter.positioning.kalman.lasting import (
     fix_layout,
     white_part,
 )
+from mapfilter.positioning.loop import locate
 from mapfilter.radio.cells import CellPlan
 
 CRS = "EPSG:32635"

@@ -9,7 +9,7 @@ import pytest
 from cross_world import SPEED_MPS, make_database, walk_log
 
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import make_log
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "live.rst"

@@ -6,15 +6,16 @@ from belief_events import Event, run
 from cross_world import make_database, walk_log
 
 from mapfilter.errors import ConfigError
-from mapfilter.evaluation.accuracy import Truth, accuracy
+from mapfilter.evaluation.accuracy import accuracy
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.candidate import CandidateSearch
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.gaussian import METHODS
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter, cell_points
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.locators import BUILT_IN, as_filter, filter_options
+from mapfilter.positioning.loop import locate
 
 OPTIONS = CandidateFilter(update_length_m=20.0, margin_db=0.0)
 

@@ -9,13 +9,8 @@ import pytest
 
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.log_options import (
-    _usual_mps,
-    _usual_row_m,
-    by_streets_alone,
-    fitted_to_log,
-    level_step_db,
-)
+from mapfilter.positioning.log_options import by_streets_alone, fitted_to_log, level_step_db
+from mapfilter.positioning.logged_errors import _usual_mps, _usual_row_m
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import make_log
 

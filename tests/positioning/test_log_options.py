@@ -9,9 +9,9 @@ import pytest
 
 from mapfilter.positioning.bayes.options import VEHICLE, BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import by_streets_alone, fitted_to_log
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.imu_noise import ImuNoise

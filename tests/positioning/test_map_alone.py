@@ -19,8 +19,9 @@ from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import VEHICLE, BayesFilter
 from mapfilter.positioning.bayes.path import LEG_M, PATH_M, RecentPath
 from mapfilter.positioning.bayes.path_start import ends_of_path, possible_turns_rad
-from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.epochs import Epoch, GnssFix
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
 from mapfilter.roads.raster import read_raster_ways
 from mapfilter.roads.route_points import RouteSource
 from mapfilter.testing import check_filter

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.database.build import build_roads
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import Bins
@@ -22,9 +22,9 @@ from mapfilter.positioning.bayes.mirrored import MirroredTwin, MirrorRules, mirr
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.path import RecentPath
-from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
+from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.route_points import RouteSource
 from mapfilter.serving.state_file import decode, encode

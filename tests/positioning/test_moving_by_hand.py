@@ -4,6 +4,7 @@
 from dataclasses import dataclass, field, replace
 from math import inf, isnan, nan, pi
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 
+CHANGES = ("carried_on", "turned_at_jump", "remounted")
 SEARCHING, TRACKING = Status.SEARCHING, Status.TRACKING
 FIX = GnssFix(0.0, 0.0)
 STEP = MotionStep(2.0, 0.5, 0.1, sampling_sd_m=0.25)
@@ -75,7 +77,7 @@ class Beliefs:
     def positions_lead(self, state):
         return self.lead
 
-    def carried_on(self, state, given, gone_s, rng):
+    def carried_on(self, given, rest, gone_s, rng):
         self.asked.append(("carried on", gone_s))
         return replace(given, log_evidence=-77.0)
 
@@ -83,11 +85,12 @@ class Beliefs:
         self.asked.append(("without compass",))
         return given
 
-    def turned(self, given, changed_rad, rng):
+    def turned_at_jump(self, given, rules, changed_rad, rng):
+        assert rules is self.holds
         self.asked.append(("turned", changed_rad))
         return given
 
-    def remounted(self, given, length_m, rng):
+    def remounted(self, given, motion, length_m, rng):
         self.asked.append(("remounted", length_m))
         return given
 
@@ -99,11 +102,17 @@ def walking(main=None, *, status=TRACKING, stepped_s=9.0, **more):
     return BayesState(status=status, **given)
 
 
+def moved_by(beliefs, *given):
+    changes = {name: getattr(beliefs, name) for name in CHANGES}
+    with patch.multiple("mapfilter.positioning.bayes.moving", **changes):
+        return moved(beliefs, *given)
+
+
 def move(state, *motion, beliefs=None, time_s=10.0, watch=None, **readings):
     beliefs = beliefs or Beliefs()
     watch = watch or SensorWatch()
     epoch = Epoch(time_s, motion, **readings)
-    found, unused = moved(beliefs, state, watch, epoch, np.random.default_rng(1))
+    found, unused = moved_by(beliefs, state, watch, epoch, np.random.default_rng(1))
     return found, unused, beliefs.asked
 
 
@@ -279,9 +288,9 @@ def test_a_belief_without_positions_is_moved_as_it_reads_headings_with_draws_of_
     assert steps_of(asked, 6) == [replace(STEP, heading_rad=-0.5, turn_rad=-0.1)]
     assert found.unaided[0].belief.state[EAST, 0] == 2.0
     rng = np.random.default_rng(1)
-    moved(Beliefs(), walking(unaided=(alone,)), SensorWatch(), Epoch(10.0, (STEP,)), rng)
+    moved_by(Beliefs(), walking(unaided=(alone,)), SensorWatch(), Epoch(10.0, (STEP,)), rng)
     other = np.random.default_rng(1)
-    moved(Beliefs(), walking(), SensorWatch(), Epoch(10.0, (STEP,)), other)
+    moved_by(Beliefs(), walking(), SensorWatch(), Epoch(10.0, (STEP,)), other)
     assert rng.bit_generator.state == other.bit_generator.state
 
 

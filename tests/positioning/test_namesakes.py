@@ -7,13 +7,13 @@ import pandas as pd
 import pytest
 from made_town import CRS, FLOOR_DBM, NAMES, WEST_M, Town, slowed, walk_log
 
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.filters.contract import Status
 from mapfilter.models.fingerprint import BoundReading, bound_table, weigh_by_bound
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading, bound_under_null
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import Cell, CellPlan
 
 SD_DB, WEIGHT = 8.0, 0.4

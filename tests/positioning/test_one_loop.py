@@ -10,16 +10,9 @@ from cross_world import walk_log
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix
-from mapfilter.positioning.filter import (
-    Filter,
-    Hypotheses,
-    StepOutput,
-    _Album,
-    estimate_of,
-    locate,
-    usable_part,
-)
+from mapfilter.positioning.filter import Filter, Hypotheses, StepOutput
+from mapfilter.positioning.loop import _Album, estimate_of, locate, usable_part
+from mapfilter.positioning.step_output import Fix
 
 GNSS = pd.DataFrame({"time_s": [3.0, 4.0, 5.0], "east_m": 1.0, "north_m": 2.0})
 

@@ -13,7 +13,7 @@ from sky_world import sky_log
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.positioning.custom_filter import CustomFilter, adapted, custom_filter
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import make_log
 
 HERE = __name__

@@ -8,7 +8,7 @@ import pytest
 
 from mapfilter.errors import ConfigError, InputError, StoreError, fail
 from mapfilter.positioning.custom_filter import CustomEpochFilter, custom_filter, wrap_user_errors
-from mapfilter.positioning.estimate import StepOutput
+from mapfilter.positioning.step_output import StepOutput
 
 
 class Own:

@@ -29,7 +29,8 @@ from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
+from mapfilter.positioning.epochs import Epoch, GnssFix
+from mapfilter.positioning.merging import epochs
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
 

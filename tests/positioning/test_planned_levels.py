@@ -10,7 +10,6 @@ from mapfilter.experiments.recorded.ground import open_ground, predicted
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
 from mapfilter.positioning.fingerprints.planned import (
-    LTE_STEP_M,
     OWN_DB,
     Planned,
     level_deviations_db,
@@ -18,7 +17,9 @@ from mapfilter.positioning.fingerprints.planned import (
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.identities import TIMING_STEP_M
 
+LTE_STEP_M = TIMING_STEP_M["LTE"]
 CRS = "EPSG:32635"
 EAST_M, NORTH_M = 385_000.0, 6_672_000.0
 AT_M = np.array([EAST_M, NORTH_M])

@@ -11,6 +11,7 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.street_motion import BIAS
 from mapfilter.positioning.bayes import filter as tested
+from mapfilter.positioning.bayes import usable
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery
@@ -59,7 +60,7 @@ def test_sensors_that_do_not_measure_are_told_with_their_rows(monkeypatch, motio
             motion, radio,
         )  # fmt: skip
 
-    monkeypatch.setattr(tested, "watched", watched)
+    monkeypatch.setattr(usable, "watched", watched)
     neighbour = ReportRow("neighbour", None, 61, 2, -80.0, 0)
     state, output = stepped(given={"motion": (STEP,), "radio": (ROW, neighbour)})
     expected = [] if motion is Reason.USED else [("motion", "", motion)]
@@ -96,7 +97,7 @@ def test_how_motion_is_read_is_told(monkeypatch, changes, left, motion, label, b
     _, output = stepped(given={"motion": (STEP,) if motion else ()}, hold=before)
     assert told(output) == ([("motion", "", label)] if label else [])
     monkeypatch.setattr(
-        tested, "watched", lambda watch, epoch, _: (watch, epoch, (Reason.NO_STEP, Reason.USED))
+        usable, "watched", lambda watch, epoch, _: (watch, epoch, (Reason.NO_STEP, Reason.USED))
     )
     _, output = stepped(given={"motion": (STEP,) if motion else ()}, hold=before)
     # Of motion that is not measured no more is told, but for its unit.

@@ -34,13 +34,13 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.unaided import beside_alternative
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
-from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.gnss.fixes import agrees_with
 from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate, _neutral
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.log import make_log
 
 

@@ -10,12 +10,13 @@ from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.integrity import sample_tail
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.place import belief_tail
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
+from mapfilter.positioning.step_output import Fix, StepOutput
 
 FEW = BayesFilter(max_particles=4000, min_search_particles=2000, min_particles=500)
 

@@ -8,7 +8,8 @@ import pytest
 from made_fingerprints import CRS
 
 from mapfilter.errors import InputError
-from mapfilter.positioning.fingerprints.reports import joined_reports, make_reports
+from mapfilter.positioning.fingerprints.joining import joined_reports
+from mapfilter.positioning.fingerprints.reports import make_reports
 
 READINGS = [
     # Report, cell, level, error and bound.

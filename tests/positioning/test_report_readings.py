@@ -27,7 +27,7 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.step_output import UnusedReading
 
 
 def test_neighbours_become_evidence_by_what_is_known_of_them():

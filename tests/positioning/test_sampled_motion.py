@@ -17,9 +17,10 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.path import DeadReckoning
-from mapfilter.positioning.epochs import Epoch, epoch_columns, epochs, headed, make_epoch
+from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.reckoning import Reckoning
+from mapfilter.positioning.merging import epoch_columns, epochs, make_epoch
 from mapfilter.tracks.log import make_log
 
 EXACT = MotionErrors(

@@ -15,9 +15,10 @@ from mapfilter.positioning.bayes.held import HeldOtherwise
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, epochs
-from mapfilter.positioning.filter import estimate_of, locate
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.gnss.receiver import carried
+from mapfilter.positioning.loop import estimate_of, locate
+from mapfilter.positioning.merging import epochs
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log
 

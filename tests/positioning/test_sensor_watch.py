@@ -9,7 +9,8 @@ from scipy.stats import multivariate_normal
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.sensors import rest
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch, watched

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.positioning.belief_tracker import BeliefTracker
 from mapfilter.positioning.epochs import serving_cell
-from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.log import make_log
 
 NOWHERE = Estimate(0.0, 0.0, np.zeros((2, 2)), np.zeros(3))

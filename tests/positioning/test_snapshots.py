@@ -5,8 +5,9 @@ import pytest
 from cross_world import walk_log
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix
-from mapfilter.positioning.filter import Filter, Hypotheses, StepOutput, locate
+from mapfilter.positioning.filter import Filter, Hypotheses, StepOutput
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.step_output import Fix
 
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST
 

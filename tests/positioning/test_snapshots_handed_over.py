@@ -10,7 +10,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 
 
 class Counter:

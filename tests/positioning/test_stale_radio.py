@@ -10,7 +10,7 @@ from made_town import CRS, Town, walk_log
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
 from mapfilter.tracks.log import make_log
 

@@ -11,8 +11,8 @@ from cross_world import make_database, walk_log
 from mapfilter.positioning.bayes import state as bayes_state
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 
 STOOD = 400

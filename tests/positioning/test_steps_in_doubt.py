@@ -9,6 +9,7 @@ import pytest
 from made_town import Town, slowed, walk_log
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.positioning.bayes.belief_changes import carried_on
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.step_units import (
@@ -18,7 +19,8 @@ from mapfilter.positioning.bayes.step_units import (
     log_odds_of_unit,
     unit_of_next_m,
 )
-from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
@@ -213,8 +215,7 @@ def test_as_many_hypotheses_are_carried_on_as_the_levels_of_the_rest_say(left_na
     rng = np.random.default_rng(1)
     state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
     rest = replace(Rest(1.0, pace_mps=1.4), left_nats=left_nats)
-    state = replace(state, watch=state.watch._replace(rest=rest))
-    after = AREA.beliefs.carried_on(state, state.belief, 100.0, rng)
+    after = carried_on(state.belief, rest, 100.0, rng)
     share = np.mean(np.any(after.state != state.belief.state, axis=0))
     # Four standard errors of 1000 hypotheses or more.
     assert state.belief.count >= 1000
@@ -226,8 +227,7 @@ def test_hypotheses_are_carried_on_as_far_as_a_walk_of_the_missed_pace_spreads()
     state = AREA.begin_at(500_450.0, 4_500_450.0, 5.0, rng)
     # 40 of 140 m were measured, so 1 m/s is missed; all have left, by their levels.
     rest = replace(Rest(1.0, pace_mps=1.4), left_nats=50.0, measured_m=40.0)
-    state = replace(state, watch=state.watch._replace(rest=rest))
-    after = AREA.beliefs.carried_on(state, state.belief, 100.0, rng)
+    after = carried_on(state.belief, rest, 100.0, rng)
     moved_m = (after.state - state.belief.state)[:2]
     # A direction that lasts for 60 s: 2 * 60 * (100 - 60 * (1 - exp(-100 / 60))) m² on the whole.
     assert (moved_m**2).mean() == pytest.approx(6159.9 / 2, rel=4 / np.sqrt(state.belief.count))

@@ -7,7 +7,7 @@ from made_town import Town, walk_log
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 
 TOWN = Town.of(1)

@@ -10,8 +10,8 @@ from made_town import Town, walk_log
 
 from mapfilter._threads import ONE
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
 
 MANY = BayesFilter(max_particles=60_000, min_search_particles=60_000, min_particles=60_000)
 AREA = Town.of(3).area()

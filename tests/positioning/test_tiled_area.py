@@ -36,11 +36,12 @@ from mapfilter.positioning.bayes.tile_search import (
 )
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 from mapfilter.positioning.bayes.timing import TimingSource
-from mapfilter.positioning.epochs import GnssFix, epochs
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.fixes import FixTerm
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import GnssSource
+from mapfilter.positioning.loop import locate
+from mapfilter.positioning.merging import epochs
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.simulation.satellites import ReceptionModel, receive
 from mapfilter.tracks.log import make_log

@@ -14,8 +14,8 @@ from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.timing import TimingSource, TimingState
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.gnss.options import TimingOptions
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import make_log
 
 LTE = TimingOptions(step_m=78.1, advance_sd_m=30.0, advance_memory_m=50.0)

@@ -12,9 +12,10 @@ from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, STATES
+from mapfilter.positioning.bayes.belief_changes import turned_at_jump
 from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 
 TOWN = Town.of(1)
@@ -99,9 +100,8 @@ def belief_of(count):
 )
 def test_how_many_are_turned_and_by_how_much(changed_rad, share):
     rules = HoldRules(probability=0.1, around_probability=0.3)
-    filters = replace(AREA.beliefs, holds=rules)
     before = belief_of(20_000)
-    belief = filters.turned(before, changed_rad, np.random.default_rng(1))
+    belief = turned_at_jump(before, rules, changed_rad, np.random.default_rng(1))
     turned = belief.state[BIAS] != np.float32(3.0)
     # Four standard deviations of a binomial share.
     assert turned.mean() == pytest.approx(share, abs=4 * (share * (1 - share) / 20_000) ** 0.5)

@@ -12,7 +12,8 @@ from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
+from mapfilter.positioning.epochs import Epoch, GnssFix
+from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.roads.route_points import RouteSource
 from mapfilter.tracks.log import make_log

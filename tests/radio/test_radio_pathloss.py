@@ -14,7 +14,7 @@ from mapfilter.propagation.empirical import (
     multi_screen_db,
     roof_to_street_db,
 )
-from mapfilter.propagation.models import outside_published_range
+from mapfilter.propagation.published_ranges import outside_published_range
 
 
 def test_hata_term_by_term() -> None:

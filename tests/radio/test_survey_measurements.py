@@ -9,7 +9,8 @@ from fuzz import fuzz
 
 from mapfilter.errors import InputError
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.survey.measurement_files import DIALECTS, read_antennas_log, read_csv
+from mapfilter.survey.antennas_log import read_antennas_log
+from mapfilter.survey.measurement_files import DIALECTS, read_csv
 from mapfilter.survey.measurement_rows import unix_seconds
 from mapfilter.survey.measurements import named_after
 from mapfilter.survey.read_measurements import read_measurements

@@ -8,13 +8,16 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 from mapfilter.errors import InputError
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate, TrackEvidence
+from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence
 from mapfilter.positioning.positioned_track import Snapshot
+from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import BLUE, save
-from mapfilter.report.errors import plot_error_over_distance, plot_evidence
+from mapfilter.report.canvas import BLUE
+from mapfilter.report.errors import plot_error_over_distance
+from mapfilter.report.evidence import plot_evidence
+from mapfilter.report.saving import save
 from mapfilter.report.snapshots import plot_belief, story_bounds_m
 from mapfilter.workflows.track_pictures import choose_snapshots
 

@@ -6,7 +6,7 @@ import shapely
 from matplotlib.figure import Figure
 
 from mapfilter.evaluation.track_percentiles import Percentile
-from mapfilter.report.canvas import BLUE, ORANGE, save
+from mapfilter.report.canvas import BLUE, ORANGE
 from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
 from mapfilter.report.curves import (
     Curve,
@@ -17,6 +17,7 @@ from mapfilter.report.curves import (
     plot_over_threshold,
     plot_seen_satellites,
 )
+from mapfilter.report.saving import save
 
 CURVES = [
     Distribution("some fail", np.array([[1.0, np.nan], [3.0, 2.0]]), BLUE, claim_m=2.5),

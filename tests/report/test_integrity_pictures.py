@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
-from mapfilter.evaluation.accuracy import Truth
 from mapfilter.evaluation.stanford import StanfordCounts, stanford_bins, stanford_counts
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import figure_of, save
+from mapfilter.report.canvas import figure_of
 from mapfilter.report.integrity import plot_coverage, plot_stanford, plot_worst_run
+from mapfilter.report.saving import save
 
 TIME_S = np.arange(200.0)
 TRUTH = Truth(TIME_S, 500_000.0 + 1.4 * TIME_S, np.full(200, 100.0))

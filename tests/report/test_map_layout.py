@@ -8,8 +8,8 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report import network
 from mapfilter.report.basemap import BaseMap, local_frame
-from mapfilter.report.canvas import save
 from mapfilter.report.network import plot_best_server
+from mapfilter.report.saving import save
 from mapfilter.report.survey import plot_left_out
 
 CRS = "EPSG:25832"

@@ -15,9 +15,10 @@ from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.report import basemap
 from mapfilter.report.basemap import BaseMap, draw_base, largest
-from mapfilter.report.canvas import BLUE, ORANGE, new_figure, png_of, save
+from mapfilter.report.canvas import BLUE, ORANGE, new_figure
 from mapfilter.report.coverage import plot_landuse, plot_margin
 from mapfilter.report.network import plot_points_per_cell
+from mapfilter.report.saving import png_of, save
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.route_points import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings

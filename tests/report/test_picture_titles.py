@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
+from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import save
+from mapfilter.report.saving import save
 from mapfilter.report.snapshots import plot_candidates
 from mapfilter.report.track import plot_track
 

@@ -12,18 +12,20 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from mapfilter.errors import InputError, OutputError
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
+from mapfilter.positioning.step_output import Fix
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base, local_frame
-from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION, png_of, save
+from mapfilter.report.canvas import BLUE, DPI, ORANGE, SKY, VERMILLION
 from mapfilter.report.coverage import plot_level
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.network import draw_cells, plot_best_server, plot_points_per_cell
+from mapfilter.report.saving import png_of, save
 from mapfilter.report.snapshots import plot_candidates
 from mapfilter.report.track import plot_track
 

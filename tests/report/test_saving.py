@@ -7,17 +7,19 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from mapfilter.errors import InputError, OutputError
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import BLACK, BLUE, distinct_colours, save
+from mapfilter.report.canvas import BLACK, BLUE, distinct_colours
 from mapfilter.report.cumulative import Distribution, plot_cumulative
 from mapfilter.report.errors import (
     plot_error_over_distance,
     plot_errors_apart,
     plot_errors_over_time,
 )
+from mapfilter.report.saving import save
 from mapfilter.report.table import latex_table, write_table
 from mapfilter.report.track import plot_track
 

@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.evaluation.success import SuccessCell
-from mapfilter.report.canvas import save
+from mapfilter.evaluation.success_cells import SuccessCell
+from mapfilter.report.saving import save
 from mapfilter.report.success import (
     curve_axis,
     plot_run_distributions,

@@ -10,7 +10,8 @@ from mapfilter.lattice import Lattice
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import BLACK, save
+from mapfilter.report.canvas import BLACK
+from mapfilter.report.saving import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 from mapfilter.survey.leave_out import LeftOut, leave_out
 from mapfilter.survey.measured_map import fit_survey

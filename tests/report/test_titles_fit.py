@@ -9,12 +9,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
+from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import png_of
+from mapfilter.report.saving import png_of
 from mapfilter.report.snapshots import plot_belief, plot_candidates
 from mapfilter.report.track import plot_track
 

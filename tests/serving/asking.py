@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from positioning.cross_world import walk_log
 
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.merging import epochs
 from mapfilter.serving.app import Service
 from mapfilter.serving.filters import SessionFilters
 from mapfilter.serving.limits import ServiceLimits

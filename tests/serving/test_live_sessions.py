@@ -18,8 +18,8 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
 from mapfilter.positioning.bayes.held import HeldOtherwise
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
-from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.filter import locate as replay
+from mapfilter.positioning.loop import locate as replay
+from mapfilter.positioning.merging import epochs
 from mapfilter.serving import sessions as sessions_module
 from mapfilter.serving.documents import RequestError
 from mapfilter.serving.store import LOCK, SessionStore

@@ -14,9 +14,9 @@ from asking import JSON, SERVING, ask, documents, service
 from positioning.cross_world import CRS
 
 from mapfilter.geodesy import unproject
-from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.fingerprints.locating import locate_by
 from mapfilter.positioning.fingerprints.log_reports import reports_of_log
+from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.serving import door as door_module
 from mapfilter.serving.documents import RequestError

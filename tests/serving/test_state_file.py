@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import StoreError
 from mapfilter.filters.grid import GridBelief
-from mapfilter.positioning.epochs import GnssFix, epochs
+from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.integrity import RadialTail
+from mapfilter.positioning.merging import epochs
 from mapfilter.serving import state_file
 from mapfilter.serving.state_file import decode, encode
 

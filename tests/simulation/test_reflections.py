@@ -9,7 +9,8 @@ from mapfilter.errors import ConfigError
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time
-from mapfilter.gnss.sky import Skyline, ecef_from_lonlat
+from mapfilter.gnss.sky import ecef_from_lonlat
+from mapfilter.gnss.skyline import Skyline
 from mapfilter.simulation.reflections import NlosModel, draw_reflections, held_along
 from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 

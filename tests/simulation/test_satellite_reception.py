@@ -9,7 +9,8 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time, satellite_positions_m
-from mapfilter.gnss.sky import GridFrame, Skyline, directions, ecef_from_lonlat
+from mapfilter.gnss.sky import GridFrame, directions, ecef_from_lonlat
+from mapfilter.gnss.skyline import Skyline
 from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 from mapfilter.tracks.log import make_log
 

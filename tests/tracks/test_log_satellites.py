@@ -10,7 +10,8 @@ from mapfilter.errors import InputError
 from mapfilter.gnss.almanacs import Almanac, nominal_gps
 from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, gps_time, satellite_positions_m
-from mapfilter.tracks.log import leave_out, make_log
+from mapfilter.tracks.kinds import leave_out
+from mapfilter.tracks.log import make_log
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import read_log, write_log

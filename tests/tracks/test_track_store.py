@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError, OutputError, StoreError
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.log import leave_out, make_log
+from mapfilter.tracks.kinds import leave_out
+from mapfilter.tracks.log import make_log
 from mapfilter.tracks.schema import MISSING_SIGNS, TABLES
 from mapfilter.tracks.store import is_log, list_logs, read_log, write_log
 

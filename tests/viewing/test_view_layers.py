@@ -13,8 +13,8 @@ from mapfilter.errors import InputError
 from mapfilter.evaluation.map_bound import BANDS, write_bound
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.ways import Buildings
 from mapfilter.viewing.arrays import cell_numbers, unpacked

@@ -26,7 +26,7 @@ from mapfilter.config.load import load_config
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.store import read_log, write_log
 from mapfilter.viewing.words import REASONS

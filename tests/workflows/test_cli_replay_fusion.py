@@ -13,10 +13,10 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters.gaussian import EKF, METHODS
 from mapfilter.models.state import POSITION
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.place import gaussian_radii_m
+from mapfilter.positioning.loop import locate
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import write_log

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from command_line import assert_done, assert_refused, mapfilter
 
-from mapfilter.evaluation.success import SuccessCell
+from mapfilter.evaluation.success_cells import SuccessCell
 from mapfilter.experiments.papers import khalaf_allah_2007 as paper
 from mapfilter.experiments.sweep.table import read_runs
 

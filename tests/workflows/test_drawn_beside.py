@@ -14,7 +14,7 @@ import pytest
 
 from mapfilter._parallel import SerialExecutor, begun
 from mapfilter.cli.options import undrawn
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot

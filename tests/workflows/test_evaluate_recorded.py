@@ -9,12 +9,13 @@ from command_line import mapfilter
 from scipy.io import savemat
 
 from mapfilter.errors import ConfigError, InputError, Stopped, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded import wifi
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.step_output import Fix
 from mapfilter.workflows import evaluate_recorded
 from mapfilter.workflows.evaluate_recorded import run_all, run_recorded
 

@@ -17,8 +17,9 @@ from pyproj import CRS
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate, write_gpx
+from mapfilter.positioning.step_output import Fix
 from mapfilter.roads.maps import resolve_map
 from mapfilter.workflows.info import run_info
 

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from mapfilter.evaluation.success import COORDINATES
+from mapfilter.evaluation.success_cells import COORDINATES
 from mapfilter.workflows.sweep import groups_of
 
 

@@ -1,6 +1,6 @@
 """Results as people read them: a short table in place of a line for each cell of a grid."""
 
-from mapfilter.evaluation.success import SuccessCell
+from mapfilter.evaluation.success_cells import SuccessCell
 from mapfilter.workflows.result_text import text_lines
 from mapfilter.workflows.sweep import brief
 

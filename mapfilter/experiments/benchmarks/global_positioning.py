@@ -20,8 +20,9 @@ from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import TOWN_HEIGHT, Walk
 from mapfilter.experiments.benchmarks.scores import Row, score, score_window
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import Filter, FilterOptions, locate
+from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.log import TrackLog

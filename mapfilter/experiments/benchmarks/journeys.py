@@ -10,11 +10,12 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import DAY_S
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.gnss.almanacs import joined, nominal_galileo, nominal_gps
 from mapfilter.gnss.orbits import gps_time
-from mapfilter.gnss.sky import Skyline
+from mapfilter.gnss.skyline import Skyline
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
@@ -28,7 +29,6 @@ _BEFORE_M = 800.0
 _AFTER_M = 1000.0
 _NEAREST_M, _FARTHEST_M = 200.0, 1000.0
 START_UTC_S = 1_700_000_000.0
-DAY_S = 86_400.0
 SPOOFED_M, SPOOFED_S = 500.0, 60.0
 WINDOW_S = 120.0
 """Errors about a spoofer are looked at from its beginning on, for so long."""

@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.ottawa_sessions import (
     ReckoningErrors,
     Session,
@@ -26,7 +27,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.log import TrackLog
 

@@ -13,15 +13,8 @@ import numpy as np
 from mapfilter._json_files import read_sealed, write_sealed
 from mapfilter._types import Floats
 from mapfilter.errors import StoreError, fail
-from mapfilter.experiments.accuracy_row import (
-    Row,
-    Success,
-    joined,
-    mean_of,
-    median_of,
-    row_of,
-    success_of,
-)
+from mapfilter.evaluation.accuracy import mean_of
+from mapfilter.experiments.accuracy_row import Row, Success, joined, median_of, row_of, success_of
 from mapfilter.experiments.benchmarks.ottawa import METHODS, ORACLES, FoundSession
 from mapfilter.experiments.row_intervals import RowInterval, ScoredRun, interval_of
 

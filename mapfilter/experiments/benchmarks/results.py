@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.evaluation.accuracy import RADII, percentile_m
+from mapfilter.evaluation.accuracy import RADII, mean_of, percentile_m
 from mapfilter.evaluation.intervals import rate_interval, share_interval, statistic_interval
 from mapfilter.evaluation.stanford import REGIONS
 from mapfilter.evaluation.success import wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.cases import Case
+from mapfilter.experiments.benchmarks.scores import ERRORS
 
 _NAN = float("nan")
-_ERRORS = ("error_mean_m", "error_67_m", "error_95_m")
 _MEANS = ("switch_mean_m", "error_mean_m", "error_95_m")
 
 
@@ -190,9 +190,9 @@ def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -
     converged = [int(row["converged"]) for row in rows]
     figures |= _share("wrong_converged", [int(row["wrong_converged"]) for row in rows], converged)
     figures |= _regions(rows) | _of_faults(rows)
-    for name in _ERRORS:
-        figures[name] = _mean(_known(good, name))
-    figures["switch_mean_m"] = _mean(switch_m)
+    for name in ERRORS:
+        figures[name] = mean_of(_known(good, name))
+    figures["switch_mean_m"] = mean_of(switch_m)
     for name in _MEANS:
         values = switch_m if name == "switch_mean_m" else _known(good, name)
         figures |= _with_ends(name, figures[name], statistic_interval(values))
@@ -210,12 +210,12 @@ def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -
         filter=filter_name,
         runs=runs,
         switch_p90_m=percentile_m(switch_m, 0.9),
-        worst_100m_mean_m=_mean(worst_m),
+        worst_100m_mean_m=mean_of(worst_m),
         worst_100m_95_m=percentile_m(worst_m, 0.95),
         claimed=_ratio(sum(claimed), _total(rows, "epochs")),
         converged=sum(converged),
         lost_per_km=_ratio(_total(rows, "lost"), sum(km)),
-        window_median_m=_mean(_known(rows, "window_median_m")),
+        window_median_m=mean_of(_known(rows, "window_median_m")),
         **figures,
     )
 
@@ -271,7 +271,3 @@ def _ratio(part: float, whole: float) -> float:
 def _known(rows: Iterable[Mapping[str, Any]], name: str) -> Floats:
     values = (row.get(name) for row in rows)
     return np.array([value for value in values if value is not None], dtype=np.float64)
-
-
-def _mean(values: Floats) -> float:
-    return float(np.mean(values)) if values.size else _NAN

@@ -11,19 +11,14 @@ from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import (
     RADII,
     SUCCESS_RADIUS_M,
-    Truth,
     accuracy,
-    claims_of,
+    mean_of,
     percentile_m,
     position_errors_m,
-    score_claims,
 )
-from mapfilter.evaluation.stanford import (
-    REGIONS,
-    IntegrityOptions,
-    stanford_bins,
-    stanford_counts,
-)
+from mapfilter.evaluation.claims import claims_of, score_claims
+from mapfilter.evaluation.stanford import REGIONS, IntegrityOptions, stanford_bins, stanford_counts
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import WINDOW_S, Walk
 from mapfilter.experiments.sweep.journeys import truth_of
@@ -32,7 +27,7 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import PositionedTrack
 
 _STAY_S = 10.0
-_ERRORS = ("error_mean_m", "error_67_m", "error_95_m")
+ERRORS = ("error_mean_m", "error_67_m", "error_95_m")
 Row = dict[str, Any]
 
 
@@ -78,7 +73,7 @@ def score(
         "success": scored.success is True,
         "wrong": bool(scored.error_at_switch_m > SUCCESS_RADIUS_M),
         "switch_m": _finite(scored.switch_distance_m),
-        **{name: _finite(getattr(scored, name)) for name in _ERRORS},
+        **{name: _finite(getattr(scored, name)) for name in ERRORS},
     }
     if case.smooth:
         row |= _errors(errors_m[np.isfinite(errors_m)])
@@ -159,17 +154,13 @@ def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m:
             row["switch_m"] = float(gone_m[begin])
             row["success"] = row["switch_m"] <= case.recovery_within_m
             return row | _errors(errors_m[after[begin:]])
-    return row | dict.fromkeys(_ERRORS)
+    return row | dict.fromkeys(ERRORS)
 
 
 def _errors(errors_m: Floats) -> Row:
-    values = _mean(errors_m), percentile_m(errors_m, 0.67), percentile_m(errors_m, 0.95)
-    return dict(zip(_ERRORS, map(_finite, values), strict=True))
+    values = mean_of(errors_m), percentile_m(errors_m, 0.67), percentile_m(errors_m, 0.95)
+    return dict(zip(ERRORS, map(_finite, values), strict=True))
 
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _mean(values: Floats) -> float:
-    return float(np.mean(values)) if values.size else float("nan")

@@ -20,6 +20,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.intervals import share_interval
 from mapfilter.experiments.benchmarks.ottawa import GOOD_M, MAP_M
 from mapfilter.experiments.benchmarks.ottawa_sessions import Session
+from mapfilter.positioning.fingerprints.joining import joined_reports
 from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
 from mapfilter.positioning.fingerprints.options import (
@@ -31,7 +32,7 @@ from mapfilter.positioning.fingerprints.options import (
     SurveyMaps,
     method_name,
 )
-from mapfilter.positioning.fingerprints.reports import Reports, joined_reports, make_reports
+from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 from mapfilter.positioning.fingerprints.tables import NOT_RECEIVED_DBM
 
 WIFI = ("UJI1", "TUT1", "TUT3", "LIB1")

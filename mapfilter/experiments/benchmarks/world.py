@@ -20,7 +20,7 @@ from mapfilter._io import atomic_file, sha256_file
 from mapfilter._types import Ints
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, opened_filter, opened_world
-from mapfilter.gnss.sky import Skyline
+from mapfilter.gnss.skyline import Skyline
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import simulate_ground_truth

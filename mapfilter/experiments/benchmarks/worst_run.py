@@ -8,12 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter.evaluation.accuracy import (
-    SUCCESS_RADIUS_M,
-    Truth,
-    claims_of,
-    position_errors_m,
-)
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, position_errors_m
+from mapfilter.evaluation.claims import claims_of
+from mapfilter.evaluation.truth import Truth
 from mapfilter.positioning.estimate import TrackEstimate
 
 _BIN_M = 25.0

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from mapfilter.evaluation.success import SuccessCell, success_cells
+from mapfilter.evaluation.success_cells import SuccessCell, success_cells
 from mapfilter.experiments.papers.paper import Paper, PaperSettings, Picture
 from mapfilter.experiments.sweep.plan import Radio, Reading, SweepPlan, noise_grid
 from mapfilter.positioning.candidate import CandidateFilter

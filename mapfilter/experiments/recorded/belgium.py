@@ -22,7 +22,8 @@ import pandas as pd
 from mapfilter._inputs import json_value, read_input
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, position_errors_m
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import (
     corridor_routes,

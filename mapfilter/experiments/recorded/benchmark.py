@@ -9,7 +9,7 @@ from typing import Any
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.worst_report import WorstReport
 from mapfilter.positioning.estimate import TrackEstimate

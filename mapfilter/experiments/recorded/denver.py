@@ -19,7 +19,7 @@ from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import roads_alone
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log

@@ -8,7 +8,7 @@ import numpy as np
 
 from mapfilter._json_files import read_sealed, write_sealed
 from mapfilter.errors import StoreError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.benchmark import Journey, Judged, Task
 from mapfilter.experiments.recorded.rows import Found, read_found, write_found
 from mapfilter.experiments.recorded.worst_report import (

@@ -17,7 +17,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.oracles import NOISE, START, motion_errors, with_start

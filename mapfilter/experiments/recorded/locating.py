@@ -11,9 +11,9 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.log_options import by_streets_alone, fitted_to_log
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog

@@ -30,7 +30,7 @@ import shapely
 
 from mapfilter._inputs import json_value, read_input
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.single_reports import BASELINE, METHODS
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import open_ground, roads_alone
@@ -47,7 +47,6 @@ from mapfilter.experiments.recorded.outages import errors_at
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.fingerprints.lasting import LastingError, lasting_error
 from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by
@@ -55,6 +54,7 @@ from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.positioning.fingerprints.sources import reports_of_logs
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan

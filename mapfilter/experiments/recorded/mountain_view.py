@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import (
     corridor_routes,

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.sky import ecef_from_lonlat
 from mapfilter.tracks.deadreckoning import steps_between

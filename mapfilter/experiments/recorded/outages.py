@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
-from mapfilter.evaluation.accuracy import Truth, position_errors_m
+from mapfilter.evaluation.accuracy import position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.tracks.deadreckoning import dead_reckon
 from mapfilter.tracks.log import TrackLog

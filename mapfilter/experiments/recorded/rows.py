@@ -13,10 +13,10 @@ import numpy as np
 from mapfilter._json_files import read_sealed, write_sealed
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import StoreError, fail
+from mapfilter.evaluation.accuracy import mean_of
 from mapfilter.experiments.accuracy_row import (
     Row,
     joined,
-    mean_of,
     median_of,
     quantile_of,
     row_of,

@@ -8,7 +8,8 @@ from math import nan
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, position_errors_m
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, position_errors_m
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.worst_run import explain
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.filters.contract import Status

@@ -21,7 +21,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.ground import lattice_about, open_ground, roads_alone
 from mapfilter.experiments.recorded.least_squares import least_squares_positions

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio, Run, SweepPlan
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.propagation.shadowing import named_rng

@@ -25,7 +25,7 @@ from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import Radio, Run, SweepPlan
 from mapfilter.experiments.sweep.world import SweepWorld, opened_world, scored_filter, write_world
-from mapfilter.positioning.filter import locate
+from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import TrackLog
 
 RUNS = "runs.parquet"
@@ -203,7 +203,7 @@ def sweep_runs(
     -------
     pandas.DataFrame
         The columns of :data:`mapfilter.experiments.sweep.table.SCHEMA` and those of varied options.
-        :func:`mapfilter.evaluation.success.success_cells` gives success rates with intervals.
+        :func:`mapfilter.evaluation.success_cells.success_cells` gives success rates with intervals.
     """
     folders = {name: database.path for name, database in databases.items()}
     with tempfile.TemporaryDirectory(prefix="mapfilter-sweep-") as name:

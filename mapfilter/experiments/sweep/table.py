@@ -18,7 +18,7 @@ from mapfilter._json_files import read_json, write_json
 from mapfilter._resume import load_part, save_part
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import Accuracy
-from mapfilter.evaluation.success import COORDINATES, SuccessCell
+from mapfilter.evaluation.success_cells import COORDINATES, SuccessCell
 from mapfilter.experiments.sweep.plan import Run
 
 _TYPES = {
@@ -46,7 +46,7 @@ SCHEMA = pa.schema(
 )
 """Columns: coordinates of the run in the grid, then its results; null where undefined.
 
-The coordinates are those of :class:`mapfilter.evaluation.success.SuccessCell`, the results are
+The coordinates are those of :class:`mapfilter.evaluation.success_cells.SuccessCell`, the results
 those of :class:`mapfilter.evaluation.accuracy.Accuracy`. Varied options are further columns, named
 by their dotted keys, before ``route``.
 """

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from mapfilter._types import Bools, Bytes, Floats32, Ints, Ints32
-from mapfilter.database.radioroutes import RadioField
+from mapfilter.database.field import RadioField
 from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import roughness
 from mapfilter.models.way_map import map_log_likelihood

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, isfinite, radians, sqrt
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,6 @@ from mapfilter._threads import ONE
 from mapfilter.filters.contract import BeliefFilter, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
-from mapfilter.geodesy import wrap_one_rad, wrap_rad
-from mapfilter.models.street_motion import BIAS, NORTH, remounted
 from mapfilter.positioning.bayes.alternative import AlternativeRules, MapBelief
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -28,7 +26,6 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
-from mapfilter.positioning.sensors.unmeasured import spread_m2
 
 MapFilter = BeliefFilter[Start, Any, RadioReading]
 
@@ -263,24 +260,6 @@ class BeliefFilters:
         gnss: GnssState = state.sources[GnssSource.name]
         return state.reckoning.travelled_m > gnss.used_at_m
 
-    def carried_on(
-        self, state: BayesState, belief: MapBelief, gone_s: float, rng: np.random.Generator
-    ) -> MapBelief:
-        """Move some hypotheses to where they may be by now, once steps are counted as before.
-
-        ``state`` is that before, ``gone_s`` the time without steps, or with few. A rest whose
-        levels were in doubt may have been a way, a stroll a longer one.
-        """
-        rest = state.watch.rest
-        if rest is None or not isinstance(belief, ParticleBelief):
-            return belief
-        count = belief.log_weight.size
-        gone = rng.random(count) < rest.left_probability
-        far_m = sqrt(spread_m2(rest.missed_mps(gone_s), gone_s) / 2)
-        moved = belief.state.copy()
-        moved[: NORTH + 1, gone] += far_m * rng.standard_normal((NORTH + 1, int(gone.sum())))
-        return replace(belief, state=moved)
-
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""
         if isinstance(belief, GridBelief):
@@ -295,38 +274,3 @@ class BeliefFilters:
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
         kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
         return replace(belief, state=state, log_weight=log_weight, kept=kept)
-
-    def turned(self, belief: MapBelief, changed_rad: float, rng: np.random.Generator) -> MapBelief:
-        """Turn the phone of some hypotheses of a search where its heading jumped.
-
-        They walk straight on; the others have turned a corner there.
-
-        Parameters
-        ----------
-        belief : MapBelief
-            Before the step; one on a grid is returned as it is.
-        changed_rad : float
-            Change of the direction that headings stand for, from the row before.
-        rng : numpy.random.Generator
-        """
-        if isinstance(belief, GridBelief):
-            return belief
-        rules = self.holds
-        around = abs(wrap_one_rad(changed_rad)) > radians(rules.around_deg)
-        probability = rules.around_probability if around else rules.probability
-        chosen = rng.random(belief.log_weight.size) < probability
-        state = belief.state.copy()
-        state[BIAS, chosen] = wrap_rad(state[BIAS, chosen] - changed_rad)
-        return replace(belief, state=state)
-
-    def remounted(self, belief: MapBelief, length_m: float, rng: np.random.Generator) -> MapBelief:
-        """Turn the phone of some hypotheses, once a position is tracked.
-
-        A search would find more places that fit.
-        """
-        if isinstance(belief, GridBelief) or belief.status is not Status.TRACKING:
-            return belief
-        if not (length_m > 0 and self.model.motion.remounts_per_m > 0):
-            return belief
-        state = remounted(belief.state, length_m, self.model.motion, rng)
-        return belief if state is belief.state else replace(belief, state=state)

@@ -27,8 +27,8 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.trail import Contradiction
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.schema import Kind
 
 SERVING_UNDER_NULL = -0.7

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import expm1, isfinite
+from math import expm1
 
 import numpy as np
 
@@ -23,10 +23,7 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.claims import judged
-from mapfilter.positioning.bayes.evidence import (
-    EvidenceSource,
-    EvidenceUpdate,
-)
+from mapfilter.positioning.bayes.evidence import EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.map_source import MapSource
@@ -37,18 +34,19 @@ from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesState, check_state, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.bayes.transitions import report
+from mapfilter.positioning.bayes.usable import usable_epoch
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.known_start import check_start
 from mapfilter.positioning.sensors.undirected import UndirectedWay
-from mapfilter.positioning.sensors.watch import UNMEASURED, SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.step_output import StepOutput, UnusedReading
 
 _LEAST_AT_START = 0.8
 """Share of a known start within 50 m from which on it is one place, and tracked."""
@@ -169,20 +167,15 @@ class BayesPositioner(Filter[BayesState]):
         """
         check_epoch(epoch)
         check_state(state, self.area)
-        epoch, repeated = _with_a_new_fix(state, epoch)
         spacing_m, hold = state.particle_spacing_m, state.hold
         state = _tracked(state)
         before, weighing = state.status, self._weighing
-        heard = epoch.radio
-        watch, epoch, (motion, radio), left_out = _watched(state.watch, epoch, hold.step_unit_m)
-        state, unused = moved(self.beliefs, state, watch, epoch, rng)
+        usable = usable_epoch(state, epoch)
+        epoch, motion, radio = usable.epoch, usable.motion, usable.radio
+        state, unused = moved(self.beliefs, state, usable.watch, epoch, rng)
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
-        if radio is not Reason.USED:
-            unused += [UnusedReading(epoch.time_s, row.role, row.name, radio) for row in heard]
-        unused += left_out
-        if repeated:
-            unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.REPEATED_FIX))
+        unused += usable.unused
         state, updates = weighing.collected(state, epoch, spacing_m)
         for update in updates:
             unused += update.unused
@@ -196,8 +189,8 @@ class BayesPositioner(Filter[BayesState]):
                 belief, sources = started
                 state = replace(state, belief=belief, sources={**state.sources, **sources})
         else:
-            measured = motion not in UNMEASURED
             moved_only = state.belief
+            measured = usable.is_measured
             state, why = weighing.weighed(state, moved_only, updates, epoch, rng, measured=measured)
             reason = reason if why is Reason.USED else why
             used = state.belief is not moved_only
@@ -238,11 +231,10 @@ class BayesPositioner(Filter[BayesState]):
         The state moved to the epoch, the evidence, and whether motion was measured; with the
         generator as before the step these are its own.
         """
-        epoch, _ = _with_a_new_fix(state, epoch)
         spacing_m, state = state.particle_spacing_m, _tracked(state)
-        watch, epoch, (motion, _), _ = _watched(state.watch, epoch, state.hold.step_unit_m)
-        state, _ = moved(self.beliefs, state, watch, epoch, rng)
-        return *self._weighing.collected(state, epoch, spacing_m), motion not in UNMEASURED
+        usable = usable_epoch(state, epoch)
+        state, _ = moved(self.beliefs, state, usable.watch, usable.epoch, rng)
+        return *self._weighing.collected(state, usable.epoch, spacing_m), usable.is_measured
 
     def for_scores(self) -> BayesPositioner:
         """Return the filter without ways, radii of 99 % and protection levels in its outputs."""
@@ -294,31 +286,3 @@ def _in_doubt(epoch: Epoch, unused: Sequence[UnusedReading]) -> list[UnusedReadi
 def _gnss_of(state: BayesState) -> GnssState:
     gnss: GnssState = state.sources[GnssSource.name]
     return gnss
-
-
-def _watched(
-    watch: SensorWatch, epoch: Epoch, step_unit_m: float
-) -> tuple[SensorWatch, Epoch, tuple[Reason, Reason], list[UnusedReading]]:
-    """Look at the sensors of an epoch, and at ways without directions.
-
-    Returns what :func:`mapfilter.positioning.sensors.watch.watched` does, and the positions that
-    are left out as they are too near to the last one.
-    """
-    watch, epoch, reasons = watched(watch, epoch, step_unit_m)
-    is_measured = reasons[0] not in UNMEASURED
-    way, epoch, left_out = watch.undirected.spread(epoch, is_measured=is_measured)
-    watch = watch if way is watch.undirected else watch._replace(undirected=way)
-    return watch, epoch, reasons, left_out
-
-
-def _with_a_new_fix(state: BayesState, epoch: Epoch) -> tuple[Epoch, bool]:
-    """Return an epoch without a fix that has no position, or repeats the last one that was used.
-
-    Also returns whether it was repeated.
-    """
-    fix = epoch.fix
-    if fix is None:
-        return epoch, False
-    repeated = fix.repeats(state.last_fix)
-    known = isfinite(fix.east_m) and isfinite(fix.north_m)
-    return (epoch if known and not repeated else replace(epoch, fix=None)), repeated

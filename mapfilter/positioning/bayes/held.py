@@ -9,7 +9,7 @@ walker has turned to the other side. The difference of their log evidence, with 
 event, decides: while one of them is ahead elsewhere, the position is LOST; when it is far ahead, it
 takes over, and headings are read as it reads them. Walks without a jump have no such beliefs. While
 the belief searches, some of its own hypotheses have a turned phone instead
-(:meth:`mapfilter.positioning.bayes.belief_filters.BeliefFilters.turned`).
+(:func:`mapfilter.positioning.bayes.belief_changes.turned_at_jump`).
 """
 
 from __future__ import annotations

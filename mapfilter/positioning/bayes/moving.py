@@ -13,6 +13,7 @@ import numpy as np
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import MapBelief
+from mapfilter.positioning.bayes.belief_changes import carried_on, remounted, turned_at_jump
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
@@ -27,8 +28,8 @@ from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.unaided import without_positions
 from mapfilter.positioning.epochs import Epoch, headed
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.step_output import UnusedReading
 
 _FORKED, _MOVED, _AWAY = 1, 2, 4
 """Salts of the draws of beliefs in which the phone was turned, and of hypotheses carried on."""
@@ -124,7 +125,7 @@ def moved(
     rested = state.watch.rest if watch.rest is None else None
     if belief is not None and rested is not None and beliefs.may_have_left(state):
         gone_s = epoch.time_s - rested.since_s
-        belief = beliefs.carried_on(state, belief, gone_s, own_rng(epoch.time_s, _AWAY))
+        belief = carried_on(belief, rested, gone_s, own_rng(epoch.time_s, _AWAY))
     for raw in epoch.motion:
         step, heading_rad = headed(raw, heading_rad)
         if compass and step.turned_sd_rad > 0:
@@ -152,7 +153,7 @@ def moved(
             jumped = compass and not ranged and jumps(walking_rad, raw, rules)
             if jumped and not positioned and belief.status is Status.SEARCHING:
                 changed_rad = raw.heading_rad - walking_rad
-                belief = beliefs.turned(belief, hold.sign * changed_rad, own.forking)
+                belief = turned_at_jump(belief, rules, hold.sign * changed_rad, own.forking)
             if tracked and jumped and isinstance(belief, ParticleBelief):
                 more = forked(
                     rules,
@@ -175,7 +176,7 @@ def moved(
                     _moved_alone(one, predict, measured, own.unaided) for one in unaided
                 )
             belief, why = predict(belief, _assumed(step, belief), rng)
-            belief = beliefs.remounted(belief, abs(step.step_m), rng)
+            belief = remounted(belief, beliefs.model.motion, abs(step.step_m), rng)
             reckoning = reckoning.moved(step)
             if alternative is not None:
                 other = alternative.belief

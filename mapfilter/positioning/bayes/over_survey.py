@@ -12,8 +12,9 @@ from math import hypot
 import numpy as np
 
 from mapfilter._types import Floats32, Ints
+from mapfilter.database.field import RadioField
 from mapfilter.database.measured import MeasuredParts
-from mapfilter.database.radioroutes import RadioField, RadioRouteDatabase
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 from mapfilter.options import NotNegative, Options, Positive

@@ -30,7 +30,7 @@ from mapfilter.positioning.bayes.evidence import (
 from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.bayes.state import FIRST_SPACING_M, BayesState
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.schema import SERVING, Kind
 
 _NEIGHBOURS_FOR_ABSENCE = 2

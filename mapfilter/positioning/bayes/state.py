@@ -20,9 +20,9 @@ from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.epochs import GnssFix
-from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading, protected_m
 from mapfilter.positioning.integrity import sample_tail
 from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading, protected_m
 
 FIRST_SPACING_M = 5.0
 """Assumed distance between hypotheses before there are any."""

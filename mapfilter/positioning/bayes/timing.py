@@ -21,8 +21,8 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Difference, Epoch
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.options import TimingOptions
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.schema import Kind
 
 _NULL_FACTOR = 1.5

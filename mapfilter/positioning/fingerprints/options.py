@@ -7,7 +7,6 @@ on one part of the Ottawa recordings; see the page "Where am I from one report".
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from math import e
 from typing import Annotated
 
 from annotated_types import Ge, Gt, Le
@@ -15,9 +14,6 @@ from annotated_types import Ge, Gt, Le
 from mapfilter.errors import ConfigError, fail
 from mapfilter.options import NotNegative, Options, Positive, Share
 from mapfilter.positioning.fingerprints.matching import Metric, Representation
-
-POWED = e
-"""Exponent of the powed representation in Torres-Sospedra et al. 2015."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,10 +17,9 @@ import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter.geodesy import azimuth_from_heading_deg, grid_convergence_rad, unproject
-from mapfilter.models.motion import SPEED_OF_LIGHT_MPS
-from mapfilter.models.ranging import GSM_STEP_M
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.identities import TIMING_STEP_M
 
 OWN_DB: Mapping[str, float] = {"eirp_dbm": 4.0, "height_m": 4.0, "azimuth_deg": 9.0}
 """Deviation of a cell's level by each of its fields that is assumed; 9 dB is that of a sector's
@@ -31,8 +30,6 @@ PATTERN_SHARE = 0.4
 """Deviation off an assumed cell's boresight, as a share of the attenuation that was predicted."""
 TIMING_SD_M, TIMING_CLIP_SD = 200.0, 3.0
 """Of a timing advance against the distance; those of the Bayes map filter."""
-LTE_STEP_M = SPEED_OF_LIGHT_MPS * 16 / (2048 * 15_000) / 2
-STEPS_M: Mapping[str, float] = {"GSM": GSM_STEP_M, "LTE": LTE_STEP_M}
 _BY_CARRIER = ("UMTS", "LTE", "NR")
 """Technologies in which cells share carriers. Phones measure few others than the serving one."""
 
@@ -65,7 +62,7 @@ class Planned:
         common = [_deviation_db(cell, COMMON_DB) for cell in cells]
         return cls(
             np.array([(cell.east_m, cell.north_m) for cell in cells]).reshape(-1, 2),
-            np.array([STEPS_M.get(cell.technology or "", np.nan) for cell in cells]),
+            np.array([TIMING_STEP_M.get(cell.technology or "", np.nan) for cell in cells]),
             np.array(
                 [
                     carriers[cell.frequency_mhz] if cell.technology in _BY_CARRIER else -1

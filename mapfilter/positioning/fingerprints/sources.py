@@ -13,9 +13,10 @@ import pandas as pd
 from mapfilter.database.measured import Readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
+from mapfilter.positioning.fingerprints.joining import joined_reports
 from mapfilter.positioning.fingerprints.log_reports import reports_of_log
 from mapfilter.positioning.fingerprints.planned import Planned, level_deviations_db
-from mapfilter.positioning.fingerprints.reports import Reports, joined_reports, make_reports
+from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes, carrier_notes
 from mapfilter.tracks.log import TrackLog

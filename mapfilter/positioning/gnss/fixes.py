@@ -10,10 +10,9 @@ import numpy as np
 from mapfilter._types import Floats, Floats32
 from mapfilter.models.street_motion import EAST, NORTH
 from mapfilter.positioning.bayes.alternative import MapBelief
-from mapfilter.positioning.epochs import GnssFix
+from mapfilter.positioning.epochs import FIX_SD_M, GnssFix
 
 _F = np.float32
-_FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
 _AGREES = -2 * log(0.05)
 """Squared distance, in standard deviations, that 95 % of two-dimensional errors keep."""
@@ -120,6 +119,6 @@ def squared_distance(belief: MapBelief, fix: GnssFix, origin_m: tuple[float, flo
 def widened(fix: GnssFix, times: float) -> GnssFix:
     """Return a fix with its variance multiplied; 10 m are assumed where it has none, or 0."""
     known = 0 < fix.var_east_m2 < inf and 0 < fix.var_north_m2 < inf
-    east_m2, north_m2 = (fix.var_east_m2, fix.var_north_m2) if known else (_FIX_SD_M**2,) * 2
+    east_m2, north_m2 = (fix.var_east_m2, fix.var_north_m2) if known else (FIX_SD_M**2,) * 2
     cross_m2 = fix.cov_east_north_m2 if known else 0.0
     return GnssFix(fix.east_m, fix.north_m, times * east_m2, times * north_m2, times * cross_m2)

@@ -19,7 +19,6 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.fixes import FixTerm, agrees_with, widened
 from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate
 from mapfilter.positioning.gnss.options import GnssOptions
@@ -35,6 +34,7 @@ from mapfilter.positioning.gnss.sky import Sky, range_sigma_m, sky_over
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail
 from mapfilter.positioning.gnss.wander import Way
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.schema import Kind
 
 _FIRST_SPACING_M = 10.0

@@ -18,7 +18,7 @@ from mapfilter.filters.gaussian import METHODS, Method
 from mapfilter.models.state import MOVING
 from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.estimate import StepOutput, TrackEstimate
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
 from mapfilter.positioning.kalman.belief import FusionHistory
 from mapfilter.positioning.kalman.lasting import extended_layout
@@ -28,6 +28,7 @@ from mapfilter.positioning.kalman.place import place_of
 from mapfilter.positioning.kalman.reckoning import RECKONED
 from mapfilter.positioning.kalman.state import KalmanState
 from mapfilter.positioning.kalman.step import KalmanStep
+from mapfilter.positioning.step_output import StepOutput
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 

@@ -20,6 +20,7 @@ from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import measure_kernel
 from mapfilter.options import NotNegative, Options, Positive
+from mapfilter.positioning.epochs import FIX_SD_M
 from mapfilter.positioning.kalman.lasting import LEAST_WHITE
 from mapfilter.positioning.kalman.level_errors import LastingLevels
 from mapfilter.propagation.empirical import cost231_hata_db
@@ -109,7 +110,7 @@ class KalmanOptions(Options):
     timing_step_m: Positive = GSM_STEP_M
     timing_sd_m: Positive = 200.0
     timing_memory_m: Positive = 500.0
-    fix_sd_m: Positive = 10.0
+    fix_sd_m: Positive = FIX_SD_M
     fix_lasting_share: Annotated[float, Ge(0), Le(1 - LEAST_WHITE)] = 0.7
     fix_lasting_m: NotNegative = 0.0
     fix_lasting_s: Positive = 30.0

@@ -10,8 +10,8 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.kalman.models import SiteModels
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 

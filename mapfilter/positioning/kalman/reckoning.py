@@ -25,7 +25,6 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.gaussian import Gaussian
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.kalman.alignment import Alignment, Direction
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
@@ -33,6 +32,7 @@ from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.positioning.sensors.unmeasured import common_way_m2, headless_step, missed_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.step_output import UnusedReading
 
 RECKONED = StateLayout(5, 0, 1)
 """East, north, the heading error in rad, the share by which steps are too short, and the error of

@@ -9,7 +9,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.fixing import FixErrors
+from mapfilter.positioning.kalman.fix_errors import FixErrors
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.level_errors import CellSlots
 from mapfilter.positioning.kalman.reckoning import Reckoning

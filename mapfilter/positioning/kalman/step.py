@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from cmath import exp
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from math import isfinite, nan
 
 import numpy as np
@@ -13,27 +12,18 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import Method
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
-from mapfilter.models.signal_strength import with_errors
 from mapfilter.models.state import MOVING
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.kalman.alignment import Direction
 from mapfilter.positioning.kalman.disputed import Ruling
 from mapfilter.positioning.kalman.fixing import FixWeighing
 from mapfilter.positioning.kalman.lasting import Motion, extended_belief, extended_motion
-from mapfilter.positioning.kalman.level_errors import (
-    LEAST_MOVED_M,
-    with_own_spread,
-)
+from mapfilter.positioning.kalman.level_errors import with_own_spread
 from mapfilter.positioning.kalman.models import SiteModels, compiled
 from mapfilter.positioning.kalman.place import WITHIN_M, belief_tail, place_of, share_within
 from mapfilter.positioning.kalman.proof import Doubt
-from mapfilter.positioning.kalman.readings import (
-    SiteReadings,
-    fix_covariance_m2,
-    site_readings,
-)
+from mapfilter.positioning.kalman.readings import SiteReadings, fix_covariance_m2, site_readings
 from mapfilter.positioning.kalman.reckoning import (
     ERRORS,
     RECKONED,
@@ -42,9 +32,11 @@ from mapfilter.positioning.kalman.reckoning import (
     at_rest,
 )
 from mapfilter.positioning.kalman.redirected import jump_to, turned_to, turns_in_doubt
+from mapfilter.positioning.kalman.report_model import report_model
 from mapfilter.positioning.kalman.start import first_belief
 from mapfilter.positioning.kalman.state import KalmanState
 from mapfilter.positioning.kalman.turned import Turn
+from mapfilter.positioning.step_output import Fix, UnusedReading
 
 _LOST_NIS, _WINDOW = 5.0, 10
 _WALK_MPS = 1.5
@@ -188,28 +180,10 @@ class KalmanStep:
         if given.cells or given.timed:
             step_m = self.options.timing_step_m
             reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
-            if self._update(self._radio_model(given), reading):
+            known = self.sites, self.layout, given, self.slots, self.growth
+            if self._update(report_model(*known, self.moved_m), reading):
                 self.moved_m, why = 0.0, Reason.USED
         return why
-
-    def _radio_model(self, given: SiteReadings) -> GaussianTerms:
-        """Return the model of a report's levels and timing advances."""
-        kept_m = [self.options.level_noise_memory_m] * len(given.cells)
-        kept_m += [self.options.timing_memory_m] * len(given.timed)
-        model = self._aged(self.sites.of(self.layout, given.cells, given.timed), kept_m)
-        if not self.slots.size:
-            return model
-        errors = self.slots.components(given.cells, self.layout)
-        # More cells than are kept at a time: their own errors are noise.
-        more_db2 = np.zeros(model.size)
-        for row, (name, (_, own)) in enumerate(zip(given.cells, errors, strict=True)):
-            more_db2[row] = self.growth[name] * self.options.level_error_db**2 if own < 0 else 0.0
-        return with_errors(replace(model, noise=model.noise + np.diag(more_db2)), errors)
-
-    def _aged(self, model: GaussianTerms, kept_m: Sequence[float]) -> GaussianTerms:
-        """Return a model with noise for errors that last: reports in a row count once."""
-        growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, LEAST_MOVED_M)))
-        return replace(model, noise=model.noise * np.outer(growth, growth))
 
     def _update_fix(self, fix: GnssFix, time_s: float) -> Reason:
         if self.belief is None:

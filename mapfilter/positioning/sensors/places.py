@@ -12,13 +12,13 @@ from itertools import pairwise
 from math import hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
-from mapfilter.positioning.epochs import GnssFix
+from mapfilter.positioning.epochs import FIX_SD_M, GnssFix
 
 _APART_S, _LASTS_S = 2.0, 60.0
 """Least time between two positions that are kept, and for how long they are."""
-_DEVIATIONS, _LEAST_SD_M, _USUAL_SD_M = 4.0, 5.0, 10.0
+_DEVIATIONS, _LEAST_SD_M = 4.0, 5.0
 """Deviations of the distance of two positions beyond which it is one; the least deviation of a
-position, whose errors last, and that of one that states none."""
+position, whose errors last."""
 _LEAST_INTERVALS, _LEAST_S = 4, 8.0
 """The least that shows a way: intervals between positions, and time."""
 _STANDS_S, _SLOWEST_MPS = 40.0, 1.0
@@ -70,7 +70,7 @@ class Places:
                 return self if gone_m == 0 else Places(rows, way_m)
             rows = tuple(row for row in rows if time_s - row.time_s <= _LASTS_S)
         variance_m2 = (fix.var_east_m2 + fix.var_north_m2) / 2
-        sd_m = sqrt(variance_m2) if 0 < variance_m2 < inf else _USUAL_SD_M
+        sd_m = sqrt(variance_m2) if 0 < variance_m2 < inf else FIX_SD_M
         place = Place(time_s, way_m, fix.east_m, fix.north_m, max(sd_m, _LEAST_SD_M))
         return Places((*rows, place), way_m)
 

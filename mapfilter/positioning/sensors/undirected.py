@@ -15,14 +15,14 @@ from math import isfinite, nan, sqrt
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.epochs import FIX_SD_M, Epoch, GnssFix
 from mapfilter.positioning.sensors.unmeasured import headless_step
+from mapfilter.positioning.step_output import UnusedReading
 
-APART_SD, APART_M, _FIX_SD_M = 2.5, 25.0, 10.0
-"""Way between positions that are used, in deviations of these, at most, and the deviation of those
-that state none: fixes nearer to each other are all ahead of a belief that spreads to all sides from
-each of them, and contradict it in the end."""
+APART_SD, APART_M = 2.5, 25.0
+"""Way between positions that are used, in deviations of these, at most: fixes nearer to each other
+are all ahead of a belief that spreads to all sides from each of them, and contradict it in the
+end."""
 _NEAR_M = 30.0
 """Nearer positions are used if the next one seems to come after a longer way than this."""
 
@@ -132,5 +132,5 @@ _DIRECTED = UndirectedWay(rows=True, directed=True, since_m=0.0)
 def _apart_m(fix: GnssFix | None) -> float:
     """Return how long the way to a position has to be since the last one that was used."""
     variance_m2 = nan if fix is None else (fix.var_east_m2 + fix.var_north_m2) / 2
-    sd_m = sqrt(variance_m2) if variance_m2 > 0 else _FIX_SD_M
+    sd_m = sqrt(variance_m2) if variance_m2 > 0 else FIX_SD_M
     return min(APART_SD * sd_m, APART_M)

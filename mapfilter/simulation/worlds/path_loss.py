@@ -21,10 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Floats, Floats32
 from mapfilter.lattice import Lattice
 
-_LIGHT_MPS = 299_792_458.0
 _SHORTEST_M = 10.0
 MOBILE_M = 1.5
 """Height of the phone above ground."""
@@ -56,7 +56,7 @@ def sight_loss_db(distance_m: Floats, frequency_mhz: float, base_height_m: float
     >>> sight_loss_db(np.array([100.0, 4000.0]), 1800.0, 30.0).round(1).tolist()
     [77.9, 121.0]
     """
-    wave_m = _LIGHT_MPS / (frequency_mhz * 1e6)
+    wave_m = LIGHT_MPS / (frequency_mhz * 1e6)
     slant = np.hypot(np.maximum(distance_m, _SHORTEST_M), base_height_m - MOBILE_M)
     break_m = 4 * base_height_m * MOBILE_M / wave_m
     beyond_db = 20 * np.log10(np.maximum(slant / break_m, 1.0))
@@ -131,7 +131,7 @@ def fresnel_parameter(
     found = np.full(east_m.shape, -2.0)
     if heights_m is None:
         return found
-    wave_m = _LIGHT_MPS / (frequency_mhz * 1e6)
+    wave_m = LIGHT_MPS / (frequency_mhz * 1e6)
     for begin in range(0, east_m.size, _AT_A_TIME):
         part = slice(begin, begin + _AT_A_TIME)
         right, up = east_m[part] - mast.east_m, north_m[part] - mast.north_m

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.options import NotNegative, Options, Positive
 from mapfilter.radio.cells import CellPlan
@@ -20,7 +21,6 @@ from mapfilter.simulation.worlds.handover import (
 from mapfilter.simulation.worlds.quantised import SCALES, ScaleName
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
-_LIGHT_MPS = 299_792_458.0
 _MOVES_M = 0.02
 
 
@@ -170,7 +170,7 @@ def fast_fading_db(
     section 1.3). At rest a fade lasts. In dB, the mean is taken out.
     """
     moved = np.hypot(np.diff(east_m, prepend=east_m[0]), np.diff(north_m, prepend=north_m[0]))
-    half_wave_m = 0.5 * _LIGHT_MPS / (frequency_mhz * 1e6)
+    half_wave_m = 0.5 * LIGHT_MPS / (frequency_mhz * 1e6)
     degrees = diversity + moved[:, None] / half_wave_m
     power = np.maximum(rng.gamma(degrees) / degrees, 1e-6)
     fade = 10 * np.log10(power) + 10 / np.log(10) / (2 * degrees)

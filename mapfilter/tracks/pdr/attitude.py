@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import imufusion
 import numpy as np
 
+from mapfilter._constants import GRAVITY_MPS2
 from mapfilter._types import Floats, Ints
-from mapfilter.tracks.pdr.signals import GRAVITY_MPS2, RATE_HZ, Signals
+from mapfilter.tracks.pdr.signals import RATE_HZ, Signals
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import MAD_TO_SD
 from mapfilter.tracks.pdr.batches import parted, spread
 from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS
 from mapfilter.tracks.pdr.options import WalkOptions
-from mapfilter.tracks.pdr.step_counts import LATE_S, PAUSE_S, STEPS_PER_S, steps_of_rows
+from mapfilter.tracks.pdr.step_counts import LATE_S, PAUSE_S, STEPS_PER_S, counted_steps
 from mapfilter.tracks.pdr.turns import turning_of
 from mapfilter.tracks.pdr.walk import DECLINATION_SD_RAD
 from mapfilter.tracks.pdr.walk_noise import SCALE, STEP_SHARE
@@ -96,7 +96,7 @@ def reckon_counted(
     rows = sensors["steps"].sort_values("time_s", kind="stable")
     rows = rows.drop_duplicates("time_s", keep="last")
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
-    counted, how = steps_of_rows(time_s, rows["count"].to_numpy(dtype=np.float64))
+    counted, how = counted_steps(time_s, rows["count"].to_numpy(dtype=np.float64))
     counted, batches = spread(time_s, counted)
     time_s, counted = parted(time_s, counted, _times_of_directions(sensors))
     unknown = int(np.isnan(counted).sum())

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.tracks.moved import MAD_TO_SD
 from mapfilter.tracks.pdr.signals import RATE_HZ, Signals, gyroscope_samples
 
 WALK_RAD_PER_SQRT_S = float(np.radians(0.15))

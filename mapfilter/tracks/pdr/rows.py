@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.pdr.height import TREAD_M, Climb, height_m
 from mapfilter.tracks.pdr.signals import RATE_HZ
@@ -50,7 +51,7 @@ def course_over_strides(course: Floats, at: Ints, stepped: Bools) -> tuple[Float
     values = np.where(stepped, mean, course[at])
     three = stepped[2:] & stepped[1:-1] & stepped[:-2]
     second = np.diff(values, 2)[three]
-    sway = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0) if second.size else 0.0
+    sway = MAD_TO_SD * float(np.median(np.abs(second))) / np.sqrt(6.0) if second.size else 0.0
     return values, sway
 
 

@@ -11,7 +11,6 @@ import pandas as pd
 from mapfilter._types import Floats
 
 RATE_HZ = 50.0
-GRAVITY_MPS2 = 9.80665
 _SLOWEST_HZ = 15.0
 _LONGEST_GAP_S = 0.5
 _SHORTEST_S = 2.0

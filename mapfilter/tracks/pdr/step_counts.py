@@ -1,4 +1,4 @@
-"""Steps of each row by a counter, or by rows that count their own."""
+"""Steps of each row of a step counter, by what it counts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LATE_S, _JITTER = 10.0, 20.0
 """Counters are read up to so many seconds late; falls of fewer steps are of rows out of order."""
 _FALLING = 0.5
 PAUSE_S = 30.0
-"""Motion since a row so long before is not known."""
+"""Time without a row after which steps are unknown."""
 _OWN_COUNTS = "counted in each row"
 
 
@@ -41,7 +41,7 @@ def are_own_counts(time_s: Floats, count: Floats) -> bool:
     return bool(count.max() <= most or (batches and count.mean() <= most))
 
 
-def steps_of_rows(time_s: Floats, count: Floats) -> tuple[Floats, str]:
+def counted_steps(time_s: Floats, count: Floats) -> tuple[Floats, str]:
     """Return the steps of each row, NaN where unknown, and what the counts were taken for."""
     lasted_s = np.diff(time_s)
     is_own = are_own_counts(time_s, count)

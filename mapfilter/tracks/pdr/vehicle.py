@@ -7,17 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import (
-    MAD_TO_SD,
-    UNDIRECTED,
-    long_gaps,
-    motion_from_odometry,
-    odometry_gaps,
-)
+from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry, odometry_gaps
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.gyroscope import (
     MOST_BIAS_RADPS,

@@ -68,7 +68,6 @@ class _Part:
     offset: YawOffset
     direction_sd_rad: float
     sway_rad: float
-    still_s: float
 
 
 def reckon_walk(
@@ -180,7 +179,7 @@ def _reckon(
     )
     used = np.bincount(turned.section[index], minlength=len(sds)) if index.size else np.ones(1)
     known = np.average(sds[: len(used)] ** 2, weights=used)
-    return _Part(rows, offset, float(np.sqrt(known)), sway, float(quiet.sum() / RATE_HZ))
+    return _Part(rows, offset, float(np.sqrt(known)), sway)
 
 
 def _speed_at(time_s: Floats, speed: pd.DataFrame) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
+from mapfilter.radio.identities import IDENTITY
 from mapfilter.radio.transmitter_lists import CELLS_OF_NODE
 from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.readers.identities import parse_identities
@@ -17,7 +18,6 @@ _HEX = re.compile(r"[0-9A-F]{1,9}", re.ASCII | re.IGNORECASE)
 _LEAST_LETTERS = 0.5
 """Share of different numbers with a letter: of hexadecimal ones of four digits 0.85 have one."""
 _LARGEST_MCC = 999
-_IDENTITY = ("mcc", "mnc", "lac", "ci")
 
 
 def cell_identities(mapped: Mapped) -> dict[str, Floats]:
@@ -27,7 +27,7 @@ def cell_identities(mapped: Mapped) -> dict[str, Floats]:
     a text of an identity holds fills what has no column of its own.
     """
     mapped = _without_hexadecimals(mapped)
-    identity = {name: mapped.whole(name) for name in _IDENTITY}
+    identity = {name: mapped.whole(name) for name in IDENTITY}
     if not mapped.has("mnc"):
         identity |= _networks(identity["mcc"])
     if mapped.has("enodeb"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mapfilter._constants import KMH_MPS
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
@@ -13,7 +14,6 @@ from mapfilter.tracks.readers.odometer_counts import counted_way
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
 
-_KMH = 1 / 3.6
 _NEAR_S, _COARSE_M = 1.0, 0.5
 _SPEEDS = ("speed_mps", "speed_kmh")
 _WHEELS, _ODOMETERS = ("wheel_speed_mps", "wheel_speed_kmh"), ("odometer_m", "odometer_km")
@@ -127,7 +127,7 @@ def _counted(mapped: Mapped, reading: Reading, time_s: Floats, field: str) -> tu
 def speeds_of(mapped: Mapped, name: str) -> Floats:
     """Return a speed in m/s, of a field for m/s or one for km/h; NaN where missing."""
     if mapped.has(f"{name}_kmh"):
-        return _KMH * mapped.number(f"{name}_kmh")
+        return KMH_MPS * mapped.number(f"{name}_kmh")
     return mapped.number(f"{name}_mps")
 
 

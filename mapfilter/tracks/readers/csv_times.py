@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
@@ -17,7 +18,6 @@ from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.times import (
-    DAY_S,
     parse_times,
     unix_seconds,
     utc_from_gps_s,

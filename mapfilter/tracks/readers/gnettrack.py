@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import KMH_MPS
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.radio.identities import technology
@@ -22,7 +23,6 @@ from mapfilter.tracks.readers.text import Text
 _NEEDED = {"timestamp", "longitude", "latitude", "networkmode"}
 _IDENTITIES = ({"rawcellid"}, {"node", "cellid"})
 _LTE_CELLS = 256
-_KMH = 1 / 3.6
 _LEAST_FIELDS = 20
 _MOST_NEIGHBOURS = 18
 _LAYOUT = "%Y.%m.%d_%H.%M.%S"
@@ -66,7 +66,7 @@ def _add_positions(
         "lon_deg": lon,
         "altitude_m": rows.number("altitude"),
         "accuracy_m": rows.number("accuracy"),
-        "speed_mps": _KMH * rows.number("speed"),
+        "speed_mps": KMH_MPS * rows.number("speed"),
     }
     kept = {name: values[new] for name, values in columns.items()}
     reading.add("positions", kept, rows.line[new])

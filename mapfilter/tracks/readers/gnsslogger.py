@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 
+from mapfilter._constants import LIGHT_MPS
 from mapfilter._types import Ints
 from mapfilter._words import number_of
 from mapfilter.gnss.almanacs import WEEK_S
@@ -19,7 +20,6 @@ from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import unix_seconds, utc_from_gps_s
 
 _BLOCK_BYTES = 1 << 24
-_LIGHT_MPS = 299_792_458.0
 _DAY_NS, _WEEK_NS = 86_400 * 10**9, int(WEEK_S) * 10**9
 _BEIDOU_BEHIND_NS = 14 * 10**9
 _MOSCOW_NS = 3 * 3600 * 10**9
@@ -194,8 +194,8 @@ def _add_raw(rows: Columns, reading: Reading) -> None:
         "time_s": utc_s,
         "satellite": names,
         "signal": np.where(first, "L1", "L5"),
-        "pseudorange_m": _LIGHT_MPS * way_ns / 1e9,
-        "sigma_m": _LIGHT_MPS * rows.number("receivedsvtimeuncertaintynanos") / 1e9,
+        "pseudorange_m": LIGHT_MPS * way_ns / 1e9,
+        "sigma_m": LIGHT_MPS * rows.number("receivedsvtimeuncertaintynanos") / 1e9,
         "rate_mps": rows.number("pseudorangeratemeterspersecond"),
         "cn0_dbhz": rows.number("cn0dbhz"),
     }

@@ -34,6 +34,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from mapfilter._constants import KMH_MPS
 from mapfilter._types import Ints
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.columns import only
@@ -60,7 +61,6 @@ _AHEAD_MIN = re.compile(r'#UT([,;\t])[^;\t\n]*?\1\d*\1"?([-+]?\d{1,3})(?!\d)', r
 _PRODUCT = re.compile(r'#PRODUCT[,;\t]+"?([^",;\t]*)"?[,;\t]"?([\d.]*)')
 _KINDS = ("GPS", "CELLMEAS", "CHI", "SEI")
 _SCANNERS = ("OFDMSCAN", "PILOTSCAN", "FREQSCAN")
-_KMH = 1 / 3.6
 _MOST_AHEAD_MIN = 14 * 60
 _MOST = {"headers": 64, "channels": 64, "channel_size": 32, "cells": 500, "size": 64}
 _NO_MAC = "00:00:00:00:00:00"
@@ -175,7 +175,7 @@ def _add_positions(events: Events, reading: Reading) -> None:
         "lat_deg": rows.number("lat"),
         "lon_deg": rows.number("lon"),
         "altitude_m": rows.number("height"),
-        "speed_mps": _KMH * rows.number("speed"),
+        "speed_mps": KMH_MPS * rows.number("speed"),
     }
     reading.add("positions", *only(columns, rows.line, ~nowhere))
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mapfilter._constants import DAY_S, KNOT_MPS
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.position_units import RADIUS_68, UERE_M
 from mapfilter.tracks.readers.columns import Columns
@@ -33,8 +34,6 @@ _KINDS = {
     b"ZDA": ("time", "day", "month", "year"),
 }
 _FIELDS = 20
-_KNOT_MPS = 1852.0 / 3600.0
-_DAY_S = 86_400.0
 _LINE_FEED = 10
 _DIGITS = np.array([int(c, 16) if (c := chr(i)) in hexdigits else -1 for i in range(256)])
 _MANY, _NEARLY_ALL = 10, 0.95
@@ -222,8 +221,8 @@ def _utc(rows: Columns, dates: pd.DataFrame) -> Floats:
     """Return UTC seconds by the date of the nearest line that has one."""
     of_day = _of_day(rows.texts("time"))
     if dates.empty:
-        turns = np.cumsum(np.diff(np.nan_to_num(of_day), prepend=0.0) < -_DAY_S / 2)
-        return np.asarray(of_day + _DAY_S * turns)
+        turns = np.cumsum(np.diff(np.nan_to_num(of_day), prepend=0.0) < -DAY_S / 2)
+        return np.asarray(of_day + DAY_S * turns)
     lines = dates["line"].to_numpy()
     at = np.clip(np.searchsorted(lines, rows.line), 1, max(len(lines) - 1, 1))
     before = np.clip(at - 1, 0, len(lines) - 1)
@@ -232,8 +231,8 @@ def _utc(rows: Columns, dates: pd.DataFrame) -> Floats:
     index = np.where(nearer, at, before)
     midnight, dated = dates["midnight_s"].to_numpy()[index], dates["of_day_s"].to_numpy()[index]
     # A sentence just before or after midnight may have its date from the other side.
-    turn = np.round((dated - of_day) / _DAY_S)
-    return np.asarray(midnight + of_day + _DAY_S * np.nan_to_num(turn))
+    turn = np.round((dated - of_day) / DAY_S)
+    return np.asarray(midnight + of_day + DAY_S * np.nan_to_num(turn))
 
 
 def _degrees(rows: Columns, name: str, sign: str, negative: str) -> Floats:
@@ -274,7 +273,7 @@ def _rmc(rows: Columns, dates: pd.DataFrame, reading: Reading) -> pd.DataFrame:
         "time_s": _utc(rows, dates),
         "lat_deg": _degrees(rows, "lat", "ns", "S"),
         "lon_deg": _degrees(rows, "lon", "ew", "W"),
-        "speed_mps": _KNOT_MPS * rows.number("knots"),
+        "speed_mps": KNOT_MPS * rows.number("knots"),
         "course_deg": rows.number("course"),
         "valid": valid & ~computed,
     }

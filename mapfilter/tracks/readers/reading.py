@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from mapfilter._constants import HOUR_S
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import listed
@@ -36,7 +37,7 @@ from mapfilter.tracks.schema import NEIGHBOUR
 _LINES_KEPT = 3
 _EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
 _TICKS = "likely: ticks since a phone was started; their unit in the header, as time_ms, reads them"
-_JUMP_S, _HOUR_S = 86_400.0, 3600.0
+_JUMP_S = 86_400.0
 _STRAY_SHARE = 0.1
 _OF_STEPS = ("steps", "motion")
 _SEVERAL = ("radio", "satellites", "ephemerides")
@@ -122,7 +123,7 @@ class Reading:
         rows = pd.DataFrame(checked, copy=False)
         steps_s = np.diff(rows["time_s"].to_numpy()) if "time_s" in rows else np.zeros(0)
         if back := int(np.sum(steps_s < 0)):
-            hour = back == 1 and -_HOUR_S <= steps_s.min() < -_HOUR_S / 2
+            hour = back == 1 and -HOUR_S <= steps_s.min() < -HOUR_S / 2
             likely = hour and self.clock == Clock("local")
             why = " (likely: a clock that was set back by an hour: --zone)" if likely else ""
             self.note(f"{table}: times go backwards in {number_of(back, 'place')}; sorted{why}")

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import union_categoricals
 
+from mapfilter._constants import DAY_S
 from mapfilter._types import Bools, Ints
 from mapfilter.tracks.readers.recorded_field import Field
 
 _MANY_ROWS = 10_000
-_LATE_S, _LATE_SHARE, _DAY_S = 30.0, 0.1, 86_400.0
+_LATE_S, _LATE_SHARE = 30.0, 0.1
 
 
 def joined_parts(parts: list[pd.DataFrame]) -> pd.DataFrame:
@@ -112,7 +113,7 @@ def late_rows(tables: Iterable[Sequence[pd.DataFrame]], last_s: float, *, read: 
         return ""
     beyond_s = last_s - max(float(time.max()) for time in times)
     lasted_s = last_s - min(float(time.min()) for time in times)
-    if not max(_LATE_S, _LATE_SHARE * lasted_s) < beyond_s < _DAY_S:
+    if not max(_LATE_S, _LATE_SHARE * lasted_s) < beyond_s < DAY_S:
         return ""
     held = "they are empty" if read else "of their columns none is used"
     return f"rows go on for {beyond_s:.0f} s after the last one with a value that is used: {held}"

@@ -237,9 +237,3 @@ RECORDED: dict[str, tuple[Field, ...]] = {
     ),
 }
 """The columns of each table of a recording; ``cells`` and ``ionosphere`` have no times."""
-
-SENSORS = (
-    *("accelerometer", "linear_acceleration", "gravity", "gyroscope", "magnetometer"),
-    *("orientation", "barometer", "steps", "compass", "turns", "odometry", "velocity"),
-)
-"""Tables of raw sensors, which a log keeps in its folder ``sensors``."""

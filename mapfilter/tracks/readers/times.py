@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from datetime import UTC, datetime, timedelta, timezone, tzinfo
+from datetime import datetime, timedelta, timezone, tzinfo
 from math import nan
 from zoneinfo import ZoneInfo
 
@@ -13,13 +13,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import ArrayLike
 
+from mapfilter._constants import DAY_S, GPS_EPOCH_S
 from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, fail
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.orbits import LEAPS_UTC_S
 
-GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
-DAY_S = 86_400.0
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
 _QUARTER_S = 900.0
 _FAR_QUARTERS = 6e7

@@ -17,7 +17,8 @@ from mapfilter._types import Bools, Floats
 from mapfilter.gnss.almanacs import joined, nominal_galileo, nominal_gps
 from mapfilter.gnss.noise import elevation_sigma_m, multipath_bias_m
 from mapfilter.gnss.orbits import satellite_positions_m
-from mapfilter.gnss.sky import LocalFrame, Skyline, directions
+from mapfilter.gnss.sky import LocalFrame, directions
+from mapfilter.gnss.skyline import Skyline
 from mapfilter.lattice import Lattice
 from mapfilter.simulation.drives import clock_walk_m
 from mapfilter.simulation.lte_network import (

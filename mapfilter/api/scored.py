@@ -1,0 +1,109 @@
+"""Score a located track against ground truth."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from math import isfinite, nan
+from typing import Any
+
+import pandas as pd
+
+from mapfilter._arguments import Argument, check_arguments
+from mapfilter.api.located import Track
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.evaluation.accuracy import (
+    Accuracy,
+    accuracy,
+    held_by_radius_95,
+    mean_of,
+    position_errors_m,
+)
+from mapfilter.evaluation.truth import Truth
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.tracks.tables import tidy_table
+
+_NO_TRUTH = (
+    "the log has no ground truth; mf.read_log(..., truth=FILE) takes that of another recording"
+)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Score(Accuracy):
+    """Accuracy of one track against ground truth.
+
+    Besides the figures of :class:`mapfilter.evaluation.accuracy.Accuracy`, how often the radius
+    holds the true position, and the error of each epoch.
+
+    Parameters
+    ----------
+    within_95 : float
+        Share of the scored epochs with a radius whose 95 % radius holds the true position; NaN
+        without any.
+    error_m : (N,) array
+        NaN where the track has no position, or the ground truth none.
+    """
+
+    within_95: float = nan
+    error_m: Any = None
+
+    def __repr__(self) -> str:
+        if not self.switched:
+            return "Score: the filter never converged"
+        then = "the ground truth tells nothing of what came then"
+        if self.scored_epochs:
+            then = f"then {self.error_mean_m:.1f} m on average, {self.error_95_m:.1f} m at 95 %"
+            if isfinite(self.within_95):
+                then += f"; the 95 % radius holds {self.within_95:.2f}"
+        if self.success is None:
+            return f"Score: converged where the ground truth does not tell; {then}"
+        outcome = "right" if self.success else "wrong"
+        return (
+            f"Score: converged after {self.switch_distance_m:.0f} m, "
+            f"{self.error_at_switch_m:.1f} m off ({outcome}); {then}"
+        )
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the figures as a table of one row."""
+        return pd.DataFrame([{k: v for k, v in asdict(self).items() if k != "error_m"}])
+
+
+def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
+    """Compare a track with ground truth.
+
+    Parameters
+    ----------
+    truth : DataFrame or Truth
+        Columns ``time_s``, ``east_m`` and ``north_m``, as the table ``truth`` of a log, in the CRS
+        of the track. As in :func:`mapfilter.make_log`, rows are sorted by time, and exact
+        duplicates dropped.
+
+    Raises
+    ------
+    InputError
+        The ground truth has fewer than two positions, lacks a column, or has values that no log may
+        have, such as NaN.
+    ConfigError
+        There is no track, or no table of ground truth.
+    """
+    check_arguments(
+        "score",
+        Argument("track", track, Track | TrackEstimate, "a track of locate"),
+        Argument("truth", truth, pd.DataFrame | Truth, "a table such as log.truth"),
+    )
+    estimate = track.estimate if isinstance(track, Track) else track
+    if not isinstance(truth, Truth):
+        lacking = {"time_s", "east_m", "north_m"} - set(truth.columns)
+        if lacking:
+            expected = "columns time_s, east_m and north_m"
+            raise fail(InputError, "truth", expected, ", ".join(map(str, truth.columns)))
+        faults = Faults()
+        tidy, _ = tidy_table("truth", truth, "truth", faults)
+        faults.raise_if_any(InputError)
+        known = Truth.of_table(tidy)
+        if known is None:
+            got, hint = (len(truth), "") if len(truth) else ("none", _NO_TRUTH)
+            raise fail(InputError, "truth", "two positions or more", got, hint)
+        truth = known
+    figures = asdict(accuracy(estimate, truth))
+    within_95 = mean_of(held_by_radius_95(estimate, truth))
+    return Score(**figures, within_95=within_95, error_m=position_errors_m(estimate, truth))
