@@ -96,6 +96,7 @@ _SUFFIXES = {
     "_kmh": ("speed", "km/h"),
     "_rad": ("angle", "rad"),
     "_deg": ("angle", "deg"),
+    "_km": ("length", "km"),
     "_m": ("length", "m"),
     "_dbm": ("level", "dbm"),
     "_hpa": ("pressure", "hpa"),

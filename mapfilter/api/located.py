@@ -239,5 +239,7 @@ def _not_located(
         remedies.append("mf.read_log makes it of a recording's positions with course_motion=True")
     if NO_MOTION in lack and len(log.radio):
         remedies.append("mf.locate_reports needs none")
+    if NO_MOTION in lack and len(log.gnss):
+        remedies.append('filter="ekf" needs none beside positions')
     remedy = f" ({'; '.join(remedies)})" if remedies else ""
     return (f"nothing is located: {lack}{remedy}",) if lack else ()

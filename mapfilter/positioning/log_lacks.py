@@ -64,7 +64,7 @@ def _unused_ranges(log: TrackLog) -> str:
 
 
 def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str, ...]:
-    """Return notes on a log that streets alone did not locate.
+    """Return notes on a log with motion that streets alone did not locate.
 
     Parameters
     ----------
@@ -75,6 +75,8 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
     if estimate.converged_at is not None or not by_streets:
         return ()
     along_m = float(log.motion["step_m"].abs().sum())
+    if not along_m:
+        return ()
     notes = [
         f"never converged in {along_m:.0f} m: by streets alone it takes about a kilometre, with "
         "turns, all of it on the map"

@@ -146,7 +146,9 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         log = replace(log, notes=tuple(kept))
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)
-        raise fail(InputError, names, "rows of a journey", "none")
+        turns = any("odometry" in r.tables for r in shifted)
+        got = "yaw rates without speeds or an odometer" if turns else "none"
+        raise fail(InputError, names, "rows of a journey", got)
     return Combined(log, sensors, alignment, tuple(notes))
 
 

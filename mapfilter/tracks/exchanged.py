@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.pdr.step_counts import are_own_counts
+from mapfilter.tracks.pdr.turns import Turning
 from mapfilter.tracks.readers.recording import Recording
 
 _COLUMNS = {"odometry": ("speed_mps", "yaw_rate_radps"), "motion": ("step_m", "turn_rad")}
@@ -84,6 +85,28 @@ def check_columns(recording: Recording) -> tuple[str, ...]:
         _check_counts(recording, steps, faults)
     faults.raise_if_any(InputError)
     return tuple(notes)
+
+
+def check_turning(rows: pd.DataFrame, turning: Turning, where: str) -> None:
+    """Raise InputError where a gyroscope's turns beside a vehicle's speeds are too fast for it.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        time_s, rising, and speed_mps.
+    turning : Turning
+    where : str
+        Names of the files, in messages.
+    """
+    time_s, speed = (rows[name].to_numpy(dtype=np.float64) for name in ("time_s", "speed_mps"))
+    lasted_s = np.diff(time_s, prepend=np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rate = turning.between(time_s) / lasted_s
+    if most := _sideways_mps2(speed, rate):
+        expected = "rad/s of a vehicle that its tyres hold"
+        got = f"{most:.0f} m/s² sideways (speed times rate of turning) in 5 % of the rows or more"
+        hint = "degrees for radians per second: state it in the header, as in gyro_x (deg/s)"
+        raise fail(InputError, f"{where}, gyroscope", expected, got, hint)
 
 
 def _check_counts(recording: Recording, steps: pd.DataFrame, faults: Faults) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -12,7 +12,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.geodesy import wrap_rad
-from mapfilter.tracks.exchanged import check_columns
+from mapfilter.tracks.exchanged import check_columns, check_turning
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -25,7 +25,10 @@ from mapfilter.tracks.moved import (
 )
 from mapfilter.tracks.parted_odometry import parted_odometry, with_turns
 from mapfilter.tracks.pdr.counted import reckon_counted
+from mapfilter.tracks.pdr.mounted import turning_of_mounted
+from mapfilter.tracks.pdr.mounted_clock import clock_shift_s
 from mapfilter.tracks.pdr.options import WalkOptions, without_effect
+from mapfilter.tracks.pdr.turns import AXES, Turning, samples
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.position_motion import motion_from_positions
@@ -34,6 +37,7 @@ from mapfilter.tracks.readers.recording import Recording
 
 _LONGEST_GAP_S = 3600.0
 _SUMMER_HOURS = 1.1
+_FEWEST = 3
 OF_RECEIVER = "motion comes from GNSS"
 
 
@@ -90,7 +94,7 @@ def journey_motion(
     """
     for recording in recordings:
         notes += check_columns(recording)
-    moved = _recorded(recordings, frame, notes)
+    moved = _recorded(recordings, sensors, frame, notes)
     if moved is None and course_motion:
         moved = _course([*recordings, *true], sensors, frame, notes)
     if moved is not None:
@@ -99,7 +103,12 @@ def journey_motion(
     return Moved() if walk is None else _walked(sensors, walk, frame, notes)
 
 
-def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -> Moved | None:
+def _recorded(
+    recordings: Sequence[Recording],
+    sensors: Mapping[str, pd.DataFrame],
+    frame: Frame,
+    notes: list[str],
+) -> Moved | None:
     """Return motion that a recording holds as such, odometry or poses; None without any."""
     for name in ("motion", "odometry", "poses"):
         having = [r for r in recordings if name in r.tables]
@@ -116,7 +125,15 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
         if name == "odometry":
             _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))
             rows, joined = with_turns(rows, turns)
-            moved, imu, words = reckon_odometry(rows)
+            turning = None
+            if rows["yaw_rate_radps"].isna().all():
+                turning, of_phone = turning_of_mounted(sensors)
+                joined = (*joined, *of_phone)
+            if turning is not None:
+                turning, late = _on_the_clock_of(having[0], rows, turning, sensors, recordings)
+                joined = (*joined, *late)
+                check_turning(rows, turning, ", ".join(r.path.name for r in recordings))
+            moved, imu, words = reckon_odometry(rows, turning)
             notes += [*joined, *words]
             return Moved(moved, imu, vehicle=True, source=source)
         poses, compass = name == "poses", False
@@ -135,6 +152,31 @@ def _recorded(recordings: Sequence[Recording], frame: Frame, notes: list[str]) -
             notes.append(f"motion: {lacking}: {UNDIRECTED}")
         return Moved(moved, source=source, compass=compass)
     return None
+
+
+def _on_the_clock_of(
+    wheels: Recording,
+    rows: pd.DataFrame,
+    turning: Turning,
+    sensors: Mapping[str, pd.DataFrame],
+    recordings: Sequence[Recording],
+) -> tuple[Turning, tuple[str, ...]]:
+    """Return a phone's turns on the clock of a vehicle's speeds, and a note where it is another."""
+    phones = [r.path.name for r in recordings if "gyroscope" in r.tables and r is not wheels]
+    force = samples(sensors, "accelerometer", AXES) or samples(sensors, "linear_acceleration", AXES)
+    speed = rows.dropna(subset=["speed_mps"])
+    if not phones or force is None or len(speed) < _FEWEST:
+        return turning, ()
+    speeds = speed["time_s"].to_numpy(np.float64), speed["speed_mps"].to_numpy(np.float64)
+    shift_s, best, now = clock_shift_s(speeds, force)
+    if not shift_s:
+        return turning, ()
+    note = (
+        f"{listed(phones)}: accelerations agree with the speeds of {wheels.path.name} best "
+        f"{shift_s:+.1f} s shifted (explained: {best:.2f}, not {now:.2f}); its turns are shifted, "
+        "--offset shifts all of it"
+    )
+    return replace(turning, time_s=turning.time_s + shift_s), (note,)
 
 
 def _walked(
@@ -209,7 +251,8 @@ def _course(
         return Moved(turned[0], turned[1], source=OF_RECEIVER)
     placed = [(r, rows) for r in recordings if (rows := _placed(r)) is not None]
     for recording, rows in placed:
-        if "course_deg" in rows and rows["course_deg"].notna().any():
+        moving = ["speed_mps", "course_deg"]
+        if set(moving) <= set(rows) and rows[moving].notna().all(axis=1).any():
             motion = motion_from_course(rows, frame.convergence_rad)
             imu = course_errors(motion, *frame.east_north(rows, recording.crs))
             told = "speed and course of its fixes", "as they differ from its positions"

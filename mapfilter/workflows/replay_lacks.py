@@ -27,8 +27,8 @@ from mapfilter.tracks.turn_drift import turn_drift_radps
 from mapfilter.viewing.words import REASONS
 
 _MOTION_COLUMNS = (
-    "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps "
-    "or wheel_speed_kmh"
+    "columns step_m, steps (with compass_deg, turn_rad, turn_deg or a yaw rate), wheel_speed_mps, "
+    "wheel_speed_kmh, odometer_m or odometer_km"
 )
 
 _UNLOCATED = {
@@ -209,7 +209,8 @@ def receiver_motion(opened: OpenedLog) -> str:
     """Return what positions of the log, or of its truth, make motion of; "" without them."""
     every = [r.tables.get("positions", r.tables.get("places")) for r in opened.recordings]
     placed = [rows for rows in every if rows is not None and rows["time_s"].nunique() > 1]
-    courses = (rows["course_deg"] for rows in placed if "course_deg" in rows)
-    if any(course.notna().any() for course in courses):
+    moving = ("speed_mps", "course_deg")
+    both = (rows[list(moving)] for rows in placed if set(moving) <= set(rows))
+    if any(rows.notna().all(axis=1).any() for rows in both):
         return "speed and course"
     return "positions" if placed else ""

@@ -45,6 +45,26 @@ def test_speeds_and_yaw_rates_of_two_files(read, every, apart_s):
     assert not [note for note in log.notes if "not used" in note]
 
 
+@pytest.mark.parametrize("parted", [False, True])
+def test_noisy_yaw_rates_that_come_more_often_than_speeds_are_all_used(read, parted):
+    """Those at the times of speeds were, and headings drifted by their noise, by 20 degrees."""
+    dense_s = START_S + np.arange(0.0, 300.0, 0.02)
+    true = np.interp(dense_s, TIME_S, RATE_RADPS)
+    noisy = true + np.random.default_rng(8).normal(0.0, 0.02, true.size)
+    at = np.arange(dense_s.size) % 50 == 0
+    speed = np.interp(dense_s, TIME_S, SPEED_MPS)
+    if parted:
+        rates = {"time": dense_s, "yaw_rate_radps": noisy}
+        log = read(obd={"time": dense_s[at], "wheel_speed_mps": speed[at]}, gyro=rates)
+    else:
+        speeds = np.where(at, speed, np.nan)
+        log = read(can={"time": dense_s, "wheel_speed_mps": speeds, "yaw_rate_radps": noisy})
+    turned = np.append(0.0, np.cumsum(0.01 * (true[1:] + true[:-1])))
+    off = turned_rad(log) - np.interp(START_S + log.motion["time_s"], dense_s, turned)
+    assert len(log.motion) == at.sum()
+    assert np.degrees(np.abs(off).max()) < 8
+
+
 def test_yaw_rates_that_speeds_have_themselves_are_not_replaced(read):
     own = {"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS}
     log = read(obd=own, gyro={"time": TIME_S, "yaw_rate_radps": -RATE_RADPS})

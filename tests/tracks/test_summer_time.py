@@ -59,6 +59,48 @@ def test_parts_of_a_large_file_follow_each_other(tmp_path, monkeypatch, begin_s,
     np.testing.assert_array_equal(found.tables["barometer"]["time_s"], utc_s)
 
 
+def exported(name, utc_s):
+    """A drive as a program of drive tests writes it, in local times."""
+    moments = pd.to_datetime(local_s(utc_s), unit="s")
+    lat, lon = 52.5 + 1e-5 * np.arange(len(utc_s)), np.full(len(utc_s), 13.4)
+    level, cell = -80 - np.arange(len(utc_s)) % 7, 101 + np.arange(len(utc_s)) // 50
+    if name == "tems":
+        head = ("Timestamp", "MS", "Message Type", "All-Latitude", "All-Longitude", "All-LAC")
+        head += ("All-Cell Id", "All-BSIC (Num)", "All-ARFCN BCCH", "All-RxLev Full (dBm)")
+        columns = (moments.strftime("%d/%m/%Y %H:%M:%S.000"), "MS1", "Measurement Report", lat, lon)
+        columns += (3021, cell, 42, 61, level)
+        return dict(zip(head, columns, strict=True)), "\t"
+    if name == "gnettrack":
+        head = ("Timestamp", "Longitude", "Latitude", "Speed", "Operator", "CellID", "LAC")
+        head += ("NetworkTech", "NetworkMode", "Level", "ARFCN", "PSC", "Node", "CGI")
+        columns = (moments.strftime("%Y.%m.%d_%H.%M.%S"), lon, lat, 8, "26201", cell, 3021)
+        columns += ("2G", "GSM", level, 61, 42, 1, "x")
+        return dict(zip(head, columns, strict=True)), "\t"
+    stamps = moments.strftime("%Y-%m-%d %H:%M:%S")
+    identity = {"mcc": 262, "mnc": 1, "lac": 3021}
+    columns = {"lat": lat, "lon": lon, "measured_at": stamps}
+    if name == "towercollector":
+        own = {"cell_id": cell, "psc": 1, "asu": 20, "dbm": level, "ta": 1, "accuracy": 5.0}
+        more = {"net_type": "GSM", "neighboring": "false", "device": "P"}
+        return identity | own | columns | more, ","
+    own = {"cellid": cell, "signal": level, "act": "GSM", "rating": 6.5, "speed": 8.0}
+    return identity | own | columns, ","
+
+
+@pytest.mark.parametrize("name", ["tems", "gnettrack", "towercollector", "opencellid"])
+@pytest.mark.parametrize(("begin_s", "end_s"), [(-1800, 600), (-1800, 3000), (-6000, 9000)])
+def test_parts_of_large_drive_tests_follow_each_other(tmp_path, monkeypatch, name, begin_s, end_s):
+    """Parts within the second pass were an hour early."""
+    monkeypatch.setattr(text, "_PART_BYTES", 1 << 14)
+    utc_s = BACK_S + np.arange(begin_s, end_s)
+    columns, separator = exported(name, utc_s)
+    pd.DataFrame(columns).to_csv(tmp_path / "drive.txt", index=False, sep=separator)
+    found = read_recording(tmp_path / "drive.txt", options=ReadOptions(zone=BERLIN))
+    assert found.format == name
+    for table in ("positions", "radio"):
+        np.testing.assert_array_equal(found.tables[table]["time_s"].unique(), utc_s)
+
+
 def test_times_with_a_zone_among_local_ones_are_no_fall():
     texts = np.array(["2026-10-25T02:50:00", "2026-10-25T00:51:00Z", "2026-10-25T02:52:00"])
     found, zoned = parse_times(texts, BERLIN)

@@ -116,6 +116,19 @@ def test_a_drive_that_fits_no_street_ends_with_advice(roads):
     assert [note.split(":")[0] for note in stated.json["notes"]] == ["never converged in 80 m"]
 
 
+def test_positions_alone_are_no_way_that_fits_no_street(roads):
+    """It said that the way of 0 m is too short, and a walker's."""
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = roads.parent / "fixes.csv"
+    places = {"east_m": WEST_M + 100.0 + np.arange(60), "north_m": NORTH_M - 100.5}
+    pd.DataFrame({"time_s": np.arange(60.0), **places}).to_csv(drive, index=False)
+    given = ("replay", "--db", built, "--log", drive, "--json")
+    done = mapfilter(*given, "--out", roads.parent / "a")
+    assert (done.code, "no motion (" in done.err) == (3, True), done.err
+    assert "--filter ekf needs none beside positions" in done.err
+    assert not any("never converged" in note or "walker" in note for note in done.json["notes"])
+
+
 def test_a_log_without_a_frame_is_one_of_the_database(roads):
     built = mapfilter("build", "-c", roads, "--json").json["database"]
     drive = write_drive(roads.parent)

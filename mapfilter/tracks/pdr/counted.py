@@ -14,6 +14,7 @@ from mapfilter._words import number_of
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.pdr.batches import parted, spread
 from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.step_counts import LATE_S, PAUSE_S, STEPS_PER_S, counted_steps
@@ -92,9 +93,12 @@ def reckon_counted(
     options = options or WalkOptions()
     if "steps" not in sensors:
         return None, None, ()
-    rows = sensors["steps"].sort_values("time_s", kind="stable").drop_duplicates("time_s")
+    rows = sensors["steps"].sort_values("time_s", kind="stable")
+    rows = rows.drop_duplicates("time_s", keep="last")
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     counted, how = counted_steps(time_s, rows["count"].to_numpy(dtype=np.float64))
+    counted, batches = spread(time_s, counted)
+    time_s, counted = parted(time_s, counted, _times_of_directions(sensors))
     unknown = int(np.isnan(counted).sum())
     if not np.nansum(counted) > 0:
         return None, None, (_without_steps(time_s, counted),)
@@ -118,12 +122,24 @@ def reckon_counted(
     if unknown:
         some = number_of(unknown, "row")
         notes.append(f"motion unknown in {some}: the counter jumped, or paused for 30 s")
+    if batches:
+        some = number_of(batches, "batch", "batches")
+        notes.append(f"steps came late, in {some}: spread over the time since the step before")
     aimless = motion["heading_rad"].isna() & motion["turn_rad"].isna() & (motion["step_m"] > 0)
     # Before the first row there is no turn.
     without = int(aimless.iloc[0 if "compass" in sensors else 1 :].sum())
     if without:
         notes.append(f"{course.unknown} {number_of(without, 'row')} with steps")
     return motion, _errors(motion, options, course.walk_rad), (*notes, *course.notes)
+
+
+def _times_of_directions(sensors: Mapping[str, pd.DataFrame]) -> Floats:
+    """Return the times at which a compass, else turns or a gyroscope, were read."""
+    for name in ("compass", "turns", "gyroscope"):
+        if name in sensors:
+            known = sensors[name].set_index("time_s").notna().any(axis=1)
+            return np.unique(known.index[known].to_numpy(dtype=np.float64))
+    return np.zeros(0)
 
 
 def _without_steps(time_s: Floats, counted: Floats) -> str:

@@ -11,11 +11,13 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.tracks.pdr.gyroscope import WALK_RAD_PER_SQRT_S, sample_noise
 
+AXES = ("x_mps2", "y_mps2", "z_mps2")
+"""Columns of forces."""
 _LONGEST_S = 2.0
 """Rates that lie farther apart say nothing about what is between them."""
 _GRAVITY_S = 1.0
 _LEAST_GRAVITY = 0.5
-_NO_VERTICAL = (
+NO_VERTICAL = (
     "a gyroscope without gravity (acc_x, acc_y, acc_z) does not show which way is up; of a phone "
     "held flat, screen up, its z axis will do: --column yaw_rate_radps=COLUMN"
 )
@@ -79,24 +81,31 @@ def turning_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Turning | None, str
     reason : str
         "" with turns, and where no such sensor is there.
     """
-    if (rows := _rows(sensors, "turns", ("turn_rad", "yaw_rate_radps"))) is not None:
+    if (rows := samples(sensors, "turns", ("turn_rad", "yaw_rate_radps"))) is not None:
         turn, rate = rows[1].T
         # A single turn says less than a rate in every row.
         if np.isfinite(turn).sum() >= np.isfinite(rate).sum():
             return Turning(rows[0], turn, WALK_RAD_PER_SQRT_S, "turns"), ""
-        return _of_rate(rows[0], rate, "a yaw rate"), ""
-    gyroscope = _rows(sensors, "gyroscope", ("x_radps", "y_radps", "z_radps"))
+        return turning_of_rate(rows[0], rate, "a yaw rate"), ""
+    gyroscope = samples(sensors, "gyroscope", ("x_radps", "y_radps", "z_radps"))
     if gyroscope is None:
         return None, ""
-    axes = ("x_mps2", "y_mps2", "z_mps2")
-    force = _rows(sensors, "gravity", axes) or _rows(sensors, "accelerometer", axes)
-    up = None if force is None else _up(gyroscope[0], *force)
+    force = force_of(sensors)
+    up = None if force is None else _up(gyroscope[0], *force[:2])
     if up is None:
-        return None, _NO_VERTICAL
-    return _of_rate(gyroscope[0], np.sum(gyroscope[1] * up, axis=1), "a gyroscope"), ""
+        return None, NO_VERTICAL
+    return turning_of_rate(gyroscope[0], np.sum(gyroscope[1] * up, axis=1), "a gyroscope"), ""
 
 
-def _rows(
+def force_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats, str] | None:
+    """Return times, the (N, 3) force of gravity or the accelerometer, and which; None without."""
+    for name in ("gravity", "accelerometer"):
+        if (rows := samples(sensors, name, AXES)) is not None:
+            return *rows, name
+    return None
+
+
+def samples(
     sensors: Mapping[str, pd.DataFrame], name: str, columns: tuple[str, ...]
 ) -> tuple[Floats, Floats] | None:
     """Return times that grow, and the columns; None where there are not two rows."""
@@ -109,7 +118,7 @@ def _rows(
     return rows["time_s"].to_numpy(dtype=np.float64), values
 
 
-def _of_rate(time_s: Floats, rate: Floats, source: str) -> Turning:
+def turning_of_rate(time_s: Floats, rate: Floats, source: str) -> Turning:
     """Integrate a rate by the mean of both ends of each interval.
 
     A walker sways: rates that are sampled seldom scatter by that, from one to the next.

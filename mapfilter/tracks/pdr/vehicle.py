@@ -23,6 +23,7 @@ from mapfilter.tracks.pdr.gyroscope import (
 from mapfilter.tracks.pdr.heading import Compass, YawOffset, yaw_offset
 from mapfilter.tracks.pdr.odometry_rows import usable_rows
 from mapfilter.tracks.pdr.signals import inertial_signals
+from mapfilter.tracks.pdr.turns import Turning, turning_of_rate
 
 _STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
 _SETTLING_S = 0.4
@@ -34,11 +35,15 @@ _SPEED_SD_MPS = 0.05
 _SCALE = 0.02
 _COURSE_BIAS_DEG = 2.0
 _MOST_SPANS = 50_000
+_DENSE = 1.5
+"""So many times as many yaw rates as speeds are integrated by themselves."""
 _UNSEEN_BIAS_DEG_PER_S = 0.05
 """Error of the bias that standing does not show: of 0.02 deg/s a count, and of warming up."""
 
 
-def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[str, ...]]:
+def reckon_odometry(
+    rows: pd.DataFrame, turning: Turning | None = None
+) -> tuple[pd.DataFrame, ImuNoise, tuple[str, ...]]:
     """Return the motion of a vehicle with a speedometer and a yaw rate, and its errors.
 
     The gyroscope's bias is the yaw rate while the vehicle stands, smoothed over the recording;
@@ -49,6 +54,8 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     ----------
     rows : pandas.DataFrame
         The table ``odometry`` of :data:`mapfilter.tracks.sensors.SENSOR_COLUMNS`.
+    turning : Turning, optional
+        Turns that another device measured, in place of yaw rates.
 
     Returns
     -------
@@ -57,13 +64,21 @@ def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     imu : ImuNoise
     notes : tuple of str
     """
-    rows, unusable = usable_rows(rows.drop_duplicates("time_s"))
+    rows = rows.drop_duplicates("time_s")
+    turning = _dense_turning(rows) if turning is None else turning
+    rows, unusable = usable_rows(rows)
     motion = motion_from_odometry(rows)
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     speed = rows["speed_mps"].to_numpy(dtype=np.float64)
-    rate = rows["yaw_rate_radps"].to_numpy(dtype=np.float64)
+    rate, averaged_s = rows["yaw_rate_radps"].to_numpy(dtype=np.float64), _usual_s(time_s)
+    if turning is not None:
+        # Each rate is a mean over two intervals.
+        motion, rate = _turned(motion, turning)
+        averaged_s *= 2
     standing = _settled(time_s, np.abs(speed) < _STANDING_MPS)
-    found, walk_rad = _bias(time_s, rate, standing, None, _usual_s(time_s))
+    found, walk_rad = _bias(time_s, rate, standing, None, averaged_s)
+    if turning is not None and not standing.any():
+        walk_rad = max(walk_rad, turning.walk_rad_per_sqrt_s)
     correction = np.interp(time_s, found.time_s, found.offset_rad)
     # Over a rest without rows nothing was read of the gyroscope.
     rested = long_gaps(time_s) & (motion["turn_rad"].to_numpy() == 0)
@@ -142,6 +157,32 @@ def reckon_velocity(
     )
     notes = (*_notes(found, int(standing.sum()), has_rate=True), *error_notes(walk_rad))
     return motion, _noise(time_s, found, walk_rad, _SPEED_SD_MPS), notes
+
+
+def _dense_turning(rows: pd.DataFrame) -> Turning | None:
+    """Return the turns by yaw rates that come more often than speeds; None of others.
+
+    Those at the times of speeds alone would be samples of their noise.
+    """
+    rate = rows["yaw_rate_radps"].to_numpy(dtype=np.float64)
+    known = np.isfinite(rate)
+    if known.sum() < _DENSE * rows["speed_mps"].notna().sum():
+        return None
+    return turning_of_rate(rows["time_s"].to_numpy(dtype=np.float64)[known], rate[known], "")
+
+
+def _turned(motion: pd.DataFrame, turning: Turning) -> tuple[pd.DataFrame, Floats]:
+    """Return motion with the turns of another device, and their rate over each two intervals."""
+    time_s = motion["time_s"].to_numpy(dtype=np.float64)
+    turn = turning.between(time_s)
+    # Over a rest without rows no turn is read.
+    rested = long_gaps(time_s) & (motion["turn_rad"].to_numpy() == 0)
+    turn = np.where(rested, 0.0, turn)
+    turn[:1] = 0.0
+    apart_s = time_s[2:] - time_s[:-2]
+    rate = np.full(len(time_s), np.nan)
+    rate[1:-1] = (turn[2:] + turn[1:-1]) / apart_s
+    return motion.assign(turn_rad=turn), rate
 
 
 def _gap_notes(time_s: Floats, speed: Floats, turn: Floats) -> tuple[str, ...]:
@@ -226,7 +267,7 @@ def _notes(found: YawOffset, stood: int, *, has_rate: bool) -> tuple[str, ...]:
     if not has_rate:
         return (
             "odometry: no yaw rates (a column such as Yaw rate [deg/s] or yaw_rate_radps): "
-            f"{UNDIRECTED}",
+            f"{UNDIRECTED}; a phone's gyroscope and accelerometer tell them, too",
         )
     bias = f"{np.degrees(found.rate_radps):+.3f} ± {np.degrees(found.rate_sd_radps):.3f} deg/s"
     if not stood:

@@ -86,7 +86,7 @@ def _read_measurements(
 ) -> None:
     reading.program = dialect.program
     rows = header_columns(text.data, reading, text.line)
-    time_s, zoned = rows.times("measured_at", zone=options.zone)
+    time_s, zoned = rows.times_of_part("measured_at", zone=options.zone)
     reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
     position = {
         "time_s": time_s,

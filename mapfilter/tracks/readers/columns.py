@@ -119,6 +119,14 @@ class Columns:
             return found
         return parse_times(self.texts(*names), zone, layout, after_s)
 
+    def times_of_part(
+        self, *names: str, zone: str = "", layout: str = "ISO8601"
+    ) -> tuple[Floats, bool]:
+        """Return what :meth:`times` does of a part of a file, after the parts before it."""
+        time_s, zoned = self.times(*names, zone=zone, layout=layout, after_s=self.reading.passed_s)
+        self.reading.passed_s = max([self.reading.passed_s, *time_s[np.isfinite(time_s)][-1:]])
+        return time_s, zoned
+
     def contains(self, part: str, *names: str) -> Bools:
         """Return in which rows a column contains a text."""
         column = self._raw(*names)

@@ -10,9 +10,11 @@ from mapfilter._header_units import parted_unit
 from mapfilter.errors import Faults
 
 _ALIKE, _ALIKE_SHORT = 0.8, 0.85
+_ALIKE_WORDS = 0.65
+"""The same of each of several words: vehicle_type is no vehicle_speed."""
 _SHORT = 4
 """Names of so many letters resemble others that differ in one; shorter ones by chance only."""
-_UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_m")
+_UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_km", "_m")
 _UNIT_WORDS = {
     "_mps": "m/s",
     "_kmh": "km/h",
@@ -20,13 +22,16 @@ _UNIT_WORDS = {
     "_degps": "deg/s",
     "_rad": "radians",
     "_deg": "degrees",
+    "_km": "km",
     "step_m": "metres each",
     "steps": "a counter",
+    "odometer_m": "m",
 }
 """Units of fields by their endings, in words."""
-FIELDS: Mapping[str, tuple[str, ...]] = {
+_NAMES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
+        *("timestamps", "timestep_time"),
         *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
     ),
     "lat_deg": ("lat_deg", "lat", "latitude"),
@@ -54,18 +59,20 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
         *("wheel_speed_kmh", "vehicle_speed_kmh"),
         *("wheel speed (km/h)", "vehicle speed (km/h)"),
     ),
+    "odometer_m": ("odometer_m", "odo_m"),
+    "odometer_km": ("odometer_km", "odo_km"),
     "role": ("role",),
-    "technology": ("technology", "radio", "rat", "network_type"),
+    "technology": ("technology", "radio", "rat", "network_type", "net_type", "tech"),
     "cell": ("cell",),
     "cgi": ("cgi", "ecgi", "ncgi"),
-    "mcc": ("mcc",),
+    "mcc": ("mcc", "plmn", "mccmnc", "mcc_mnc"),
     "mnc": ("mnc", "net"),
     "lac": ("lac", "tac", "area"),
     "ci": ("ci", "cid", "eci", "nci", "cellid", "cell_id"),
     "enodeb": ("enodeb", "enodeb_id", "enodebid", "enb", "enb_id", "enbid"),
     "sector": ("sector", "sector_id", "sectorid", "cell_number", "local_cell_id", "lcid"),
     "arfcn": ("arfcn", "uarfcn", "earfcn", "nrarfcn", "nr_arfcn"),
-    "bsic": ("bsic", "psc", "pci"),
+    "bsic": ("bsic", "psc", "pci", "psc_or_pci", "pci_psc"),
     "level_dbm": ("level_dbm", "dbm", "rsrp", "rscp", "rssi", "signal_dbm", "ss_rsrp"),
     "bars": ("bars", "signal_bars"),
     "level_step_db": ("level_step_db",),
@@ -80,11 +87,15 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
         )
         for sensor, unit, others in (
             ("acc", "mps2", ("accel", "accelerometer", "acceleration")),
-            ("gyr", "radps", ("gyro", "gyroscope", "angular_velocity")),
+            ("gyr", "radps", ("gyro", "gyroscope", "angular_velocity", "w")),
             ("mag", "ut", ("magnetometer", "magnetic")),
         )
         for axis in "xyz"
     },
+}
+FIELDS: Mapping[str, tuple[str, ...]] = {
+    field: tuple(dict.fromkeys([*names, *(name.replace("_", " ") for name in names)]))
+    for field, names in _NAMES.items()
 }
 """Fields that a column map may name, and the names of columns that are known without one."""
 
@@ -97,9 +108,9 @@ def usual_fields(names: Collection[str]) -> dict[str, str]:
 
 MOTION_FIELDS = (
     *("step_m", "steps", "compass_deg", "heading_rad", "turn_rad", "turn_deg", "yaw_rate_radps"),
-    *("yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh"),
+    *("yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh", "odometer_m", "odometer_km"),
 )
-"""Fields of which motion is made; step_m, steps or a wheel speed among them."""
+"""Fields of which motion is made; step_m, steps, a wheel speed or an odometer among them."""
 
 
 def meant(column: str, taken: Collection[str] = ()) -> str:
@@ -134,12 +145,20 @@ def _likeness(column: str, name: str, field: str) -> float:
         return 0.0
     if is_of_axis(field) and text[-1] != field[-1]:
         return 0.0
+    words, others = _words(text), _words(own)
+    if len(words) == len(others) and any(map(_differ, words, others)):
+        return 0.0
     found = [0.0]
     for one in (own, "".join(_words(name))):
         ratio = SequenceMatcher(None, text, one).ratio()
         least = _ALIKE_SHORT if len(one) == _SHORT else _ALIKE
         found += [ratio] if len(one) >= _SHORT and ratio >= least else []
     return max(found)
+
+
+def _differ(word: str, other: str) -> bool:
+    """Return whether two words are no misspelling of one another."""
+    return SequenceMatcher(None, word, other).ratio() < _ALIKE_WORDS
 
 
 def is_of_axis(field: str) -> bool:

@@ -29,6 +29,10 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
         *("course", "bearing", "gps course", "gps bearing", "course over ground", "cog"),
         "location bearing",
     ),
+    "odometer_m": (
+        *("odometer", "odometer reading", "vehicle odometer", "odo", "mileage", "wheel distance"),
+        *("vehicle distance", "total vehicle distance", "distance odometer"),
+    ),
     "east_m": ("easting", "east"),
     "north_m": ("northing", "north"),
     "step_m": ("step",),
@@ -36,7 +40,16 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "turn_rad": ("turn", "turn angle", "heading change"),
     "compass_deg": ("compass", "heading", "azimuth", "compass heading"),
     "yaw_rate_radps": ("yaw rate", "turn rate", "turning rate"),
-    "level_dbm": ("level", "rsrp", "rscp", "rssi", "signal", "signal level", "signal strength"),
+    "level_dbm": (
+        "level",
+        "rsrp",
+        "rscp",
+        "rssi",
+        "signal",
+        "signal level",
+        "signal strength",
+        "serving rsrp",
+    ),
     "pressure_hpa": ("pressure", "air pressure", "barometer", "barometric pressure"),
     **{
         f"{sensor}_{axis}": tuple(f"{word} {axis}" for word in words)
@@ -50,6 +63,13 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 }
 """Words for the quantity of a field, in any order; times of the first of several columns."""
 
+_ALSO_MEANT: Mapping[str, tuple[str, ...]] = {
+    "odometer_m": (
+        *("distance", "trip distance", "total distance", "distance travelled", "trip"),
+        *("distance traveled", "travelled distance", "traveled distance", "cumulative distance"),
+    ),
+}
+"""Words that may mean a quantity, which only a user knows."""
 _UNITLESS = ("time", "steps")
 """Fields without a unit, or whose unit is found by their values."""
 _OF_PLACES = ("altitude_m", "accuracy_m", "hdop")
@@ -61,6 +81,7 @@ _OTHER_UNIT = {
     "wheel_speed_mps": "wheel_speed_kmh",
     "yaw_rate_radps": "yaw_rate_degps",
     "turn_rad": "turn_deg",
+    "odometer_m": "odometer_km",
 }
 """Fields of the same quantity as others."""
 _OTHER_MEANING = {**_OTHER_UNIT, "step_m": "steps"}
@@ -116,7 +137,7 @@ def fields_meant(column: str) -> tuple[str, ...]:
         return ()
     some = [
         one
-        for one in _fields_of(text) or _abbreviated(text)
+        for one in _fields_of(text) or _fields_of(text, _ALSO_MEANT) or _abbreviated(text)
         if not unit or unit in UNITS.get(quantity_of(one), ())
     ]
     # One of several units is as good as the other where the header states it.
@@ -164,13 +185,13 @@ def _abbreviated(text: str) -> list[str]:
     return list(found) if len(found) == 1 else []
 
 
-def _fields_of(text: str) -> dict[str, int]:
+def _fields_of(text: str, quantities: Mapping[str, tuple[str, ...]] = QUANTITIES) -> dict[str, int]:
     """Return the fields whose quantity is written in a text, and by which of its words."""
     every = _WORD.findall(text)
     # A zone is no quantity.
     words = [word for word in every if word != "utc"] or every
     found = {}
-    for field, some in QUANTITIES.items():
+    for field, some in quantities.items():
         for rank, quantity in enumerate(some):
             own = quantity.split()
             if sorted(words) == sorted(own) or words == ["".join(own)]:

@@ -17,6 +17,7 @@ from mapfilter.tracks.readers.identities import parse_identities
 _HEX = re.compile(r"[0-9A-F]{1,9}", re.ASCII | re.IGNORECASE)
 _LEAST_LETTERS = 0.5
 """Share of different numbers with a letter: of hexadecimal ones of four digits 0.85 have one."""
+_LARGEST_MCC = 999
 
 
 def cell_identities(mapped: Mapped) -> dict[str, Floats]:
@@ -27,6 +28,8 @@ def cell_identities(mapped: Mapped) -> dict[str, Floats]:
     """
     mapped = _without_hexadecimals(mapped)
     identity = {name: mapped.whole(name) for name in IDENTITY}
+    if not mapped.has("mnc"):
+        identity |= _networks(identity["mcc"])
     if mapped.has("enodeb"):
         identity["ci"] = _of_nodes(mapped, identity["ci"])
     if mapped.has("cgi"):
@@ -74,6 +77,13 @@ def _without_hexadecimals(mapped: Mapped) -> Mapped:
             rows = rows.rewritten(r"^\s*([0-9A-Fa-f]+)\s*$", r"0x\1", name)
             rows.reading.note(note)
     return replace(mapped, rows=rows)
+
+
+def _networks(number: Floats) -> dict[str, Floats]:
+    """Return mcc and mnc of numbers that hold both: five digits, or six with an mnc of three."""
+    both, digits = number > _LARGEST_MCC, np.where(number >= 100_000, 1000.0, 100.0)
+    network = {"mcc": np.where(both, number // digits, number)}
+    return network | {"mnc": np.where(both, number % digits, np.nan)}
 
 
 def _of_nodes(mapped: Mapped, ci: Floats) -> Floats:

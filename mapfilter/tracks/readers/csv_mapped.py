@@ -24,6 +24,8 @@ _DIRECTIONS = (
     *("compass_deg", "heading_rad", "turn_rad", "turn_deg"),
     *("yaw_rate_radps", "yaw_rate_degps"),
 )
+_SIGNALS = ("signal", "signal_strength", "signal strength", "signalstrength", "strength")
+_USUAL_DBM, _MOSTLY = (-150.0, -20.0), 0.9
 _CELLS = ("cell", "cgi", "ci", "level_dbm", "bars")
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 
@@ -152,7 +154,7 @@ def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Map
         hint = "--column time=COLUMN"
         faults.add(where, "a column of times", present, hint)
     faults.raise_if_any(InputError)
-    return _with_azimuths(mapped, reading)
+    return _with_signals(_with_azimuths(mapped, reading), reading)
 
 
 def _with_azimuths(mapped: Mapped, reading: Reading) -> Mapped:
@@ -175,6 +177,26 @@ def _with_azimuths(mapped: Mapped, reading: Reading) -> Mapped:
         return mapped
     reading.note(f"{name}: taken for degrees clockwise from north, by its values")
     return replace(mapped, stated={**mapped.stated, "compass_deg": name})
+
+
+def _with_signals(mapped: Mapped, reading: Reading) -> Mapped:
+    """Return columns with signals without a unit as levels beside cells, where they look like dBm.
+
+    By their values they may also be bars, ASU, or per cent.
+    """
+    name = mapped.rows.find(*_SIGNALS)
+    if name is None or mapped.has("level_dbm") or not any(map(mapped.has, ("ci", "cell", "cgi"))):
+        return mapped
+    if name in {column.lower() for column in mapped.own.values()}:
+        return mapped
+    level = mapped.rows.number(name)
+    known = level[np.isfinite(level)]
+    low, high = _USUAL_DBM
+    in_dbm = known.size and np.mean((known >= low) & (known <= high)) > _MOSTLY
+    if not (in_dbm or reading.columns.get("level_dbm") == name):
+        return mapped
+    reading.note(f"{name}: taken for levels in dBm, by its values")
+    return replace(mapped, stated={**mapped.stated, "level_dbm": name})
 
 
 def with_dates(mapped: Mapped) -> Mapped:

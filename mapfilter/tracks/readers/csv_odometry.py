@@ -10,11 +10,13 @@ from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
+from mapfilter.tracks.readers.odometer_counts import counted_way
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
 
-_NEAR_S = 1.0
+_NEAR_S, _COARSE_M = 1.0, 0.5
 _SPEEDS = ("speed_mps", "speed_kmh")
+_WHEELS, _ODOMETERS = ("wheel_speed_mps", "wheel_speed_kmh"), ("odometer_m", "odometer_km")
 _OF_PHONES = ("steps", "step_m", "level_dbm", "bars", "cell", "ci", "cgi", "acc_x")
 _FEWEST_ALONE, _ALONE_SHARE = 10, 0.1
 
@@ -22,10 +24,10 @@ _FEWEST_ALONE, _ALONE_SHARE = 10, 0.1
 def has_odometry(mapped: Mapped) -> bool:
     """Return whether a file has the speed of a vehicle.
 
-    It is that of the wheels; else any speed, where there are no positions whose receiver measured
-    it, and besides a yaw rate nothing of a walk or a phone.
+    It is that of the wheels, or by their odometer; else any speed, where there are no positions
+    whose receiver measured it, and besides a yaw rate nothing of a walk or a phone.
     """
-    if mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh"):
+    if any(map(mapped.has, (*_WHEELS, *_ODOMETERS))):
         return True
     if not any(map(mapped.has, _SPEEDS)) or _is_placed(mapped):
         return False
@@ -73,11 +75,8 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         if _is_placed(mapped) and any(map(mapped.has, _SPEEDS)):
             _note_speeds(mapped, reading)
         return
-    wheels = mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh")
-    if not wheels:
-        reading.note("speed: taken for a vehicle's, as there are no positions beside it")
     _note_units(mapped, reading)
-    speed = speeds_of(mapped, "wheel_speed" if wheels else "speed")
+    speed, speed_sd_mps = _speeds(mapped, reading, time_s)
     rates = mapped.radians("yaw_rate", "ps")
     if heading := heading_of_wheels(mapped):
         rates = _rates_of(mapped, heading, time_s)
@@ -88,10 +87,41 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
             reading.ignore(f"{column}: no two values within {2 * _NEAR_S:g} s, turns are unknown")
     yaw = _at_speeds(reading, time_s, speed, rates)
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
+    columns["speed_sd_mps"] = np.full(len(speed), speed_sd_mps)
     if not np.isfinite(speed).any():
         return
     turns = np.isfinite(yaw) & (np.isfinite(speed) | (np.abs(yaw) <= FASTEST_TURN_RADPS))
     add_rows(reading, "odometry", columns, mapped.rows, np.isfinite(speed) | turns)
+
+
+def _speeds(mapped: Mapped, reading: Reading, time_s: Floats) -> tuple[Floats, float]:
+    """Return speeds of the wheels, else by their odometer, else any; and their deviation."""
+    odometer = next(filter(mapped.has, _ODOMETERS), "")
+    by_wheels = any(map(mapped.has, _WHEELS))
+    if odometer and not by_wheels:
+        return _counted(mapped, reading, time_s, odometer)
+    if odometer:
+        column = mapped.rows.find(*mapped.names(odometer))
+        reading.ignore(f"{column}: not used beside the speeds of the wheels")
+    if not by_wheels:
+        reading.note("speed: taken for a vehicle's, as there are no positions beside it")
+    return speeds_of(mapped, "wheel_speed" if by_wheels else "speed"), float("nan")
+
+
+def _counted(mapped: Mapped, reading: Reading, time_s: Floats, field: str) -> tuple[Floats, float]:
+    """Return the speeds by which an odometer grows, and their standard deviation."""
+    column = mapped.rows.find(*mapped.names(field))
+    unit = mapped.unit(field)
+    metres = (1000.0 if field == "odometer_km" else 1.0) * (1.0 if unit is None else unit.factor)
+    way = counted_way(time_s, mapped.number(field) / (1.0 if unit is None else unit.factor), metres)
+    text = f"{column}: an odometer, speeds are those by which it grows"
+    if way.least_m > _COARSE_M:
+        text += f", in counts of {way.least_m:.3g} m"
+    for count, what in ((way.wraps, "wraps around"), (way.resets, "begins anew or jumps")):
+        if count:
+            text += f"; it {what} {number_of(count, 'time')}"
+    reading.note(text)
+    return way.speed_mps, way.speed_sd_mps
 
 
 def speeds_of(mapped: Mapped, name: str) -> Floats:

@@ -23,6 +23,7 @@ _OF_ODOMETRY = ("speed_mps", "speed_kmh", "yaw_rate_radps", "yaw_rate_degps")
 _OF_WHEELS = {"speed_mps": "wheel_speed_mps", "speed_kmh": "wheel_speed_kmh"}
 _OF_STEPS = ("compass_deg", "turn_rad", "turn_deg")
 _OF_COUNTED_STEPS = (*_OF_STEPS, "yaw_rate_radps", "yaw_rate_degps")
+_LATE_GUESSES = ("altitude_m", "odometer_m")
 _OF_SPEEDS = {"": "", "m/s": "_mps", "km/h": "_kmh"}
 """Endings of fields of speeds by unit; of an unknown one of all."""
 _MEASURED = {*_OF_PLACES, *_OF_ODOMETRY, *_OF_STEPS, "heading_rad"}
@@ -67,7 +68,9 @@ def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
 
 def unused_note(unread: tuple[str, ...]) -> str:
     """Return a note on columns that are not used, with an option that names one of them."""
-    guessed = next((one for one in unread if one.endswith("?)")), "")
+    guesses = [one for one in unread if one.endswith("?)")]
+    # A height serves for little, and speeds go before an odometer.
+    guessed = min(guesses, key=lambda one: sum(of in one for of in _LATE_GUESSES), default="")
     if not guessed:
         return f"columns not used: {listed(unread)}; see --column"
     name, _, fields = guessed[:-2].rpartition(" (")

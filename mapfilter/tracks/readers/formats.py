@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-import shlex
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from mapfilter._header_units import parted_unit
-from mapfilter.errors import ConfigError, InputError, MapfilterError, fail, listed
+from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.tracks.readers import (
     antennas,
     cell_csv,
@@ -29,13 +25,13 @@ from mapfilter.tracks.readers import (
     smartloc,
     tems,
 )
-from mapfilter.tracks.readers.csv_fields import by_unit, usual_fields
-from mapfilter.tracks.readers.csv_headers import likely_fields, stated_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.readers.separated_values import header_names, likely_separator
 from mapfilter.tracks.readers.text import Text, parts_of, read_text
+from mapfilter.tracks.readers.title_lines import below_title
+from mapfilter.tracks.readers.unknown_formats import JSON, NOT_READ, unknown_format
 
 FORMATS: tuple[Format, ...] = (
     gnettrack.FORMAT,
@@ -61,34 +57,7 @@ FORMATS: tuple[Format, ...] = (
 )
 """All formats, in the order in which a file is compared with them."""
 
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
-_LIST = "docs/howto/recordings.rst lists them"
 _PEEKED_BYTES = 1 << 18
-_JSON = ('{"', '[{"')
-_FIELD_OF_UNIT = {
-    "km/h": "wheel_speed_kmh",
-    "m/s": "wheel_speed_mps",
-    "deg/s": "yaw_rate_degps",
-    "rad/s": "yaw_rate_radps",
-    "dbm": "level_dbm",
-}
-"""Fields that a column whose name is of another language may be, by its unit."""
-_NOT_READ = {
-    ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
-    ".dt1": "a Nemo log of version 1; export it as CSV, and map the columns",
-    ".trp": "a binary TEMS log; export it as tab-delimited text",
-    ".kml": "KML; export GPX, or a table as CSV",
-    ".kmz": "KML; export GPX, or a table as CSV",
-    ".geojson": "GeoJSON; export GPX, or a table as CSV",
-    ".json": "JSON; export GPX, or a table as CSV",
-    ".jsonl": "JSON; export GPX, or a table as CSV",
-    ".ndjson": "JSON; export GPX, or a table as CSV",
-    ".fit": "a FIT file; export GPX",
-    ".xlsx": "a spreadsheet; export it as CSV",
-    ".xls": "a spreadsheet; export it as CSV",
-    ".ods": "a spreadsheet; export it as CSV",
-}
-"""Suffixes of formats that are not read, and what to do."""
 
 
 def format_named(name: str) -> Format:
@@ -102,7 +71,7 @@ def format_named(name: str) -> Format:
 
 def find_format(text: Text) -> Format | None:
     """Return the format that a file looks like, or None."""
-    if text.first_line.lstrip().startswith(_JSON):
+    if text.first_line.lstrip().startswith(JSON):
         return None
     return next((known for known in FORMATS if known.matches(text)), None)
 
@@ -110,9 +79,13 @@ def find_format(text: Text) -> Format | None:
 def format_of(path: str | Path) -> Format | None:
     """Return the format that a file looks like by its beginning; None for another file."""
     try:
-        return find_format(read_text(Path(path), _PEEKED_BYTES))
+        text = read_text(Path(path), _PEEKED_BYTES)
     except InputError:
         return None
+    found = find_format(text)
+    if found is None and _below_title(text, None) is not None:
+        return plain_csv.FORMAT
+    return found
 
 
 def read_recording(
@@ -139,16 +112,20 @@ def read_recording(
     try:
         text = read_text(path)
     except InputError as error:
-        hint = _NOT_READ.get(path.suffix.lower(), "")
+        hint = NOT_READ.get(path.suffix.lower(), "")
         raise InputError(tuple(replace(f, hint=hint or f.hint) for f in error.faults)) from error
     found = find_format(text)
     known = format_named(name) if name else found
     own = options is not None and bool(options.columns)
+    if found is None and known in (None, plain_csv.FORMAT) and not (own and _named(text, options)):
+        below = _below_title(text, options)
+        if below is not None:
+            text, known = below, plain_csv.FORMAT
     if own and not name and (known is None or (known is tems.FORMAT and _named(text, options))):
         # The columns of such an export are chosen, and may be named.
         known = plain_csv.FORMAT if _is_of(text, options) else None
     if known is None:
-        raise _unknown(path, text)
+        raise unknown_format(path, text, find_format)
     reading = Reading(path, notes=list(text.notes))
     options = options or ReadOptions()
     try:
@@ -169,6 +146,17 @@ def read_recording(
         raise InputError(named) from error
 
 
+def _below_title(text: Text, options: ReadOptions | None) -> Text | None:
+    """Return a table below lines of a title, with known columns or those of a column map."""
+    if text.first_line.lstrip().startswith(JSON):
+        return None
+    own = options if options is not None and options.columns else None
+    return below_title(
+        text,
+        lambda line: plain_csv.FORMAT.matches(line) or (own is not None and _named(line, own)),
+    )
+
+
 def _named(text: Text, options: ReadOptions | None) -> bool:
     """Return whether a file has every column of a column map."""
     columns = {} if options is None else options.columns
@@ -182,59 +170,3 @@ def _is_of(text: Text, options: ReadOptions | None) -> bool:
         return True
     names = header_names(text.first_line, likely_separator(text.first_line))
     return any(column.lower() in names for column in options.columns.values())
-
-
-def _other_separators(path: Path, text: Text) -> str:
-    """Return the hint for a file that would be of a known format with other separators."""
-    head = "\n".join(text.head)
-    for own, other in itertools.permutations("\t;, ", 2):
-        found = find_format(Text(path, head.replace(own, other).encode()))
-        if own in head and found is not None:
-            return f"{found.title} with {_SEPARATORS[own]} where {_SEPARATORS[other]} should be"
-    return ""
-
-
-def _unknown(path: Path, text: Text) -> MapfilterError:
-    """Return the error for a file of no known format."""
-    separator = likely_separator(text.first_line)
-    names = header_names(text.first_line, separator)
-    is_table = len(names) > 1 and not text.first_line.lstrip().startswith(("{", "[", "<"))
-    hint = _NOT_READ.get(path.suffix.lower(), "") or _other_separators(path, text)
-    if text.first_line.lstrip().startswith(_JSON):
-        hint = hint or _NOT_READ[".json"]
-    if is_table and not hint:
-        hint = _other_names(names)
-    got = f"none of them; it begins with {text.first_line[:60]!r}"
-    if is_table:
-        got = f"none of them, but a table with the columns {listed([n for n in names if n])}"
-    return fail(InputError, str(path), f"a recording in a known format ({_LIST})", got, hint)
-
-
-def _other_names(names: Sequence[str]) -> str:
-    """Return the hint for a table whose columns are not known, with the fields they resemble."""
-    usual, stated = usual_fields(names), stated_fields(names, (), ())
-    found = {*usual, *stated}
-    others = [name for name in names if name and name not in (*usual.values(), *stated.values())]
-    likely = {name: fields for name in others if (fields := likely_fields(name, found))}
-    such = [_pairs(name, fields) for name, fields in likely.items()]
-    such += [
-        shlex.quote(f"{_FIELD_OF_UNIT[unit]}={name}")
-        for name in others
-        if name not in likely and (unit := parted_unit(name)[1]) in _FIELD_OF_UNIT
-    ]
-    if not such and not {"lat_deg", "lon_deg"} <= found:
-        such = ["lat_deg=LATITUDE", "lon_deg=LONGITUDE"]
-    times = ""
-    if "time" not in found:
-        times = "a CSV without a column of times; "
-        such += [] if any("time" in fields for fields in likely.values()) else ["time=COLUMN"]
-    option = (
-        f"--column FIELD=COLUMN (track.columns in a configuration), such as {' and '.join(such)}"
-    )
-    return f"{times}a CSV with other names of columns: {option}"
-
-
-def _pairs(name: str, fields: Sequence[str]) -> str:
-    """Return what names a column's field, by its unit where that is open."""
-    pairs = [f"{field}={name}" for field in fields]
-    return pairs[0] if len(pairs) == 1 else f"({by_unit(fields, pairs)})"

@@ -39,7 +39,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     rows = header_columns(text.data, reading, text.line, ragged=_LEAST_FIELDS)
     version = [word for word in rows.texts("version_name")[:1] if word]
     reading.program += f" {version[0]}" if version else ""
-    time_s, zoned = rows.times("timestamp", zone=options.zone, layout=_LAYOUT)
+    time_s, zoned = rows.times_of_part("timestamp", zone=options.zone, layout=_LAYOUT)
     reading.clock = Clock("local", options.zone if zoned else "")
     lat, lon = rows.number("latitude"), rows.number("longitude")
     _add_positions(rows, reading, time_s, lat, lon)

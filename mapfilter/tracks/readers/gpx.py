@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from mapfilter._types import Ints
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.position_units import UERE_M
 from mapfilter.tracks.readers.columns import Columns
@@ -73,11 +73,17 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
             "lon_deg": rows.number("lon"),
             "altitude_m": rows.number("ele"),
             "speed_mps": rows.number("speed"),
-            "course_deg": rows.number("course"),
-            "accuracy_m": UERE_M * rows.number("hdop"),
+            "course_deg": rows.number("course", "bearing"),
+            "accuracy_m": _accuracy(rows),
         }
         reading.rows += len(lines)
         reading.add("positions", columns, lines)
+
+
+def _accuracy(rows: Columns) -> Floats:
+    """Return the accuracy that a phone states, else one by the HDOP."""
+    stated = rows.number("accuracy")
+    return np.where(np.isnan(stated), UERE_M * rows.number("hdop"), stated)
 
 
 def _points(data: bytes, kind: bytes, reading: Reading) -> Iterator[tuple[pa.Array, Ints]]:
@@ -136,7 +142,7 @@ def _columns(points: pa.Array, lines: Ints, reading: Reading) -> Columns:
             pattern = _ATTRIBUTE if name in ("lat", "lon") else _ELEMENT
             values = _extracted(some, pattern.replace("NAME", name))
             found[name] = pc.replace_with_mask(found[name], other, values)
-    for name in ("speed", "course", "hdop"):
+    for name in ("speed", "course", "bearing", "hdop", "accuracy"):
         if pc.any(pc.match_substring(points, name)).as_py():
             found[name] = _extracted(points, _ELEMENT.replace("NAME", name))
     rows = Columns(reading, tuple(found), lines, decimal_comma=True)

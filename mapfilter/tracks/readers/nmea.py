@@ -16,13 +16,15 @@ from mapfilter.tracks.position_units import RADIUS_68, UERE_M
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
+from mapfilter.tracks.readers.nmea_stamps import stamped_dates
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.separated_values import line_columns
 from mapfilter.tracks.readers.text import Text
 
-_SENTENCE = re.compile(rb"(?:NMEA,)?[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")
-"""Apps for Android write ``NMEA,$GNGGA,…*hh,TIME``."""
+_STAMP = rb"[^$!,;\t]{0,48}(?:[,;\t][^$!,;\t]{0,48}){0,2}"
+_SENTENCE = re.compile(_STAMP + rb"[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")
+"""Apps for Android write ``NMEA,$GNGGA,…*hh,TIME``, loggers a time stamp before each sentence."""
 _MODE = ("magnetic", "side", "mode")
 """Fields that old receivers do not have."""
 _KINDS = {
@@ -52,6 +54,11 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     kinds = _sentences(text.data, reading)
     tables = {kind: _table(kind, *kinds.pop(kind), reading) for kind in _KINDS}
     dates = _dates(tables)
+    if dates.empty:
+        gga = tables[b"GGA"]
+        dates = stamped_dates(text.data, gga.line, _of_day(gga.texts("time")))
+        if len(dates):
+            reading.note("dates are those of the time stamps before the sentences")
     if dates.empty:
         reading.note("no date in the file (neither RMC nor ZDA): times count from a midnight")
         reading.clock = Clock("monotonic")

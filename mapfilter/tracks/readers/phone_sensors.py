@@ -125,7 +125,7 @@ def _phyphox_time(seconds: Floats, reading: Reading) -> Floats:
 
 def _is_sensor_logger(text: Text) -> bool:
     names = set(_names(text))
-    held = {"x", "latitude", "pressure", "qx", "steps"}
+    held = {"x", "latitude", "pressure", "qx", "steps", "magneticbearing"}
     return {"time", "seconds_elapsed"} <= names and bool(held & names)
 
 
@@ -159,6 +159,9 @@ def _read_sensor_logger(text: Text, reading: Reading, options: ReadOptions) -> N
         reading.add("orientation", {"time_s": time_s, **columns}, rows.line)
     elif rows.has("steps"):
         reading.add("steps", {"time_s": time_s, "count": rows.number("steps")}, rows.line)
+    elif rows.has("magneticbearing"):
+        columns = {"time_s": time_s, "magnetic_deg": rows.number("magneticbearing")}
+        reading.add("compass", columns, rows.line)
     elif rows.has("x", "y", "z"):
         _add_axes(rows, reading, _sensor(rows, reading), time_s, ["x", "y", "z"])
     else:
@@ -203,7 +206,8 @@ SENSOR_LOGGER = Format(
     "sensorlogger",
     "a Sensor Logger CSV",
     "Sensor Logger (CSV export, one file for each sensor)",
-    "accelerometer, gravity, gyroscope, magnetometer, orientation, barometer, steps, positions",
+    "accelerometer, gravity, gyroscope, magnetometer, orientation, compass, barometer, steps, "
+    "positions",
     _is_sensor_logger,
     _read_sensor_logger,
     by_rows=True,

@@ -26,12 +26,20 @@ _SPEEDS = ("speed_mps", "speed_kmh")
 _CONTENT = (
     *(("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("bars",)),
     *(("acc_x",), ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",)),
-    *(("wheel_speed_kmh",), ("steps",), ("yaw_rate_radps",), ("yaw_rate_degps",)),
+    *(
+        ("odometer_m",),
+        ("odometer_km",),
+        ("wheel_speed_kmh",),
+        ("steps",),
+        ("yaw_rate_radps",),
+        ("yaw_rate_degps",),
+    ),
     *((speed,) for speed in _SPEEDS),
 )
 _VITAL = (
     *("step_m", "heading_rad", "turn_rad", "turn_deg", "compass_deg", "steps", "level_dbm", "bars"),
     *("yaw_rate_radps", "yaw_rate_degps", "wheel_speed_mps", "wheel_speed_kmh"),
+    *("odometer_m", "odometer_km"),
 )
 """Fields that must hold numbers where a column has them."""
 

@@ -17,6 +17,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import listed
 from mapfilter.tracks.cut_times import cut_times
+from mapfilter.tracks.readers.batched_rows import without_batches
 from mapfilter.tracks.readers.held_positions import own_positions
 from mapfilter.tracks.readers.recorded_field import Field
 from mapfilter.tracks.readers.recorded_values import (
@@ -38,6 +39,7 @@ _EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
 _TICKS = "likely: ticks since a phone was started; their unit in the header, as time_ms, reads them"
 _JUMP_S = 86_400.0
 _STRAY_SHARE = 0.1
+_OF_STEPS = ("steps", "motion")
 _SEVERAL = ("radio", "satellites", "ephemerides")
 """Tables that have several rows for each moment."""
 
@@ -46,8 +48,9 @@ _SEVERAL = ("radio", "satellites", "ephemerides")
 class Reading:
     """Collects the tables, bad rows and notes of one file while it is read.
 
-    ``last_s`` is the last time of the file's rows, used or not; ``columns`` are the names in the
-    file of columns without a usual name, by field.
+    ``last_s`` is the last time of the file's rows, used or not, and ``passed_s`` that of the parts
+    read so far, of formats without ``last_s``; ``columns`` are the names in the file of columns
+    without a usual name, by field.
     """
 
     path: Path
@@ -63,6 +66,7 @@ class Reading:
     named: tuple[str, ...] = ()
     tallies: Tallies = field(default_factory=Tallies)
     last_s: float = -inf
+    passed_s: float = -inf
     columns: dict[str, str] = field(default_factory=dict)
     _firsts: dict[str, str] = field(default_factory=dict)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
@@ -231,9 +235,12 @@ class Reading:
         if late := late_rows(self.tables.values(), self.last_s, read=not self.unread):
             self.ignore(late)
         radio = self.tables.get("radio", ())
+        cells = bool(radio)
         by_cell = any((part["role"] == NEIGHBOUR).any() for part in radio)
         kept = {
-            table: self._tidy(table, joined_parts(self.tables.pop(table)), by_cell=by_cell)
+            table: self._tidy(
+                table, joined_parts(self.tables.pop(table)), cells=cells, by_cell=by_cell
+            )
             for table in RECORDED
             if table in self.tables
         }
@@ -253,13 +260,21 @@ class Reading:
             self.named,
         )
 
-    def _tidy(self, table: str, rows: pd.DataFrame, *, by_cell: bool) -> pd.DataFrame:
-        """Sort a table and drop exact duplicates; ``by_cell`` where a file lists neighbours."""
+    def _tidy(self, table: str, rows: pd.DataFrame, *, cells: bool, by_cell: bool) -> pd.DataFrame:
+        """Sort a table and drop exact duplicates.
+
+        ``cells`` says whether a file has some, and ``by_cell`` whether it lists neighbours.
+        """
         if "time_s" not in rows:
             return rows
         time = rows["time_s"].to_numpy()
         if (np.diff(time) < 0).any():
             rows = reordered(rows, np.argsort(time, kind="stable"))
+            time = rows["time_s"].to_numpy()
+        if table in _OF_STEPS:
+            rows, batches = without_batches(table, rows, repeated=cells)
+            if batches:
+                self.note(batches)
             time = rows["time_s"].to_numpy()
         if (np.diff(time) == 0).any():
             duplicate = repeated_readings(rows, duplicates(rows))

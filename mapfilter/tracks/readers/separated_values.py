@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from mapfilter._types import Ints
+from mapfilter._words import number_of
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, good_lines, parsed
 from mapfilter.tracks.readers.reading import Reading
@@ -34,10 +35,25 @@ def header_columns(
         if header.strip():
             separator = likely_separator(header)
             names = header_names(header, separator)
+            rest = _without_headers(data[start:], header, separator, reading)
             return value_columns(
-                memoryview(data)[start:], reading, names, separator, first_line, ragged=ragged
+                memoryview(rest), reading, names, separator, first_line, ragged=ragged
             )
     return Columns(reading, (), np.zeros(0, dtype=np.int64))
+
+
+def _without_headers(data: bytes, header: str, separator: str, reading: Reading) -> bytes:
+    """Return lines without those that repeat the header, as where an app was started again."""
+    line = header.encode()
+    again = b"\n" + line + b"\n"
+    if separator not in header or (again not in data and not data.startswith(line + b"\n")):
+        return data
+    found, data = 0, b"\n" + data
+    while again in data:
+        found += data.count(again)
+        data = data.replace(again, b"\n\n")
+    reading.note(f"{number_of(found, 'line repeats', 'lines repeat')} the header, left out")
+    return data[1:]
 
 
 def likely_separator(header: str) -> str:

@@ -139,7 +139,7 @@ def _times(rows: Columns, reading: Reading, options: ReadOptions) -> Floats:
         before_s = max((p[-1]["time_s"].iloc[-1] for p in reading.tables.values()), default=np.nan)
         return without_midnights(day_s, float(before_s))
     iso = rows.rewritten(_DAY_FIRST, r"\3-\2-\1T\4", *_TIMES)
-    time_s, zoned = iso.times(*_TIMES, zone=options.zone)
+    time_s, zoned = iso.times_of_part(*_TIMES, zone=options.zone)
     if zoned and not options.zone:
         reading.clock = Clock("utc")
     return time_s

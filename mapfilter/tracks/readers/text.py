@@ -82,7 +82,7 @@ def parts_of(text: Text) -> Iterator[Text]:
     begin = len(text.data) - len(text.data.lstrip(b"\n \t"))
     end = text.data.find(b"\n", begin)
     header, at = text.data[begin : end + 1], end + 1
-    line = 1 + text.data[:begin].count(b"\n")
+    line = text.line + text.data[:begin].count(b"\n")
     while end >= 0 and at < len(text.data):
         cut = text.data.find(b"\n", at + _PART_BYTES)
         stop = cut + 1 if cut >= 0 else len(text.data)

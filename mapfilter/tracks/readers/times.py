@@ -49,6 +49,7 @@ def utc_from_gps_s(gps_s: ArrayLike) -> Floats:
 
     Examples
     --------
+    >>> from datetime import UTC
     >>> float(utc_from_gps_s(1930 * WEEK_S + 18.0)) - datetime(2017, 1, 1, tzinfo=UTC).timestamp()
     0.0
     """
@@ -169,6 +170,7 @@ def utc_from_local_s(local_s: ArrayLike, zone: str, after_s: float = nan) -> Flo
 
     Examples
     --------
+    >>> from datetime import UTC
     >>> local = [datetime(2026, 10, 25, 2, m, tzinfo=UTC).timestamp() for m in (50, 59, 0, 10)]
     >>> (np.diff(utc_from_local_s(local, "Europe/Berlin")) / 60).tolist()
     [9.0, 1.0, 10.0]

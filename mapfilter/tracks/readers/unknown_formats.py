@@ -1,0 +1,148 @@
+"""What is said of a file of no known format: what it most likely is, and how it can be read."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import shlex
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from mapfilter._header_units import parted_unit
+from mapfilter.errors import InputError, MapfilterError, fail, listed
+from mapfilter.tracks.readers.csv_fields import by_unit, usual_fields
+from mapfilter.tracks.readers.csv_headers import likely_fields, stated_fields
+from mapfilter.tracks.readers.format import Format
+from mapfilter.tracks.readers.separated_values import header_names, likely_separator
+from mapfilter.tracks.readers.text import Text
+
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+_LIST = "docs/howto/recordings.rst lists them"
+JSON = ('{"', '[{"')
+_FIELD_OF_UNIT = {
+    "km/h": "wheel_speed_kmh",
+    "m/s": "wheel_speed_mps",
+    "deg/s": "yaw_rate_degps",
+    "rad/s": "yaw_rate_radps",
+    "dbm": "level_dbm",
+}
+"""Fields that a column whose name is of another language may be, by its unit."""
+_KINDS = ("pid", "signal", "signal_name", "signal name", "name", "sensor", "parameter", "variable")
+_TIMES = ("time", "timestamp", "timestamps", "seconds", "time_s", "t")
+"""Columns of a table with a row for each value, as of loggers of a vehicle's bus."""
+_RAW_FRAMES = "raw frames of a bus; decode them by its DBC (cantools), export signals as CSV"
+_FRAME = re.compile(r"\(\d{1,12}\.\d{1,9}\) \w{1,16} [0-9A-Fa-f]{3,8}#")
+"""A line of candump."""
+NOT_READ = {
+    ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
+    ".dt1": "a Nemo log of version 1; export it as CSV, and map the columns",
+    ".trp": "a binary TEMS log; export it as tab-delimited text",
+    ".ntm": "a list of cells of NetMonster, no journey; as [cells] plan with names of its columns",
+    ".asc": _RAW_FRAMES,
+    ".blf": _RAW_FRAMES,
+    ".mf4": "a measurement of a bus; export its signals as CSV (asammdf)",
+    ".mdf": "a measurement of a bus; export its signals as CSV (asammdf)",
+    ".vbo": "a VBOX file; export CSV, GPX or NMEA",
+    ".kml": "KML; export GPX, or a table as CSV",
+    ".kmz": "KML; export GPX, or a table as CSV",
+    ".geojson": "GeoJSON; export GPX, or a table as CSV",
+    ".json": "JSON; export GPX, or a table as CSV",
+    ".jsonl": "JSON; export GPX, or a table as CSV",
+    ".ndjson": "JSON; export GPX, or a table as CSV",
+    ".fit": "a FIT file; export GPX",
+    ".xlsx": "a spreadsheet; export it as CSV",
+    ".xls": "a spreadsheet; export it as CSV",
+    ".ods": "a spreadsheet; export it as CSV",
+}
+"""Suffixes of formats that are not read, and what to do."""
+
+
+def _other_separators(path: Path, text: Text, find_format: Callable[[Text], Format | None]) -> str:
+    """Return the hint for a file that would be of a known format with other separators."""
+    head = "\n".join(text.head)
+    for own, other in itertools.permutations("\t;, ", 2):
+        if own == " " and any(one in text.first_line for one in _SEPARATORS if one != own):
+            # Blanks between words of a table's header separate nothing.
+            continue
+        found = find_format(Text(path, head.replace(own, other).encode()))
+        if own in head and found is not None:
+            return f"{found.title} with {_SEPARATORS[own]} where {_SEPARATORS[other]} should be"
+    return ""
+
+
+def unknown_format(
+    path: Path, text: Text, find_format: Callable[[Text], Format | None]
+) -> MapfilterError:
+    """Return the error for a file of no known format."""
+    separator = likely_separator(text.first_line)
+    names = header_names(text.first_line, separator)
+    is_table = len(names) > 1 and not text.first_line.lstrip().startswith(("{", "[", "<"))
+    hint = NOT_READ.get(path.suffix.lower(), "") or _other_separators(path, text, find_format)
+    if _FRAME.match(text.first_line):
+        hint = hint or _RAW_FRAMES
+    if text.first_line.lstrip().startswith(JSON):
+        hint = hint or NOT_READ[".json"]
+    if is_table and not hint:
+        hint = _other_table(names) or _other_names(names)
+    got = f"none of them; it begins with {text.first_line[:60]!r}"
+    if is_table:
+        got = f"none of them, but a table with the columns {listed([n for n in names if n])}"
+    return fail(InputError, str(path), f"a recording in a known format ({_LIST})", got, hint)
+
+
+def _other_table(names: Sequence[str]) -> str:
+    """Return the hint for a table whose rows or first line no map of columns mends; "" for none."""
+    if {"databytes", "data bytes", "dlc"} & set(names):
+        return _RAW_FRAMES
+    if names[0].startswith("wiglewifi"):
+        columns = ("time=FirstSeen", "lat_deg=CurrentLatitude", "lon_deg=CurrentLongitude")
+        options = " ".join(f"--column {one}" for one in (*columns, "cgi=MAC", "technology=Type"))
+        return f"WiGLE, whose names of columns are in the second line: delete the first, {options}"
+    value = next((name for name in names if name in ("value", "values")), "")
+    kind = next((name for name in names if name in _KINDS), "")
+    if value and kind:
+        time = next((name for name in names if name in _TIMES), "time")
+        pivot = f"pandas.pivot_table(rows, values={value!r}, index={time!r}, columns={kind!r})"
+        return f"a row for each value: make a column of each {kind}, as by {pivot}"
+    return ""
+
+
+def _other_names(names: Sequence[str]) -> str:
+    """Return the hint for a table whose columns are not known, with the fields they resemble."""
+    usual, stated = usual_fields(names), stated_fields(names, (), ())
+    found = {*usual, *stated}
+    others = [name for name in names if name and name not in (*usual.values(), *stated.values())]
+    likely = {name: fields for name in others if (fields := likely_fields(name, found))}
+    several = Counter(tuple(fields) for fields in likely.values())
+    such = [
+        _pairs(name, fields)
+        for name, fields in likely.items()
+        if several[tuple(fields)] == 1 or fields[0] == "time"
+    ]
+    such += [
+        f"{fields[0]}= one of {', '.join(name for name in likely if tuple(likely[name]) == fields)}"
+        for fields, count in several.items()
+        if count > 1 and fields[0] != "time"
+    ]
+    such += [
+        shlex.quote(f"{_FIELD_OF_UNIT[unit]}={name}")
+        for name in others
+        if name not in likely and (unit := parted_unit(name)[1]) in _FIELD_OF_UNIT
+    ]
+    if not such and not {"lat_deg", "lon_deg"} <= found:
+        such = ["lat_deg=LATITUDE", "lon_deg=LONGITUDE"]
+    times = ""
+    if "time" not in found:
+        times = "a CSV without a column of times; "
+        such += [] if any("time" in fields for fields in likely.values()) else ["time=COLUMN"]
+    option = (
+        f"--column FIELD=COLUMN (track.columns in a configuration), such as {' and '.join(such)}"
+    )
+    return f"{times}a CSV with other names of columns: {option}"
+
+
+def _pairs(name: str, fields: Sequence[str]) -> str:
+    """Return what names a column's field, by its unit where that is open."""
+    pairs = [f"{field}={name}" for field in fields]
+    return pairs[0] if len(pairs) == 1 else f"({by_unit(fields, pairs)})"
