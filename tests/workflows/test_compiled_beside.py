@@ -15,7 +15,7 @@ import numpy as np
 from mapfilter.filters import hypotheses, particle, resampling
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models import fingerprint, level_covariance, level_kernels, street_motion, way_map
-from mapfilter.positioning import estimate, integrity
+from mapfilter.positioning import integrity, step_output
 from mapfilter.positioning.bayes import area_map, evidence, model
 from mapfilter.workflows import kernels
 
@@ -45,7 +45,7 @@ for _ in range(3):
     belief, _ = filter_.update(belief, reading, rng)
     belief.summary, made.area.matched_way(*belief.state[:2], belief.weight)
     tail = integrity.sample_tail(*belief.state[:2], belief.weight, belief.summary.mean, 0.0)
-    estimate.protected_m(tail, belief.summary.radii_m)
+    step_output.protected_m(tail, belief.summary.radii_m)
     made.area.holds(*belief.state[:2], belief.weight), made.area.clear_of_edge(belief.state)
 assert called() == before, set(called().items()) - set(before.items())
 assert sum(map(len, before.values())) >= 22, before
