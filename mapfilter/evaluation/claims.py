@@ -14,8 +14,6 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 
 _CLAIMS = (Status.CONVERGED, Status.TRACKING)
-
-
 _WINDOW_M = 100.0
 
 

@@ -1,4 +1,4 @@
-"""Ground truth: the true positions of a journey, and what they do not tell of a track."""
+"""Ground truth: the true positions of a journey, and which epochs of a track they cannot judge."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 GAP_S, GAP_M = 30.0, 50.0
-"""Between true positions that are farther apart than both, nobody knows the way."""
+"""Between true positions that are farther apart than both, the way is unknown."""
 
 _COLUMNS = ("time_s", "east_m", "north_m")
 
@@ -84,7 +84,7 @@ class Truth:
 
 
 def truth_notes(estimate: TrackEstimate, truth: Truth) -> tuple[str, ...]:
-    """Return what a ground truth does not tell of a track that was located.
+    """Return notes on what a ground truth cannot judge of a located track.
 
     Epochs before it begins and after it ends are no reason for a note, as many records are shorter
     than the log, but for the switch.

@@ -38,7 +38,8 @@ def switched(
         if not agrees:
             return status, nan
         since_m = agreement_start_m if isfinite(agreement_start_m) else travelled_m
-        if travelled_m - since_m < hold_m:
+        # A distance that is not known does not hold.
+        if not travelled_m - since_m >= hold_m:
             return status, since_m
         status, agreement_start_m = Status.CONVERGED, since_m
     elif status is Status.CONVERGED:

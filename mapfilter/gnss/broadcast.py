@@ -9,12 +9,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mapfilter._constants import DAY_S, LIGHT_MPS
+from mapfilter._constants import DAY_S, GPS_EPOCH_S, LIGHT_MPS
 from mapfilter._types import Floats, Ints
 from mapfilter.gnss.earth_rotation import in_frame_of_reception
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, LEAPS_UTC_S
 
-GPS_EPOCH_UTC_S = 315_964_800.0
 _GRAVITY = {"G": 3.986005e14, "J": 3.986005e14, "E": 3.986004418e14, "C": 3.986004418e14}
 _EARTH_RATE = {"C": 7.292115e-5}
 _RELATIVITY = -4.442807633e-10
@@ -35,7 +34,7 @@ def gps_from_utc_s(utc_s: ArrayLike) -> Floats:
     """
     utc = np.asarray(utc_s, dtype=np.float64)
     leaps = np.searchsorted(np.sort(np.asarray(LEAPS_UTC_S)), utc, side="right")
-    return np.asarray(utc - GPS_EPOCH_UTC_S + leaps)
+    return np.asarray(utc - GPS_EPOCH_S + leaps)
 
 
 def satellite_states(ephemeris: pd.DataFrame, index: Ints, gps_s: Floats) -> tuple[Floats, Floats]:
@@ -156,6 +155,6 @@ def _days(rows: pd.DataFrame, ephemerides: pd.DataFrame) -> str:
     if abs(middles[0] - middles[1]) <= DAY_S:
         return ""
     of, measured = (
-        pd.Timestamp(GPS_EPOCH_UTC_S + seconds, unit="s").date().isoformat() for seconds in middles
+        pd.Timestamp(GPS_EPOCH_S + seconds, unit="s").date().isoformat() for seconds in middles
     )
     return f"; the ephemerides are of {of}, the pseudoranges of {measured}"

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapfilter._constants import GPS_EPOCH_S
+from mapfilter._constants import DAY_S, GPS_EPOCH_S
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.gnss.almanacs import WEEK_S, Almanac
@@ -88,7 +88,7 @@ def satellite_positions_m(
         since = since - WEEK_S * np.round(since / WEEK_S)
     else:
         since = since + WEEK_S * (week - almanac.week)
-        off_days = float(np.abs(since).max(initial=0.0)) / 86_400.0
+        off_days = float(np.abs(since).max(initial=0.0)) / DAY_S
         if off_days > oldest_days:
             expected = f"one within {oldest_days:g} days of week {week}"
             hint = "weeks counted modulo 1024: see Almanac.in_era"

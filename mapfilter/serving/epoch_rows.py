@@ -25,7 +25,9 @@ from mapfilter.serving.documents import (
 from mapfilter.serving.places import in_metres
 from mapfilter.tracks.identify import PlanNames, ReportedCell
 from mapfilter.tracks.schema import (
+    LEAST_PLACE_M,
     MISSING_SIGNS,
+    MOST_PLACE_M,
     NEIGHBOUR,
     PLACE,
     SCHEMA,
@@ -48,7 +50,6 @@ the speed: what gets somewhere is faster."""
 _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
 _COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
-_LEAST_PLACE_M, _MOST_PLACE_M = 2.0e7, 5.5e7
 
 
 def read_epochs(
@@ -223,7 +224,7 @@ def _check_pseudorange(values: Mapping[str, Any], where: str, faults: Faults) ->
         faults.add(f"{where}, {', '.join(PLACE)}", "all three, or none", "some of them")
     elif all(known):
         away_m = sum(one * one for one in place) ** 0.5
-        if not _LEAST_PLACE_M <= away_m <= _MOST_PLACE_M:
+        if not LEAST_PLACE_M <= away_m <= MOST_PLACE_M:
             expected = "20 000 to 55 000 km from the earth's centre"
             faults.add(f"{where}, {', '.join(PLACE)}", expected, f"{away_m / 1000:.0f} km")
 

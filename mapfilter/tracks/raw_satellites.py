@@ -13,7 +13,7 @@ from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.atmosphere import directions, ionosphere_m, receiver_m, troposphere_m
 from mapfilter.gnss.broadcast import gps_from_utc_s, place_by_broadcast
 from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.schema import HIGHEST_M, LOWEST_M, PLACE
+from mapfilter.tracks.schema import LEAST_PLACE_M, MOST_PLACE_M, PLACE
 
 _COLUMNS = ("time_s", "satellite", "pseudorange_m", "sigma_m", *PLACE)
 
@@ -70,7 +70,7 @@ def _sane_places(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
     """Return rows without places at which no satellite can be."""
     place = rows[list(PLACE)].to_numpy(dtype=np.float64)
     away_m = np.linalg.norm(place, axis=1)
-    bad = np.isfinite(place).any(axis=1) & ~((away_m >= LOWEST_M) & (away_m <= HIGHEST_M))
+    bad = np.isfinite(place).any(axis=1) & ~((away_m >= LEAST_PLACE_M) & (away_m <= MOST_PLACE_M))
     if not bad.any():
         return rows
     some = number_of(

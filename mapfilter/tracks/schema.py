@@ -21,8 +21,8 @@ SATELLITE = r"[GRECJIS]\d{2}"
 
 PLACE = ("x_m", "y_m", "z_m")
 """Position of a satellite, earth-centred."""
-LOWEST_M, HIGHEST_M = 2.0e7, 5.5e7
-"""Distances of satellites from the earth's centre."""
+LEAST_PLACE_M, MOST_PLACE_M = 2.0e7, 5.5e7
+"""Distances of a satellite from the earth's centre that are possible."""
 
 SERVING = "serving"
 NEIGHBOUR = "neighbour"

@@ -19,8 +19,8 @@ from mapfilter.tracks.column_values import TableFaults, column_values, note_valu
 from mapfilter.tracks.cut_times import cut_times
 from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import (
-    HIGHEST_M,
-    LOWEST_M,
+    LEAST_PLACE_M,
+    MOST_PLACE_M,
     NEIGHBOUR,
     PLACE,
     SATELLITE,
@@ -143,7 +143,7 @@ def _check_satellites(rows: pd.DataFrame, found: TableFaults) -> None:
     some = known.any(axis=1) & ~known.all(axis=1)
     found.add_rows(some, field, "all three, or none", lambda _: "some of them", lambda _: "")
     away_m = np.sqrt(np.sum(place**2, axis=1))
-    bad = known.all(axis=1) & ~((away_m >= LOWEST_M) & (away_m <= HIGHEST_M))
+    bad = known.all(axis=1) & ~((away_m >= LEAST_PLACE_M) & (away_m <= MOST_PLACE_M))
     found.add_rows(
         bad,
         field,

@@ -1,7 +1,7 @@
 """Options of the methods that find a position from a single report.
 
 The defaults were chosen by cross-validation within the training sets of four Wi-Fi benchmarks and
-on one part of the Ottawa recordings; see the page "Where am I from one report".
+on one part of the Ottawa recordings; see the page "Accuracy of single reports".
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import KNOT_MPS, MPH_MPS
 from mapfilter._types import Bools, Floats
 from mapfilter.tracks.position_units import METRES_PER_DEGREE
 from mapfilter.tracks.readers.csv_mapped import Mapped
@@ -13,7 +14,7 @@ from mapfilter.tracks.receiver_speeds import speed_unit_fault
 _FASTEST_MPS, _MOST = 70.0, 0.95
 """Vehicles are slower most of the time: numbers beyond are km/h."""
 _OFF = 1.1
-_KMH, _OTHERS = 3.6, {"mph": 1 / 0.44704, "knots": 3600 / 1852}
+_KMH, _OTHERS = 3.6, {"mph": 1 / MPH_MPS, "knots": 1 / KNOT_MPS}
 
 
 def speed_unit(mapped: Mapped, column: str, time_s: Floats) -> str:

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from mapfilter._constants import LIGHT_MPS
+from mapfilter._constants import GPS_EPOCH_S, LIGHT_MPS
 from mapfilter._types import Ints
 from mapfilter._words import number_of
 from mapfilter.gnss.almanacs import WEEK_S
@@ -179,7 +179,7 @@ def _add_raw(rows: Columns, reading: Reading) -> None:
     known = np.where(by_day, state & _KNOWN_DAY, state & _KNOWN_WEEK) != 0
     whole = has_time & has_bias & has_sent & has_svid
     reading.refuse(rows.line[whole & ~known], "Raw: the satellite's time is not decoded")
-    leap_ns = np.round(gps_ns / 1e9 - (utc_s - 315_964_800.0)).astype(np.int64) * 10**9
+    leap_ns = np.round(gps_ns / 1e9 - (utc_s - GPS_EPOCH_S)).astype(np.int64) * 10**9
     received = np.mod(gps_ns, _WEEK_NS)
     received = np.where(system == 5, received - _BEIDOU_BEHIND_NS, received)
     received = np.where(by_day, np.mod(gps_ns + _MOSCOW_NS - leap_ns, _DAY_NS), received)

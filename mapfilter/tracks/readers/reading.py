@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mapfilter._constants import HOUR_S
+from mapfilter._constants import DAY_S, GPS_EPOCH_S, HOUR_S
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import listed
@@ -35,9 +35,9 @@ from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import NEIGHBOUR
 
 _LINES_KEPT = 3
-_EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
+_EARLIEST_UTC_S, _LATEST_UTC_S = GPS_EPOCH_S, 4_102_444_800.0
 _TICKS = "likely: ticks since a phone was started; their unit in the header, as time_ms, reads them"
-_JUMP_S = 86_400.0
+_JUMP_S = DAY_S
 _STRAY_SHARE = 0.1
 _OF_STEPS = ("steps", "motion")
 _SEVERAL = ("radio", "satellites", "ephemerides")

@@ -11,7 +11,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from mapfilter.gnss.broadcast import GPS_EPOCH_UTC_S
+from mapfilter._constants import GPS_EPOCH_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
@@ -63,7 +63,7 @@ def gps_seconds(words: Sequence[str]) -> float:
         return float("nan")
     if not 0 <= second < 61:
         return float("nan")
-    return (moment + timedelta(seconds=second)).timestamp() - GPS_EPOCH_UTC_S
+    return (moment + timedelta(seconds=second)).timestamp() - GPS_EPOCH_S
 
 
 class Lines:
@@ -115,7 +115,7 @@ def _read_observation(text: Text, reading: Reading, options: ReadOptions) -> Non
         found = read_epochs2(body, first_line, types, wanted, reading)
     for some in found:
         elapsed = some.gps_s - _SYSTEMS.get(system, 0.0)
-        utc = elapsed + GPS_EPOCH_UTC_S if reading.clock.kind == "utc" else utc_from_gps_s(elapsed)
+        utc = elapsed + GPS_EPOCH_S if reading.clock.kind == "utc" else utc_from_gps_s(elapsed)
         columns = {
             "time_s": utc,
             "satellite": some.satellite,

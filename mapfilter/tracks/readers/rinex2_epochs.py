@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pyarrow as pa
 
-from mapfilter.gnss.broadcast import GPS_EPOCH_UTC_S
+from mapfilter._constants import GPS_EPOCH_S
 from mapfilter.tracks.readers.lines import blocks, line_texts
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.rinex_epochs import Observations, Records, Wanted, observed
@@ -123,7 +123,7 @@ def _gps_s(text: bytes) -> float:
     except ValueError:
         return np.nan
     second = float(found[6])
-    return moment.timestamp() - GPS_EPOCH_UTC_S + second if second < 61 else np.nan
+    return moment.timestamp() - GPS_EPOCH_S + second if second < 61 else np.nan
 
 
 def _observations(

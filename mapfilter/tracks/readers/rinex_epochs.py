@@ -10,8 +10,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from mapfilter._constants import GPS_EPOCH_S
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.gnss.broadcast import GPS_EPOCH_UTC_S
 from mapfilter.tracks.readers.lines import blocks, line_texts
 from mapfilter.tracks.readers.reading import Reading
 
@@ -135,7 +135,7 @@ def _seconds(texts: pa.Array) -> Floats:
     day = pd.to_datetime(dates, errors="coerce")
     midnight_s = (day - pd.Timestamp(0)).dt.total_seconds().to_numpy(dtype=np.float64)
     of_day_s = 3600 * part["hour"] + 60 * part["minute"] + part["second"]
-    return np.where(whole, midnight_s + of_day_s - GPS_EPOCH_UTC_S, np.nan)
+    return np.where(whole, midnight_s + of_day_s - GPS_EPOCH_S, np.nan)
 
 
 def observed(

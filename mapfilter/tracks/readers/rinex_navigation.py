@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._constants import DAY_S
 from mapfilter._words import number_of
+from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
@@ -108,10 +110,10 @@ def _message(name: str, block: Sequence[str], first: int) -> dict[str, Any] | No
     if not np.isfinite(week):
         return None
     # Weeks may be counted modulo 1024: the one nearest the clock's time is meant.
-    toe = week * 604_800.0 + found["toe"]
-    turns = np.round((toc - toe) / (1024 * 604_800.0)) if np.isfinite(toc + toe) else 0.0
-    toe += turns * 1024 * 604_800.0
-    if not abs(toe - toc) < 86_400.0:
+    toe = week * WEEK_S + found["toe"]
+    turns = np.round((toc - toe) / (1024 * WEEK_S)) if np.isfinite(toc + toe) else 0.0
+    toe += turns * 1024 * WEEK_S
+    if not abs(toe - toc) < DAY_S:
         return None
     kept = {key: found[key] for key in _KEPT}
     clocks = dict(zip(("af0", "af1", "af2"), clock, strict=True))
