@@ -41,6 +41,8 @@ def simulate(
     rasters : RxLevRasters
         The levels that the phone receives. Other rasters than those of the database, or
         the database has no errors.
+    cells : CellPlan
+        Their sites and carriers, as :func:`mapfilter.read_cell_plan` reads them.
     roads : path, GeoDataFrame or Ways
         OpenStreetMap file or vector layer, as for :func:`mapfilter.read_routes`.
     journeys : int

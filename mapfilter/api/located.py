@@ -13,10 +13,12 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._arguments import Entries, Setting, check_arguments, generator
+from mapfilter._words import number_of
 from mapfilter.api.given import log_argument, opened, optional_database
 from mapfilter.api.mapless import over_sites, own_sites, without_sites
 from mapfilter.api.motion import with_right_motion
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.truth import Truth
 from mapfilter.options import Probability
 from mapfilter.positioning import loop
@@ -25,7 +27,7 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.integrity import DEFAULT_RISK
 from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
-from mapfilter.positioning.log_lacks import NO_MOTION, advice_of, lack_of_log
+from mapfilter.positioning.log_lacks import NO_MOTION, advice_of, check_places, lack_of_log
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.radio.cells import CellPlan
@@ -50,7 +52,8 @@ class Track:
     ----------
     positioned : PositionedTrack
         The filter's result: an estimate, snapshots of its hypotheses, and the processor time of
-        this process in seconds, without reading the database.
+        this process in seconds, without reading the database. In a fresh installation the first
+        track of a filter includes the compilation of kernels, up to 20 s.
     database : RadioRouteDatabase or None
         None where the filter needed no map.
     trace : TraceRecorder or None
@@ -71,14 +74,11 @@ class Track:
         return len(self.estimate)
 
     def __repr__(self) -> str:
-        found, status = self.estimate, "no epochs"
-        if len(found):
-            first = found.converged_at
-            when = "never converged" if first is None else f"converged at {found.time_s[first]:g} s"
-            status = f"{when}, {found.status[-1]} at the end"
+        notes = number_of(len(self.log.notes), "note") + " in log.notes"
         return (
-            f"Track by {found.filter}: {len(found)} epochs, {status}, "
+            f"Track by {self.estimate.filter}: {self.estimate.summary}, "
             f"{self.positioned.filter_s:.2f} s of processor time"
+            f"{f'; {notes}' if self.log.notes else ''}"
         )
 
     def _repr_html_(self) -> str:
@@ -179,8 +179,9 @@ def locate(
     Raises
     ------
     InputError
-        The log is in another CRS than the database, or its fixes prove that a column of its motion
-        is of another unit or sense, for which there is no factor.
+        The log is in another CRS than the database; all of its fixes, or of its ground truth, lie
+        more than 5 km outside of the database; or its fixes prove that a column of its motion is of
+        another unit or sense, for which there is no factor.
     StoreError
         A path holds no database, or one that is damaged.
     ConfigError
@@ -209,6 +210,10 @@ def locate(
         log, plan = without_sites(log), CellPlan(log.crs, ())
     else:
         log = in_frame(log, plan.crs)
+    if database is not None:
+        faults = Faults()
+        check_places("log", log, database.lattice, faults)
+        faults.raise_if_any(InputError)
     log = with_range_notes(name_by_plan(log, plan), plan)
     options, notes = fitted_to_log(given_filter, log)
     alone = database is not None and by_streets_alone(options, log, database)

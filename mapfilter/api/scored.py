@@ -18,13 +18,17 @@ from mapfilter.evaluation.accuracy import (
     mean_of,
     position_errors_m,
 )
-from mapfilter.evaluation.truth import Truth
+from mapfilter.evaluation.truth import Truth, truth_notes
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.tables import tidy_table
 
 _NO_TRUTH = (
     "the log has no ground truth; mf.read_log(..., truth=FILE) takes that of another recording"
 )
+
+
+_NO_FIGURES = ("error_m", "notes")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -41,21 +45,28 @@ class Score(Accuracy):
         without any.
     error_m : (N,) array
         NaN where the track has no position, or the ground truth none.
+    notes : tuple of str
+        Epochs that the ground truth does not cover.
     """
 
     within_95: float = nan
     error_m: Any = None
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
+        return "\n  ".join((self._summary, *self.notes))
+
+    @property
+    def _summary(self) -> str:
         if not self.switched:
             return "Score: the filter never converged"
-        then = "the ground truth tells nothing of what came then"
+        then = "no error is known"
         if self.scored_epochs:
             then = f"then {self.error_mean_m:.1f} m on average, {self.error_95_m:.1f} m at 95 %"
             if isfinite(self.within_95):
                 then += f"; the 95 % radius holds {self.within_95:.2f}"
         if self.success is None:
-            return f"Score: converged where the ground truth does not tell; {then}"
+            return f"Score: converged where there is no ground truth; {then}"
         outcome = "right" if self.success else "wrong"
         return (
             f"Score: converged after {self.switch_distance_m:.0f} m, "
@@ -64,7 +75,7 @@ class Score(Accuracy):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the figures as a table of one row."""
-        return pd.DataFrame([{k: v for k, v in asdict(self).items() if k != "error_m"}])
+        return pd.DataFrame([{k: v for k, v in asdict(self).items() if k not in _NO_FIGURES}])
 
 
 def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
@@ -80,8 +91,8 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
     Raises
     ------
     InputError
-        The ground truth has fewer than two positions, lacks a column, or has values that no log may
-        have, such as NaN.
+        The ground truth has fewer than two positions, lacks a column, has values that no log may
+        have, such as NaN, or lies more than 5 km outside of the track's database.
     ConfigError
         There is no track, or no table of ground truth.
     """
@@ -104,6 +115,11 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
             got, hint = (len(truth), "") if len(truth) else ("none", _NO_TRUTH)
             raise fail(InputError, "truth", "two positions or more", got, hint)
         truth = known
+    if isinstance(track, Track) and track.database is not None:
+        faults, lattice = Faults(), track.database.lattice
+        check_near("truth", truth.east_m, truth.north_m, lattice, faults, "of another journey")
+        faults.raise_if_any(InputError)
     figures = asdict(accuracy(estimate, truth))
     within_95 = mean_of(held_by_radius_95(estimate, truth))
-    return Score(**figures, within_95=within_95, error_m=position_errors_m(estimate, truth))
+    error_m, notes = position_errors_m(estimate, truth), truth_notes(estimate, truth)
+    return Score(**figures, within_95=within_95, error_m=error_m, notes=notes)

@@ -43,9 +43,8 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.options import Positive
+from mapfilter.options import Options, Positive
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -83,6 +82,9 @@ class Sweep:
     def to_dataframe(self) -> pd.DataFrame:
         """Return success rates with 95 % intervals and mean errors, one row for each grid cell.
 
+        Errors are those of the successful runs alone: a filter that is mostly ``wrong`` may have
+        the smallest ones. Compare ``success`` and ``wrong`` first.
+
         Columns are those of :class:`mapfilter.evaluation.success_cells.SuccessCell`, with one for
         each varied option in place of ``varied``, named by its key as in ``runs``.
         """
@@ -114,7 +116,7 @@ def sweep(
     database: RadioRouteDatabase | Path | str,
     rasters: RxLevRasters,
     roads: Layer | Ways,
-    filters: Mapping[str, FilterOptions | str],
+    filters: Mapping[str, object],
     *,
     noises: Sequence[ImuNoise] | ImuNoise | None = None,
     routes: int = 10,
@@ -133,8 +135,9 @@ def sweep(
         The levels that the phone receives, with the handovers and fading of ``reports``.
     roads : path, GeoDataFrame or Ways
         As for :func:`simulate`.
-    filters : mapping of str to options
-        Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``.
+    filters : mapping of str to options, their class, or the name of a filter
+        Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``. A custom
+        filter goes by its name, ``"my_module:MyFilter"``, by which workers import it.
     noises : sequence of ImuNoise, or one, optional
         See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations. Errors of a
         gyro may differ only where a custom filter uses turns (``turns="gyro"``).
@@ -203,17 +206,30 @@ def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
     faults = Faults()
     found = []
     for name, given in filters.items():
-        options = filter_options(given) if isinstance(given, str) else given
+        options: Any = filter_options(given) if isinstance(given, str) else given
+        if isinstance(given, type) and issubclass(given, Options):
+            options = given()
         if isinstance(options, type) or not hasattr(options, "over"):
             expected = "options, or the name of a filter"
-            faults.add(
-                f"filters, {name}", expected, type(options).__name__, "custom filters by name"
-            )
+            faults.add(f"filters, {name}", expected, *_unnamed(options))
         else:
             own_m = options.update_length_m if isinstance(options, CandidateFilter) else nan
             found.append(Reading(name, options, float(own_m)))
     faults.raise_if_any(ConfigError)
     return tuple(found)
+
+
+def _unnamed(given: Any) -> tuple[str, str]:
+    """Return what was given for a filter, and the likely mistake."""
+    if not callable(given):
+        own = type(given)
+        is_filter = callable(getattr(given, "locate", getattr(given, "step", None)))
+        return own.__name__, f'"{own.__module__}:{own.__name__}"' if is_filter else ""
+    kind = getattr(given, "__name__", type(given).__name__)
+    module = getattr(given, "__module__", "__main__")
+    if module in ("__main__", "functools") or kind == "<lambda>":
+        return kind, 'a custom filter goes by its name, "my_module:MyFilter", in a file of its own'
+    return kind, f'a custom filter goes by its name, "{module}:{kind}"'
 
 
 def _distinguished(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mapfilter._types import Floats, Ints
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.step_output import Fix, UnusedReading
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TrackEvidence:
     """Uncertainty of filters that hold probabilities, over N epochs; NaN before the start.
 
@@ -40,8 +41,11 @@ class TrackEvidence:
     entropy_bits: Floats
     log_evidence: Floats
 
+    def __repr__(self) -> str:
+        return f"TrackEvidence({number_of(self.entropy_bits.size, 'epoch')})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class TrackEstimate:
     """The fixes of one track as arrays over N epochs.
 
@@ -118,6 +122,20 @@ class TrackEstimate:
 
     def __len__(self) -> int:
         return int(self.time_s.size)
+
+    def __repr__(self) -> str:
+        # Arrays of a thousand epochs would fill pages.
+        return f"TrackEstimate({self.filter}, {self.summary}, {self.crs})"
+
+    @property
+    def summary(self) -> str:
+        """Number of epochs, when it converged, and the last status."""
+        epochs = number_of(len(self), "epoch")
+        if not len(self):
+            return epochs
+        first = self.converged_at
+        when = "never converged" if first is None else f"converged at {self.time_s[first]:g} s"
+        return f"{epochs}, {when}, {self.status[-1]} at the end"
 
     def fix(self, index: int) -> Fix:
         """Return one epoch."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
 
@@ -38,11 +39,19 @@ def filter_options(name: str = DEFAULT) -> FilterOptions:
         return custom_filter(name)
     if name not in BUILT_IN:
         expected = f"{', '.join(BUILT_IN)}, or package.module:Name"
-        raise fail(ConfigError, "filter", expected, repr(name))
+        raise fail(ConfigError, "filter", expected, repr(name), _likely(name))
     module, _, kind = BUILT_IN[name].partition(":")
     options = getattr(import_module(module), kind)()
     found: FilterOptions = options if options.name == name else replace(options, method=name)
     return found
+
+
+def _likely(name: str) -> str:
+    """Return the filter that a wrong name is likely to mean, or ""."""
+    module, dot, kind = name.rpartition(".")
+    if dot:
+        return f"{module}:{kind}"
+    return next(iter(get_close_matches(name.lower(), BUILT_IN, n=1)), "")
 
 
 def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:

@@ -1,16 +1,23 @@
-"""What a log lacks that a filter did not locate."""
+"""What a log lacks that a filter did not locate, and logs of another area."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import Faults, listed
+from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.kalman.filter import KalmanFilter, KalmanTracker
 from mapfilter.positioning.log_options import by_streets_alone
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.schema import PLACE, SERVING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NO_MOTION = "no motion"
 
@@ -42,7 +49,9 @@ def lack_of_log(
     has_cells = database is None or bool(database.cell_ids)
     if database is not None and by_streets_alone(options, log, database):
         has_cells = False
-    lack = lacking(log, estimate, cells=has_cells, turns=isinstance(options, BayesFilter))
+    known = () if database is None else database.cell_ids
+    by_turns = isinstance(options, BayesFilter)
+    lack = lacking(log, estimate, cells=has_cells, turns=by_turns, known=known)
     name = str(getattr(options, "name", ""))
     if lack and not has_cells and name in _BY_CELLS:
         return f"the filter {name} needs cells to start, the database has none ({_BY_STREETS})"
@@ -90,12 +99,17 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
 
 
 def lacking(
-    log: TrackLog, estimate: TrackEstimate, *, cells: bool = True, turns: bool = False
+    log: TrackLog,
+    estimate: TrackEstimate,
+    *,
+    cells: bool = True,
+    turns: bool = False,
+    known: Sequence[str] = (),
 ) -> str:
     """Return the missing data of a log that was not located, or an empty text.
 
     Without ``cells`` in the database, motion is all that it needs. ``turns`` says whether the
-    filter does without headings.
+    filter does without headings. ``known`` are the cells of the database.
     """
     if estimate.converged_at is not None:
         return ""
@@ -112,7 +126,8 @@ def lacking(
     elif not serving.any() and not (estimate.hypotheses > 0).any():
         lacks.append("no serving cell")
     elif not (estimate.hypotheses > 0).any():
-        lacks.append("no serving cell of which the database has points")
+        names = _names(log.radio.loc[serving, "cell"], known)
+        lacks.append(f"no serving cell of which the database has points{names}")
     if not moved.any():
         lacks.append(NO_MOTION)
     elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turned.any():
@@ -120,3 +135,19 @@ def lacking(
     elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turns:
         lacks.append("no heading (turns alone do not give one; the filter bayes needs none)")
     return " and ".join(lacks)
+
+
+def _names(served: pd.Series, known: Sequence[str]) -> str:
+    """Return the cells of a log, the most frequent ones first, and some of the database."""
+    if not known:
+        return ""
+    found = [str(cell) for cell in served.value_counts().index]
+    return f" (the log has {listed(found, 3)}; the database has {listed(known, 3)})"
+
+
+def check_places(where: str, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
+    """Note ground truth or GNSS fixes that all lie more than 5 km outside of a database's area."""
+    for table in ("truth", "gnss"):
+        places = getattr(log, table)
+        east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
+        check_near(f"{where}, {table}", east_m, north_m, lattice, faults)

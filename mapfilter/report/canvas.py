@@ -92,6 +92,10 @@ Look = dict[str, Any]
 styled = matplotlib.rc_context(_STYLE)
 """Decorator of all functions that draw: fonts, sizes and colours of the package."""
 
+saved = matplotlib.rc_context({k: v for k, v in _STYLE.items() if k != "text.parse_math"})
+"""Decorator of functions that write: ticks that matplotlib makes only then, such as those of
+logarithmic axes, are mathematical text."""
+
 
 def new_figure(width_in: float, height_in: float) -> Figure:
     """Return an empty figure of a size in inches, at :data:`DPI` pixels each."""

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from mapfilter._io import atomic_file
 from mapfilter.errors import OutputError, fail
-from mapfilter.report.canvas import DPI, Drawn, figure_of, styled
+from mapfilter.report.canvas import DPI, Drawn, figure_of, saved
 
 _METADATA: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
@@ -33,7 +33,7 @@ _MOST_LAYOUTS, _SETTLED = 5, 0.005
 """How often maps are laid out again, and how far axes may move still, as a share of the figure."""
 
 
-@styled
+@saved
 def save(drawn: Drawn, path: Path) -> Path:
     """Write what a ``plot_*`` function returned as PNG, SVG or PDF, by the suffix, in one step.
 
@@ -53,7 +53,7 @@ def save(drawn: Drawn, path: Path) -> Path:
     return path
 
 
-@styled
+@saved
 def png_of(drawn: Drawn) -> bytes:
     """Return the bytes of the PNG that :func:`save` would write."""
     stream = BytesIO()

@@ -35,8 +35,17 @@ _READ_STEPS_A_DEGREE = 200
 
 
 def is_map(name_or_path: str | Path) -> bool:
-    """Return whether a name is that of an embedded map, or of an OpenStreetMap file."""
+    """Return whether a name is that of an embedded map, or of an OpenStreetMap file.
+
+    Raises
+    ------
+    InputError
+        It is that of an embedded map in other letters, and no file.
+    """
     name = str(name_or_path)
+    if name not in EMBEDDED_MAPS and name.lower() in EMBEDDED_MAPS and not Path(name).exists():
+        hint = f'the embedded map "{name.lower()}"'
+        raise fail(InputError, name, "a map or a layer", "no such file", hint)
     return name in EMBEDDED_MAPS or name.lower().endswith(SUFFIXES)
 
 

@@ -16,10 +16,9 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import same_crs, short_crs
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.log_lacks import NO_MOTION, lack_of_log
+from mapfilter.positioning.log_lacks import NO_MOTION, check_places, lack_of_log
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.log_checks import ends_early
-from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
@@ -56,10 +55,7 @@ def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> No
             hint = f"convert it with --crs {short_crs(lattice.crs)}"
         faults.add(f"{path}, crs", expected, LOCAL_FRAME if local else log.crs, hint)
         return
-    for table in ("truth", "gnss"):
-        places = getattr(log, table)
-        east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
-        check_near(f"{path}, {table}", east_m, north_m, lattice, faults)
+    check_places(str(path), log, lattice, faults)
 
 
 def lack_of(

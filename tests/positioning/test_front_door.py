@@ -4,6 +4,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 
 import geopandas as gpd
 import numpy as np
@@ -48,7 +49,9 @@ def track(database):
 
 
 def test_objects_are_shown_in_two_lines(database, track):
-    for one in (database, walk_log(), track, mf.score(track, walk_log().truth)):
+    bayes = mf.locate(walk_log(), database).estimate
+    scored = mf.score(track, walk_log().truth)
+    for one in (database, walk_log(), track, track.estimate, bayes, bayes.evidence, scored):
         lines = repr(one).splitlines()
         assert 1 <= len(lines) <= 2, one
         assert max(map(len, lines)) <= 130, one
@@ -180,13 +183,55 @@ def test_a_score_says_what_the_ground_truth_does_not_tell(track):
     whole = mf.score(track, truth)
     late = mf.score(track, truth[truth["time_s"] > whole.switch_time_s])
     assert (late.switched, late.success) == (True, None)
-    begins = "Score: converged where the ground truth does not tell; then "
+    begins = "Score: converged where there is no ground truth; then "
     assert repr(late).startswith(begins + f"{late.error_mean_m:.1f} m on average")
     other = mf.score(track, truth.assign(time_s=truth["time_s"] + 1e6))
-    assert repr(other) == (
-        "Score: converged where the ground truth does not tell; "
-        "the ground truth tells nothing of what came then"
-    )
+    assert repr(other).splitlines() == [
+        "Score: converged where there is no ground truth; no error is known",
+        f"  {other.notes[0]}",
+    ]
+    assert "covers no epoch of the log" in other.notes[0]
+    assert other.notes[0].endswith("another clock or time zone?")
+    assert whole.notes == ()
+    assert "notes" not in other.to_dataframe()
+
+
+def test_a_ground_truth_of_elsewhere_is_refused(track, database):
+    log = walk_log()
+    degrees = log.truth.assign(east_m=-8.61, north_m=41.15)
+    likely = "degrees given for metres"
+    with pytest.raises(mf.MapfilterError, match=f"truth: expected positions near .+{likely}"):
+        mf.score(track, degrees)
+    far = mf.make_log(log.crs, motion=log.motion, radio=log.radio, truth=degrees)
+    with pytest.raises(mf.MapfilterError, match=f"log, truth: expected positions near .+{likely}"):
+        mf.locate(far, database)
+
+
+def test_a_log_of_unknown_cells_says_which(database):
+    log = walk_log()
+    radio = log.radio.assign(cell="X" + log.radio["cell"].astype(str))
+    found = mf.locate(mf.make_log(log.crs, motion=log.motion, radio=radio), database)
+    (note,) = [one for one in found.log.notes if "nothing is located" in one]
+    first = radio.loc[radio["role"] == "serving", "cell"].value_counts().index[0]
+    assert f"(the log has {first}" in note
+    assert f"the database has {database.cell_ids[0]}, " in note
+    assert len(found.log.notes) == 1
+    assert repr(found).endswith("; 1 note in log.notes")
+
+
+@pytest.mark.parametrize(
+    ("name", "likely"),
+    [("Bayes", "bayes"), ("bays", "bayes"), ("EKF", "ekf"), ("my.module.Mine", "my.module:Mine")],
+)
+def test_a_wrong_name_of_a_filter_names_the_likely_one(database, name, likely):
+    with pytest.raises(mf.MapfilterError) as caught:
+        mf.locate(walk_log(), database, name)
+    assert str(caught.value).endswith(f"(likely: {likely})")
+
+
+def test_the_embedded_map_in_other_letters_is_named(rasters):
+    with pytest.raises(mf.MapfilterError, match='the embedded map "helsinki"'):
+        mf.read_routes("Helsinki", rasters.lattice)
 
 
 def test_what_is_no_ground_truth_is_refused(track):
@@ -320,5 +365,17 @@ def test_what_cannot_be_swept_is_refused(database, rasters, streets):
     gyro = mf.ImuNoise(turns="gyro"), mf.ImuNoise(turns="gyro", gyro_bias_deg_per_s=1.0)
     with pytest.raises(mf.MapfilterError, match=r"gyro_bias_deg_per_s: .*one without effect"):
         swept(database, rasters, streets, noises=gyro)
-    with pytest.raises(mf.MapfilterError, match="filters, mine: expected options, or the name"):
+    named = f'a custom filter goes by its name, "{Recording.__module__}:Recording"'
+    with pytest.raises(mf.MapfilterError, match=f"filters, mine: expected options, .+{named}"):
         mf.sweep(database, rasters, streets, {"mine": Recording})
+    for nameless in (lambda area: Recording(area), partial(Recording), 3.0):
+        hint = "in a file of its own" if callable(nameless) else "found float$"
+        with pytest.raises(mf.MapfilterError, match=hint):
+            mf.sweep(database, rasters, streets, {"mine": nameless})
+
+
+def test_a_sweep_takes_the_class_of_options(database, rasters, streets):
+    given = {"routes": 1, "length_m": 200.0}
+    by_class = mf.sweep(database, rasters, streets, {"c": mf.CandidateFilter}, **given).runs
+    by_name = mf.sweep(database, rasters, streets, {"c": "candidate"}, **given).runs
+    pd.testing.assert_frame_equal(by_class, by_name)

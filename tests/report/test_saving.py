@@ -135,3 +135,21 @@ def test_tables_are_csv_and_latex(tmp_path):
     assert r"ekf &  & 12.34567 \\" in lines
     with pytest.raises(OutputError, match=r"\.csv or \.tex"):
         write_table(TABLE, tmp_path / "errors.xlsx")
+
+
+def test_ticks_of_a_figure_of_the_users_own_are_mathematical_text(tmp_path):
+    """Those of logarithmic axes are made while the figure is written."""
+
+    def words(save_to):
+        figure = Figure()
+        axes = figure.subplots()
+        axes.plot([1.0, 1000.0], [0.0, 1.0])
+        axes.set_xscale("log")
+        save_to(figure)
+        return {
+            tick.label1.get_text(): tick.label1.get_parse_math() for tick in axes.xaxis.majorTicks
+        }
+
+    found = words(lambda figure: save(figure, tmp_path / "own.png"))
+    assert any("$" in text for text in found)
+    assert all(found.values())

@@ -41,7 +41,14 @@ class Term(Protocol):
     """A log-likelihood over hypotheses."""
 
     def log_likelihood(self, state: Floats32) -> Floats:
-        """Return the value for each hypothesis, shape (N,), or one for all, shape (1,)."""
+        """Return the value for each hypothesis, shape (N,), or one for all, shape (1,).
+
+        Parameters
+        ----------
+        state : (STATES, N) array
+            Rows as in :mod:`mapfilter.models.street_motion`: ``state[EAST]`` and ``state[NORTH]``
+            in metres from the south-western corner of the area's lattice.
+        """
 
 
 @runtime_checkable

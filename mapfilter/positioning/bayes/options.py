@@ -292,7 +292,10 @@ class BayesFilter(Options):
 
 @dataclass(frozen=True, slots=True)
 class GridFilter(BayesFilter):
-    """The exact Bayes filter on the lattice in place of particles: slow, without the step scale.
+    """The exact Bayes filter on the lattice in place of particles, without the step scale.
+
+    It takes about 60 times as long as particles: half a minute for a walk of 1.5 km in a town
+    centre of a square kilometre.
 
     Parameters are those of :class:`BayesFilter`, and:
 
