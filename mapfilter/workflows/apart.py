@@ -46,7 +46,7 @@ def check_out_apart(out: Path, inputs: Sequence[Path], option: str = "--out") ->
     ``option`` names them in the message.
     """
     faults, place = Faults(), out.resolve()
-    for path in inputs:
+    for path in dict.fromkeys(inputs):
         if path.is_dir() and place.is_relative_to(path.resolve()):
             hint = "results need a folder of their own"
             faults.add(option, f"a folder outside {path}, which is an input", str(out), hint)

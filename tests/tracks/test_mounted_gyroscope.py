@@ -1,11 +1,9 @@
 """A phone's raw gyroscope beside the speeds of a vehicle: turns about the vertical."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-import mapfilter as mf
 from mapfilter.errors import InputError
 
 START_S = 1_778_666_400.0
@@ -40,16 +38,6 @@ def table(gyroscope, force, *, gyroscope_names="gyro_{}"):
     columns = {"time": START_S + TIME_S}
     columns |= {gyroscope_names.format(a): gyroscope[:, i] for i, a in enumerate(AXES)}
     return columns | {f"acc_{a}": force[:, i] for i, a in enumerate(AXES)}
-
-
-@pytest.fixture
-def read(tmp_path):
-    def of(**files):
-        for name, columns in files.items():
-            pd.DataFrame(columns).to_csv(tmp_path / f"{name}.csv", index=False)
-        return mf.read_log([tmp_path / f"{name}.csv" for name in files])
-
-    return of
 
 
 def obd(speed, every):

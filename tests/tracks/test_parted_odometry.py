@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import mapfilter as mf
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.workflows.convert import run_convert
 
@@ -13,16 +12,6 @@ TIME_S = START_S + np.arange(0.0, 300.0, 0.2)
 SPEED_MPS = np.maximum(8.0 + 6.0 * np.sin(np.arange(TIME_S.size) / 60), 2.5)
 RATE_RADPS = 0.15 * np.sin(np.arange(TIME_S.size) / 45)
 TURNED_RAD = np.append(0.0, np.cumsum(0.1 * (RATE_RADPS[1:] + RATE_RADPS[:-1])))
-
-
-@pytest.fixture
-def read(tmp_path):
-    def of(**files):
-        for name, columns in files.items():
-            pd.DataFrame(columns).to_csv(tmp_path / f"{name}.csv", index=False)
-        return mf.read_log([tmp_path / f"{name}.csv" for name in files])
-
-    return of
 
 
 def turned_rad(log):

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import mapfilter as mf
 from mapfilter.errors import InputError
 
 COUNT = 300
@@ -15,16 +14,6 @@ LON = 25 + np.arange(COUNT) * 1e-5
 
 def table(time_s=TIME_S, **columns):
     return pd.DataFrame({"time": time_s, **columns})
-
-
-@pytest.fixture
-def read(tmp_path):
-    def of(**files):
-        for name, rows in files.items():
-            rows.to_csv(tmp_path / f"{name}.csv", index=False)
-        return mf.read_log([tmp_path / f"{name}.csv" for name in files])
-
-    return of
 
 
 def test_a_receiver_that_two_files_have_counts_once(read):

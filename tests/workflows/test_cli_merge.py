@@ -42,6 +42,8 @@ def test_no_database_is_merged_into_one_of_its_inputs(own_world, tmp_path, insid
     for out in (own_world.database / inside, link / inside):
         refused = mapfilter("merge", own_world.database, "--without-cell", "B", "--out", out)
         assert_refused(refused, "--out: expected a folder outside", "which is an input")
+    twice = mapfilter("merge", own_world.database, own_world.database, "--out", own_world.database)
+    assert twice.err.count("which is an input") == 1
     assert contents(own_world.database) == before
 
 

@@ -23,9 +23,10 @@ def clock_shift_s(
 
     Parameters
     ----------
-    speeds : (times, (N,) array)
-    forces : (times, (M, 3) array)
-        Of one posture, in rising order.
+    speeds : ((N,) array, (N,) array)
+        Times in seconds, rising, and speeds in m/s.
+    forces : ((M,) array, (M, 3) array)
+        Times in seconds, rising, and specific forces in m/s², of one posture of the phone.
 
     Returns
     -------

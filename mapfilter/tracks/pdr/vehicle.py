@@ -267,7 +267,7 @@ def _notes(found: YawOffset, stood: int, *, has_rate: bool) -> tuple[str, ...]:
     if not has_rate:
         return (
             "odometry: no yaw rates (a column such as Yaw rate [deg/s] or yaw_rate_radps): "
-            f"{UNDIRECTED}; a phone's gyroscope and accelerometer tell them, too",
+            f"{UNDIRECTED}; a phone's gyroscope and accelerometer show them, too",
         )
     bias = f"{np.degrees(found.rate_radps):+.3f} ± {np.degrees(found.rate_sd_radps):.3f} deg/s"
     if not stood:

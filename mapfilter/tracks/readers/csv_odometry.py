@@ -112,8 +112,8 @@ def _counted(mapped: Mapped, reading: Reading, time_s: Floats, field: str) -> tu
     """Return the speeds by which an odometer grows, and their standard deviation."""
     column = mapped.rows.find(*mapped.names(field))
     unit = mapped.unit(field)
-    metres = (1000.0 if field == "odometer_km" else 1.0) * (1.0 if unit is None else unit.factor)
-    way = counted_way(time_s, mapped.number(field) / (1.0 if unit is None else unit.factor), metres)
+    unit_m = (1000.0 if field == "odometer_km" else 1.0) * (1.0 if unit is None else unit.factor)
+    way = counted_way(time_s, mapped.number(field) / (1.0 if unit is None else unit.factor), unit_m)
     text = f"{column}: an odometer, speeds are those by which it grows"
     if way.least_m > _COARSE_M:
         text += f", in counts of {way.least_m:.3g} m"

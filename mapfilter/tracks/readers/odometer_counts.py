@@ -45,7 +45,7 @@ class CountedWay(NamedTuple):
     resets: int = 0
 
 
-def counted_way(time_s: Floats, count: Floats, metres: float = 1.0) -> CountedWay:
+def counted_way(time_s: Floats, count: Floats, unit_m: float = 1.0) -> CountedWay:
     """Return the speeds by which a counter grows.
 
     What is counted coarsely is spread over the time from one count to the next, but for rests. A
@@ -55,8 +55,8 @@ def counted_way(time_s: Floats, count: Floats, metres: float = 1.0) -> CountedWa
     ----------
     time_s, count : (N,) arrays
         In any order; NaN where missing.
-    metres : float
-        Of one unit of the counter.
+    unit_m : float
+        Length of one unit of the counter.
 
     Examples
     --------
@@ -76,31 +76,31 @@ def counted_way(time_s: Floats, count: Floats, metres: float = 1.0) -> CountedWa
         return CountedWay(speed, float("nan"), 0.0)
     least, usual = float(grown.min()), float(np.median(grown))
     lasted_s = np.diff(at_s)
-    fallen = np.flatnonzero(_is_fall(counted, change, lasted_s, usual, metres))
+    fallen = np.flatnonzero(_is_fall(counted, change, lasted_s, usual, unit_m))
     ends = np.array([_end_of(counted[k], counted[k + 1], least, usual) for k in fallen])
     wraps = fallen[np.isfinite(ends)] if fallen.size else fallen
     total = counted.copy()
     for k, end in zip(fallen, ends, strict=True):
         total[k + 1 :] += end if np.isfinite(end) else 0.0
     change = np.diff(total)
-    broken = change * metres > np.maximum(_FASTEST_MPS * lasted_s, 1.5 * least * metres)
+    broken = change * unit_m > np.maximum(_FASTEST_MPS * lasted_s, 1.5 * least * unit_m)
     broken[np.setdiff1d(fallen, wraps)] = True
     gap_s = _usual_gap(at_s, change)
     for part in np.split(np.arange(known.size), np.flatnonzero(broken) + 1):
-        coarse = metres * least > _COARSE_M
-        speed[known[part]] = _speeds(at_s[part], metres * total[part], gap_s, coarse=coarse)
+        coarse = unit_m * least > _COARSE_M
+        speed[known[part]] = _speeds(at_s[part], unit_m * total[part], gap_s, coarse=coarse)
     # Errors of a count do not add up: those of its time are as if drawn anew in each 10 s.
     period_s = float(np.median(lasted_s))
-    sd = metres * least / 6**0.5 / (max(gap_s, _SPREAD_S) * period_s) ** 0.5
+    sd = unit_m * least / 6**0.5 / (max(gap_s, _SPREAD_S) * period_s) ** 0.5
     sd = sd if sd > _LEAST_SD_MPS else float("nan")
-    return CountedWay(speed, sd, metres * least, wraps.size, int(broken.sum()))
+    return CountedWay(speed, sd, unit_m * least, wraps.size, int(broken.sum()))
 
 
 def _is_fall(
-    counted: Floats, change: Floats, lasted_s: Floats, usual: float, metres: float
+    counted: Floats, change: Floats, lasted_s: Floats, usual: float, unit_m: float
 ) -> Bools:
     """Return after which rows a counter falls, and its vehicle does not just back up."""
-    fast = -change * metres > _BACK_MPS * lasted_s
+    fast = -change * unit_m > _BACK_MPS * lasted_s
     return np.asarray((change < -_JITTER) & (fast | (np.abs(counted[1:]) <= usual)))
 
 
