@@ -8,12 +8,13 @@ from dataclasses import dataclass, fields
 from html import escape
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import pandas as pd
 
 from mapfilter._annotations import items_of
 from mapfilter._arguments import (
+    Argument,
     Count,
     Entries,
     Setting,
@@ -48,14 +49,18 @@ from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.locators import filter_options
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.roads.osm import Profile
 from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Ways
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
+from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+SweepFigure = Literal["success", "coverage_95", "radius_95_median_m"]
 
 _FILTERS = 'names and options, such as {"mine": BayesFilter()}'
 
@@ -80,18 +85,19 @@ class Sweep:
         return f"<p>{escape(repr(self))}</p>{self.to_dataframe().head(20).to_html()}"
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return success rates with 95 % intervals and mean errors, one row for each grid cell.
+        """Return success, errors and coverage, one row for each grid cell.
 
         Errors are those of the successful runs alone: a filter that is mostly ``wrong`` may have
-        the smallest ones. Compare ``success`` and ``wrong`` first.
+        the smallest ones. Compare ``success`` and ``wrong`` first. ``coverage_95`` and
+        ``radius_95_median_m`` are of what all runs claimed. Shares have 95 % intervals.
 
         Columns are those of :class:`mapfilter.evaluation.success_cells.SuccessCell`, with one for
         each varied option in place of ``varied``, named by its key as in ``runs``.
         """
         return pd.DataFrame([cell.row for cell in success_cells(self.runs)])
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw success over the deviation of headings, or over another value that differs.
+    def plot(self, ax: Axes | None = None, *, figure: SweepFigure = "success") -> Axes:
+        """Draw a figure over the deviation of headings, or over another value that differs.
 
         There is a curve for each filter, and for each other noise or option that differs. With one
         deviation of headings the first of these is drawn along the axis; where nothing but the
@@ -101,15 +107,31 @@ class Sweep:
         ----------
         ax : matplotlib Axes, optional
             Where to draw; a new figure when left out.
+        figure : {"success", "coverage_95", "radius_95_median_m"}
+            The column of :meth:`to_dataframe` that is drawn.
+
+        Raises
+        ------
+        ConfigError
+            There is no such figure, or no filter of the sweep claimed a position with a radius.
         """
+        from mapfilter.report import claimed_radii
         from mapfilter.report.success import curve_axis, plot_success_curves, success_curves
 
+        check_arguments("plot", keywords=[Setting("figure", figure, SweepFigure)])
         cells = success_cells(self.runs)
+        if figure != "success" and not claimed_radii.have_radii(cells):
+            expected = "'success', as no position with a radius was claimed"
+            raise fail(ConfigError, "plot, figure", expected, figure)
+        draw, name = {
+            "success": (plot_success_curves, "Success"),
+            "coverage_95": (claimed_radii.plot_coverage_curves, "Coverage of the 95 % radius"),
+            "radius_95_median_m": (claimed_radii.plot_radius_curves, "95 % radius"),
+        }[figure]
         axis = curve_axis(cells)
-        title = "Success of filters" if axis == READING else f"Success over {axis}"
-        if axis == HEADING:
-            title = "Success over the noise of headings"
-        return plot_success_curves(success_curves(cells, axis), ax, title=title, axis=axis)
+        over = "the noise of headings" if axis == HEADING else axis
+        title = f"{name} of filters" if axis == READING else f"{name} over {over}"
+        return draw(success_curves(cells, axis), ax, title=title, axis=axis)
 
 
 def sweep(
@@ -123,6 +145,8 @@ def sweep(
     draws: int = 1,
     length_m: float = 1940.0,
     reports: ReportModel | None = None,
+    walker: WalkerModel | None = None,
+    profile: Profile = "walking",
     seed: int = 0,
     executor: Executor | None = None,
 ) -> Sweep:
@@ -145,8 +169,9 @@ def sweep(
         Routes, and runs on each of them with every noise.
     length_m : float
         Length of each route.
-    reports : ReportModel, optional
-        As for :func:`simulate`.
+    reports, walker, profile : optional
+        As for :func:`simulate`. Of drives, filters take the defaults of vehicles, as where
+        :func:`locate` is given the log of a drive.
     seed : int
         Of routes and noise.
     executor : Executor, optional
@@ -172,6 +197,8 @@ def sweep(
             Setting("draws", draws, Count),
             Setting("length_m", length_m, Positive),
             reports_argument(reports),
+            Argument("walker", walker, WalkerModel | None, "WalkerModel"),
+            Setting("profile", profile, Profile),
             Setting("seed", seed, WholeNumber),
             executor_argument(executor),
         ],
@@ -179,6 +206,7 @@ def sweep(
     database = opened(database)
     reports = reports or ReportModel()
     radio = Radio() if reports.radio == AS_PREDICTED else Radio("ground truth", nan)
+    journey = JourneyPlan(length_m=length_m, profile=profile, walker=walker or WalkerModel())
     plans = [
         SweepPlan(
             _readings(filters),
@@ -188,7 +216,7 @@ def sweep(
             imu_periods_s=(noise.period_s,),
             routes=routes,
             draws=draws,
-            journey=JourneyPlan(length_m=length_m),
+            journey=journey,
             reports=reports,
             seed=seed,
             varied=varied,
@@ -196,7 +224,7 @@ def sweep(
         for noise, varied in _distinguished(items_of(several) or [ImuNoise()])
     ]
     _check_turns(plans)
-    network = network_of(roads, rasters, "walking")
+    network = network_of(roads, rasters, profile)
     named = named_by_plan(rasters, database.plan)
     world = SweepWorld.of(network, database.plan, {radio.name: named})
     return Sweep(sweep_runs(plans, world, {"database": database}, executor=executor))

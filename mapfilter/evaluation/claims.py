@@ -62,6 +62,46 @@ class Claims:
     worst_100m_m: float
 
 
+@dataclass(frozen=True, slots=True)
+class ClaimedRadii:
+    """The 95 % radius of one track, where a position was claimed.
+
+    Parameters
+    ----------
+    epochs, claimed_epochs : int
+        As ``epochs`` and ``claimed`` of :class:`Claims`.
+    held_95_epochs : int or None
+        Claimed epochs whose 95 % radius held the true position; None where none of them has a
+        radius, as with the candidate filter.
+    radius_95_median_m : float
+        Median of that radius over the claimed epochs that have one; NaN without any.
+    """
+
+    epochs: int
+    claimed_epochs: int
+    held_95_epochs: int | None
+    radius_95_median_m: float
+
+
+def claimed_radii(estimate: TrackEstimate, truth: Truth) -> ClaimedRadii:
+    """Count how often the 95 % radius of claimed positions held the truth along one track.
+
+    Examples
+    --------
+    >>> claimed_radii(TrackEstimate.of_fixes("EPSG:32635", "none", []), Truth(*np.eye(3, 2)))
+    ClaimedRadii(epochs=0, claimed_epochs=0, held_95_epochs=None, radius_95_median_m=nan)
+    """
+    counted = truth.tells(estimate.time_s)
+    claimed = counted & claims_of(estimate)
+    radius_m = estimate.radii_m[claimed, -1] if len(estimate) else np.zeros(0)
+    known_m = radius_m[~np.isnan(radius_m)]
+    held = None
+    if known_m.size:
+        held = int((position_errors_m(estimate, truth)[claimed] <= radius_m).sum())
+    median_m = float(np.median(known_m)) if known_m.size else nan
+    return ClaimedRadii(int(counted.sum()), int(claimed.sum()), held, median_m)
+
+
 def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf) -> Claims:
     """Count what a filter claimed along one track.
 

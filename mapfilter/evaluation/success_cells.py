@@ -1,10 +1,11 @@
-"""Success rates over a grid: the runs of each cell, with their intervals."""
+"""Success and coverage over a grid: the runs of each cell, with their intervals."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from itertools import takewhile
+from math import nan
 from typing import Any
 
 import pandas as pd
@@ -40,6 +41,17 @@ class SuccessCell:
         Means over the successful runs of each run's figure, as Table 4 of Khalaf-Allah 2007.
     switch_distance_m : float
         Mean over the runs that switched.
+    claimed : float
+        Share of all epochs at which a position was claimed: CONVERGED or TRACKING.
+    coverage_95, coverage_95_low, coverage_95_high : float
+        Share of the claimed epochs of all runs, wrong ones included, whose 95 % radius held the
+        true position, and its 95 % interval for *these* routes; NaN of filters without radii. Runs
+        are drawn, not epochs, as those of a run are alike.
+    coverage_95_routes_low, coverage_95_routes_high : float
+        The interval for all routes of the area; NaN for a single one.
+    radius_95_median_m : float
+        Median over the runs that claimed a position of each run's median 95 % radius; NaN without
+        any.
     varied : dict of str to float
         Values of varied options, by dotted key.
     """
@@ -70,6 +82,13 @@ class SuccessCell:
     error_67_m: float
     error_95_m: float
     switch_distance_m: float
+    claimed: float
+    coverage_95: float
+    coverage_95_low: float
+    coverage_95_high: float
+    coverage_95_routes_low: float
+    coverage_95_routes_high: float
+    radius_95_median_m: float
     varied: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -97,8 +116,8 @@ def success_cells(runs: pd.DataFrame) -> tuple[SuccessCell, ...]:
     Parameters
     ----------
     runs : pandas.DataFrame
-        The coordinates, ``route``, ``switched``, ``success``, ``switch_distance_m`` and the errors
-        of each run, as a sweep's table holds them.
+        The coordinates, ``route``, ``switched``, ``success``, ``switch_distance_m``, the errors
+        and the claimed radii of each run, as a sweep's table holds them.
     """
     keys = varied_keys(runs)
     grouped = runs.groupby([*COORDINATES, *keys], sort=False, dropna=False)
@@ -128,8 +147,27 @@ def _cell(place: tuple[Any, ...], keys: Sequence[str], rows: pd.DataFrame) -> Su
         error_67_m=float(right["error_67_m"].mean()),
         error_95_m=float(right["error_95_m"].mean()),
         switch_distance_m=float(rows["switch_distance_m"].mean()),
+        **_radii(rows),
         varied=dict(zip(keys, map(float, place[count:]), strict=True)),
     )
+
+
+def _radii(rows: pd.DataFrame) -> dict[str, Any]:
+    """Return what the runs of a cell claimed, and how well their radii held it."""
+    epochs, claimed = int(rows["epochs"].sum()), int(rows["claimed_epochs"].sum())
+    figures: dict[str, Any] = {
+        "claimed": claimed / epochs if epochs else nan,
+        "radius_95_median_m": float(rows["radius_95_median_m"].median()),
+    }
+    known = rows[rows["held_95_epochs"].notna()]
+    of = known["claimed_epochs"].sum()
+    figures["coverage_95"] = float(known["held_95_epochs"].sum() / of) if of else nan
+    by_route = known.groupby("route")[["held_95_epochs", "claimed_epochs"]].sum()
+    for name, clusters in (("coverage_95", known), ("coverage_95_routes", by_route)):
+        held, whole = clusters["held_95_epochs"], clusters["claimed_epochs"]
+        ends = wilson_interval_of_routes(held, whole)
+        figures |= dict(zip((f"{name}_low", f"{name}_high"), ends, strict=True))
+    return figures
 
 
 def axes_of(cells: Sequence[SuccessCell], *, by_reading: bool = False) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -132,23 +132,44 @@ def plot_success_curves(
         end = Look(marker="|", markersize=11, markeredgewidth=2.6)
         axes.plot([deg], [100 * share], color=BLACK, zorder=4, **end)
         name = None
+    draw_curves(axes, curves, axis, lambda one: (one.success, one.low, one.high), 100)
+    axes.set(ylabel="successful global positioning / %", ylim=(0, 102), title=title)
+    legend(axes, ax, 3)
+    return axes
+
+
+def draw_curves(
+    axes: Axes,
+    curves: Sequence[tuple[str, Sequence[SuccessCell]]],
+    axis: str,
+    figure_of_cell: Callable[[SuccessCell], tuple[float, float, float]],
+    factor: float = 1.0,
+) -> None:
+    """Draw a figure of cells over a coordinate of the grid, a curve for each group.
+
+    Parameters
+    ----------
+    curves, axis
+        As for :func:`plot_success_curves`.
+    figure_of_cell : callable
+        Returns the figure of a cell, and the ends of its interval; NaN where there is none.
+    factor : float
+        Of figures in the unit of the axis.
+    """
     places, shifts = _across(curves, axis)
     bars = {"marker": "o", "markersize": 4, "linewidth": 1.4, "elinewidth": 0.9, "capsize": 2}
     colours = distinct_colours(len(curves))
     for (label, cells), at, shift, colour in zip(curves, places, shifts, colours, strict=True):
         order = np.argsort(at, kind="stable")
-        ordered = [cells[index] for index in order]
-        success = np.array([cell.success for cell in ordered])
-        error = success - [c.low for c in ordered], [c.high for c in ordered] - success
-        look = Look(yerr=100 * np.abs(np.array(error)), color=colour, label=label) | bars
-        axes.errorbar(at[order] + shift, 100 * success, **look)
-    axes.set(xlabel=_LABELS.get(axis, axis), ylim=(0, 102), title=title)
+        found = factor * np.array([figure_of_cell(cells[index]) for index in order]).reshape(-1, 3)
+        value, low, high = found.T
+        error = np.abs(np.array([value - low, high - value]))
+        look = Look(yerr=error, color=colour, label=label) | bars
+        axes.errorbar(at[order] + shift, value, **look)
+    axes.set_xlabel(_LABELS.get(axis, axis))
     if axis != HEADING:
         _mark(axes, [name for name, _ in curves], places, axis)
-    axes.set_ylabel("successful global positioning / %")
     tidy(axes)
-    legend(axes, ax, 3)
-    return axes
 
 
 def _across(curves: Sequence[tuple[str, Sequence[SuccessCell]]], axis: str) -> tuple[Any, Any]:

@@ -16,6 +16,7 @@ from mapfilter._cluster import cluster_executor
 from mapfilter._parallel import SerialExecutor, local_executor
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
+from mapfilter.evaluation.claims import claimed_radii
 from mapfilter.experiments.papers.khalaf_allah_2007 import MAP_SETTINGS, ONE_SIGMA_TRANS_M, plans
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import SweepPlan
@@ -149,7 +150,8 @@ def _parts(plan: SweepPlan, world: SweepWorld, database: Path) -> tuple[int, dic
             with timed("located_s"):
                 found = locate(moved, filter_, filter_rng(plan.seed, run)).estimate
             with timed("scored_s"):
-                accuracy(found, truth_of(log.truth))
+                truth = truth_of(log.truth)
+                accuracy(found, truth), claimed_radii(found, truth)
             epochs = len(found)
     return epochs, {name: median(times) for name, times in took.items()}
 

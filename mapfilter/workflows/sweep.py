@@ -33,6 +33,7 @@ from mapfilter.experiments.sweep.plan import NOISE_AXES
 from mapfilter.experiments.sweep.run import run_batch, seconds_per_run, sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.report.canvas import Drawn
+from mapfilter.report.claimed_radii import have_radii, plot_claimed_radii
 from mapfilter.report.saving import save
 from mapfilter.report.success import (
     place_words,
@@ -45,11 +46,14 @@ from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plans, sweep_w
 
 _WHITE = {f"{section}{name}" for section in ("", "imu.") for name in NOISE_AXES[:2]}
 _MOST_CURVES, _MOST_GROUPS = 8, 16
-_OWN = re.compile(r"table\.(csv|tex)|(success|success-map|distributions)(-[0-9]+)?\.png")
+_OWN = re.compile(r"table\.(csv|tex)|(success|success-map|radii|distributions)(-[0-9]+)?\.png")
 _PLACES = ("sweep.databases", "database.path", "output.dir")
 
 
-_FOUND = ("runs", "success", "low", "high", "wrong", "error_mean_m", "switch_distance_m")
+_SUCCESS = ("runs", "success", "low", "high", "wrong", "error_mean_m", "switch_distance_m")
+_COVERAGE = ("coverage_95", "coverage_95_low", "coverage_95_high")
+_FOUND = (*_SUCCESS, "claimed", *_COVERAGE, "radius_95_median_m")
+_BRIEF = (*_SUCCESS, "coverage_95", "radius_95_median_m")
 
 
 def draw_sweep(runs: pd.DataFrame, out: Path) -> tuple[Path, ...]:
@@ -58,8 +62,9 @@ def draw_sweep(runs: pd.DataFrame, out: Path) -> tuple[Path, ...]:
     Returns
     -------
     pictures : tuple of Path
-        ``success.png``, ``success-map.png`` and ``distributions.png``, with numbers before the
-        ending where there are several groups, of which the first 16 are drawn.
+        ``success.png``, ``success-map.png``, ``distributions.png``, and ``radii.png`` of filters
+        with radii, with numbers before the ending where there are several groups, of which the
+        first 16 are drawn.
     """
     pictures: list[Path] = []
     groups = list(groups_of(runs))[:_MOST_GROUPS]
@@ -70,11 +75,14 @@ def draw_sweep(runs: pd.DataFrame, out: Path) -> tuple[Path, ...]:
             curves.setdefault(f"step {cell.sigma_trans_m:g} m", []).append(cell)
         one_step = rows[rows["sigma_trans_m"] == rows["sigma_trans_m"].min()]
         by_heading = [(f"heading {sigma:g}°", some) for sigma, some in one_step.groupby(HEADING)]
+        shown = list(curves.items())[:_MOST_CURVES]
         drawn: dict[str, Drawn] = {
-            "success": plot_success_curves(list(curves.items())[:_MOST_CURVES], title=title),
+            "success": plot_success_curves(shown, title=title),
             "success-map": plot_success_map(cells, title=title),
             "distributions": plot_run_distributions(by_heading[:_MOST_CURVES], title=title),
         }
+        if have_radii(cells):
+            drawn["radii"] = plot_claimed_radii(shown, title=title)
         tail = f"-{number}" if len(groups) > 1 else ""
         pictures += [save(picture, out / f"{name}{tail}.png") for name, picture in drawn.items()]
     return tuple(pictures)
@@ -271,7 +279,7 @@ def brief(cells: Sequence[SuccessCell]) -> list[dict[str, Any]]:
     """
     axes = axes_of(cells, by_reading=True)
     if HEADING not in axes:
-        names = [*axes, *_FOUND]
+        names = [*axes, *_BRIEF]
         return [{name: (asdict(cell) | cell.place)[name] for name in names} for cell in cells]
     axes = [name for name in axes if name not in (HEADING, f"imu.{HEADING}")]
     degrees = sorted({cell.sigma_orient_deg for cell in cells})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapfilter.evaluation.claims import score_claims
+from mapfilter.evaluation.claims import claimed_radii, score_claims
 from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import TrackEstimate
@@ -27,6 +27,11 @@ def claims(
     statuses, errors_m, radii_m=(10.0, 20.0, 30.0, 40.0), *, seconds=None, time_s=None, **more
 ):
     """Score epochs a second apart that are off to the north."""
+    end = len(statuses) - 1 if seconds is None else seconds
+    return score_claims(track(statuses, errors_m, radii_m, time_s), truth(end), **more)
+
+
+def track(statuses, errors_m, radii_m, time_s=None):
     count = len(statuses)
     times = np.arange(float(count)) if time_s is None else np.asarray(time_s, dtype=float)
     errors = np.broadcast_to(np.asarray(errors_m, dtype=float), (count,))
@@ -38,8 +43,7 @@ def claims(
         )
         for i in range(count)
     ]  # fmt: skip
-    estimate = TrackEstimate.of_fixes("EPSG:32629", "bayes", fixes)
-    return score_claims(estimate, truth(count - 1 if seconds is None else seconds), **more)
+    return TrackEstimate.of_fixes("EPSG:32629", "bayes", fixes)
 
 
 def test_every_claimed_epoch_counts_and_no_other():
@@ -69,6 +73,32 @@ def test_coverage_is_counted_against_the_radius_itself(error_m, radii_m, covered
 def test_coverage_takes_each_epochs_own_radius():
     radii = [(1, 1, 1, 1), (1, 2, 3, 4), (4, 5, 6, 7), (7, 8, 9, 10)]
     assert claims("SCTT", [0, 2, 5.5, 6], radii).covered == (1, 2, 3, 3)
+
+
+def test_radii_are_counted_where_a_position_is_claimed():
+    """Of five epochs with truth three are claimed; UNCERTAIN, LOST and the last one are not."""
+    radii = [(1, 2, radius, 9) for radius in (10.0, 20.0, 90.0, 60.0, 80.0, 70.0)]
+    found = claimed_radii(track("CTTULT", [10.0, 20.1, 5.0, 0, 0, 0], radii), truth(4))
+    assert (found.epochs, found.claimed_epochs, found.held_95_epochs) == (5, 3, 2)
+    assert found.radius_95_median_m == 20.0
+
+
+@pytest.mark.parametrize(
+    ("statuses", "radius_m", "claimed", "held"),
+    [("SSU", 9.0, 0, None), ("CTT", np.nan, 3, None), ("CTT", np.inf, 3, 3), ("", 9.0, 0, None)],
+)
+def test_what_has_no_radius_is_held_by_none(statuses, radius_m, claimed, held):
+    found = claimed_radii(track(statuses, 5.0, (1.0, 2.0, radius_m, 9.0)), truth(9))
+    assert (found.epochs, found.claimed_epochs, found.held_95_epochs) == (
+        len(statuses), claimed, held,
+    )  # fmt: skip
+    assert np.isnan(found.radius_95_median_m) == (held is None)
+
+
+def test_an_epoch_without_a_radius_among_others_holds_nothing():
+    radii = [(1, 2, radius, 9) for radius in (30.0, np.nan, 50.0)]
+    found = claimed_radii(track("CTT", 5.0, radii), truth(9))
+    assert (found.claimed_epochs, found.held_95_epochs, found.radius_95_median_m) == (3, 2, 40.0)
 
 
 def test_every_converged_counts_also_after_lost():

@@ -10,10 +10,12 @@ import pytest
 
 from mapfilter.errors import StoreError
 from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.evaluation.claims import ClaimedRadii
 from mapfilter.experiments.sweep.plan import LONGEST_BATCH, Reading, SweepPlan
 from mapfilter.experiments.sweep.table import (
     SCHEMA,
     join_parts,
+    note_whole,
     read_part,
     read_runs,
     row,
@@ -25,20 +27,24 @@ from mapfilter.tracks.imu_noise import ImuNoise
 
 NEVER = Accuracy(False, False, nan, nan, nan, nan, nan, nan, 0)
 RIGHT = Accuracy(True, True, 60.0, 84.0, 3.0, 4.0, 5.0, 9.0, 10)
+SILENT = ClaimedRadii(12, 0, None, nan)
+HELD = ClaimedRadii(12, 10, 9, 21.0)
 PLAN = SweepPlan((Reading("set", CandidateFilter()),), draws=25)
 
 
 def rows(first, end, score=RIGHT):
-    return to_table([row(run, score, "TRACKING") for run in PLAN.select(first, end)])
+    return to_table([row(run, score, HELD, "TRACKING") for run in PLAN.select(first, end)])
 
 
 def test_a_row_tells_run_and_score_and_null_where_there_is_none():
-    table = to_table([row(next(PLAN.select(3, 4)), NEVER, "SEARCHING")])
+    table = to_table([row(next(PLAN.select(3, 4)), NEVER, SILENT, "SEARCHING")])
     assert table.schema.equals(SCHEMA)
     found = table.to_pylist()[0]
     assert (found["draw"], found["filter"], found["sigma_trans_m"]) == (3, "candidate", 0.2)
     assert found["success"] is False
     assert found["error_mean_m"] is found["switch_distance_m"] is found["update_length_m"] is None
+    assert (found["epochs"], found["claimed_epochs"]) == (12, 0)
+    assert found["held_95_epochs"] is found["radius_95_median_m"] is None
 
 
 def test_parts_join_to_the_whole(tmp_path):
@@ -88,6 +94,15 @@ def test_another_table_is_refused(tmp_path):
     pq.write_table(rows(0, 5).drop_columns(["draw", "route"]), other)
     with pytest.raises(StoreError, match="columns of a sweep"):
         read_runs(other)
+
+
+def test_a_table_of_an_earlier_version_is_named_as_such(tmp_path):
+    older = tmp_path / "runs.parquet"
+    pq.write_table(rows(0, 5).drop_columns(["held_95_epochs", "claimed_epochs"]), older)
+    note_whole(older, {"version": 1})
+    expected = "none of claimed_epochs, held_95_epochs.+an earlier version of mapfilter"
+    with pytest.raises(StoreError, match=expected):
+        read_runs(older)
 
 
 @pytest.mark.parametrize(

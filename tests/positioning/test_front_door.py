@@ -341,6 +341,32 @@ def test_cells_of_a_sweep_are_a_table_of_plain_columns(database, rasters, street
     assert list(table)[: len(coordinates)] == coordinates
 
 
+def test_a_sweep_of_drives_is_one_of_logs_of_vehicles(database, rasters, streets):
+    """Drives are faster than walks, and their filters are those of vehicles, as by mf.locate."""
+
+    def runs(profile, options):
+        given = {"routes": 2, "length_m": 200.0, "seed": 4, "profile": profile}
+        return mf.sweep(database, rasters, streets, {"b": options}, **given).runs
+
+    easy = {"switch_mass": 0.1, "switch_hold_m": 0.0}
+    walks, drives = (runs(profile, mf.BayesFilter(**easy)) for profile in ("walking", "driving"))
+    assert (drives["epochs"] < 0.5 * walks["epochs"]).all()
+    vehicle = mf.BayesFilter(vehicle=True, **easy)
+    pd.testing.assert_frame_equal(runs("driving", vehicle), drives)
+    assert not runs("walking", vehicle).equals(walks)
+    with pytest.raises(mf.MapfilterError, match="sweep, profile: expected 'walking'"):
+        runs("cycling", vehicle)
+
+
+def test_the_radius_of_a_sweep_is_drawn_where_there_is_one(database, rasters, streets):
+    alone = swept(database, rasters, streets)
+    assert alone.to_dataframe()["coverage_95"].isna().all()
+    with pytest.raises(mf.MapfilterError, match="plot, figure: expected 'success', as no position"):
+        alone.plot(figure="coverage_95")
+    with pytest.raises(mf.MapfilterError, match="plot, figure: expected 'success', 'coverage_95'"):
+        alone.plot(figure="coverage")
+
+
 def ticks_of(axes):
     return [label.get_text() for label in axes.get_xticklabels()]
 

@@ -8,6 +8,11 @@ import pandas as pd
 import pytest
 
 from mapfilter.evaluation.success_cells import SuccessCell
+from mapfilter.report.claimed_radii import (
+    plot_claimed_radii,
+    plot_coverage_curves,
+    plot_radius_curves,
+)
 from mapfilter.report.saving import save
 from mapfilter.report.success import (
     curve_axis,
@@ -153,3 +158,44 @@ def test_distributions_of_runs_that_never_switched(tmp_path):
     groups = [("never", runs(9, switched=False)), ("some", runs(9))]
     save(plot_run_distributions(groups, title="a town"), path)
     assert path.is_file()
+
+
+def with_radii(coverage, radius_m, **place):
+    low, high = max(coverage - 0.1, 0.0), min(coverage + 0.05, 1.0)
+    ends = {"coverage_95": coverage, "coverage_95_low": low, "coverage_95_high": high}
+    place = {"reading": "b", **place}
+    return replace(cell(3.0, 0.2, 0.5), **ends, radius_95_median_m=radius_m, **place)
+
+
+def drawn_heights(axes):
+    """Heights of the markers of each curve; the line at 95 % has none."""
+    curves = [line for line in axes.lines if line.get_marker() == "o"]
+    return [list(map(float, line.get_ydata())) for line in curves]
+
+
+def test_coverage_and_radius_are_those_of_the_cells():
+    cells = [with_radii(0.9, 30.0, scale=0.0), with_radii(0.8, 41.0, scale=0.1)]
+    axis, curves = curve_axis(cells), success_curves(cells, curve_axis(cells))
+    covered = plot_coverage_curves(curves, title="a town", axis=axis)
+    assert drawn_heights(covered) == [pytest.approx([90.0, 80.0])]
+    assert 95.0 in {float(line.get_ydata()[0]) for line in covered.lines}
+    bars = covered.collections[0].get_segments()
+    assert [sorted(end[:, 1]) for end in bars] == [
+        pytest.approx([80.0, 95.0]),
+        pytest.approx([70.0, 85.0]),
+    ]
+    wide = plot_radius_curves(curves, title="a town", axis=axis)
+    assert drawn_heights(wide) == [[30.0, 41.0]]
+    assert wide.get_ylim()[1] > 41.0
+    both = plot_claimed_radii(curves, title="a town", axis=axis)
+    assert [drawn_heights(axes)[0][1] for axes in both.axes] == pytest.approx([80.0, 41.0])
+
+
+def test_a_filter_without_radii_is_named_as_such(tmp_path):
+    filters = [with_radii(0.9, 30.0, reading="b"), with_radii(np.nan, np.nan, reading="c")]
+    curves = success_curves(filters, "reading")
+    axes = plot_coverage_curves(curves, title="a town", axis="reading")
+    assert axes.get_legend_handles_labels()[1] == ["b", "c: no radius"]
+    for name, radius in (("some", curves), ("none", curves[1:])):
+        save(plot_claimed_radii(radius, title="a town", axis="reading"), tmp_path / f"{name}.png")
+        assert inked(tmp_path / f"{name}.png") > 0.005

@@ -14,6 +14,7 @@ from mapfilter._json_files import sealed
 from mapfilter._parallel import SerialExecutor, local_executor
 from mapfilter.config.load import load_config
 from mapfilter.errors import ConfigError, MapfilterError, StoreError
+from mapfilter.experiments.sweep import run
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.workflows.simulate import run_simulate
@@ -70,6 +71,12 @@ def test_the_command_and_what_it_tells(world, whole, tmp_path):
         [cell["success"] for cell in found["cells"]], abs=1e-4
     )
     assert {"sigma_trans_m", "sigma_orient_deg", "update_length_m"} <= set(table)
+    # The candidate filter has no radii.
+    assert {cell["coverage_95"] for cell in found["cells"]} == {None}
+    assert table["radius_95_median_m"].isna().all()
+    assert table["claimed"].tolist() == pytest.approx(
+        [cell["claimed"] for cell in found["cells"]], abs=1e-4
+    )
     assert "\\toprule" in (out / "table.tex").read_text()
     runs = read_runs(out / "runs.parquet")
     assert runs["success"].sum() == sum(round(c["success"] * 12) for c in found["cells"])
@@ -86,9 +93,27 @@ def test_logs_of_a_sweep_are_as_sound_as_checked_ones(parts):
     truth = journeys.true_path(world, plan, run.route)
     log = journeys.radio_log(world, plan, truth, run.route, run.radio, run.report_period_s)
     sensed = journeys.sensed(plan, log, run)
+    assert (log.vehicle, sensed.vehicle) == (None, None)
     checked = make_log(sensed.crs, motion=sensed.motion, radio=sensed.radio, truth=sensed.truth)
     for name in ("motion", "radio", "truth"):
         assert getattr(checked, name).equals(getattr(sensed, name)), name
+
+
+def test_an_older_version_is_not_resumed(parts, whole, tmp_path, monkeypatch):
+    """Neither a finished sweep nor an unfinished one mixes with rows of another version."""
+    version = run._VERSION
+    for stops in (None, 1):
+        monkeypatch.setattr(run, "_VERSION", version - 1)
+        out = tmp_path / str(stops)
+        if stops is None:
+            sweep(*parts, out)
+        else:
+            with pytest.raises(KeyboardInterrupt):
+                sweep(*parts, out, executor=StopsAfter(stops), in_flight=1)
+        monkeypatch.setattr(run, "_VERSION", version)
+        with pytest.raises(ConfigError, match="another version of the sweep"):
+            sweep(*parts, out, resume=True)
+        assert sweep(*parts, out).read_bytes() == whole
 
 
 def test_two_processes_give_the_same_bytes(parts, whole, tmp_path):
@@ -247,6 +272,34 @@ def test_any_numeric_option_is_an_axis(own_world):
     single = read_runs(out / "runs.parquet")
     last = runs[(runs["imu.scale"] == 0.1) & (runs["filter.update_length_m"] == 20.0)]
     pd.testing.assert_frame_equal(last.drop(columns=keys).reset_index(drop=True), single)
+
+
+def test_radii_are_in_table_and_picture_and_of_drives(own_world):
+    """Coverage and median radius, by hand from the runs; filters take a vehicle's defaults."""
+    given = settings(
+        filter__name="bayes",
+        roads__profile="driving",
+        sweep__routes=2,
+        sweep__draws=2,
+        journeys__length_m=300,
+        imu__sigma_trans_m=0.05,
+        output__pictures="first",
+    )
+    result = run_sweep(load_sweep(own_world.toml, [text.removeprefix("--set=") for text in given]))
+    assert {"radii.png", "success.png"} <= {picture.name for picture in result.pictures}
+    runs, (cell,) = read_runs(result.table), result.cells
+    held, claimed = runs["held_95_epochs"].sum(), runs["claimed_epochs"].sum()
+    assert cell.coverage_95 == held / claimed > 0.5
+    assert cell.coverage_95_low <= cell.coverage_95 <= cell.coverage_95_high
+    assert cell.radius_95_median_m == runs["radius_95_median_m"].median() > 0
+    shown = pd.read_csv(own_world.out / "sweep" / "table.csv").iloc[0]
+    names = ("claimed", "coverage_95", "coverage_95_low", "radius_95_median_m")
+    for name in names:
+        assert shown[name] == pytest.approx(getattr(cell, name), rel=1e-3)
+    vehicle = settings(filter__bayes__vehicle="true")
+    stated = [text.removeprefix("--set=") for text in (*given, *vehicle)]
+    again = run_sweep(load_sweep(own_world.toml, stated))
+    pd.testing.assert_frame_equal(read_runs(again.table), runs)
 
 
 def test_a_varied_sweep_is_resumed(own_world):

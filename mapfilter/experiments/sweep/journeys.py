@@ -69,7 +69,10 @@ def radio_log(
     radio: Radio,
     report_period_s: float,
 ) -> TrackLog:
-    """Return the log of a journey without its motion: what the phone reports, and the truth."""
+    """Return the log of a journey without its motion: what the phone reports, and the truth.
+
+    A drive is stated to be a vehicle's, as by :mod:`mapfilter.simulation.simulate`.
+    """
     model = replace(
         plan.reports,
         report_period_s=report_period_s,
@@ -78,7 +81,8 @@ def radio_log(
     levels = array_sampler(world.levels_dbm[radio.name], world.lattice)
     rng = radio_rng(plan.seed, number, radio, report_period_s)
     rows = reports(truth, levels, world.plan, model, rng)
-    return make_log(world.network.crs, radio=rows, truth=truth)
+    driven = plan.journey.profile == "driving" or None
+    return make_log(world.network.crs, radio=rows, truth=truth, vehicle=driven)
 
 
 def sensed(plan: SweepPlan, log: TrackLog, run: Run) -> TrackLog:

@@ -21,17 +21,19 @@ from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import check_same, kept_when_stopped, start_or_resume, with_code
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.accuracy import accuracy
+from mapfilter.evaluation.claims import claimed_radii
 from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import Radio, Run, SweepPlan
 from mapfilter.experiments.sweep.world import SweepWorld, opened_world, scored_filter, write_world
+from mapfilter.positioning.log_options import LogStatement, fitted_to_statement
 from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import TrackLog
 
 RUNS = "runs.parquet"
 UNFINISHED = "unfinished"
 
-_VERSION = 1
+_VERSION = 2
 _DETERMINED_BY = {
     "plan_sha256": "plan",
     "world_sha256": "world (streets, cells or levels)",
@@ -69,12 +71,15 @@ def run_batch(batch: Batch) -> pa.Table:
     runs = plan.select(batch.first, batch.end)
     for (radio, period_s, route), alike in groupby(runs, key=_journey):
         log = _radio_log(batch.world, batch.world_sha256, plan, route, radio, period_s)
-        truth = truth_of(log.truth)
+        truth, stated = truth_of(log.truth), LogStatement.of_log(log)
         for run in alike:
-            filter_ = scored_filter(*databases[run.database], run.reading.choice)
+            # As where the logs of a simulation are replayed.
+            choice, _ = fitted_to_statement(run.reading.choice, stated)
+            filter_ = scored_filter(*databases[run.database], choice)
             found = locate(sensed(plan, log, run), filter_, filter_rng(plan.seed, run)).estimate
+            figures = accuracy(found, truth), claimed_radii(found, truth)
             last = str(found.status[-1]) if len(found) else ""
-            rows.append(table.row(run, accuracy(found, truth), last, plan.varied))
+            rows.append(table.row(run, *figures, last, plan.varied))
     return table.to_table(rows, table.schema_of(key for key, _ in plan.varied))
 
 

@@ -16,8 +16,9 @@ from mapfilter._inputs import open_input
 from mapfilter._io import atomic_file, sha256_file, sha256_of
 from mapfilter._json_files import read_json, write_json
 from mapfilter._resume import load_part, save_part
-from mapfilter.errors import StoreError, fail
+from mapfilter.errors import StoreError, fail, listed
 from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.evaluation.claims import ClaimedRadii
 from mapfilter.evaluation.success_cells import COORDINATES, SuccessCell
 from mapfilter.experiments.sweep.plan import Run
 
@@ -25,6 +26,7 @@ _TYPES = {
     "str": pa.string(),
     "float": pa.float64(),
     "int": pa.int32(),
+    "int | None": pa.int32(),
     "bool": pa.bool_(),
     "bool | None": pa.bool_(),
 }
@@ -41,14 +43,16 @@ SCHEMA = pa.schema(
         ("route", pa.int32()),
         ("draw", pa.int32()),
         *_columns(Accuracy),
+        *_columns(ClaimedRadii),
         ("final_status", pa.string()),
     ]
 )
 """Columns: coordinates of the run in the grid, then its results; null where undefined.
 
 The coordinates are those of :class:`mapfilter.evaluation.success_cells.SuccessCell`, the results
-those of :class:`mapfilter.evaluation.accuracy.Accuracy`. Varied options are further columns, named
-by their dotted keys, before ``route``.
+those of :class:`mapfilter.evaluation.accuracy.Accuracy` and of
+:class:`mapfilter.evaluation.claims.ClaimedRadii`. Varied options are further columns, named by
+their dotted keys, before ``route``.
 """
 
 _GROUP_ROWS = 100_000
@@ -66,7 +70,11 @@ def schema_of(varied: Iterable[str]) -> pa.Schema:
 
 
 def row(
-    run: Run, score: Accuracy, final_status: str, varied: Iterable[tuple[str, float]] = ()
+    run: Run,
+    score: Accuracy,
+    radii: ClaimedRadii,
+    final_status: str,
+    varied: Iterable[tuple[str, float]] = (),
 ) -> tuple[Any, ...]:
     """Return a run's row, in the order of :func:`schema_of`."""
     reading = run.reading
@@ -84,6 +92,7 @@ def row(
         run.route,
         run.draw,
         *astuple(score),
+        *astuple(radii),
         final_status,
     )
 
@@ -166,6 +175,8 @@ def read_runs(path: Path) -> pd.DataFrame:
         raise fail(StoreError, str(path), "the table of a sweep", error, "cut off") from error
     lacking = set(SCHEMA.names) - set(table.column_names)
     if lacking:
-        raise fail(StoreError, str(path), "all columns of a sweep", f"none of {sorted(lacking)}")
+        expected, got = "all columns of a sweep", f"none of {listed(sorted(lacking))}"
+        hint = "of an earlier version of mapfilter: sweep again" if head.is_file() else ""
+        raise fail(StoreError, str(path), expected, got, hint)
     # What pandas noted about columns may be damaged, and is needed for none of them.
     return table.replace_schema_metadata(None).to_pandas()
