@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from mapfilter.api.reports import locate_reports as locate_reports
     from mapfilter.api.scored import Score as Score
     from mapfilter.api.scored import score as score
-    from mapfilter.api.studies import Sweep as Sweep
     from mapfilter.api.studies import sweep as sweep
+    from mapfilter.api.swept import Sweep as Sweep
     from mapfilter.database.build import build as build
     from mapfilter.database.radioroutes import RadioRouteDatabase as RadioRouteDatabase
     from mapfilter.database.store import open_database as open_database
@@ -76,7 +76,8 @@ _NAMES = {
     "api.pictures": "save_picture",
     "api.reports": "locate_reports",
     "api.scored": "Score score",
-    "api.studies": "Sweep sweep",
+    "api.studies": "sweep",
+    "api.swept": "Sweep",
     "database.build": "build",
     "database.radioroutes": "RadioRouteDatabase",
     "database.store": "open_database",

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields
-from html import escape
+from dataclasses import fields
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
-
-import pandas as pd
+from typing import Any
 
 from mapfilter._annotations import items_of
 from mapfilter._arguments import (
+    FUNCTION,
     Argument,
     Count,
     Entries,
@@ -23,6 +21,7 @@ from mapfilter._arguments import (
     executor_argument,
     items,
 )
+from mapfilter._parallel import Progress
 from mapfilter.api.given import database_argument, opened
 from mapfilter.api.journeys import (
     network_of,
@@ -30,9 +29,9 @@ from mapfilter.api.journeys import (
     reports_argument,
     roads_argument,
 )
+from mapfilter.api.swept import Sweep
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.evaluation.success_cells import HEADING, READING, success_cells
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
     GYRO_ERRORS,
@@ -57,81 +56,7 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-SweepFigure = Literal["success", "coverage_95", "radius_95_median_m"]
-
 _FILTERS = 'names and options, such as {"mine": BayesFilter()}'
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class Sweep:
-    """Results of a sweep.
-
-    Parameters
-    ----------
-    runs : DataFrame
-        One row for each run, see :data:`mapfilter.experiments.sweep.table.SCHEMA`.
-    """
-
-    runs: pd.DataFrame
-
-    def __repr__(self) -> str:
-        return f"Sweep: {len(self.runs)} runs in {len(success_cells(self.runs))} cells of its grid"
-
-    def _repr_html_(self) -> str:
-        """Return the summary and the success rates, as notebooks show them."""
-        return f"<p>{escape(repr(self))}</p>{self.to_dataframe().head(20).to_html()}"
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return success, errors and coverage, one row for each grid cell.
-
-        Errors are those of the successful runs alone: a filter that is mostly ``wrong`` may have
-        the smallest ones. Compare ``success`` and ``wrong`` first. ``coverage_95`` and
-        ``radius_95_median_m`` are of what all runs claimed. Shares have 95 % intervals.
-
-        Columns are those of :class:`mapfilter.evaluation.success_cells.SuccessCell`, with one for
-        each varied option in place of ``varied``, named by its key as in ``runs``.
-        """
-        return pd.DataFrame([cell.row for cell in success_cells(self.runs)])
-
-    def plot(self, ax: Axes | None = None, *, figure: SweepFigure = "success") -> Axes:
-        """Draw a figure over the deviation of headings, or over another value that differs.
-
-        There is a curve for each filter, and for each other noise or option that differs. With one
-        deviation of headings the first of these is drawn along the axis; where nothing but the
-        filters differs, they stand side by side.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure when left out.
-        figure : {"success", "coverage_95", "radius_95_median_m"}
-            The column of :meth:`to_dataframe` that is drawn.
-
-        Raises
-        ------
-        ConfigError
-            There is no such figure, or no filter of the sweep claimed a position with a radius.
-        """
-        from mapfilter.report import claimed_radii
-        from mapfilter.report.success import curve_axis, plot_success_curves, success_curves
-
-        check_arguments("plot", keywords=[Setting("figure", figure, SweepFigure)])
-        cells = success_cells(self.runs)
-        if figure != "success" and not claimed_radii.have_radii(cells):
-            expected = "'success', as no position with a radius was claimed"
-            raise fail(ConfigError, "plot, figure", expected, figure)
-        draw, name = {
-            "success": (plot_success_curves, "Success"),
-            "coverage_95": (claimed_radii.plot_coverage_curves, "Coverage of the 95 % radius"),
-            "radius_95_median_m": (claimed_radii.plot_radius_curves, "95 % radius"),
-        }[figure]
-        axis = curve_axis(cells)
-        over = "the noise of headings" if axis == HEADING else axis
-        title = f"{name} of filters" if axis == READING else f"{name} over {over}"
-        return draw(success_curves(cells, axis), ax, title=title, axis=axis)
 
 
 def sweep(
@@ -149,6 +74,8 @@ def sweep(
     profile: Profile = "walking",
     seed: int = 0,
     executor: Executor | None = None,
+    in_flight: int = 8,
+    progress: Progress | None = None,
 ) -> Sweep:
     """Simulate many journeys with each noise, and locate each with every filter.
 
@@ -176,6 +103,10 @@ def sweep(
         Of routes and noise.
     executor : Executor, optional
         Does the runs, such as a ``ProcessPoolExecutor``; this process when left out.
+    in_flight : int
+        Batches that are handed out at once; twice the number of workers keeps all of them busy.
+    progress : callable, optional
+        Called with runs done and runs in all, such as ``print``.
 
     Raises
     ------
@@ -201,6 +132,8 @@ def sweep(
             Setting("profile", profile, Profile),
             Setting("seed", seed, WholeNumber),
             executor_argument(executor),
+            Setting("in_flight", in_flight, Count),
+            Argument("progress", progress, FUNCTION, "a function"),
         ],
     )
     database = opened(database)
@@ -227,12 +160,22 @@ def sweep(
     network = network_of(roads, rasters, profile)
     named = named_by_plan(rasters, database.plan)
     world = SweepWorld.of(network, database.plan, {radio.name: named})
-    return Sweep(sweep_runs(plans, world, {"database": database}, executor=executor))
+    runs = sweep_runs(
+        plans,
+        world,
+        {"database": database},
+        executor=executor,
+        in_flight=in_flight,
+        progress=progress,
+    )
+    return Sweep(runs)
 
 
 def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
     faults = Faults()
     found = []
+    if not filters:
+        faults.add("sweep, filters", f"at least one, {_FILTERS}", "none")
     for name, given in filters.items():
         options: Any = filter_options(given) if isinstance(given, str) else given
         if isinstance(given, type) and issubclass(given, Options):

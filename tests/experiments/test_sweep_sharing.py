@@ -8,6 +8,7 @@ from mapfilter._io import sha256_file
 from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
+from mapfilter.evaluation.claims import claimed_radii
 from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.run import sweep_runs
@@ -54,7 +55,8 @@ def by_itself(plan, world, database, run):
     )
     filter_ = run.reading.choice.over(open_database(database.path))
     found = locate(log, filter_, filter_rng(plan.seed, run)).estimate
-    return found, table.row(run, accuracy(found, truth_of(truth)), str(found.status[-1]))
+    figures = accuracy(found, truth_of(truth)), claimed_radii(found, truth_of(truth))
+    return found, table.row(run, *figures, str(found.status[-1]))
 
 
 def test_runs_of_a_sweep_are_those_of_filters_of_their_own(prepared):

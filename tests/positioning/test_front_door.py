@@ -3,6 +3,7 @@
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -356,6 +357,28 @@ def test_a_sweep_of_drives_is_one_of_logs_of_vehicles(database, rasters, streets
     assert not runs("walking", vehicle).equals(walks)
     with pytest.raises(mf.MapfilterError, match="sweep, profile: expected 'walking'"):
         runs("cycling", vehicle)
+
+
+def test_a_sweep_reports_its_progress_and_fills_its_workers(database, rasters, streets):
+    """As many batches are under way at once as in_flight says."""
+
+    class Counts(ThreadPoolExecutor):
+        handed, most = 0, 0
+
+        def submit(self, fn, /, *args, **kwargs):
+            self.handed += 1
+            self.most = max(self.most, self.handed - len(told) + 1)
+            return super().submit(fn, *args, **kwargs)
+
+    told = []
+    with Counts(2) as executor:
+        given = {"draws": 50, "executor": executor, "in_flight": 6}
+        found = swept(database, rasters, streets, **given, progress=lambda *at: told.append(at))
+    assert told[0] == (0, 200)
+    assert told[-1] == (200, 200) == (len(found.runs), 200)
+    assert executor.most == 6
+    with pytest.raises(mf.MapfilterError, match="sweep, progress: expected a function, found 3"):
+        swept(database, rasters, streets, progress=3)
 
 
 def test_the_radius_of_a_sweep_is_drawn_where_there_is_one(database, rasters, streets):

@@ -108,6 +108,7 @@ def test_another_type_is_refused_by_the_name_of_the_parameter(good, function, pa
             "sweep, filters, key: expected a text, found 1",
         ),
         ("sweep", {"filters": "bayes"}, "sweep, filters: expected names and options, such as"),
+        ("sweep", {"filters": {}}, "sweep, filters: expected at least one, names and options"),
         ("sweep", {"noises": [mf.ImuNoise(), 3]}, "sweep, noises[1]: expected ImuNoise, found 3"),
         ("open_rasters", {"crs": 3}, "open_rasters, crs: expected a text"),
         ("open_rasters", {"quantity": "levels"}, "expected 'level', 'loss', 'deviation'"),

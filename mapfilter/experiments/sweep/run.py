@@ -193,13 +193,14 @@ def sweep_runs(
     databases: Mapping[str, RadioRouteDatabase],
     *,
     executor: Executor | None = None,
+    in_flight: int = 4,
     progress: Progress | None = None,
 ) -> pd.DataFrame:
     """Do all runs of a sweep and return one row for each run; nothing is kept on disk.
 
     Parameters
     ----------
-    plans, world, executor, progress
+    plans, world, executor, in_flight, progress
         As for :func:`sweep`; see :meth:`SweepWorld.of` for a world of your own objects.
     databases : mapping of str to RadioRouteDatabase
         Each of the plans' databases.
@@ -212,7 +213,15 @@ def sweep_runs(
     """
     folders = {name: database.path for name, database in databases.items()}
     with tempfile.TemporaryDirectory(prefix="mapfilter-sweep-") as name:
-        done = sweep(plans, world, folders, Path(name), executor=executor, progress=progress)
+        done = sweep(
+            plans,
+            world,
+            folders,
+            Path(name),
+            executor=executor,
+            in_flight=in_flight,
+            progress=progress,
+        )
         return table.read_runs(done)
 
 

@@ -81,7 +81,8 @@ class KalmanOptions(Options):
     turn_rate_sd_deg_per_s : float
         Assumed deviation of the lasting error of a rate of turns, where headings are their sums.
     scale : float
-        Assumed deviation of the share by which steps are too short.
+        Assumed deviation of the share by which steps are too short; 0.09 for walkers whose step
+        length nobody measured.
     drift_m_per_sqrt_s : float
         Assumed random walk of the position besides dead reckoning.
     acceleration_mps_per_sqrt_s : float
