@@ -9,6 +9,7 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
+from mapfilter.tracks.pdr.orientation import turning_of_orientation
 from mapfilter.tracks.pdr.turns import NO_VERTICAL, Turning, force_of, samples, turning_of_rate
 
 _AROUND = 60
@@ -25,7 +26,9 @@ _LEAST_GRAVITY = 0.5
 def turning_of_mounted(
     sensors: Mapping[str, pd.DataFrame],
 ) -> tuple[Turning | None, tuple[str, ...]]:
-    """Return the turns of a vehicle that a phone's gyroscope and accelerometer show, and notes.
+    """Return the turns of a vehicle that a phone in it shows, and notes.
+
+    They are those of its gyroscope and accelerometer, without these those of its attitude.
 
     The vertical is the mean force over two minutes, in each posture that the phone is put to;
     while it is moved from one to another, turns are unknown.
@@ -33,13 +36,13 @@ def turning_of_mounted(
     Parameters
     ----------
     sensors : mapping of str to pandas.DataFrame
-        ``gyroscope`` with ``gravity`` or ``accelerometer``, of
+        ``gyroscope`` with ``gravity`` or ``accelerometer``, else ``orientation``, of
         :data:`mapfilter.tracks.sensors.SENSOR_COLUMNS`.
 
     Returns
     -------
     turning : Turning or None
-        None where there is no gyroscope, or nothing shows the vertical.
+        None where there are none of these, or nothing shows the vertical.
     notes : tuple of str
 
     Examples
@@ -53,7 +56,10 @@ def turning_of_mounted(
     """
     gyroscope = samples(sensors, "gyroscope", ("x_radps", "y_radps", "z_radps"))
     if gyroscope is None:
-        return None, ()
+        turning = turning_of_orientation(sensors)
+        if turning is None:
+            return None, ()
+        return turning, (f"odometry: turns are those of {turning.source}",)
     time_s, rate_radps = gyroscope
     force = force_of(sensors)
     # Seconds with samples only: times far apart are of one recording, too.

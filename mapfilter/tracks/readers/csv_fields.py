@@ -80,6 +80,13 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "pressure_hpa": ("pressure_hpa", "pressure"),
     "steps": ("steps", "step_count"),
     **{
+        f"q{axis}": (
+            *(f"q{axis}", f"q_{axis}", f"quat_{axis}", f"quaternion_{axis}"),
+            *(f"rotation_vector_{axis}", f"orientation_q{axis}"),
+        )
+        for axis in "xyzw"
+    },
+    **{
         f"{sensor}_{axis}": tuple(
             name
             for word in (sensor, *others)
