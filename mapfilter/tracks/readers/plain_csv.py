@@ -10,6 +10,7 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.errors import listed
 from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.csv_app_names import full_names, with_full_names
 from mapfilter.tracks.readers.csv_attitude import add_attitude
 from mapfilter.tracks.readers.csv_cells import add_cells
 from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
@@ -65,6 +66,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
 
 def has_content(names: Sequence[str]) -> bool:
     """Return whether columns of these names make rows of a journey: times, and what was there."""
+    names = full_names(names)
     found = {*usual_fields(names), *stated_fields(names, (), ())}
     return "time" in found and any(found.issuperset(fields) for fields in _CONTENT)
 
@@ -77,6 +79,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
     InputError
         A field or column that does not exist, a unit of another quantity in a name, no times.
     """
+    rows = with_full_names(rows, {name.lower() for name in options.columns.values()})
     mapped = with_dates(mapped_columns(rows, reading, options))
     rows = mapped.rows
     hemispheres = hemisphere_columns(rows, mapped.taken)
