@@ -24,19 +24,19 @@ _NO_SPEED_KMH = 255
 _SPEED_SD_MPS = KMH_MPS / 12**0.5
 """Speeds are whole km/h."""
 _HEAD_LINES = 50
-_STAMP = r"^[ \t]*\((\d{1,12}\.\d{1,9})\)[ \t]+\S{1,16}[ \t]+"
+_STAMP = r"^[ \t]*\((\d{1,12}\.\d{1,9})\)[ \t]+\S{1,16}[ \t]+(?:[RT]X[ \t]+\S[ \t]+\S[ \t]+)?"
 _REPLY = r"(7E[89A-F]|18DAF1[0-9A-F]{2})"
 """Identifiers by which control units reply (ISO 15765-4), of 11 and of 29 bits."""
 _SPEED = r"0[3-7]{0}41{0}0D{0}([0-9A-F]{{2}})"
 """A single frame of ISO-TP with a reply of service 01 that begins with PID 0D."""
-_FLAGS = r"(?:[ \t]+[RT]X[ \t]+\S[ \t]+\S)?[ \t]+\[\d{1,2}\][ \t]+"
+_LENGTH = r"[ \t]+\[\d{1,2}\][ \t]+"
 _ASC = r"^[ \t]*(\d{1,12}\.\d{1,9})[ \t]+\d{1,3}[ \t]+"
 _ASC_DATA = r"x?[ \t]+[RT]x[ \t]+d[ \t]+\d{1,2}[ \t]+"
 _ASC_DECIMAL = r"(202[4-9]|203[01])" + _ASC_DATA + r"0*[3-7][ ]+0*65[ ]+0*13[ ]+(\d{1,3})\b"
 _BASE = re.compile(
     r"base[ \t]+(hex|dec)(?:[ \t]+timestamps[ \t]+(absolute|relative))?", re.IGNORECASE
 )
-_CANDUMP = re.compile(_STAMP + r"[0-9A-F]{3,8}(?:#|" + _FLAGS + ")", re.ASCII | re.IGNORECASE)
+_CANDUMP = re.compile(_STAMP + r"[0-9A-F]{3,8}(?:#|" + _LENGTH + ")", re.ASCII | re.IGNORECASE)
 
 
 def _compiled(pattern: str) -> re.Pattern[bytes]:
@@ -45,7 +45,7 @@ def _compiled(pattern: str) -> re.Pattern[bytes]:
 
 _CANDUMP_SPEEDS = (
     _compiled(_STAMP + _REPLY + "#" + _SPEED.format("")),
-    _compiled(_STAMP + _REPLY + _FLAGS + _SPEED.format("[ ]")),
+    _compiled(_STAMP + _REPLY + _LENGTH + _SPEED.format("[ ]")),
 )
 _ASC_SPEEDS = {
     16: _compiled(_ASC + _REPLY + _ASC_DATA + _SPEED.format("[ ]+")),

@@ -16,6 +16,7 @@ from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
+from mapfilter.tracks.readers.csv_headers import likely_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.plain_csv import has_content, read_columns
 from mapfilter.tracks.readers.reading import Reading
@@ -95,41 +96,57 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         expected = "columns of a time, a name, and a value or three axes"
         raise fail(InputError, f"{reading.path} header", expected, listed(rows.names))
     own = {name.lower() for name in options.columns.values()}
+    if not len(rows):
+        return
     wide = _widened(rows, layout, own)
     if not (has_content(wide.names) or own & set(wide.names)):
         expected = f"names in column {layout.kind} that are known as columns of a CSV"
-        got = listed([name for name in wide.names if name not in (layout.time, *layout.beside)])
-        raise fail(InputError, str(reading.path), expected, got, other_names(wide.names))
+        got = [name for name in wide.names[len(layout.beside) + 1 :] if name]
+        near = any(likely_fields(name, ()) for name in got)
+        hint = "--column FIELD=NAME names them, as wheel_speed_kmh one of speeds in km/h"
+        hint = other_names(wide.names) if near else hint
+        raise fail(InputError, str(reading.path), expected, listed(got) or "none", hint)
     read_columns(wide, reading, options)
 
 
 def _widened(rows: Columns, layout: _Layout, own: Collection[str]) -> Columns:
     """Return a row for each time, with a column for each name; names again at a time are apart."""
-    units = rows.texts(layout.unit) if layout.unit else np.full(len(rows), "", dtype=object)
-    kind, kinds = pd.factorize(pd.MultiIndex.from_arrays([rows.texts(layout.kind), units]))
+    kind, kinds = _kinds(rows, layout)
     if len(kinds) > _MOST_NAMES:
         got = number_of(len(kinds), "different name")
         where = f"{rows.reading.path}, column {layout.kind}"
         hint = "names and values are exchanged, or names count something"
         raise fail(InputError, where, f"at most {_MOST_NAMES} different names", got, hint)
-    time = pd.factorize(rows.texts(layout.time))[0]
-    again = pd.DataFrame({"time": time, "kind": kind}).groupby(["time", "kind"]).cumcount()
-    group, firsts = pd.factorize(pd.MultiIndex.from_arrays([time, again]))
+    time = pd.factorize(rows.texts(layout.time))[0].astype(np.int64)
+    same = time * max(len(kinds), 1) + kind
+    again = pd.Series(same).groupby(same, sort=False).cumcount().to_numpy(dtype=np.int64)
+    group, firsts = pd.factorize(time * (len(rows) + 1) + again)
     first = np.full(len(firsts), -1, dtype=np.int64)
     first[group[::-1]] = np.arange(len(rows))[::-1]
     time_name = layout.time
     if time_name == _SECONDS and _SECONDS not in own:
         time_name = "time_s"
     columns = {time_name: (layout.time, first)}
-    for name, value, number in _names(rows, layout, kind, list(kinds), own):
+    for name, value, number in _names(rows, layout, kind, kinds, own):
         at = np.flatnonzero(kind == number)
         index = np.full(len(firsts), -1, dtype=np.int64)
         index[group[at]] = at
         columns.setdefault(name, (value, index))
+    made = number_of(len(columns) - 1, "column")
     columns = {**{name: (name, first) for name in layout.beside if name not in columns}, **columns}
-    made = number_of(len(columns) - 1 - len(layout.beside), "column")
     rows.reading.note(f"a row for each value: {made} made of the names in {layout.kind}")
-    return rows.picked(columns, rows.line[first] if len(first) else rows.line[:0])
+    return rows.picked(columns, rows.line[first])
+
+
+def _kinds(rows: Columns, layout: _Layout) -> tuple[Ints, list[tuple[str, str]]]:
+    """Return the number of each row's name and unit, and these; rows without a name are refused."""
+    words = rows.mapped(str.lower, layout.kind)
+    units = rows.texts(layout.unit) if layout.unit else np.full(len(rows), "", dtype=object)
+    word, every = pd.factorize(words)
+    unit, some = pd.factorize(units)
+    number, pairs = pd.factorize(word.astype(np.int64) * max(len(some), 1) + unit)
+    rows.reading.refuse(rows.line[words == ""], f"no name in column {layout.kind}")
+    return number, [(str(every[p // len(some)]), str(some[p % len(some)])) for p in pairs]
 
 
 def _names(
@@ -141,10 +158,10 @@ def _names(
         if not word:
             continue
         if "" in layout.values:
-            yield _with_unit(word.lower(), unit, own), layout.values[""], number
+            yield _with_unit(word, unit, own), layout.values[""], number
             continue
         sensor = _sensor(word, layout.kind)
-        sensor = word.lower() if sensor in taken else sensor
+        sensor = word if sensor in taken else sensor
         taken.add(sensor)
         of = kind == number
         rest = [rows.texts(layout.values[axis])[of] for axis in ("y", "z")]

@@ -48,7 +48,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "SensorLog"
     rows = header_columns(text.data, reading, text.line)
     names = _named(rows.names)
-    time_s, zoned = rows.times_of_part(names[_TIME], zone=options.zone)
+    time_s, zoned = rows.times_of_part(names.get(_TIME, _TIME), zone=options.zone)
     reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
     _add_positions(rows, reading, names, time_s, zoned=zoned)
     _add_forces(rows, reading, names, time_s)

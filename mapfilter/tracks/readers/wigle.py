@@ -21,6 +21,8 @@ from mapfilter.tracks.readers.text import Text
 _TITLE = "wiglewifi-"
 _COLUMNS = {"mac", "firstseen", "rssi", "currentlatitude", "currentlongitude", "type"}
 _RELEASE = re.compile(r"\bappRelease=([^,]*)")
+_CELL = re.compile(r"\d{5,6}_\d{1,10}_\d{1,11}", re.ASCII)
+"""MCC and MNC, LAC or TAC, and the cell."""
 _CELLS = ("GSM", "UMTS", "LTE", "NR")
 
 
@@ -73,7 +75,8 @@ def _add_networks(rows: Columns, reading: Reading, time_s: Floats) -> None:
         # 0 where it was not measured.
         "level_dbm": np.where(level == 0, np.nan, level),
     }
-    identity = parse_identities(np.where(cell, keys, ""))
+    named = rows.mapped(lambda word: word if _CELL.fullmatch(word) else "", "mac")
+    identity = parse_identities(np.where(cell, named, ""))
     known = np.isfinite(identity["ci"])
     reading.refuse(rows.line[cell & ~known], "radio: the MAC of a cell is no MCCMNC_LAC_CI")
     # Which cell served is not recorded; as in other lists, one with an identity may have.
