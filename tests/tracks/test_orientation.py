@@ -82,9 +82,14 @@ def test_counted_steps_turn_by_it(tmp_path, names):
     assert not any("has no effect" in note for note in ahead.notes)
 
 
-def test_a_vehicle_turns_by_it(tmp_path):
-    """Beside speeds of the wheels it was not used: directions were unknown."""
+@pytest.mark.parametrize("rates", [{}, {"gyr_x": 0.3, "gyr_y": -0.2, "gyr_z": 0.1}])
+def test_a_vehicle_turns_by_it(tmp_path, rates):
+    """Beside speeds of the wheels it was not used: directions were unknown.
+
+    So they are with a gyroscope that nothing shows the vertical of.
+    """
     table = orientation(POCKET).rename(columns={"time_s": "time"}).assign(wheel_speed_mps=8.0)
+    table = table.assign(**rates)
     table.to_csv(tmp_path / "a.csv", index=False)
     log = mf.read_log(tmp_path / "a.csv")
     turned = HEADING_RAD[-1] - HEADING_RAD[0]

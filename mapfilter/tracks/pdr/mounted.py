@@ -55,17 +55,15 @@ def turning_of_mounted(
     [nan, 0.6]
     """
     gyroscope = samples(sensors, "gyroscope", ("x_radps", "y_radps", "z_radps"))
-    if gyroscope is None:
-        turning = turning_of_orientation(sensors)
-        if turning is None:
-            return None, ()
-        return turning, (f"odometry: turns are those of {turning.source}",)
-    time_s, rate_radps = gyroscope
     force = force_of(sensors)
+    if gyroscope is None or force is None:
+        return _by_attitude(sensors, () if gyroscope is None else (NO_VERTICAL,))
+    time_s, rate_radps = gyroscope
     # Seconds with samples only: times far apart are of one recording, too.
     seconds, second = np.unique(np.floor(time_s), return_inverse=True)
-    if force is None or (direction := _by_second(*force[:2], seconds)) is None:
-        return None, (NO_VERTICAL,)
+    direction = _by_second(*force[:2], seconds)
+    if direction is None:
+        return _by_attitude(sensors, (NO_VERTICAL,))
     cuts = _cuts(direction)
     up = _unit(np.concatenate([_mean(part) for part in np.split(direction, cuts)]))
     unknown = _handled(direction, up, cuts)
@@ -76,6 +74,16 @@ def turning_of_mounted(
         notes.append(f"gyroscope: moved in the vehicle, turns are unknown for {some}")
     about = np.sum(rate_radps * up[second], axis=1)
     return turning_of_rate(time_s, about, "a gyroscope"), tuple(notes)
+
+
+def _by_attitude(
+    sensors: Mapping[str, pd.DataFrame], lacking: tuple[str, ...]
+) -> tuple[Turning | None, tuple[str, ...]]:
+    """Return the turns of a device that states its attitude, else what is lacking."""
+    turning = turning_of_orientation(sensors)
+    if turning is None:
+        return None, lacking
+    return turning, (f"odometry: turns are those of {turning.source}",)
 
 
 def _by_second(time_s: Floats, force: Floats, seconds: Floats) -> Floats | None:
