@@ -6,6 +6,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 
@@ -152,3 +153,28 @@ def test_a_drive_of_car_scanner(tmp_path):
     log = mf.read_log(written(tmp_path, rows, header, sep=";"))
     assert len(log.gnss) == 90
     assert log.motion["step_m"].sum() == pytest.approx(89 * 31 / 3.6, rel=1e-6)
+
+
+@pytest.mark.parametrize("parts", [False, True])
+def test_seconds_of_the_day_go_on_after_midnight(tmp_path, monkeypatch, parts):
+    """The file was refused as that of two journeys."""
+    second = (86_350.5 + np.arange(200)) % 86_400
+    columns = {"time": second, "Vehicle speed [km/h]": 30.0 + np.arange(200) % 3}
+    pd.DataFrame(columns).to_csv(tmp_path / "wide.csv", index=False)
+    if parts:
+        monkeypatch.setattr(text, "_PART_BYTES", 512)
+    times = [read_recording(tmp_path / "wide.csv").tables["odometry"]["time_s"]]
+    rows = [(s, "Vehicle speed", 30 + i % 3, "km/h") for i, s in enumerate(second)]
+    path = written(tmp_path, rows, "SECONDS;PID;VALUE;UNITS", sep=";")
+    times.append(read_recording(path).tables["odometry"]["time_s"])
+    for found in times:
+        np.testing.assert_allclose(found, 86_350.5 + np.arange(200))
+
+
+def test_a_counter_of_seconds_that_begins_anew_at_noon_is_no_midnight(tmp_path):
+    second = np.append(50_000 + np.arange(50.0), np.arange(50.0))
+    columns = {"time": second, "Vehicle speed [km/h]": 30.0 + np.arange(100) % 3}
+    pd.DataFrame(columns).to_csv(tmp_path / "a.csv", index=False)
+    found = read_recording(tmp_path / "a.csv")
+    assert found.tables["odometry"]["time_s"].max() == 50_049
+    assert any("times go backwards" in note for note in found.notes)
