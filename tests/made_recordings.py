@@ -14,7 +14,17 @@ from made_satellites import (
     smartloc,
     smartloc_raw,
 )
-from made_walk import COUNT, LAT_DEG, LEVEL_DBM, LON_DEG, START_UTC_S, STEP_S, TIMES_S, clock
+from made_walk import (
+    COUNT,
+    LAT_DEG,
+    LEVEL_DBM,
+    LON_DEG,
+    SPEED_MPS,
+    START_UTC_S,
+    STEP_S,
+    TIMES_S,
+    clock,
+)
 
 
 def _lines(header: str, rows: list[str], end: str = "\n") -> str:
@@ -169,6 +179,89 @@ def plain_csv() -> str:
     return _lines(head, rows)
 
 
+def wigle() -> str:
+    """As the app writes it since 2.80: the names of the columns are in the second line."""
+    head = (
+        "WigleWifi-1.6,appRelease=2.86,model=Pixel 6,release=13,device=oriole,display=TQ3A,"
+        "board=oriole,brand=google,star=Sol,body=3,subBody=0\nMAC,SSID,AuthMode,FirstSeen,Channel,"
+        "Frequency,RSSI,CurrentLatitude,CurrentLongitude,AltitudeMeters,AccuracyMeters,RCOIs,"
+        "MfgrId,Type"
+    )
+    rows = []
+    for i in range(COUNT):
+        stamp = clock(i, "%Y-%m-%d %H:%M:%S", 3 * 3600)
+        place = f"{LAT_DEG[i]:.8f},{LON_DEG[i]:.8f},21.5,3.9,,"
+        rows.append(
+            f"24491_3021_117025{i // 15},Op,LTE;fi,{stamp},1300,0,{LEVEL_DBM[i]},{place},LTE"
+        )
+        rows.append(
+            f"1a:9f:ee:5c:71:{i % 9:02x},Shop,[WPA2][ESS],{stamp},36,5180,{LEVEL_DBM[i] + 20},{place},WIFI"
+        )
+    return _lines(head, rows)
+
+
+def car_scanner() -> str:
+    """Rows end with a separator, and one header is misspelt, as in the app."""
+    rows = []
+    for i in range(COUNT):
+        place = f'"{LAT_DEG[i]:.7f}";"{LON_DEG[i]:.7f}";'
+        for name, value, unit in (
+            ("Speed (GPS)", f"{3.6 * SPEED_MPS:.2f}", "km/h"),
+            ("Engine RPM", "1500", "rpm"),
+            ("Vehicle speed", f"{3.6 * SPEED_MPS:.0f}", "km/h"),
+        ):
+            rows.append(f'"{TIMES_S[i]:.1f}";"{name}";"{value}";"{unit}";{place}')
+    return _lines('"SECONDS";"PID";"VALUE";"UNITS";"LATITUDE";"LONGTITUDE";', rows, "\r\n")
+
+
+def long_axes() -> str:
+    rows = []
+    for i in range(COUNT):
+        rows.append(f"{int(TIMES_S[i])}000,accelerometer,0.1,0.2,{9.8 + i % 3 / 10:.1f}")
+        rows.append(f"{int(TIMES_S[i])}000,LSM6DSO Gyroscope,0.01,0.02,0.03")
+        rows.append(f"{int(TIMES_S[i])}000,pressure,1013.2,,")
+    return _lines("timestamp,sensor,x,y,z", rows)
+
+
+def candump() -> str:
+    rows = []
+    for i in range(COUNT):
+        rows.append(f"({TIMES_S[i]:.6f}) can0 7DF#02010D0000000000")
+        rows.append(f"({TIMES_S[i] + 0.01:.6f}) can0 7E8#03410D{20 + i % 5:02X}AAAAAAAA")
+        rows.append(f"({TIMES_S[i] + 0.02:.6f}) can0 1A6#0011223344556677")
+    return _lines(rows[0], rows[1:])
+
+
+def vector_asc() -> str:
+    head = (
+        "date Fri May 1 10:00:00.000 am 2026\nbase hex  timestamps absolute\ninternal events logged"
+    )
+    rows = [
+        f"{STEP_S * i:11.6f} 1  7E8             Rx   d 8 03 41 0D {20 + i % 5:02X} AA AA AA AA"
+        for i in range(COUNT)
+    ]
+    return _lines(head, rows)
+
+
+def sensorlog() -> str:
+    """Accelerations are in g, and those of gravity: -1 in z where the screen is up."""
+    head = (
+        "loggingTime(txt),locationTimestamp_since1970(s),locationLatitude(WGS84),"
+        "locationLongitude(WGS84),locationAltitude(m),locationSpeed(m/s),locationCourse(°),"
+        "locationHorizontalAccuracy(m),accelerometerAccelerationX(G),accelerometerAccelerationY(G),"
+        "accelerometerAccelerationZ(G),motionRotationRateX(rad/s),motionRotationRateY(rad/s),"
+        "motionRotationRateZ(rad/s),motionMagneticFieldX(µT),motionMagneticFieldY(µT),"
+        "motionMagneticFieldZ(µT),pedometerNumberofSteps(N),altimeterPressure(kPa)"
+    )
+    rows = [
+        f"{clock(i, '%Y-%m-%d %H:%M:%S', 3 * 3600)}.000 +0300,{TIMES_S[i]:.3f},{LAT_DEG[i]:.6f},"
+        f"{LON_DEG[i]:.6f},12.5,2.2,-1.0,4.5,0.01,0.02,{-1 - i % 3 / 10:.1f},0.01,0.02,0.03,"
+        f"0,{20 + i % 2},-43,{3 * i},101.3"
+        for i in range(COUNT)
+    ]
+    return _lines(head, rows)
+
+
 MADE: dict[str, tuple[str, str]] = {
     "gnettrack": ("walk.txt", gnettrack()),
     "towercollector": ("towers.csv", towercollector()),
@@ -193,6 +286,12 @@ MADE: dict[str, tuple[str, str]] = {
     "nemo": ("drive.1.nmf", nemo()),
     "tems": ("drive.txt", tems()),
     "tems/lte": ("drive_lte.txt", tems_lte()),
+    "wigle": ("WigleWifi_20260501.csv", wigle()),
+    "can": ("candump.log", candump()),
+    "can/asc": ("drive.asc", vector_asc()),
+    "sensorlog": ("sensorlog.csv", sensorlog()),
+    "long": ("2026-05-01 13-00-00.csv", car_scanner()),
+    "long/axes": ("sensors.csv", long_axes()),
     "csv": ("drive.csv", plain_csv()),
 }
 """File name and content by format; after a slash the dialect."""

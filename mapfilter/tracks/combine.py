@@ -146,7 +146,8 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         log = replace(log, notes=tuple(kept))
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)
-        turns = any("odometry" in r.tables for r in shifted)
+        odometry = [r.tables["odometry"] for r in shifted if "odometry" in r.tables]
+        turns = any(rows["yaw_rate_radps"].notna().any() for rows in odometry)
         got = "yaw rates without speeds or an odometer" if turns else "none"
         raise fail(InputError, names, "rows of a journey", got)
     return Combined(log, sensors, alignment, tuple(notes))

@@ -202,6 +202,7 @@ def _walked(
     with_compass, why = _compass_of(counted)
     why = f"steps are counted by the phone, {why}"
     used = {"step_m", "declination_deg"} if with_compass else {"step_m"}
+    used |= {"pose"} if with_compass and "compass" not in sensors else set()
     notes += without_effect(walk, used, why)
     return Moved(counted, noise, compass=with_compass)
 

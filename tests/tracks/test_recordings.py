@@ -54,6 +54,19 @@ ROWS = {
     "nemo": {"positions": COUNT, "radio": 2 * COUNT + 50},
     "tems": {"positions": COUNT, "radio": 2 * COUNT},
     "tems/lte": {"positions": COUNT, "radio": 2 * COUNT},
+    "wigle": {"positions": COUNT, "radio": 2 * COUNT},
+    "can": {"odometry": COUNT},
+    "can/asc": {"odometry": COUNT},
+    "sensorlog": {
+        "positions": COUNT,
+        "accelerometer": COUNT,
+        "gyroscope": COUNT,
+        "magnetometer": COUNT,
+        "barometer": COUNT,
+        "steps": COUNT,
+    },
+    "long": {"positions": COUNT, "odometry": COUNT},
+    "long/axes": {"accelerometer": COUNT, "gyroscope": COUNT, "barometer": COUNT},
     "csv": {"positions": COUNT, "motion": COUNT, "radio": COUNT, "barometer": COUNT},
 }
 
@@ -94,7 +107,7 @@ def test_every_format_has_a_made_recording():
 def test_times_are_utc_where_the_clock_is_known(name, written):
     recording = read_recording(written(name), options=ReadOptions(zone="+03:00"))
     if not recording.clock.absolute:
-        assert name in ("smartloc", "phyphox", "kitti", "tems/lte")
+        assert name in ("smartloc", "phyphox", "kitti", "tems/lte", "can/asc")
         return
     for table, rows in recording.tables.items():
         if "time_s" in rows:

@@ -62,6 +62,11 @@ FILES = {
     "trajectory.txt": text("tum"),
     "drive.1.nmf": text("nemo"),
     "tems.txt": text("tems"),
+    "sensorlog.csv": text("sensorlog"),
+    "WigleWifi_20260501.csv.gz": text("wigle"),
+    "candump.log": text("can"),
+    "phone.csv": text("long/axes"),
+    "2026-05-01 10-00-00.csv": text("long"),
     "drive.csv": german_csv(),
 }
 

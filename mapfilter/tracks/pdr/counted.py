@@ -17,6 +17,7 @@ from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.batches import parted, spread
 from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS
 from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.pdr.orientation import compass_of_orientation, turning_of_orientation
 from mapfilter.tracks.pdr.step_counts import LATE_S, PAUSE_S, STEPS_PER_S, counted_steps
 from mapfilter.tracks.pdr.turns import turning_of
 from mapfilter.tracks.pdr.walk import DECLINATION_SD_RAD
@@ -30,8 +31,12 @@ _CARRIED_SD_DEG = 15.0
 _CORRELATION_S = 6.0
 _NO_COURSE = (
     "steps are counted, but no compass and no turns are beside them (a column compass_deg, "
-    "turn_rad or yaw_rate_radps, or a gyroscope): which way they went is unknown, so there is no "
-    "motion; between positions the track stands still"
+    "turn_rad or yaw_rate_radps, a gyroscope, or qx, qy, qz, qw): which way they went is unknown, "
+    "so there is no motion; between positions the track stands still"
+)
+_POINTED = (
+    "orientation: turns only; the pose device (--pose, track.walk.pose) takes its headings, where "
+    "its north is that of a compass and the phone points where one walks"
 )
 
 
@@ -64,10 +69,11 @@ def reckon_counted(
     sensors : mapping of str to pandas.DataFrame
         ``steps`` (time_s, count: since some start, or in each row, see
         :func:`mapfilter.tracks.pdr.step_counts.are_own_counts`) and ``compass`` (time_s,
-        magnetic_deg, clockwise from magnetic north); without a compass ``turns``, or ``gyroscope``
-        with ``gravity`` or ``accelerometer``: see :func:`mapfilter.tracks.pdr.turns.turning_of`.
+        magnetic_deg, clockwise from magnetic north); without a compass ``turns``, ``gyroscope``
+        with ``gravity`` or ``accelerometer``, see :func:`mapfilter.tracks.pdr.turns.turning_of`, or
+        ``orientation``, which with the pose "device" is a compass, too.
     options : WalkOptions, optional
-        Of which the length of a step and the magnetic declination are used.
+        Of which the length of a step and the magnetic declination are used, and the pose.
     convergence_rad : float
         Clockwise angle from true north to grid north.
 
@@ -102,6 +108,10 @@ def reckon_counted(
     unknown = int(np.isnan(counted).sum())
     if not np.nansum(counted) > 0:
         return None, None, (_without_steps(time_s, counted),)
+    pointed = options.pose == "device" and "compass" not in sensors
+    compass = compass_of_orientation(sensors) if pointed else None
+    if compass is not None:
+        sensors = {**sensors, "compass": compass}
     if "compass" in sensors:
         course, reason = _by_compass(time_s, counted, sensors, options, convergence_rad)
     else:
@@ -116,9 +126,8 @@ def reckon_counted(
             "turn_rad": course.turn_rad,
         }
     )
-    notes = [
-        f"motion: {np.nansum(counted):.0f} steps of {options.step_m:g} m {how}, {course.source}"
-    ]
+    source = course.source if compass is None else "with the phone's orientation as a compass"
+    notes = [f"motion: {np.nansum(counted):.0f} steps of {options.step_m:g} m {how}, {source}"]
     if unknown:
         some = number_of(unknown, "row")
         notes.append(f"motion unknown in {some}: the counter jumped, or paused for 30 s")
@@ -135,7 +144,7 @@ def reckon_counted(
 
 def _times_of_directions(sensors: Mapping[str, pd.DataFrame]) -> Floats:
     """Return the times at which a compass, else turns or a gyroscope, were read."""
-    for name in ("compass", "turns", "gyroscope"):
+    for name in ("compass", "turns", "gyroscope", "orientation"):
         if name in sensors:
             known = sensors[name].set_index("time_s").notna().any(axis=1)
             return np.unique(known.index[known].to_numpy(dtype=np.float64))
@@ -188,6 +197,12 @@ def _by_compass(
 def _by_turns(time_s: Floats, sensors: Mapping[str, pd.DataFrame]) -> tuple[_Course | None, str]:
     """Return turns, or why there are none; the heading at the start stays unknown."""
     turning, reason = turning_of(sensors)
+    notes: tuple[str, ...] = (
+        "no compass (a column compass_deg): turns only, the heading at the start is unknown until "
+        "positions or a map tell it",
+    )
+    if turning is None and (turning := turning_of_orientation(sensors)) is not None:
+        notes = (*notes, _POINTED)
     if turning is None:
         return None, f"no motion: {reason}" if reason else _NO_COURSE
     turn = turning.between(time_s)
@@ -197,10 +212,6 @@ def _by_turns(time_s: Floats, sensors: Mapping[str, pd.DataFrame]) -> tuple[_Cou
             "2 s apart: no motion"
         )
     nothing, whole = np.full(len(time_s), np.nan), np.ones(len(time_s))
-    notes = (
-        "no compass (a column compass_deg): turns only, the heading at the start is unknown until "
-        "positions or a map tell it",
-    )
     source, walk_rad = f"with {turning.source}", turning.walk_rad_per_sqrt_s
     return _Course(nothing, turn, whole, walk_rad, source, "no turn known in", notes), ""
 

@@ -20,7 +20,7 @@ _PHASE_RAD = np.radians(45.0)
 _BAND_HZ = (1.2, 3.0)
 _LEAST_S = 5.0
 _AGREE_RAD = np.radians(40.0)
-_UPRIGHT = 0.7
+UPRIGHT = 0.7
 
 
 def direction_by_acceleration(level_mps2: Floats, yaw_rad: Floats, walking: Bools) -> float:
@@ -64,9 +64,9 @@ def direction_by_device(reference: Rotation) -> float:
     that is held upright, in any orientation of the screen.
     """
     up = reference.inv().apply([0.0, 0.0, 1.0])
-    if up[2] < -_UPRIGHT:
+    if up[2] < -UPRIGHT:
         return float("nan")
-    axis = [0.0, 1.0, 0.0] if up[2] > _UPRIGHT else [0.0, 0.0, -1.0]
+    axis = [0.0, 1.0, 0.0] if up[2] > UPRIGHT else [0.0, 0.0, -1.0]
     pointing = reference.apply(axis)
     return float(np.arctan2(pointing[1], pointing[0]))
 

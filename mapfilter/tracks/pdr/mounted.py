@@ -9,6 +9,7 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
+from mapfilter.tracks.pdr.orientation import turning_of_orientation
 from mapfilter.tracks.pdr.turns import NO_VERTICAL, Turning, force_of, samples, turning_of_rate
 
 _AROUND = 60
@@ -25,7 +26,9 @@ _LEAST_GRAVITY = 0.5
 def turning_of_mounted(
     sensors: Mapping[str, pd.DataFrame],
 ) -> tuple[Turning | None, tuple[str, ...]]:
-    """Return the turns of a vehicle that a phone's gyroscope and accelerometer show, and notes.
+    """Return the turns of a vehicle that a phone in it shows, and notes.
+
+    They are those of its gyroscope and accelerometer, without these those of its attitude.
 
     The vertical is the mean force over two minutes, in each posture that the phone is put to;
     while it is moved from one to another, turns are unknown.
@@ -33,13 +36,13 @@ def turning_of_mounted(
     Parameters
     ----------
     sensors : mapping of str to pandas.DataFrame
-        ``gyroscope`` with ``gravity`` or ``accelerometer``, of
+        ``gyroscope`` with ``gravity`` or ``accelerometer``, else ``orientation``, of
         :data:`mapfilter.tracks.sensors.SENSOR_COLUMNS`.
 
     Returns
     -------
     turning : Turning or None
-        None where there is no gyroscope, or nothing shows the vertical.
+        None where there are none of these, or nothing shows the vertical.
     notes : tuple of str
 
     Examples
@@ -52,14 +55,15 @@ def turning_of_mounted(
     [nan, 0.6]
     """
     gyroscope = samples(sensors, "gyroscope", ("x_radps", "y_radps", "z_radps"))
-    if gyroscope is None:
-        return None, ()
-    time_s, rate_radps = gyroscope
     force = force_of(sensors)
+    if gyroscope is None or force is None:
+        return _by_attitude(sensors, () if gyroscope is None else (NO_VERTICAL,))
+    time_s, rate_radps = gyroscope
     # Seconds with samples only: times far apart are of one recording, too.
     seconds, second = np.unique(np.floor(time_s), return_inverse=True)
-    if force is None or (direction := _by_second(*force[:2], seconds)) is None:
-        return None, (NO_VERTICAL,)
+    direction = _by_second(*force[:2], seconds)
+    if direction is None:
+        return _by_attitude(sensors, (NO_VERTICAL,))
     cuts = _cuts(direction)
     up = _unit(np.concatenate([_mean(part) for part in np.split(direction, cuts)]))
     unknown = _handled(direction, up, cuts)
@@ -70,6 +74,16 @@ def turning_of_mounted(
         notes.append(f"gyroscope: moved in the vehicle, turns are unknown for {some}")
     about = np.sum(rate_radps * up[second], axis=1)
     return turning_of_rate(time_s, about, "a gyroscope"), tuple(notes)
+
+
+def _by_attitude(
+    sensors: Mapping[str, pd.DataFrame], lacking: tuple[str, ...]
+) -> tuple[Turning | None, tuple[str, ...]]:
+    """Return the turns of a device that states its attitude, else what is lacking."""
+    turning = turning_of_orientation(sensors)
+    if turning is None:
+        return None, lacking
+    return turning, (f"odometry: turns are those of {turning.source}",)
 
 
 def _by_second(time_s: Floats, force: Floats, seconds: Floats) -> Floats | None:

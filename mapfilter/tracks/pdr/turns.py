@@ -13,7 +13,9 @@ from mapfilter.tracks.pdr.gyroscope import WALK_RAD_PER_SQRT_S, sample_noise
 
 AXES = ("x_mps2", "y_mps2", "z_mps2")
 """Columns of forces."""
-_LONGEST_S = 2.0
+ORIENTATION = "the phone's orientation"
+"""Source of turns that are no gyroscope's alone."""
+LONGEST_S = 2.0
 """Rates that lie farther apart say nothing about what is between them."""
 _GRAVITY_S = 1.0
 _LEAST_GRAVITY = 0.5
@@ -126,7 +128,7 @@ def turning_of_rate(time_s: Floats, rate: Floats, source: str) -> Turning:
     known = np.isfinite(rate)
     time_s, rate = time_s[known], rate[known]
     lasted_s = np.diff(time_s)
-    turn = np.where(lasted_s <= _LONGEST_S, lasted_s * (rate[1:] + rate[:-1]) / 2, np.nan)
+    turn = np.where(lasted_s <= LONGEST_S, lasted_s * (rate[1:] + rate[:-1]) / 2, np.nan)
     scatter = sample_noise(np.diff(rate, 2))
     usual_s = float(np.median(lasted_s)) if lasted_s.size else 0.0
     walk = float(np.hypot(WALK_RAD_PER_SQRT_S, scatter * usual_s**0.5))

@@ -23,7 +23,7 @@ from mapfilter.tracks.pdr.gyroscope import (
 from mapfilter.tracks.pdr.heading import Compass, YawOffset, yaw_offset
 from mapfilter.tracks.pdr.odometry_rows import usable_rows
 from mapfilter.tracks.pdr.signals import inertial_signals
-from mapfilter.tracks.pdr.turns import Turning, turning_of_rate
+from mapfilter.tracks.pdr.turns import ORIENTATION, Turning, turning_of_rate
 
 _STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
 _SETTLING_S = 0.4
@@ -93,7 +93,8 @@ def reckon_odometry(
         notes += (f"odometry: no yaw rate over {blind_s:.1f} s of driving: motion is not known",)
         motion = motion.assign(step_m=motion["step_m"].where(~blind))
     speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
-    notes += error_notes(walk_rad)
+    by_gyroscope = turning is None or turning.source != ORIENTATION
+    notes += error_notes(walk_rad) if by_gyroscope else ()
     speed_sd_mps = float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS
     imu = _noise(time_s, found, walk_rad, speed_sd_mps)
     notes += _gap_notes(time_s, speed, turn)

@@ -11,7 +11,7 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.radio.asu import UNKNOWN_ASU
 from mapfilter.radio.identities import technology
-from mapfilter.tracks.readers.columns import Columns, only
+from mapfilter.tracks.readers.columns import Columns, changed_rows, only
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
 from mapfilter.tracks.readers.reading import Reading
@@ -98,10 +98,7 @@ def _read_measurements(
         "course_deg": rows.number(*dialect.of("bearing")),
     }
     # Each position is repeated for every cell of a report.
-    new = np.zeros(len(rows), dtype=bool)
-    new[:1] = True
-    for name in ("time_s", "lat_deg", "lon_deg"):
-        new[1:] |= np.diff(np.nan_to_num(position[name])) != 0
+    new = changed_rows(position, ("time_s", "lat_deg", "lon_deg"))
     reading.add("positions", *only(position, rows.line, new))
     _add_cells(rows, reading, time_s, dialect)
 

@@ -159,6 +159,19 @@ class Columns:
         changed = pc.replace_substring_regex(column, pattern, by)
         return replace(self, _columns={**self._columns, self.names.index(name): changed})
 
+    def picked(self, columns: Mapping[str, tuple[str, Ints]], line: Ints) -> Columns:
+        """Return columns of other rows: by name a column of these, and its row for each new one.
+
+        ``line`` is the file's line of each new row; a row of -1 is missing.
+        """
+        every = {}
+        for number, (name, row) in enumerate(columns.values()):
+            column = self._raw(name)
+            index = pa.array(row, mask=row < 0)
+            picked = pa.nulls(len(row), pa.string()) if column is None else column.take(index)
+            every[number] = pc.fill_null(pa.chunked_array(picked), "")
+        return replace(self, names=tuple(columns), line=line, _columns=every)
+
     def first_text(self, name: str) -> str:
         """Return the first text of a column that is not blank; "" where there is none."""
         column = self._raw(name)
@@ -260,3 +273,12 @@ def only(columns: Mapping[str, Any], lines: Ints, rows: Bools) -> tuple[dict[str
         return dict(columns), lines
     kept = {name: v[rows] if np.ndim(v) else v for name, v in columns.items()}
     return kept, lines[rows]
+
+
+def changed_rows(columns: Mapping[str, Floats], names: Sequence[str]) -> Bools:
+    """Return which rows differ from the row before in one of some columns; the first one does."""
+    changed = np.ones(len(columns[names[0]]), dtype=bool)
+    if len(changed):
+        steps = np.stack([np.diff(np.nan_to_num(columns[name])) for name in names])
+        changed[1:] = (steps != 0).any(axis=0)
+    return changed

@@ -33,9 +33,13 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
         *("timestamps", "timestep_time"),
         *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
+        "yyyy-mo-dd hh-mi-ss_sss",
     ),
-    "lat_deg": ("lat_deg", "lat", "latitude"),
-    "lon_deg": ("lon_deg", "lon", "lng", "long", "longitude"),
+    "lat_deg": ("lat_deg", "lat", "latitude", "location latitude :"),
+    "lon_deg": (
+        *("lon_deg", "lon", "lng", "long", "longitude", "longtitude"),
+        "location longitude :",
+    ),
     "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
     "accuracy_m": ("accuracy_m", "accuracy"),
     "hdop": ("hdop",),
@@ -79,6 +83,13 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "timing_advance": ("timing_advance", "ta"),
     "pressure_hpa": ("pressure_hpa", "pressure"),
     "steps": ("steps", "step_count"),
+    **{
+        f"q{axis}": (
+            *(f"q{axis}", f"q_{axis}", f"quat_{axis}", f"quaternion_{axis}"),
+            *(f"rotation_vector_{axis}", f"orientation_q{axis}"),
+        )
+        for axis in "xyzw"
+    },
     **{
         f"{sensor}_{axis}": tuple(
             name

@@ -15,8 +15,22 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     ),
     "lat_deg": ("latitude", "lat", "gps latitude", "gps lat"),
     "lon_deg": ("longitude", "lon", "lng", "long", "gps longitude", "gps lon"),
-    "altitude_m": ("altitude", "alt", "height", "elevation", "ele", "gps altitude"),
-    "accuracy_m": ("accuracy", "horizontal accuracy", "position accuracy", "gps accuracy"),
+    "altitude_m": (
+        "altitude",
+        "alt",
+        "height",
+        "elevation",
+        "ele",
+        "gps altitude",
+        "location altitude",
+    ),
+    "accuracy_m": (
+        "accuracy",
+        "horizontal accuracy",
+        "position accuracy",
+        "gps accuracy",
+        "location accuracy",
+    ),
     "speed_mps": (
         *("speed", "velocity", "gps speed", "gnss speed", "gps velocity", "ground speed"),
         *("speed over ground", "sog", "location speed"),
@@ -27,7 +41,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     ),
     "course_deg": (
         *("course", "bearing", "gps course", "gps bearing", "course over ground", "cog"),
-        "location bearing",
+        *("location bearing", "location orientation"),
     ),
     "odometer_m": (
         *("odometer", "odometer reading", "vehicle odometer", "odo", "mileage", "wheel distance"),
@@ -50,7 +64,13 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
         "signal strength",
         "serving rsrp",
     ),
-    "pressure_hpa": ("pressure", "air pressure", "barometer", "barometric pressure"),
+    "pressure_hpa": (
+        "pressure",
+        "air pressure",
+        "barometer",
+        "barometric pressure",
+        "atmospheric pressure",
+    ),
     **{
         f"{sensor}_{axis}": tuple(f"{word} {axis}" for word in words)
         for sensor, words in (

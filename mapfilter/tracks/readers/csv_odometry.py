@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapfilter._constants import KMH_MPS
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.readers.csv_fields import column_option
@@ -14,7 +14,7 @@ from mapfilter.tracks.readers.odometer_counts import counted_way
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
 
-_NEAR_S, _COARSE_M = 1.0, 0.5
+_NEAR_S, _COARSE_M, _COURSE_MPS = 1.0, 0.5, 1.0
 _SPEEDS = ("speed_mps", "speed_kmh")
 _WHEELS, _ODOMETERS = ("wheel_speed_mps", "wheel_speed_kmh"), ("odometer_m", "odometer_km")
 _OF_PHONES = ("steps", "step_m", "level_dbm", "bars", "cell", "ci", "cgi", "acc_x")
@@ -54,14 +54,14 @@ def heading_of_wheels(mapped: Mapped) -> str:
     """Return the field of headings by which a vehicle without a yaw rate turns; "" for none.
 
     Beside positions a heading may be the course of their receiver, which ends with them, and beside
-    steps it is a walker's.
+    steps it is a walker's. A course that is alone with a speed goes on as that does.
     """
     others = ("steps", "step_m")
     if not has_odometry(mapped) or _is_turned(mapped) or _is_placed(mapped):
         return ""
     if any(map(mapped.has, others)):
         return ""
-    return next(filter(mapped.has, ("heading_rad", "compass_deg")), "")
+    return next(filter(mapped.has, ("heading_rad", "compass_deg", "course_deg")), "")
 
 
 def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
@@ -79,7 +79,9 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     speed, speed_sd_mps = _speeds(mapped, reading, time_s)
     rates = mapped.radians("yaw_rate", "ps")
     if heading := heading_of_wheels(mapped):
-        rates = _rates_of(mapped, heading, time_s)
+        # Of a receiver that stands the course is noise.
+        known = np.abs(speed) >= _COURSE_MPS if heading == "course_deg" else None
+        rates = _rates_of(mapped, heading, time_s, known)
         column = mapped.rows.find(*mapped.names(heading))
         if np.isfinite(rates).any():
             reading.note(f"yaw rates are those by which {column} changes")
@@ -167,9 +169,13 @@ def _note_speeds(mapped: Mapped, reading: Reading) -> None:
         reading.ignore(f"{column}: {some} without a position in the row, not used; {option}")
 
 
-def _rates_of(mapped: Mapped, field: str, time_s: Floats) -> Floats:
-    """Return the rates by which headings turn, counter-clockwise; NaN after rows far apart."""
+def _rates_of(mapped: Mapped, field: str, time_s: Floats, known: Bools | None) -> Floats:
+    """Return the rates by which headings turn, counter-clockwise; NaN after rows far apart.
+
+    ``known`` says in which rows a heading counts; in all of them if None.
+    """
     given = mapped.number(field)
+    given = given if known is None else np.where(known, given, np.nan)
     heading = given if field == "heading_rad" else -np.radians(given)
     rates = np.full(len(heading), np.nan)
     rows = np.flatnonzero(np.isfinite(heading) & np.isfinite(time_s))
@@ -180,9 +186,9 @@ def _rates_of(mapped: Mapped, field: str, time_s: Floats) -> Floats:
     # The rate of an interval is taken for its middle: at a row it is the mean of both.
     both = np.full((2, rows.size), np.nan)
     both[0, 1:][good] = both[1, :-1][good] = turned[good] / lasted_s[good]
-    known = np.isfinite(both)
-    mean = np.where(known, both, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    rates[rows] = np.where(known.any(axis=0), mean, np.nan)
+    there = np.isfinite(both)
+    mean = np.where(there, both, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    rates[rows] = np.where(there.any(axis=0), mean, np.nan)
     return rates
 
 

@@ -13,7 +13,7 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
-from mapfilter.tracks.readers.csv_weeks import over_weeks, week_column, weeks_of
+from mapfilter.tracks.readers.csv_weeks import over_days, over_weeks, week_column, weeks_of
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
@@ -53,7 +53,7 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             reading.note(f"time: seconds of the GPS week in column {week}")
             return utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
         reading.clock = Clock("monotonic")
-        return over_weeks(reading, number)
+        return over_days(reading, over_weeks(reading, number))
     reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
     names = mapped.names("time")
     # A zone that is given is that of the local times of all files.

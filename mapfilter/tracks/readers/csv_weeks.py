@@ -1,9 +1,10 @@
-"""Seconds of the GPS week in a plain CSV: beside a column of weeks, and over the end of a week."""
+"""Seconds of the GPS week or of the day in a plain CSV: weeks beside them, and over their ends."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.tracks.readers.columns import Columns
@@ -15,6 +16,7 @@ _TURN, _LATEST = 1024, 4096
 """Weeks of files may be counted modulo 1024; those of a year are fewer than 54."""
 _WEEKS_OF_YEAR = 54
 _NEAR_END_S = 3600.0
+_LONGEST_PAUSE_S = 600.0
 
 
 def week_column(mapped: Mapped) -> str:
@@ -59,4 +61,21 @@ def over_weeks(reading: Reading, second: Floats) -> Floats:
     counted = second.copy()
     counted[known] = np.unwrap(seconds, period=WEEK_S)[len(before_s) :]
     reading.note("time: seconds of the GPS week begin anew: times go on")
+    return counted
+
+
+def over_days(reading: Reading, second: Floats) -> Floats:
+    """Return seconds of the day that go on after midnight, where they begin anew within minutes."""
+    known = np.isfinite(second)
+    before_s = [reading.last_s] if np.isfinite(reading.last_s) else []
+    seconds = np.concatenate([before_s, second[known]])
+    if not known.any() or second[known].min() < 0 or second[known].max() > DAY_S:
+        return second
+    steps = np.diff(seconds)
+    back = steps[steps < -DAY_S / 2]
+    if not back.size or back.min() < -DAY_S or back.max() > _LONGEST_PAUSE_S - DAY_S:
+        return second
+    counted = second.copy()
+    counted[known] = np.unwrap(seconds, period=DAY_S)[len(before_s) :]
+    reading.note("time: seconds of the day begin anew: times go on")
     return counted

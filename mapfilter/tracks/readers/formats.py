@@ -10,11 +10,13 @@ import numpy as np
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.tracks.readers import (
     antennas,
+    can_frames,
     cell_csv,
     gnettrack,
     gnsslogger,
     gpx,
     indoor,
+    long_tables,
     nemo,
     nmea,
     phone_sensors,
@@ -22,8 +24,10 @@ from mapfilter.tracks.readers import (
     poses,
     rinex,
     rinex_navigation,
+    sensorlog,
     smartloc,
     tems,
+    wigle,
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.reading import Reading
@@ -48,11 +52,15 @@ FORMATS: tuple[Format, ...] = (
     indoor.FORMAT,
     phone_sensors.PHYPHOX,
     phone_sensors.SENSOR_LOGGER,
+    sensorlog.FORMAT,
     antennas.FORMAT,
     poses.KITTI,
     poses.TUM,
     nemo.FORMAT,
     tems.FORMAT,
+    wigle.FORMAT,
+    can_frames.FORMAT,
+    long_tables.FORMAT,
     plain_csv.FORMAT,
 )
 """All formats, in the order in which a file is compared with them."""
@@ -120,7 +128,7 @@ def read_recording(
     if found is None and known in (None, plain_csv.FORMAT) and not (own and _named(text, options)):
         below = _below_title(text, options)
         if below is not None:
-            text, known = below, plain_csv.FORMAT
+            text, known = below, find_format(below) or plain_csv.FORMAT
     if own and not name and (known is None or (known is tems.FORMAT and _named(text, options))):
         # The columns of such an export are chosen, and may be named.
         known = plain_csv.FORMAT if _is_of(text, options) else None
@@ -151,9 +159,12 @@ def _below_title(text: Text, options: ReadOptions | None) -> Text | None:
     if text.first_line.lstrip().startswith(JSON):
         return None
     own = options if options is not None and options.columns else None
+    tables = (long_tables.FORMAT, plain_csv.FORMAT)
     return below_title(
         text,
-        lambda line: plain_csv.FORMAT.matches(line) or (own is not None and _named(line, own)),
+        lambda line: (
+            any(known.matches(line) for known in tables) or (own is not None and _named(line, own))
+        ),
     )
 
 

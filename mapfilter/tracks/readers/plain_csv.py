@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import listed
+from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.csv_app_names import full_names, with_full_names
+from mapfilter.tracks.readers.csv_attitude import add_attitude
 from mapfilter.tracks.readers.csv_cells import add_cells
 from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
 from mapfilter.tracks.readers.csv_headers import stated_fields
@@ -25,7 +29,14 @@ from mapfilter.tracks.readers.text import Text
 _SPEEDS = ("speed_mps", "speed_kmh")
 _CONTENT = (
     *(("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("bars",)),
-    *(("acc_x",), ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",)),
+    *(
+        ("acc_x",),
+        ("gyr_x",),
+        ("mag_x",),
+        ("qx", "qy", "qz"),
+        ("pressure_hpa",),
+        ("wheel_speed_mps",),
+    ),
     *(
         ("odometer_m",),
         ("odometer_km",),
@@ -45,14 +56,30 @@ _VITAL = (
 
 
 def _matches(text: Text) -> bool:
-    names = header_names(text.first_line, likely_separator(text.first_line))
-    found = {*usual_fields(names), *stated_fields(names, (), ())}
-    return "time" in found and any(found.issuperset(fields) for fields in _CONTENT)
+    return has_content(header_names(text.first_line, likely_separator(text.first_line)))
 
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "CSV"
-    rows = header_columns(text.data, reading, text.line)
+    read_columns(header_columns(text.data, reading, text.line), reading, options)
+
+
+def has_content(names: Sequence[str]) -> bool:
+    """Return whether columns of these names make rows of a journey: times, and what was there."""
+    names = full_names(names)
+    found = {*usual_fields(names), *stated_fields(names, (), ())}
+    return "time" in found and any(found.issuperset(fields) for fields in _CONTENT)
+
+
+def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
+    """Read columns by the fields that their names mean, or that a user names.
+
+    Raises
+    ------
+    InputError
+        A field or column that does not exist, a unit of another quantity in a name, no times.
+    """
+    rows = with_full_names(rows, {name.lower() for name in options.columns.values()})
     mapped = with_dates(mapped_columns(rows, reading, options))
     rows = mapped.rows
     hemispheres = hemisphere_columns(rows, mapped.taken)
@@ -103,6 +130,8 @@ def _add_sensors(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
             columns = {f"{axis}_{unit}": mapped.number(f"{short}_{axis}") for axis in "xyz"}
             there = np.isfinite(columns[f"x_{unit}"])
             add_rows(reading, sensor, {"time_s": time_s, **columns}, mapped.rows, there)
+    if mapped.has("qx", "qy", "qz"):
+        add_attitude(mapped, reading, time_s)
     for field, table, column in (
         ("pressure_hpa", "barometer", "pressure_hpa"),
         ("steps", "steps", "count"),

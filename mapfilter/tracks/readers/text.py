@@ -200,8 +200,8 @@ def _utf16(data: bytes) -> str | None:
     if data.startswith(b"\xfe\xff"):
         return "utf-16-be"
     head = data[:512]
-    if len(head) >= 8 and re.fullmatch(rb"(?:[\t\n\r -~]\0)+.?", head, re.DOTALL):
+    if len(head) >= 8 and re.fullmatch(rb"(?:[\t\n\r -~\xa0-\xff]\0)+.?", head, re.DOTALL):
         return "utf-16-le"
-    if len(head) >= 8 and re.fullmatch(rb"(?:\0[\t\n\r -~])+.?", head, re.DOTALL):
+    if len(head) >= 8 and re.fullmatch(rb"(?:\0[\t\n\r -~\xa0-\xff])+.?", head, re.DOTALL):
         return "utf-16-be"
     return None

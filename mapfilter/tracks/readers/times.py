@@ -36,6 +36,8 @@ _HALF_DAY = re.compile(
     re.IGNORECASE,
 )
 """Hours of half a day, minutes, and AM or PM."""
+_MILLISECONDS = re.compile(r"(?<=[ T])(\d\d:\d\d:\d\d):(\d{3})\b", re.ASCII)
+"""A time of day whose milliseconds follow a colon."""
 _UTC = re.compile(r"\s{0,3}\b(?:UTC|GMT)\s{0,3}$")
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
@@ -93,7 +95,8 @@ def parse_times(
         Zone of times that state none.
     layout : str
         Format as of ``strptime``, or "ISO8601"; numbers are Unix times then, and days with dots
-        (31.12.2026), names of months (31-Dec-2026) and AM or PM after the time are read, too.
+        (31.12.2026), names of months (31-Dec-2026), AM or PM after the time and milliseconds after
+        a colon are read, too.
     after_s : float
         As of :func:`utc_from_local_s`.
 
@@ -128,6 +131,7 @@ def parse_times(
             )
         if plain.str.match(_NAMED).any():
             plain = plain.str.replace(_NAMED, _with_month_number, regex=True)
+        plain = plain.str.replace(_MILLISECONDS, r"\1.\2", regex=True)
         plain = plain.str.replace(_HALF_DAY, _with_whole_day, regex=True)
     plain = plain.where(plain.str.match(r"\s*(?:19|20)\d\d"), "")
     moments = pd.to_datetime(plain, format=layout, utc=True, errors="coerce")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 import shlex
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -28,19 +27,14 @@ _FIELD_OF_UNIT = {
     "dbm": "level_dbm",
 }
 """Fields that a column whose name is of another language may be, by its unit."""
-_KINDS = ("pid", "signal", "signal_name", "signal name", "name", "sensor", "parameter", "variable")
-_TIMES = ("time", "timestamp", "timestamps", "seconds", "time_s", "t")
-"""Columns of a table with a row for each value, as of loggers of a vehicle's bus."""
-_RAW_FRAMES = "raw frames of a bus; decode them by its DBC (cantools), export signals as CSV"
-_FRAME = re.compile(r"\(\d{1,12}\.\d{1,9}\) \w{1,16} [0-9A-Fa-f]{3,8}#")
-"""A line of candump."""
+RAW_FRAMES = "raw frames of a bus; decode them by its DBC (cantools), export signals as CSV"
 NOT_READ = {
     ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
     ".dt1": "a Nemo log of version 1; export it as CSV, and map the columns",
     ".trp": "a binary TEMS log; export it as tab-delimited text",
     ".ntm": "a list of cells of NetMonster, no journey; as [cells] plan with names of its columns",
-    ".asc": _RAW_FRAMES,
-    ".blf": _RAW_FRAMES,
+    ".asc": RAW_FRAMES,
+    ".blf": RAW_FRAMES,
     ".mf4": "a measurement of a bus; export its signals as CSV (asammdf)",
     ".mdf": "a measurement of a bus; export its signals as CSV (asammdf)",
     ".vbo": "a VBOX file; export CSV, GPX or NMEA",
@@ -79,36 +73,18 @@ def unknown_format(
     names = header_names(text.first_line, separator)
     is_table = len(names) > 1 and not text.first_line.lstrip().startswith(("{", "[", "<"))
     hint = NOT_READ.get(path.suffix.lower(), "") or _other_separators(path, text, find_format)
-    if _FRAME.match(text.first_line):
-        hint = hint or _RAW_FRAMES
     if text.first_line.lstrip().startswith(JSON):
         hint = hint or NOT_READ[".json"]
     if is_table and not hint:
-        hint = _other_table(names) or _other_names(names)
+        raw = {"databytes", "data bytes", "dlc"} & set(names)
+        hint = RAW_FRAMES if raw else other_names(names)
     got = f"none of them; it begins with {text.first_line[:60]!r}"
     if is_table:
         got = f"none of them, but a table with the columns {listed([n for n in names if n])}"
     return fail(InputError, str(path), f"a recording in a known format ({_LIST})", got, hint)
 
 
-def _other_table(names: Sequence[str]) -> str:
-    """Return the hint for a table whose rows or first line no map of columns mends; "" for none."""
-    if {"databytes", "data bytes", "dlc"} & set(names):
-        return _RAW_FRAMES
-    if names[0].startswith("wiglewifi"):
-        columns = ("time=FirstSeen", "lat_deg=CurrentLatitude", "lon_deg=CurrentLongitude")
-        options = " ".join(f"--column {one}" for one in (*columns, "cgi=MAC", "technology=Type"))
-        return f"WiGLE, whose names of columns are in the second line: delete the first, {options}"
-    value = next((name for name in names if name in ("value", "values")), "")
-    kind = next((name for name in names if name in _KINDS), "")
-    if value and kind:
-        time = next((name for name in names if name in _TIMES), "time")
-        pivot = f"pandas.pivot_table(rows, values={value!r}, index={time!r}, columns={kind!r})"
-        return f"a row for each value: make a column of each {kind}, as by {pivot}"
-    return ""
-
-
-def _other_names(names: Sequence[str]) -> str:
+def other_names(names: Sequence[str]) -> str:
     """Return the hint for a table whose columns are not known, with the fields they resemble."""
     usual, stated = usual_fields(names), stated_fields(names, (), ())
     found = {*usual, *stated}
