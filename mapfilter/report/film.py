@@ -16,6 +16,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
+from mapfilter._inputs import open_input, read_input
 from mapfilter._io import atomic_file, check_replaceable
 from mapfilter._types import Floats
 from mapfilter.errors import OutputError, fail
@@ -41,6 +42,7 @@ _LAST_BYTES = {
     ".mp4": b"\x00\x00\x00\x16freemapfilter film",
 }
 """What films end with, which no player shows: a comment and the trailer, and a free box."""
+_MOST_BYTES = 1 << 31
 
 _WIDTH_IN, _DPI = 6.4, 100
 _LABELS_IN, _ROW_IN, _TITLE_IN = 0.75, 0.2, 0.85
@@ -172,20 +174,18 @@ def write_film(
 
 def _mark_as_film(path: Path, kind: str) -> None:
     """Mark a film as one that a later one may replace."""
-    mark = _LAST_BYTES[kind]
-    with path.open("r+b") as stream:
-        # The trailer of a GIF is its last byte.
-        stream.seek(-1 if kind == ".gif" else 0, os.SEEK_END)
-        stream.write(mark)
+    film = read_input(path, _MOST_BYTES, "a film", OutputError)
+    # The trailer of a GIF is its last byte.
+    path.write_bytes((film[:-1] if kind == ".gif" else film) + _LAST_BYTES[kind])
 
 
 def _is_film(path: Path) -> bool:
-    mark = _LAST_BYTES[path.suffix.lower()]
+    last = _LAST_BYTES[path.suffix.lower()]
     try:
-        with path.open("rb") as stream:
-            stream.seek(-len(mark), os.SEEK_END)
-            return stream.read() == mark
-    except OSError:
+        with open_input(path, OutputError) as stream:
+            stream.seek(-len(last), os.SEEK_END)
+            return stream.read() == last
+    except (OutputError, OSError):
         return False
 
 
