@@ -143,6 +143,7 @@ ERRORS = [
     ("rxlev-as-level", lambda w: w.each(quantised)),
     ("field-strength", lambda w: w.each(lambda v: v + 142.3)),
     ("azimuth-radians", lambda w: w.change("azimuth_deg", lambda a: round(np.radians(a), 4))),
+    ("azimuth-gons", lambda w: w.change("azimuth_deg", lambda a: a / 0.9)),
     ("azimuth-counter-clockwise", lambda w: w.change("azimuth_deg", lambda a: -a % 360)),
     ("azimuth-counter-clockwise", lambda w: w.change("azimuth_deg", lambda a: (90 - a) % 360)),
     ("azimuth-off-by-90", lambda w: w.change("azimuth_deg", lambda a: (a + 90) % 360)),
