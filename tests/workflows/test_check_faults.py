@@ -290,6 +290,16 @@ def test_a_missing_antenna_is_an_error_where_rasters_are_to_be_predicted(world):
     assert (outcome.code, codes) == (2, {("antenna-missing", "error")})
 
 
+def test_heights_in_feet(world):
+    """They passed without a word."""
+    for row in world.rows:
+        row["height_m"] = round(float(row["height_m"]) / 0.3048)
+    world.write()
+    (finding,) = mapfilter("check", "-c", world.toml, "--json").json["findings"]
+    assert (finding["code"], finding["severity"]) == ("feet-for-metres", "warning")
+    assert "0.3048" in finding["remedy"]
+
+
 def test_tilts_that_are_counted_upwards(world):
     for row in world.rows:
         row["downtilt_deg"] = -6
