@@ -110,3 +110,25 @@ def test_roles_by_a_letter_and_words_that_are_none(read):
     by_time = radio.sort_values("time_s", kind="stable")["role"]
     assert by_time.tolist() == [expected[row % 6] for row in range(COUNT)]
     assert "role: 6 values are no roles (serving, neighbour), taken as missing" in notes
+
+
+@pytest.mark.parametrize("names", [("A1", "B2", "C3"), ("S1", "S2", "S3"), ("C101", "C102", "F1")])
+def test_names_of_a_plan_in_a_column_of_numbers(read, names):
+    """They were taken for hexadecimal numbers, or all of them were lost."""
+    given = np.resize(names, COUNT)
+    radio, notes = read(cell_id=given)
+    assert radio["cell"].tolist() == given.tolist()
+    assert set(radio["role"]) == {"serving"}
+    assert "cell_id: taken for the plan's names of cells" in notes
+
+
+def test_names_of_a_plan_among_placeholders_and_numbers(read):
+    _, notes = read(cell_id=np.resize(["17", "18", "unknown", "19"], COUNT))
+    assert "names of cells" not in notes
+
+
+def test_whole_identities_in_a_column_of_numbers(read):
+    radio, notes = read(cell_id=np.resize(["244-91-7-1234", "244-91-7-1235"], COUNT))
+    assert radio["cell"].tolist() == ["244-91-7-1234", "244-91-7-1235"] * (COUNT // 2)
+    assert "cell_id: taken for identities" in notes
+    assert radio["ci"].tolist() == [1234, 1235] * (COUNT // 2)

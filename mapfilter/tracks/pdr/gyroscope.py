@@ -189,15 +189,17 @@ def sample_noise(bends: Floats) -> float:
     return MAD_TO_SD * float(np.sqrt(np.mean(usual**2) / 6.0))
 
 
-def error_notes(walk_rad_per_sqrt_s: float, bias_radps: float = 0.0) -> tuple[str, ...]:
-    """Return a note on the errors of a gyroscope at rest where they are unusually large."""
+def error_notes(
+    walk_rad_per_sqrt_s: float, bias_radps: float = 0.0, *, of: str = "gyroscope"
+) -> tuple[str, ...]:
+    """Return a note on the errors of turns at rest where they are unusually large."""
     found = []
     if bias_radps >= _LARGE_BIAS_RADPS:
         found.append(f"a bias of {np.degrees(bias_radps):.2g} deg/s, which is subtracted")
     if walk_rad_per_sqrt_s >= _LARGE_WALK_RAD_PER_SQRT_S:
         drift_deg = float(np.degrees(walk_rad_per_sqrt_s))
         found.append(f"noise by which headings drift {drift_deg:.2g} deg/sqrt(s)")
-    return (f"gyroscope: unusually large at rest: {', and '.join(found)}",) if found else ()
+    return (f"{of}: unusually large errors at rest: {', and '.join(found)}",) if found else ()
 
 
 def _rests(rate_radps: Floats, quiet: Bools, noise: float) -> tuple[Ints, Floats, Floats]:

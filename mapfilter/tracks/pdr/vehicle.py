@@ -94,7 +94,7 @@ def reckon_odometry(
         motion = motion.assign(step_m=motion["step_m"].where(~blind))
     speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
     by_gyroscope = turning is None or turning.source != ORIENTATION
-    notes += error_notes(walk_rad) if by_gyroscope else ()
+    notes += error_notes(walk_rad, of="yaw rate") if by_gyroscope else ()
     speed_sd_mps = float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS
     imu = _noise(time_s, found, walk_rad, speed_sd_mps)
     notes += _gap_notes(time_s, speed, turn)

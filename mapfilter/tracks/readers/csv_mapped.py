@@ -15,7 +15,7 @@ from mapfilter.tracks.readers.columns import Columns, only
 from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields
 from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.identities import available
+from mapfilter.tracks.readers.identities import available, parse_identities
 from mapfilter.tracks.readers.reading import Reading
 
 DATE = "date"
@@ -26,6 +26,9 @@ _DIRECTIONS = (
 )
 _SIGNALS = ("signal", "signal_strength", "signal strength", "signalstrength", "strength")
 _USUAL_DBM, _MOSTLY = (-150.0, -20.0), 0.9
+_OF_CELLS = ("cell_id", "cellid")
+_DECIMAL = re.compile(r"-?[0-9]{1,20}(\.0*)?|0x[0-9a-f]{1,9}", re.ASCII | re.IGNORECASE)
+_HEXADECIMAL = re.compile(r"[0-9a-f]{4,9}", re.ASCII | re.IGNORECASE)
 _CELLS = ("cell", "cgi", "ci", "level_dbm", "bars")
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 
@@ -57,7 +60,7 @@ class Mapped:
         if field in self.stated:
             return (self.stated[field],)
         # A column that a user names for one field is no other one's.
-        taken = {column.lower() for column in self.own.values()}
+        taken = {column.lower() for column in (*self.own.values(), *self.stated.values())}
         return tuple(name for name in FIELDS[field] if name not in taken)
 
     @property
@@ -154,7 +157,7 @@ def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Map
         hint = "--column time=COLUMN"
         faults.add(where, "a column of times", present, hint)
     faults.raise_if_any(InputError)
-    return _with_signals(_with_azimuths(mapped, reading), reading)
+    return _with_names(_with_signals(_with_azimuths(mapped, reading), reading), reading)
 
 
 def _with_azimuths(mapped: Mapped, reading: Reading) -> Mapped:
@@ -197,6 +200,31 @@ def _with_signals(mapped: Mapped, reading: Reading) -> Mapped:
         return mapped
     reading.note(f"{name}: taken for levels in dBm, by its values")
     return replace(mapped, stated={**mapped.stated, "level_dbm": name})
+
+
+def _with_names(mapped: Mapped, reading: Reading) -> Mapped:
+    """Return columns with ids of cells as whole identities or a plan's names, if no numbers.
+
+    Hexadecimal ones have four digits or more, and the network's numbers beside them: A1 and C101
+    are names else.
+    """
+    name = mapped.rows.find(*_OF_CELLS)
+    owned = name in {column.lower() for column in mapped.own.values()}
+    if name is None or owned or any(map(mapped.has, ("cell", "cgi"))):
+        return mapped
+    words = {word.strip() for word in set(mapped.rows.texts(name))} - {""}
+    kinds = [_DECIMAL, _HEXADECIMAL] if any(map(mapped.has, ("lac", "mcc", "mnc"))) else [_DECIMAL]
+    numbers = sum(any(kind.fullmatch(word) for kind in kinds) for word in words)
+    # Of hexadecimal numbers a tenth or so have no letter.
+    named = len(words) - numbers > 0.5 * len(words)
+    if not (named or name in (reading.columns.get("cell"), reading.columns.get("cgi"))):
+        return mapped
+    whole = np.isfinite(parse_identities(np.array(sorted(words), dtype=object))["ci"])
+    if whole.mean() > _MOSTLY or reading.columns.get("cgi") == name:
+        reading.note(f"{name}: taken for identities, as 262-01-1234-5678")
+        return replace(mapped, stated={**mapped.stated, "cgi": name})
+    reading.note(f"{name}: taken for the plan's names of cells, as they are no numbers")
+    return replace(mapped, stated={**mapped.stated, "cell": name})
 
 
 def with_dates(mapped: Mapped) -> Mapped:
