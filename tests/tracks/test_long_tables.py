@@ -1,5 +1,7 @@
 """Tables with a row for each value, and with a row for each sensor: read as a table of columns."""
 
+import tracemalloc
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -58,6 +60,50 @@ def test_units_of_a_column_of_their_own_count(tmp_path):
     np.testing.assert_allclose(found.tables["odometry"]["speed_mps"], 0.44704 * SPEED_MPS)
     assert found.unread == ("engine rpm [rpm]",)
     assert not found.clock.absolute
+
+
+def test_units_that_are_written_in_several_ways_make_one_column(tmp_path):
+    """Every second speed was lost, or all of those whose name states the unit, too."""
+    given = {"Vehicle speed": ("km/h", "KM/H"), "Vehicle speed [km/h]": ("km/h", "")}
+    for name, units in given.items():
+        rows = [(t, name, 30 + t % 3, units[t % 2]) for t in range(60)]
+        found = read_recording(written(tmp_path, rows, "time,name,value,unit"))
+        np.testing.assert_allclose(
+            found.tables["odometry"]["speed_mps"], (30 + np.arange(60) % 3) / 3.6
+        )
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "columns", "table"),
+    [
+        ("time,type,value", ("car", 8), {"wheel_speed_mps": "value"}, "odometry"),
+        ("time,name,x,y,z", ("car", 385e3, 6672e3, 1), {"east_m": "X", "north_m": "Y"}, "places"),
+        ("time,lat,lon,type,value", (60, 24, "rsrp", -90), {"level_dbm": "value"}, "radio"),
+    ],
+)
+def test_a_table_whose_values_are_a_column_of_a_field_stays_one(
+    tmp_path, header, row, columns, table
+):
+    """Such a map was that of a plain table before tables with a row for each value were read."""
+    path = written(tmp_path, [(t, *row) for t in TIME_S], header)
+    found = read_recording(path, options=ReadOptions(columns=columns))
+    assert found.format == "csv"
+    assert len(found.tables[table]) == 90
+
+
+@pytest.mark.parametrize("header", ["time,name,value", "time,name,x,y,z"])
+def test_many_names_at_many_times_fit_into_memory(tmp_path, header):
+    """Where each of 150 names was a column in memory, 30,000 rows took more than 40 MB."""
+    more = (0.1, 0.2) if "x" in header else ()
+    rows = [(t / 10, f"n{t % 150}" if t % 150 else "gyroscope", 1, *more) for t in range(30_000)]
+    rows += [(9000 + t, "pressure", 1013 + t % 2, *(0,) * len(more)) for t in range(9)]
+    path = written(tmp_path, rows, header)
+    tracemalloc.start()
+    found = read_recording(path)
+    used_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(found.tables["barometer"]) == 9
+    assert used_bytes < 25e6, used_bytes
 
 
 def test_names_are_mapped_as_columns_are(tmp_path):
@@ -169,6 +215,17 @@ def test_seconds_of_the_day_go_on_after_midnight(tmp_path, monkeypatch, parts):
     times.append(read_recording(path).tables["odometry"]["time_s"])
     for found in times:
         np.testing.assert_allclose(found, 86_350.5 + np.arange(200))
+
+
+def test_seconds_of_the_day_go_on_after_two_midnights_in_parts(tmp_path, monkeypatch):
+    """From the part after the second midnight on, times were those of the first day again."""
+    second = np.arange(80_000.0, 300_000.0, 100.0)
+    columns = {"time": second % 86_400, "Vehicle speed [km/h]": 30.0 + np.arange(2200) % 3}
+    pd.DataFrame(columns).to_csv(tmp_path / "a.csv", index=False)
+    for size in (8192, 1 << 24):
+        monkeypatch.setattr(text, "_PART_BYTES", size)
+        found = read_recording(tmp_path / "a.csv").tables["odometry"]["time_s"]
+        np.testing.assert_allclose(found, second)
 
 
 def test_a_counter_of_seconds_that_begins_anew_at_noon_is_no_midnight(tmp_path):

@@ -89,7 +89,8 @@ def _add_positions(
         "speed_mps": _not_negative(number("locationspeed")),
         "course_deg": _not_negative(number("locationcourse")),
     }
-    new = changed_rows(position, ("time_s", "lat_deg", "lon_deg"))
+    stamp_s = own_s if np.isfinite(own_s).any() else time_s
+    new = changed_rows({**position, "time_s": stamp_s}, ("time_s", "lat_deg", "lon_deg"))
     new &= np.isfinite(position["lat_deg"]) & np.isfinite(position["lon_deg"])
     old = new & (time_s - measured_s > _OLDEST_S)
     reading.refuse(rows.line[old], f"positions: measured more than {_OLDEST_S:g} s before the row")
