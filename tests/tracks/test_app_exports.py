@@ -62,6 +62,18 @@ def test_rows_of_wigle_that_are_not_used_are_named(tmp_path):
         read_recording(written(tmp_path, name, lost))
 
 
+def test_types_of_a_damaged_wigle_are_few(tmp_path):
+    """Each of thousands of types was a note, and a pass over all rows."""
+    name, text = MADE["wigle"]
+    lines = text.splitlines()
+    bad = [lines[3].replace(",WIFI", f",T{i:05d}") for i in range(20_000)]
+    found = read_recording(written(tmp_path, name, "\n".join([*lines, *bad])))
+    assert found.ignored[-2:] == (
+        "1 row of type T00007 left out",
+        "19992 rows of other types left out",
+    )
+
+
 def test_forces_of_sensorlog_have_the_sign_of_all_others(tmp_path):
     """Apple's accelerations at rest point down, and are in g; a gyroscope turned the wrong way."""
     found = read_recording(written(tmp_path, *MADE["sensorlog"]))

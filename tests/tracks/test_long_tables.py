@@ -91,6 +91,17 @@ def test_a_table_whose_values_are_a_column_of_a_field_stays_one(
     assert len(found.tables[table]) == 90
 
 
+def test_values_of_several_cells_at_a_time_are_not_mixed(tmp_path):
+    """The level of a second cell was that of the first, where the first one had none."""
+    rows = []
+    for t in TIME_S:
+        rows += [(t, 244, 91, 30, 257, "rsrq", -11), (t, 244, 91, 30, 258, "rsrp", -97)]
+        rows += [(t, 244, 91, 30, 259, "rsrp", -80), (t, 244, 91, 30, 259, "rsrq", -9)]
+    found = read_recording(written(tmp_path, rows, "time,mcc,mnc,tac,ci,name,value"))
+    radio = found.tables["radio"].dropna(subset="level_dbm")
+    assert set(zip(radio["ci"], radio["level_dbm"], strict=True)) == {(258, -97), (259, -80)}
+
+
 @pytest.mark.parametrize("header", ["time,name,value", "time,name,x,y,z"])
 def test_many_names_at_many_times_fit_into_memory(tmp_path, header):
     """Where each of 150 names was a column in memory, 30,000 rows took more than 40 MB."""

@@ -12,14 +12,14 @@ import numpy as np
 
 from mapfilter._constants import KMH_MPS
 from mapfilter._words import number_of
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.unknown_formats import RAW_FRAMES
 
-_UNIX_S = 1e8
 _NO_SPEED_KMH = 255
 _SPEED_SD_MPS = KMH_MPS / 12**0.5
 """Speeds are whole km/h."""
@@ -62,7 +62,7 @@ def _matches(text: Text) -> bool:
     return bool(_CANDUMP.match(text.first_line) or _base(text))
 
 
-def _relative(reading: Reading, got: str) -> InputError:
+def _relative(reading: Reading, got: str) -> MapfilterError:
     """Return the error of times that count from the frame before."""
     hint = "times since the frame before; export with absolute timestamps (candump -ta, -l)"
     return fail(InputError, str(reading.path), "absolute timestamps", got, hint)
@@ -93,7 +93,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     if (back := int(np.sum(np.diff(time_s) < 0))) > _MOST_BACK_SHARE * len(own):
         raise _relative(reading, f"times that go backwards in {number_of(back, 'place')}")
     speed_kmh = np.array([float(int(match[3], base)) for match in own])
-    reading.clock = Clock("utc" if np.median(time_s) > _UNIX_S else "monotonic")
+    reading.clock = Clock("utc" if np.median(time_s) > LEAST_UNIX_S else "monotonic")
     unknown = speed_kmh >= _NO_SPEED_KMH
     reading.refuse(line[unknown], f"speed of {_NO_SPEED_KMH} km/h: the mark of no value")
     columns = {

@@ -16,6 +16,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.times import (
+    LEAST_UNIX_S,
     parse_times,
     seconds_of_day,
     unix_seconds,
@@ -25,7 +26,6 @@ from mapfilter.tracks.readers.times import (
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
 _FIRST_ROWS = 1000
-_LEAST_UNIX_S = 1e8
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
 _WHOLE = r"^[-+]?(\d{1,18}|[0-8]\d{18})$"
@@ -115,7 +115,7 @@ class Columns:
             except pa.ArrowInvalid:
                 pass
             else:
-                return unix_seconds(np.where(np.abs(number) > _LEAST_UNIX_S, number, np.nan)), True
+                return unix_seconds(np.where(np.abs(number) > LEAST_UNIX_S, number, np.nan)), True
         if (
             column is not None
             and (found := _plain_times(column, zone, layout, after_s)) is not None

@@ -40,6 +40,10 @@ _OTHERS = ("uncal", "linear", "game", "geomagnetic")
 """Parts of the names of sensors, and of those that measure something else."""
 _NUMBERED = {"1": "accelerometer", "2": "magnetometer", "4": "gyroscope", "6": "pressure"}
 """Sensors by Android's numbers of their types."""
+_OF_CELLS = {
+    *("cell", "cgi", "mcc", "mnc", "lac", "ci", "enodeb", "sector"),
+    *("arfcn", "bsic", "role", "technology"),
+}
 _MOST_NAMES, _HEAD_ROWS = 1000, 400
 
 
@@ -127,7 +131,12 @@ def _widened(rows: Columns, layout: _Layout, own: Collection[str]) -> tuple[Colu
         where = f"{rows.reading.path}, column {layout.kind}"
         hint = "names and values are exchanged, or names count something"
         raise fail(InputError, where, f"at most {_MOST_NAMES} different names", got, hint)
-    time = pd.factorize(rows.texts(layout.time))[0].astype(np.int64)
+    moment = rows.texts(layout.time)
+    # Values of several cells at a time are in rows of their own.
+    beside = usual_fields(layout.beside)
+    for field in beside.keys() & _OF_CELLS:
+        moment = moment + "\n" + rows.texts(beside[field])
+    time = pd.factorize(moment)[0].astype(np.int64)
     same = time * max(len(kinds), 1) + kind
     again = pd.Series(same).groupby(same, sort=False).cumcount().to_numpy(dtype=np.int64)
     group, firsts = pd.factorize(time * (len(rows) + 1) + again)
@@ -194,8 +203,8 @@ def _names(
 def _with_unit(name: str, unit: str, own: Collection[str]) -> str:
     """Return a name with its unit in brackets, unless it states one, or means a field without."""
     field = next(iter(usual_fields([name])), "")
-    stated = field and (not quantity_of(field) or header_unit(field, name) is not None)
-    stated = stated or stated_fields([name], (), ())
+    known = field and (not quantity_of(field) or header_unit(field, name) is not None)
+    stated = known or stated_fields([name], (), ())
     return name if not unit or stated or name in own else f"{name} [{unit}]"
 
 

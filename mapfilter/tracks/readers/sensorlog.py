@@ -26,7 +26,7 @@ _FIELDS = ("motionmagneticfield", "magnetometer")
 """Of the gyroscope and the magnetometer: calibrated ones first."""
 _LATITUDE, _LONGITUDE = "locationlatitude", "locationlongitude"
 _OLDEST_S = 10.0
-_HPA_KPA = 10.0
+_KPA_HPA = 10.0
 
 
 def _named(names: Sequence[str]) -> dict[str, str]:
@@ -57,7 +57,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         if of:
             _add_axes(rows, reading, sensor, unit, time_s, [rows.number(names[one]) for one in of])
     for table, column, name, factor in (
-        ("barometer", "pressure_hpa", "altimeterpressure", _HPA_KPA),
+        ("barometer", "pressure_hpa", "altimeterpressure", _KPA_HPA),
         ("steps", "count", "pedometernumberofsteps", 1.0),
         ("compass", "magnetic_deg", "locationmagneticheading", 1.0),
     ):
