@@ -162,6 +162,18 @@ def test_a_row_for_each_sensor(tmp_path, names, by_sensor):
     assert ("barometer" in found) == (names[3] == "pressure")
 
 
+def test_units_of_axes_and_sensors_of_one_value(tmp_path):
+    """Degrees a second were taken for radians, g for m/s²; a pressure with zeros was unknown."""
+    rows = []
+    for i, t in enumerate(TIME_S):
+        rows += [(t, "gyroscope", 1, 2, i % 3, "deg/s"), (t, "accelerometer", 0, 0.1, 1, "g")]
+        rows += [(t, "pressure", 1013 + i % 2, *(("0.0000", "nan") if i % 2 else ("", "0")), "hPa")]
+    found = read_recording(written(tmp_path, rows, "time,sensor,x,y,z,unit")).tables
+    np.testing.assert_allclose(found["gyroscope"]["y_radps"], np.radians(2))
+    np.testing.assert_allclose(found["accelerometer"]["z_mps2"], 9.80665)
+    assert set(found["barometer"]["pressure_hpa"]) == {1013, 1014}
+
+
 def test_sensors_by_androids_numbers(tmp_path):
     rows = [
         (f"{t:.0f}", kind, 0.1, 0.2, z) for t in 1000 * TIME_S for kind, z in ((1, 9.8), (4, 0))

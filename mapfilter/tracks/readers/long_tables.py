@@ -33,6 +33,7 @@ _KINDS = (
 )
 _VALUES, _UNITS = ("value", "values", "val"), ("units", "unit")
 _AXIS = re.compile(r"(?:(?:values?|val|v|axis|data)[_ \[]?)?([xyzw0-3])\]?")
+_NOTHING = re.compile(r"-?0{0,3}(?:[.,]0{1,18})?|nan|n/?a|none|null", re.ASCII | re.IGNORECASE)
 _AXES = {"0": "x", "1": "y", "2": "z", "3": "w"}
 _PREFIX = re.compile(r"android\.sensor\.|sensor_type_|type_")
 _SENSORS = {"accelerometer": "accelerometer", "gyroscope": "gyroscope", "magnet": "magnetometer"}
@@ -183,7 +184,7 @@ def _names(
     rows_of = np.split(np.argsort(kind, kind="stable"), np.cumsum(np.bincount(kind))[:-1])
     single = np.ones(len(rows), dtype=bool)
     for axis in {"y", "z"} & layout.values.keys():
-        single &= np.isin(rows.texts(layout.values[axis]), ("", "0", "0.0"))
+        single &= rows.mapped(_is_nothing, layout.values[axis]).astype(bool)
     for of, (word, unit) in zip(rows_of, kinds, strict=True):
         if not word:
             continue
@@ -194,10 +195,15 @@ def _names(
         sensor = word if sensor in taken else sensor
         taken.add(sensor)
         if single[of].all():
-            yield sensor, layout.values["x"], of
+            yield _with_unit(sensor, unit, own), layout.values["x"], of
             continue
         for axis, column in layout.values.items():
-            yield f"{sensor}_{axis}", column, of
+            yield _with_unit(f"{sensor}_{axis}", unit, own), column, of
+
+
+def _is_nothing(word: str) -> bool:
+    """Return whether a value is missing, or 0."""
+    return bool(_NOTHING.fullmatch(word))
 
 
 def _with_unit(name: str, unit: str, own: Collection[str]) -> str:
