@@ -57,6 +57,7 @@ def errors(pooled: CaseResult, cities: Cities) -> dict[str, str]:
         "To CONVERGED, m": of_cities(cities, "switch_mean_m", 0),
         "Mean error, m": of_cities(cities, "error_mean_m", 1),
         "95 % error, m": of_cities(cities, "error_95_m", 0),
+        "Claimed": f"{pooled.claimed:.2f}",
         "Within the 95 % radius": share(pooled, "coverage_95", 2),
         "Claimed, more than 50 m off": share(pooled, "off_50m"),
         "False LOST per km": f"{pooled.false_lost_per_km:.2f}",

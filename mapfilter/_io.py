@@ -137,6 +137,28 @@ def replaced_files(folder: Path, older: Callable[[], Iterable[Path]]) -> Iterato
             shutil.rmtree(partial, ignore_errors=True)
 
 
+def check_replaceable(path: Path, is_own: Callable[[Path], bool], older: str) -> None:
+    """Check that a path holds nothing yet, or a file that may be replaced.
+
+    Parameters
+    ----------
+    is_own : callable
+        Tells whether a file is one of those that ``older`` names.
+    older : str
+        Such as "an older export".
+
+    Raises
+    ------
+    OutputError
+        There is a folder or another file.
+    """
+    if not path.exists() or (path.is_file() and is_own(path)):
+        return
+    got = "a folder" if path.is_dir() else "a file of another program, or one changed since"
+    hint = "an input, or a file that was edited; give another name, or move it away"
+    raise fail(OutputError, str(path), f"nothing yet, or {older}", got, hint)
+
+
 def left_aside(path: Path) -> Path | None:
     """Return the folder moved aside by a replacement that was cut short, if there is one."""
     found = (partial / ASIDE for partial in partials(path))

@@ -28,6 +28,7 @@ REMEDIES = {
     "azimuth-off-by-180": "Give the direction into which the antenna radiates, clockwise from "
     "true north.",
     "azimuth-off-lobe": "Correct the azimuth, or take the raster that belongs to the cell.",
+    "azimuth-gons": "Turn the azimuths into degrees: 0.9 times as many.",
     "azimuth-radians": "Turn the azimuths into degrees.",
     "cell-without-raster": "Add the rasters, or take the cells out of the plan.",
     "code-reused-nearby": "Correct carrier (arfcn) or code (bsic) of one of them, or take out "
@@ -123,6 +124,7 @@ _BY_HINT = {
     "degrees given for metres": "degrees-for-metres",
     "east and north swapped, or another CRS": "east-north-swapped",
     "feet given for metres": "feet-for-metres",
+    "gons given for degrees": "azimuth-gons",
     "radians given for degrees": "azimuth-radians",
     "watts or milliwatts given for dBm": "eirp-watts",
     "GHz given for MHz": "frequency-unit",

@@ -125,6 +125,10 @@ _CLEAR_SCORE = 0.25
 _CLEAR_CONTRAST_DB = 6.0
 _BETTER = 0.3
 _STRAY_SHARE = 0.1
+DEG_PER_GON = 0.9
+_LEAST_SECTORS = 6
+_GONS_BETTER, _THAN_ROTATED = 0.03, 0.01
+_ALIKE_BELOW_DEG = 90.0
 
 _READINGS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("azimuth-counter-clockwise", "counter-clockwise from north", lambda a: -a),
@@ -168,11 +172,13 @@ def azimuth_mistakes(
 
     A sector counts as wrong where its azimuth is more than 45° from the lobe and explains the
     raster clearly worse. A mistake of the whole plan is preferred where it explains two sites or
-    more, then labels exchanged within a site, then single azimuths. Cells without a lobe are
-    skipped.
+    more, then labels exchanged within a site, then single azimuths. Gons are at most 40° from
+    degrees, and are told by all sectors together. Cells without a lobe are skipped.
     """
     usable = [cell for cell in cells if _is_clear(cell, lobes)]
     azimuth = {cell.id: float(cell.azimuth_deg or 0.0) for cell in usable}
+    if (gons := _gons(usable, lobes, azimuth)) is not None:
+        return (gons,)
     wrong = [cell for cell in usable if _is_off(lobes[cell.id], azimuth[cell.id])]
     if not wrong:
         return ()
@@ -240,6 +246,27 @@ def _whole_plan(
     concerned = tuple(cell.id for cell in wrong)
     off_deg, read_deg = (_median_off(concerned, lobes, some) for some in (azimuth, meant))
     return AzimuthMistake(mistake, concerned, reading, off_deg, read_deg)
+
+
+def _gons(
+    usable: Sequence[Cell], lobes: Mapping[str, Lobe], azimuth: Mapping[str, float]
+) -> AzimuthMistake | None:
+    """Return the mistake of azimuths in gons, where they explain more than any rotation."""
+    if len(usable) < _LEAST_SECTORS or len({cell.site for cell in usable}) < 2:
+        return None
+
+    def mean_score(read: Callable[[float], float]) -> float:
+        return float(np.mean([lobes[i].score(read(a) % 360) for i, a in azimuth.items()]))
+
+    as_gons = mean_score(lambda a: DEG_PER_GON * a)
+    rotated = max(mean_score(lambda a, by=by: a + by) for by in np.arange(-30.0, 31.0, STEP_DEG))  # type: ignore[misc]
+    if as_gons - mean_score(lambda a: a) < _GONS_BETTER or as_gons - rotated < _THAN_ROTATED:
+        return None
+    # Near north both are alike.
+    ids = tuple(i for i, a in azimuth.items() if a > _ALIKE_BELOW_DEG)
+    meant = {i: DEG_PER_GON * azimuth[i] for i in ids}
+    off_deg, read_deg = (_median_off(ids, lobes, some) for some in (azimuth, meant))
+    return AzimuthMistake("azimuth-gons", ids, "gons", off_deg, read_deg)
 
 
 def _swapped(

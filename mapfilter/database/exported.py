@@ -9,7 +9,8 @@ from pathlib import Path
 from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
-from mapfilter.errors import InputError, OutputError, fail
+from mapfilter._io import check_replaceable
+from mapfilter.errors import InputError
 
 BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
 CELLS_TAG = "CELLS"
@@ -25,13 +26,8 @@ def check_export_replaceable(path: Path) -> None:
     OutputError
         There is a folder, a file of another program, or a GeoPackage that was edited.
     """
-    if not path.exists():
-        return
     own = _is_own_raster if path.suffix.lower() in (".tif", ".tiff") else _is_own_geopackage
-    if path.is_dir() or not own(path):
-        got = "a folder" if path.is_dir() else "a file of another program, or one changed since"
-        hint = "an input, or a map that was edited; give another name, or move the file away"
-        raise fail(OutputError, str(path), "nothing yet, or an older export", got, hint)
+    check_replaceable(path, own, "an older export")
 
 
 def _is_own_raster(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Remarks on predictions: outside what models and patterns are made for, or of unlikely tilts."""
+"""Remarks on predictions outside of what models are made for, or with unlikely antennas."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from mapfilter.radio.cells import Cell, CellPlan
 
 _MOST_NAMED = 3
 _NEAR_FREQUENCY = 0.2
+_HIGH_M = 75.0
 
 
 def outside_validity(plan: CellPlan, lattice: Lattice, model: PredictionModel) -> tuple[str, ...]:
@@ -70,6 +71,22 @@ def upward_tilts(plan: CellPlan) -> tuple[str, ...]:
                 "horizon (likely: the list counts tilts upwards)"
             )
     return tuple(notes)
+
+
+def high_antennas(plan: CellPlan) -> tuple[str, ...]:
+    """Return a remark where most outdoor antennas of a plan are as high as few masts are."""
+    heights_m = {
+        cell.id: cell.height_m
+        for cell in plan.cells
+        if not cell.indoor and "height_m" not in cell.assumes
+    }
+    high = [cell_id for cell_id, height_m in heights_m.items() if height_m >= _HIGH_M]
+    if 2 * len(high) <= len(heights_m):
+        return ()
+    return (
+        f"{_named(high)}: antennas {_HIGH_M:g} m above the ground and higher, such as "
+        f"{heights_m[high[0]]:g} m (likely: feet given for metres)",
+    )
 
 
 def _named(ids: list[str]) -> str:

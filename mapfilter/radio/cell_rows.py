@@ -31,6 +31,7 @@ DEFAULT_HINT = "set cells.{}, which is then taken for all cells without one"
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
 _HEMISPHERES = {"lat": "NS", "lon": "EW"}
 _LONGEST_SHOWN = 80
+_SLASH = "no file can have this name: give the cell that of its raster, as with _"
 
 
 @dataclass(slots=True)
@@ -69,7 +70,8 @@ def row_of(where: str, line: int, given: Mapping[str, str], table: Arranged, fau
     values["id"], values["site"] = given["cell"], given.get("site") or given["cell"]
     for name, key in (("cell", "id"), ("site", "site")):
         if wrong := id_fault(values[key]):
-            refuse(name, *wrong)
+            slash = any(mark in values[key] for mark in "/\\")
+            refuse(name, *wrong, _SLASH if slash else "")
     for name, allowed in RANGES.items():
         if given.get(name):
             value = parse(name, allowed.expected)

@@ -63,7 +63,10 @@ RANGES: dict[str, Range] = {
     "height_m": Range(0, 1000, "metres", above_low=True, mistakes=((0, 0, "height left out"),)),
     "azimuth_deg": Range(
         *(0, 360, "degrees clockwise from true north"),
-        mistakes=((-180, 0, "counted from -180; add 360"),),
+        mistakes=(
+            (-180, 0, "counted from -180; add 360"),
+            (360, 400, "gons given for degrees"),
+        ),
     ),
     "downtilt_deg": Range(-90, 90, "degrees"),
     "mechanical_downtilt_deg": Range(-90, 90, "degrees"),

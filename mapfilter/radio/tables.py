@@ -135,16 +135,26 @@ def read_table(path: Path, what: str) -> Table:
         raise fail(InputError, f"{path} row {reader.line_num}", "CSV", error) from error
     if not lines:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "an empty file")
-    titles = next((n for n, (_, row) in enumerate(lines) if len(row) > 1), 0)
-    if 0 < titles <= _MOST_TITLES:
-        some = number_of(titles, "line")
-        notes += (f"{path.name}: {some} above the header left out: {lines[0][1][0].strip()!r}",)
-        lines = lines[titles:]
+    lines, titles = _without_titles(path, lines)
+    notes += titles
     header = tuple(name.strip() for name in lines[0][1])
     if len(header) > _MOST_COLUMNS:
         expected = f"{what} of at most {_MOST_COLUMNS} columns"
         raise fail(InputError, f"{path}, header", expected, len(header), "another file")
     return Table(path, separator, header, tuple(lines[1:]), notes)
+
+
+def _without_titles(
+    path: Path, lines: list[tuple[int, list[str]]]
+) -> tuple[list[tuple[int, list[str]]], tuple[str, ...]]:
+    """Leave out lines of one field above the header, with a note."""
+    fields = (sum(bool(field.strip()) for field in row) for _, row in lines)
+    titles = next((n for n, count in enumerate(fields) if count > 1), 0)
+    if not 0 < titles <= _MOST_TITLES:
+        return lines, ()
+    first = next(field.strip() for field in lines[0][1] if field.strip())
+    some = number_of(titles, "line")
+    return lines[titles:], (f"{path.name}: {some} above the header left out: {first!r}",)
 
 
 def _too_large(path: Path, what: str, lines: int) -> MapfilterError:
@@ -202,7 +212,8 @@ def _read_workbook(path: Path, data: bytes, what: str) -> Table:
         raise _too_large(path, what, len(lines))
     others = f"; {len(sheets) - 1} more not read" if len(sheets) > 1 else ""
     note = f"{path.name}: sheet {sheets[0]!r} of a workbook{others}"
-    return Table(path, "", tuple(lines[0][1]), tuple(lines[1:]), (note,))
+    lines, titles = _without_titles(path, lines)
+    return Table(path, "", tuple(lines[0][1]), tuple(lines[1:]), (note, *titles))
 
 
 def _text(value: Any) -> str:

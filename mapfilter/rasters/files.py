@@ -133,6 +133,8 @@ def check_plausible(values: Floats32, quantity: Quantity, path: Path) -> None:
             hint = f"{wrong[0]:g} means no data, and the file does not state it; set nodata"
         elif np.abs(wrong).max() > 1000:
             hint = "factor left out, or the wrong byte order"
+            if quantity == "level" and low + 65536 <= lowest:
+                hint = "negative numbers read as unsigned ones: PIXELTYPE SIGNEDINT in the .hdr"
         raise fail(InputError, where, f"a {quantity} in {low:g}..{high:g} {unit}", got, hint)
     if quantity == "level" and highest >= 0 and _most(values >= 0, values):
         got = f"{got}, mostly 0 and above"

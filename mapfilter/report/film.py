@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, isfinite
@@ -15,7 +16,8 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from mapfilter._io import atomic_file
+from mapfilter._inputs import open_input, read_input
+from mapfilter._io import atomic_file, check_replaceable
 from mapfilter._types import Floats
 from mapfilter.errors import OutputError, fail
 from mapfilter.report.basemap import BaseMap, LocalFrame, attribute, draw_base, map_height_in
@@ -34,6 +36,13 @@ from mapfilter.report.canvas import (
 
 FILM_FORMATS = {".gif": "pillow", ".mp4": "ffmpeg"}
 """Endings of films, and the writers of matplotlib that make them."""
+
+_LAST_BYTES = {
+    ".gif": b"!\xfe\x0emapfilter film\x00;",
+    ".mp4": b"\x00\x00\x00\x16freemapfilter film",
+}
+"""What films end with, which no player shows: a comment and the trailer, and a free box."""
+_MOST_BYTES = 1 << 31
 
 _WIDTH_IN, _DPI = 6.4, 100
 _LABELS_IN, _ROW_IN, _TITLE_IN = 0.75, 0.2, 0.85
@@ -111,6 +120,8 @@ def write_film(
 ) -> Path:
     """Write a film as GIF or, where ffmpeg is found, as MP4, by the suffix.
 
+    An older film is replaced.
+
     Parameters
     ----------
     track : FilmTrack
@@ -121,15 +132,18 @@ def write_film(
     Raises
     ------
     OutputError
-        The format is another one, its writer is missing, or the file cannot be written.
+        The format is another one, its writer is missing, there is a file that is no older film, or
+        the file cannot be written.
     """
-    name = FILM_FORMATS.get(path.suffix.lower())
+    kind = path.suffix.lower()
+    name = FILM_FORMATS.get(kind)
     where = str(path)
     if name is None:
         raise fail(OutputError, where, f"a film: {' or '.join(FILM_FORMATS)}", path.suffix)
     if not animation.writers.is_available(name):
         hint = "install the package ffmpeg, or write a .gif"
         raise fail(OutputError, where, "the program ffmpeg, which makes MP4", "none", hint)
+    check_replaceable(path, _is_film, "an older film")
     marks = _marks(track, moments)
     rows = ceil(len(marks) / _COLUMNS)
     height_in = map_height_in(base, _WIDTH_IN - _LABELS_IN) + _TITLE_IN + _ROW_IN * rows
@@ -154,7 +168,25 @@ def write_film(
                 status = track.status[moment.epoch].lower()
                 axes.set_title(f"{title}  {moment.caption}  {status}", fontsize=9)
                 writer.grab_frame()
+        _mark_as_film(temporary, kind)
     return path
+
+
+def _mark_as_film(path: Path, kind: str) -> None:
+    """Mark a film as one that a later one may replace."""
+    film = read_input(path, _MOST_BYTES, "a film", OutputError)
+    # The trailer of a GIF is its last byte.
+    path.write_bytes((film[:-1] if kind == ".gif" else film) + _LAST_BYTES[kind])
+
+
+def _is_film(path: Path) -> bool:
+    last = _LAST_BYTES[path.suffix.lower()]
+    try:
+        with open_input(path, OutputError) as stream:
+            stream.seek(-len(last), os.SEEK_END)
+            return stream.read() == last
+    except (OutputError, OSError):
+        return False
 
 
 def _marks(track: FilmTrack, moments: Sequence[FilmMoment]) -> list[Artist]:

@@ -16,12 +16,16 @@ from mapfilter._types import Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.survey.level_trend import EXPONENT, Covariate, DistanceLoss, Prior, fit_trend
+from mapfilter.survey.level_trend import (
+    CALIBRATION_SLOPE,
+    EXPONENT,
+    Covariate,
+    DistanceLoss,
+    Prior,
+    fit_trend,
+)
 from mapfilter.survey.measured_points import Points
 from mapfilter.survey.residual_field import Shadowing
-
-CALIBRATION = {"slope": 1.0, "slope_deviation": 0.2}
-"""Prior of the slope of levels over those that were predicted."""
 
 _CLEAR, _EACH, _FEWEST = 12.0, 3.0, 2
 """Log odds of a site, and of each of the cells that are exchanged: one alone is never."""
@@ -151,7 +155,7 @@ def _likelihoods(
         return None
     some = points.some(known)
     covariance = shadowing.covariance_db2(some)
-    prior = Prior(float(some.level_dbm.mean()), **CALIBRATION)
+    prior = Prior(float(some.level_dbm.mean()), *CALIBRATION_SLOPE)
     return np.array([-_cost(given, some, covariance, prior) / 2 for given in values[:, known]])
 
 

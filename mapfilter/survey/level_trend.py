@@ -10,7 +10,7 @@ SciPy is imported where it is used: every command reads the options of a survey,
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,9 @@ EXPONENT, EXPONENT_DEVIATION = 3.5, 0.7
 """Prior of the path-loss exponent: between free space and a dense city."""
 OFFSET_DEVIATION_DB = 12.0
 """Prior deviation of a cell's mean level from that of all cells."""
+
+CALIBRATION_SLOPE = 1.0, 0.2
+"""Prior mean and deviation of the slope of levels over those that were predicted."""
 
 _SEARCH_BEYOND_M = 800.0
 _GRID = 25
@@ -84,12 +87,21 @@ class Trend:
 
 @dataclass(frozen=True)
 class Prior:
-    """Normal prior of offset and slope."""
+    """Normal prior of offset and slope.
+
+    Of a calibration the offset is one from the covariate, a prediction, in dB.
+    """
 
     offset_dbm: float
     slope: float = EXPONENT
     slope_deviation: float = EXPONENT_DEVIATION
     offset_deviation_db: float = OFFSET_DEVIATION_DB
+    of_calibration: bool = False
+
+    @classmethod
+    def of_prediction(cls, offset_db: float, deviation_db: float) -> Prior:
+        """Return that of a calibration."""
+        return cls(offset_db, *CALIBRATION_SLOPE, deviation_db, of_calibration=True)
 
 
 def fit_trend(
@@ -101,6 +113,8 @@ def fit_trend(
     east_m, level_dbm = points.east_m, points.level_dbm
     values = np.zeros_like(east_m) if covariate is None else covariate(east_m, points.north_m)
     centre = float(values.mean())
+    if prior.of_calibration:
+        prior = replace(prior, offset_dbm=centre + prior.offset_dbm)
     root = cholesky(covariance_db2, lower=True)
     offset, slope, spread, cost = _profile(root, level_dbm, (values - centre)[:, None], prior)
     return Trend(

@@ -7,7 +7,7 @@ located from the levels.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -19,8 +19,9 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.exchanged_sectors import CALIBRATION
+from mapfilter.survey.expected_offsets import ExpectedOffset, expected_offsets, measured_offset
 from mapfilter.survey.level_trend import (
+    OFFSET_DEVIATION_DB,
     Covariate,
     DistanceLoss,
     Prior,
@@ -108,6 +109,9 @@ class Survey:
         Learnt from all cells together.
     cells : mapping of str to SurveyedCell
         In the order of their ids.
+    expected : mapping of str to ExpectedOffset
+        Of the cells of the plan that were predicted, not measured: how far their levels are from
+        the prediction, as the other cells let expect.
     weakest : mapping of str to WeakestReported
         What bounds the levels of cells that are not in the reports, by
         :func:`~mapfilter.survey.weakest_reported.scale_of` their technology.
@@ -121,6 +125,7 @@ class Survey:
     options: SurveyOptions
     shadowing: Shadowing
     cells: Mapping[str, SurveyedCell]
+    expected: Mapping[str, ExpectedOffset]
     weakest: Mapping[str, WeakestReported]
     technologies: Mapping[str, str]
     notes: tuple[str, ...]
@@ -157,8 +162,8 @@ def fit_survey(
         Positions of the antennas it names; the others are located from their levels.
     predicted : mapping of str to callable, optional
         Calibrate predictions: for each cell a function from east and north (m) to the predicted
-        level (dBm, NaN where there is none). Offset, slope and residuals are fitted about it.
-        Cells that were not predicted are left out.
+        level (dBm, NaN where there is none). Offset, slope and residuals are fitted about it, the
+        offset drawn towards that of the other cells. Cells that were not predicted are left out.
     only : collection of str, optional
         Make the maps of these cells alone. The shadowing is that of all.
 
@@ -205,12 +210,15 @@ def fit_survey(
     level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
     plan = plan.to_crs(measurements.crs) if plan is not None else None
     shadowing = Shadowing()
+    offsets: dict[str, ExpectedOffset] = {}
+    unknown_offset = ExpectedOffset(0.0, OFFSET_DEVIATION_DB)
 
     def trend_of(points: Points) -> Trend:
         prior = Prior(level_dbm)
         covariate: Covariate | None = None
         if predicted is not None:
-            prior = Prior(level_dbm, **CALIBRATION)
+            offset = offsets.get(points.cell_id, unknown_offset)
+            prior = Prior.of_prediction(offset.offset_db, offset.deviation_db)
             covariate = predicted[points.cell_id]
         elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
             covariate = DistanceLoss.of_cell(plan[points.cell_id])
@@ -225,6 +233,8 @@ def fit_survey(
         telling = most_telling(points)
         for _ in range(_ROUNDS):
             shadowing = learn_shadowing(telling, [trend_of(some) for some in telling], shadowing)
+        if predicted is not None:
+            offsets = _expected(points, predicted, plan, shadowing)
         for some in points:
             if only is not None and some.cell_id not in only:
                 continue
@@ -253,7 +263,33 @@ def fit_survey(
             f"{options.min_points_to_locate} squares): the trend is their mean level"
         )
     weakest, kinds = weakest_reported(measurements), measurements.technologies
-    return Survey(measurements.crs, options, shadowing, cells, weakest, kinds, tuple(notes))
+    known = {some.cell_id for some in points}
+    unmeasured = {one: offset for one, offset in offsets.items() if one not in known}
+    return Survey(
+        measurements.crs, options, shadowing, cells, unmeasured, weakest, kinds, tuple(notes)
+    )
+
+
+def _expected(
+    points: Sequence[Points],
+    predicted: Mapping[str, Covariate],
+    plan: CellPlan | None,
+    shadowing: Shadowing,
+) -> dict[str, ExpectedOffset]:
+    """Return the offset that other cells let expect: of cells with points, and of the plan's."""
+    sites = {cell.id: cell.site for cell in plan.cells} if plan is not None else {}
+    measured = []
+    for some in (one.thinned(_LOCATED_FROM) for one in points):
+        error_db = some.level_dbm - predicted[some.cell_id](some.east_m, some.north_m)
+        site = sites.get(some.cell_id, some.cell_id)
+        measured.append(measured_offset(site, error_db, shadowing.covariance_db2(some)))
+    ids = [some.cell_id for some in points]
+    others = [one for one in predicted if one in sites and one not in ids]
+    return dict(
+        zip(
+            [*ids, *others], expected_offsets(measured, [sites[one] for one in others]), strict=True
+        )
+    )
 
 
 def _renamed(strange: Collection[str], predicted: Collection[str]) -> str:

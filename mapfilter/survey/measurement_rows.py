@@ -15,7 +15,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter._words import counted, number_of
-from mapfilter.errors import Fault
+from mapfilter.errors import Fault, InputError
 from mapfilter.geodesy import degree_fault
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, is_above_asu
 from mapfilter.radio.cell_rules import RANGES, id_fault
@@ -44,6 +44,11 @@ NO_TIME = "times not understood (levels kept)"
 _TIMES = "expected ISO 8601 (2026-05-01T10:00:00+02:00), 31.12.2026 10:00:00 or Unix s, ms or µs"
 _DOTTED = re.compile(r"(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)[ T]+(\d\d?):(.*)", re.ASCII)
 """Day, month and year with dots, which no one writes in another order, and a time."""
+
+
+class NotMeasurementsError(InputError):
+    """A file is sound, or of no known kind, but holds no levels of cells with positions."""
+
 
 Identity = tuple[int, int, int, int]
 """mcc, mnc, lac (tac in LTE) and ci."""

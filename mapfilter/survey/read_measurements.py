@@ -15,8 +15,14 @@ from mapfilter._words import counted, number_of
 from mapfilter.errors import Fault, InputError, fail, listed
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.survey.antennas_log import read_antennas_log
-from mapfilter.survey.measurement_files import DIALECTS, header_of, mapped, read_csv
-from mapfilter.survey.measurement_rows import Rows
+from mapfilter.survey.measurement_files import (
+    DIALECTS,
+    header_of,
+    is_like_measurements,
+    mapped,
+    read_csv,
+)
+from mapfilter.survey.measurement_rows import NotMeasurementsError, Rows
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SESSION_GAP_S
 
@@ -42,7 +48,8 @@ def read_measurements(
 ) -> Measurements:
     """Read files of measurements; each file, session column and long silence begins a session.
 
-    Bad rows are counted in the notes, and lose nothing else. Exact repetitions are left out.
+    Bad rows are counted in the notes, and lose nothing else. Exact repetitions are left out, and so
+    are other texts of a folder, with a note, where it has measurements as well.
 
     Parameters
     ----------
@@ -59,36 +66,52 @@ def read_measurements(
         A longer silence begins a new session.
     recorded : callable, optional
         With "auto": reads files that are none of these formats; None for those that it does not
-        know.
+        know. Raises NotMeasurementsError for sound ones without levels of cells or positions.
 
     Raises
     ------
     InputError
-        A file cannot be read, is of another kind, or has no good row; with the first faults of
-        each.
+        A file cannot be read, is of another kind, or has no good row, unless it is one of a folder
+        that resembles no measurements; with the first faults of each.
     """
-    tables = []
+    tables, strays = [], []
     faults: list[Fault] = []
+    named = set(map(Path, files))
     for path in _expanded(files, recorded):
         try:
             table = _read(path, format, columns, recorded)
         except InputError as error:
-            faults.extend(error.faults)
+            if path in named or not isinstance(error, NotMeasurementsError):
+                faults.extend(error.faults)
+            else:
+                strays.append((path, error.faults))
             continue
-        tables.append(table)
-        if not table.cell:
+        if table.cell:
+            tables.append(table)
+        else:
             aside = "; ".join(counted(count, what) for what, count in table.aside.items())
             got = number_of(table.read, "row") + (f": {aside}" if aside else "")
             expected = "at least one level with cell and position"
             unnamed = any("without identity" in what for what in table.aside)
             hint = _NO_CELLS if unnamed else ""
-            faults.extend(table.faults or (Fault(str(path), expected, got, hint),))
+            found = table.faults or [Fault(str(path), expected, got, hint)]
+            if path in named or table.read:
+                faults.extend(found)
+            else:
+                strays.append((path, tuple(found)))
+    if not (faults or tables):
+        faults = [fault for _, found in strays for fault in found]
     if faults:
         raise InputError(tuple(faults))
     if crs is None:
         lat_deg, lon_deg = np.median(np.concatenate([t.columns[1:3] for t in tables], 1), axis=1)
         crs = utm_crs(float(lon_deg), float(lat_deg))
-    return _joined(tables, projected_crs(crs), session_gap_s)
+    joined = _joined(tables, projected_crs(crs), session_gap_s)
+    if not strays:
+        return joined
+    left = f"{number_of(len(strays), 'file')} left out, without cells, positions and levels: "
+    note = left + listed([path.name for path, _ in strays])
+    return replace(joined, notes=(note, *joined.notes))
 
 
 def _read(
@@ -97,14 +120,21 @@ def _read(
     columns: Mapping[str, str] | None,
     recorded: Callable[[Path], Rows | None] | None,
 ) -> Rows:
-    if columns:
-        return read_csv(path, mapped(columns))
-    if kind == "auto":
+    dialect = mapped(columns) if columns else None
+    if dialect is None and kind == "auto":
         own = _kind_of(path)
         if own is None and recorded is not None and (rows := recorded(path)) is not None:
             return rows
         kind = own or "csv"
-    return read_antennas_log(path) if kind == "antennas" else read_csv(path, DIALECTS[kind])
+    if dialect is None and kind == "antennas":
+        return read_antennas_log(path)
+    dialect = dialect or DIALECTS[kind]
+    try:
+        return read_csv(path, dialect)
+    except InputError as error:
+        if is_like_measurements(path, dialect):
+            raise
+        raise NotMeasurementsError(error.faults) from error
 
 
 def _kind_of(path: Path) -> Format | None:

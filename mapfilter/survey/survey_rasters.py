@@ -38,6 +38,7 @@ def write_survey(
     mean_path: Path,
     deviation_path: Path,
     *,
+    predicted: Mapping[str, Covariate] | None = None,
     fill: bool = False,
     deviation_factor: float = 1.0,
     tags: Mapping[str, str] | None = None,
@@ -51,7 +52,8 @@ def write_survey(
     them. Farther than 500 m from every reading, a trend that is not about a given antenna or
     prediction is bounded by the reports of its technology without it
     (:class:`~mapfilter.survey.weakest_reported.WeakestReported`). Cells not measured on the
-    lattice, in the survey's CRS, are left out.
+    lattice, in the survey's CRS, are left out; with ``fill`` those of ``predicted``, which the
+    survey calibrates, are kept with the offset that it expects.
     ``deviation_factor`` multiplies the deviations.
 
     Raises
@@ -64,12 +66,21 @@ def write_survey(
         kind: _bound_dbm(weakest, lattice, survey.options.reach_m)
         for kind, weakest in (survey.weakest.items() if fill else ())
     }
+    unmeasured = survey.expected if fill and predicted is not None else {}
+    everyone = sorted((*survey.cells, *unmeasured))
+    measured = False
     with tempfile.TemporaryFile() as spool:
-        for done, (cell_id, cell) in enumerate(survey.cells.items(), start=1):
-            filled = fill and survey.can_fill(cell)
-            kind = scale_of(survey.technologies.get(cell_id))
-            bound = bounds_dbm[kind] if filled and not cell.has_given_trend else None
-            found = _on_lattice(survey, cell, lattice, filled, bound)
+        for done, cell_id in enumerate(everyone, start=1):
+            if predicted is not None and cell_id in unmeasured:
+                offset_db = unmeasured[cell_id].offset_db
+                found = _expected_on_lattice(predicted[cell_id], offset_db, lattice)
+            else:
+                cell = survey.cells[cell_id]
+                filled = fill and survey.can_fill(cell)
+                kind = scale_of(survey.technologies.get(cell_id))
+                bound = bounds_dbm[kind] if filled and not cell.has_given_trend else None
+                found = _on_lattice(survey, cell, lattice, filled, bound)
+                measured = measured or found is not None
             if found is not None:
                 ids.append(cell_id)
                 pixels, levels = found
@@ -77,8 +88,8 @@ def write_survey(
                 np.save(spool, pixels)
                 np.save(spool, levels.astype(np.float32))
             if progress is not None:
-                progress(done, len(survey.cells))
-        if not ids:
+                progress(done, len(everyone))
+        if not measured:
             bounds = ", ".join(f"{value:.0f}" for value in lattice.bounds_m)
             raise fail(InputError, "measurements", f"some in the area {bounds}", "none")
         for path, row, quantity in ((mean_path, 0, "level"), (deviation_path, 1, "deviation")):
@@ -180,13 +191,36 @@ def _on_lattice(
     return np.concatenate(pixels), np.concatenate(levels, axis=1)
 
 
+def _expected_on_lattice(
+    predicted: Covariate, offset_db: float, lattice: Lattice
+) -> tuple[Ints, Floats] | None:
+    """Return what :func:`_on_lattice` does for a cell that was not measured: no deviations."""
+    pixels, levels = [], []
+    for row, rows in _strips(lattice.rows, lattice.cols):
+        grid = np.mgrid[row : row + rows, : lattice.cols].reshape(2, -1)
+        level_dbm = predicted(*lattice.east_north(grid[0], grid[1])) + offset_db
+        some = np.isfinite(level_dbm)
+        pixels.append((grid[0] * lattice.cols + grid[1])[some])
+        levels.append(level_dbm[some])
+    mean_dbm = np.concatenate(levels)
+    if not mean_dbm.size:
+        return None
+    return np.concatenate(pixels), np.stack([mean_dbm, np.full_like(mean_dbm, np.nan)])
+
+
+def _strips(rows: int, cols: int) -> Iterator[tuple[int, int]]:
+    """Yield first row and number of rows of strips that are not too large."""
+    step = max(_LARGEST_WINDOW_PX // cols, 1)
+    for row in range(0, rows, step):
+        yield row, min(step, rows - row)
+
+
 def _bound_dbm(weakest: WeakestReported, lattice: Lattice, within_m: float) -> Floats32:
     """Return the bound of what was not reported at each pixel, infinite without reports."""
     bound_dbm = np.empty((lattice.rows, lattice.cols), dtype=np.float32)
-    step = max(_LARGEST_WINDOW_PX // lattice.cols, 1)
-    for row in range(0, lattice.rows, step):
-        strip = bound_dbm[row : row + step]
-        grid = np.mgrid[row : row + len(strip), : lattice.cols].reshape(2, -1)
+    for row, rows in _strips(lattice.rows, lattice.cols):
+        strip = bound_dbm[row : row + rows]
+        grid = np.mgrid[row : row + rows, : lattice.cols].reshape(2, -1)
         east_m, north_m = lattice.east_north(grid[0], grid[1])
         strip[:] = weakest.bound_dbm(east_m, north_m, within_m).reshape(strip.shape)
     return bound_dbm
@@ -207,9 +241,8 @@ def _windows(
     cols = right - left + 1
     if cols < 1:
         return
-    step = max(_LARGEST_WINDOW_PX // cols, 1)
-    for row in range(top, bottom + 1, step):
-        yield row, left, min(step, bottom + 1 - row), cols
+    for row, rows in _strips(bottom + 1 - top, cols):
+        yield top + row, left, rows, cols
 
 
 def _bands(

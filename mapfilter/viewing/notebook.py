@@ -42,10 +42,12 @@ class View:
     def save(self, path: str | Path) -> Path:
         """Write the page as a self-contained HTML file, and return its path.
 
+        An older page is replaced.
+
         Raises
         ------
         OutputError
-            The file cannot be written.
+            There is a file that is no such page, or the file cannot be written.
         """
         file = Path(path)
         write_page(self.bundle, file)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from mapfilter._inputs import json_value, read_input
-from mapfilter._io import atomic_file
+from mapfilter._io import atomic_file, check_replaceable
 from mapfilter.errors import StoreError, fail
 from mapfilter.viewing.bundle import FORMAT, VERSION
 
@@ -94,13 +94,14 @@ def _folder() -> Traversable:
 
 
 def write_page(bundle: Mapping[str, Any], path: Path) -> None:
-    """Write the page with a bundle in it.
+    """Write the page with a bundle in it; an older page is replaced.
 
     Raises
     ------
     OutputError
-        The file cannot be written.
+        There is a file that is no such page, or the file cannot be written.
     """
+    check_replaceable(path, _is_page, "an older page")
     with atomic_file(path) as temporary:
         temporary.write_text(page_html(bundle), encoding="utf-8")
 
@@ -129,6 +130,15 @@ def read_page(path: Path) -> dict[str, Any]:
         hint = "made by another version of mapfilter; make it again"
         raise fail(StoreError, where, f"version {VERSION}", bundle.get("version"), hint)
     return bundle
+
+
+def _is_page(path: Path) -> bool:
+    """Return whether a file holds a bundle, of whichever version."""
+    try:
+        text = read_input(path, _MOST_BYTES, "a page", StoreError)
+    except StoreError:
+        return False
+    return OPENING.encode() in text
 
 
 def _unzipped(packed: bytes) -> bytes:

@@ -21,7 +21,7 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, MapfilterError, listed
 from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
-from mapfilter.propagation.remarks import off_frequency, upward_tilts
+from mapfilter.propagation.remarks import high_antennas, off_frequency, upward_tilts
 from mapfilter.radio.arrange_cells import UNUSED_COLUMNS
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
@@ -229,6 +229,8 @@ class _Checks:
     def check_antennas(self, plan: CellPlan, lattice: Lattice, severity: Severity) -> None:
         for note in upward_tilts(plan):
             self.findings.add("tilts-upwards", self.plan_name, f"{note}.", "warning")
+        for note in high_antennas(plan):
+            self.findings.add("feet-for-metres", self.plan_name, f"{note}.", "warning")
         named = sorted({cell.antenna for cell in plan.cells} - set(ANTENNAS))
         if not named:
             return

@@ -11,7 +11,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.radio.identities import IDENTITY
-from mapfilter.survey.measurement_rows import Rows
+from mapfilter.survey.measurement_rows import NotMeasurementsError, Rows
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
@@ -32,7 +32,7 @@ def recorded_rows(path: Path) -> Rows | None:
     Raises
     ------
     InputError
-        The recording holds no usable row, or lacks cells or positions.
+        The recording holds no usable row, or lacks cells or positions (NotMeasurementsError).
     """
     if is_log(path):
         return _log_rows(path)
@@ -47,7 +47,7 @@ def recorded_rows(path: Path) -> Rows | None:
         hint = ""
         if "radio" in tables and {"true_places", "places"} & set(tables):
             hint = "convert it with --origin LAT,LON, and name the log"
-        raise fail(InputError, str(path), _EXPECTED, got, hint)
+        raise fail(NotMeasurementsError, str(path), _EXPECTED, got, hint)
     rows = Rows(path, read=recording.rows)
     for unusable in recording.unusable:
         rows.aside[f"rows left out: {unusable.reason}"] += unusable.count

@@ -16,7 +16,12 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict, simulate_ground_truth
-from mapfilter.propagation.remarks import off_frequency, outside_validity, upward_tilts
+from mapfilter.propagation.remarks import (
+    high_antennas,
+    off_frequency,
+    outside_validity,
+    upward_tilts,
+)
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.far_cells import check_cells_near
 from mapfilter.radio.plan_notes import carrier_notes
@@ -153,6 +158,7 @@ def _predict_network(config: Config, progress: Progress | None) -> PredictResult
         *outside_validity(plan, lattice, model),
         *off_frequency(plan, antennas),
         *upward_tilts(plan),
+        *high_antennas(plan),
     )
     parts = 2 if both else 1
     tags = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -87,6 +87,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         lattice,
         target,
         deviation,
+        predicted=predicted,
         fill=section.fill,
         deviation_factor=factor,
         tags={
@@ -131,7 +132,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
             *measurements.notes,
             *survey.notes,
             *plan_faults(survey, plan, predicted),
-            *_unmeasured(inputs.predicted, ids),
+            *_unmeasured(inputs.predicted, survey, ids),
             *_unvalidated(validation, options.reach_m),
             *(_unfilled(survey, ids) if section.fill else ()),
             *_advice(survey, factor, floor_dbm),
@@ -168,17 +169,29 @@ def _predicted(
     return predicted_levels(rasters, plan)
 
 
-def _unmeasured(predicted: RxLevRasters | None, ids: Sequence[str]) -> list[str]:
-    """Return a note on cells of a prediction that its calibration does not have."""
-    held = set(ids)
-    missing = [one for one in predicted.cell_ids if one not in held] if predicted else []
-    if not missing:
-        return []
-    return [
-        f"{len(missing)} of {number_of(len(missing) + len(held), 'cell')} of the prediction "
-        f"are not in the result, as they were not measured: {listed(missing, _NAMED)}; build them "
-        "from the prediction, and merge the databases, where they are needed"
+def _unmeasured(
+    predicted: RxLevRasters | None, survey: Survey, ids: Sequence[str]
+) -> Iterator[str]:
+    """Yield notes on cells of a prediction that were not measured."""
+    held, cells = set(ids), predicted.cell_ids if predicted is not None else ()
+    missing = [one for one in cells if one not in held]
+    count = number_of(len(cells), "cell")
+    expected = [
+        f"{one} by {offset.offset_db:+.1f} ± {offset.deviation_db:.1f} dB"
+        for one, offset in survey.expected.items()
+        if one in held
     ]
+    if expected:
+        yield (
+            f"{len(expected)} of {count} of the prediction were not measured, and are corrected as "
+            f"the others let expect: {listed(expected, _NAMED)} (standard deviation of the offset)"
+        )
+    if missing:
+        yield (
+            f"{len(missing)} of {count} of the prediction are not in the result, as they were not "
+            f"measured: {listed(missing, _NAMED)}; where they are needed, set "
+            "prediction.survey.fill, which keeps and corrects those of the plan"
+        )
 
 
 def _unvalidated(validation: Validation | None, reach_m: float) -> list[str]:
@@ -194,7 +207,8 @@ def _unvalidated(validation: Validation | None, reach_m: float) -> list[str]:
 
 def _unfilled(survey: Survey, ids: Sequence[str]) -> list[str]:
     """Return a note on cells that are not filled in: their trend does not hold far away."""
-    count = sum(not survey.can_fill(survey.cells[cell_id]) for cell_id in ids)
+    measured = (survey.cells[cell_id] for cell_id in ids if cell_id in survey.cells)
+    count = sum(not survey.can_fill(cell) for cell in measured)
     if not count:
         return []
     return [

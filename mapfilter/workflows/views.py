@@ -13,7 +13,7 @@ from mapfilter._inputs import shown
 from mapfilter.database.checked import MANIFEST
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.evaluation.map_bound import BANDS
 from mapfilter.geodesy import same_crs, short_crs
 from mapfilter.lattice import Lattice
@@ -22,6 +22,7 @@ from mapfilter.viewing.bundle import database_bundle
 from mapfilter.viewing.layers import frame_of, with_bound, with_buildings
 from mapfilter.viewing.merge import side_by_side
 from mapfilter.viewing.page import read_page, write_page
+from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.results import REPLAY_HTML
 
 VIEW_HTML = "view.html"
@@ -60,15 +61,20 @@ def run_view(
     Raises
     ------
     MapfilterError
-        A result has no view, or is of another database; or the file cannot be written.
+        A result has no view, or is of another database; or the file cannot be written, or is one
+        that is no older page, or an input.
     """
     file = (out or Path(VIEW_HTML)).absolute()
+    check_out_apart(file, [path for path in paths if (path / MANIFEST).is_file()])
     bounds = [path for path in paths if (path / BOUND_TIF).is_file()]
     rest = [path for path in paths if path not in bounds]
     if len(rest) == 1 and (rest[0] / MANIFEST).is_file():
         bundle = database_view(open_database(rest[0]))
     else:
         pages = pages_of(rest or paths)
+        if file.resolve() in [page.resolve() for page in pages]:
+            hint = "a page of several beside those that it shows: give another name"
+            raise fail(OutputError, str(file), "another place than an input", "one of them", hint)
         bundle = side_by_side([(shown(str(page)), read_page(page)) for page in pages])
     for path in bounds:
         bundle = _bounded(bundle, path / BOUND_TIF)

@@ -34,9 +34,9 @@ def carrier(arfcn, bsic, level_dbm, censored=0):
 START = DeadReckoning()
 
 
-def read(*rows, used=None, moved=START, options=OPTIONS):
+def read(*rows, used=None, moved=START, options=OPTIONS, area=AREA):
     """Read a report after the last one that was used, and as many metres as were moved."""
-    source = RadioSource(AREA, options)
+    source = RadioSource(area, options)
     update = source.read(used, moved, Epoch(0.0, radio=rows), SPACING_M)
     return update.state, update.radio, update.reason, update.unused
 

@@ -187,6 +187,17 @@ def test_a_full_list_leaves_out_what_is_weaker_than_its_weakest():
     assert absent(reading) == ([C, D], FLOOR_DBM)
 
 
+def test_cells_on_one_carrier_may_be_drowned_by_those_of_the_report():
+    """A phone finds them by what is left beside the stronger ones, and not down to the floor."""
+    rows = serving("A", -70.0), named("B", -80.0), named("X", -84.5)
+    for bands, limit_dbm in (({A}, -84.5), ({B, D}, -84.5), ({C, D}, FLOOR_DBM), ((), FLOOR_DBM)):
+        _, reading, _, _ = read(*rows, area=replace(AREA, interfering=frozenset(bands)))
+        assert absent(reading) == ([C, D], limit_dbm)
+    # One neighbour may still be all that a phone measures.
+    _, reading, _, _ = read(*rows[:2], area=replace(AREA, interfering=frozenset({A})))
+    assert reading.levels.absent.size == 0
+
+
 def test_no_cell_of_a_report_is_absent_however_it_is_named():
     serves = serving("A", -70.0)
     for rows, expected in (

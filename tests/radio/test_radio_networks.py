@@ -169,6 +169,24 @@ def test_workbooks_of_excel(tmp_path):
     assert plan.notes == ("cells.xlsx: sheet 'S1' of a workbook; 1 more not read",)
 
 
+@pytest.mark.parametrize("name", ["cells.xlsx", "cells.csv"])
+def test_lines_of_a_title_above_the_header_are_left_out(tmp_path, name):
+    """Those of a workbook, and of a CSV file with its separators, were taken for the header."""
+    rows = [["Export of 12 March"], [""], *ROWS]
+    data = "".join(";".join([*map(str, row), *[""] * (8 - len(row))]) + "\n" for row in rows)
+    given = workbook(rows) if name.endswith("xlsx") else data
+    plan = read(tmp_path, given, name, layout="atoll")
+    assert plan["S\u00fcd_1"].height_m == 30.0
+    assert plan.notes[-1] == f"{name}: 1 line above the header left out: 'Export of 12 March'"
+
+
+def test_names_that_no_file_can_have_say_what_to_write(tmp_path):
+    rows = [ROWS[0], ["Nord/1", *ROWS[1][1:]]]
+    assert "give the cell that of its raster" in refusal(
+        tmp_path, workbook(rows), "cells.xlsx", layout="atoll"
+    )
+
+
 def test_faults_of_workbooks(tmp_path):
     rows = [ROWS[0], [*ROWS[1][:3], "high", *ROWS[1][4:]]]
     said = refusal(tmp_path, workbook(rows), "cells.xlsx", layout="atoll")

@@ -14,7 +14,7 @@ from mapfilter.propagation.empirical import friis_db, log_distance_db, okumura_h
 from mapfilter.propagation.line_of_sight import line_of_sight
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict, simulate_ground_truth
-from mapfilter.propagation.remarks import off_frequency, upward_tilts
+from mapfilter.propagation.remarks import high_antennas, off_frequency, upward_tilts
 from mapfilter.propagation.tr38901 import hidden_loss_db, seen_loss_db, sight_probability
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
@@ -229,6 +229,18 @@ def test_wrong_choices_are_told_together() -> None:
         "reference_loss_db",
     ):
         assert part in text
+
+
+def test_heights_of_feet_are_told() -> None:
+    def plan(*heights_m, **more):
+        cells = (replace(NORTH, id=f"N{n}", height_m=h, **more) for n, h in enumerate(heights_m))
+        return CellPlan(CRS, tuple(cells))
+
+    (told,) = high_antennas(plan(98.4, 30.0, 82.0))
+    assert told.startswith("2 cells ('N0', 'N2'): antennas 75 m above the ground and higher")
+    # A mast among others, and what stands for a height that is not known.
+    assert high_antennas(plan(98.4, 30.0)) == ()
+    assert high_antennas(plan(98.4, assumed="height_m")) == ()
 
 
 def test_tilts_that_a_list_counts_upwards_are_told() -> None:

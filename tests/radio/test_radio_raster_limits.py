@@ -54,6 +54,8 @@ def test_what_is_just_plausible(tmp_path, values, quantity):
         ((-249, 100), "loss", "levels given for path losses"),
         ((-999, -999), "level", "path losses, or raw RXLEV"),
         ((-1001, -900), "level", "factor left out, or the wrong byte order"),
+        ((65413, 65524), "level", "negative numbers read as unsigned ones"),
+        ((40000, 65524), "level", "factor left out, or the wrong byte order"),
         ((-1000, -900, -80), "level", "path losses, or raw RXLEV"),
         ((-999, -999, -998, -80), "level", "path losses, or raw RXLEV"),
     ],

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pyproj
 import pytest
 
 from mapfilter.errors import InputError
@@ -159,6 +160,10 @@ def test_files_far_apart_or_of_two_systems():
         common_lattice([made(), made(far)], None, "nearest")
     other = replace(LATTICE, crs="EPSG:32634")
     with pytest.raises(InputError, match="two systems mixed up"):
+        common_lattice([made(), made(other)], None, "nearest")
+    # GeoTIFF has the parameters of a system, which were all in the message.
+    other = replace(LATTICE, crs=pyproj.CRS.from_epsg(3067).to_wkt())
+    with pytest.raises(InputError, match=r"as in .*, found .*TM35FIN\(E,N\) \(likely"):
         common_lattice([made(), made(other)], None, "nearest")
 
 

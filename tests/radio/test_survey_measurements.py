@@ -224,6 +224,43 @@ def test_files_without_any_good_row_are_refused_together(tmp_path):
     assert "absent.csv: expected a readable file" in text
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Drives of May, by car: level, rsrp and cell of each second.\n\nThe phone lay on it.\n",
+        "",
+        "time,driver,remark\n2024-05-01,AB,rain\n",
+        PLAIN.splitlines(keepends=True)[0],
+    ],
+)
+def test_other_texts_of_a_folder_are_named_and_left_out(tmp_path, text):
+    """One such file stopped the read of all."""
+    write(tmp_path, PLAIN)
+    stray = write(tmp_path, text, "remarks.csv")
+    found = read_measurements([tmp_path])
+    assert len(found) == 20
+    assert found.notes == ("1 file left out, without cells, positions and levels: remarks.csv",)
+    assert "remarks.csv" in refused(stray)
+    (tmp_path / "drive.csv").unlink()
+    assert "remarks.csv" in refused(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN.replace("level_dbm", "strength"),
+        "Drive of Monday\n" + PLAIN,
+        PLAIN.replace(",-", ","),
+        PLAIN.encode("utf-16"),
+        ANTENNAS[: ANTENNAS.index("Best")],
+    ],
+)
+def test_drive_tests_with_faults_are_not_left_out(tmp_path, text):
+    write(tmp_path, PLAIN)
+    write(tmp_path, text, "other.csv")
+    assert "other.csv" in refused(tmp_path)
+
+
 def test_headers_that_do_not_fit_say_which_column_is_meant(tmp_path):
     path = write(tmp_path, "cell,lat,lng,rsrp_dbm\nA,60.1,24.9,-70\n")
     text = refused(path)

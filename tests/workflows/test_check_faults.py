@@ -143,6 +143,7 @@ ERRORS = [
     ("rxlev-as-level", lambda w: w.each(quantised)),
     ("field-strength", lambda w: w.each(lambda v: v + 142.3)),
     ("azimuth-radians", lambda w: w.change("azimuth_deg", lambda a: round(np.radians(a), 4))),
+    ("azimuth-gons", lambda w: w.change("azimuth_deg", lambda a: a / 0.9)),
     ("azimuth-counter-clockwise", lambda w: w.change("azimuth_deg", lambda a: -a % 360)),
     ("azimuth-counter-clockwise", lambda w: w.change("azimuth_deg", lambda a: (90 - a) % 360)),
     ("azimuth-off-by-90", lambda w: w.change("azimuth_deg", lambda a: (a + 90) % 360)),
@@ -287,6 +288,16 @@ def test_a_missing_antenna_is_an_error_where_rasters_are_to_be_predicted(world):
     outcome = mapfilter("check", "-c", world.toml, "--json", *world.settings)
     codes = {(f["code"], f["severity"]) for f in outcome.json["findings"]}
     assert (outcome.code, codes) == (2, {("antenna-missing", "error")})
+
+
+def test_heights_in_feet(world):
+    """They passed without a word."""
+    for row in world.rows:
+        row["height_m"] = round(float(row["height_m"]) / 0.3048)
+    world.write()
+    (finding,) = mapfilter("check", "-c", world.toml, "--json").json["findings"]
+    assert (finding["code"], finding["severity"]) == ("feet-for-metres", "warning")
+    assert "0.3048" in finding["remedy"]
 
 
 def test_tilts_that_are_counted_upwards(world):

@@ -41,6 +41,25 @@ def test_several_databases_are_refused_as_such(world, tmp_path):
     assert not (tmp_path / "view.html").exists()
 
 
+def test_only_older_pages_are_replaced(world, replays, tmp_path):
+    """Files of other programs, pages that are shown and databases were, without a word."""
+    page, own = tmp_path / "view.html", "<p>A report of my own.</p>"
+    page.write_text(own)
+    view = ("view", world.database, "--out")
+    assert_refused(mapfilter(*view, page), "nothing yet, or an older page", "another program")
+    assert page.read_text() == own
+    assert_done(mapfilter(*view, tmp_path / "other.html"))
+    assert_done(mapfilter(*view, tmp_path / "other.html"))
+    shown = replays / NAMES[0] / "replay.html"
+    before = shown.read_bytes()
+    both = [replays / name for name in NAMES]
+    assert_refused(mapfilter("view", *both, "--out", shown), "another place than an input")
+    assert shown.read_bytes() == before
+    inside = world.database / "view.html"
+    assert_refused(mapfilter(*view, inside), "which is an input")
+    assert not inside.exists()
+
+
 def test_epochs_are_those_of_the_estimate(bundle, replays):
     estimate = read_estimate(replays / "bayes" / "estimate.parquet")
     (run,) = bundle["runs"]

@@ -52,6 +52,43 @@ def test_other_endings_are_named(page, tmp_path):
         run_film(page, tmp_path / "walk.avi", pictures=2)
 
 
+@pytest.mark.parametrize("name", ["walk.gif", "walk.mp4"])
+def test_what_is_no_older_film_is_not_replaced(page, tmp_path, monkeypatch, name):
+    """It was, without a word."""
+    monkeypatch.setattr(animation.writers, "is_available", lambda _: True)
+    film_path, holiday = tmp_path / name, b"GIF89a of a holiday;"
+    film_path.write_bytes(holiday)
+    with pytest.raises(OutputError, match="expected nothing yet, or an older film"):
+        run_film(page, film_path, pictures=2)
+    assert film_path.read_bytes() == holiday
+
+
+def test_an_older_film_is_replaced_and_one_that_was_edited_is_not(page, tmp_path):
+    film_path = tmp_path / "walk.gif"
+    for pictures in (2, 3):
+        run_film(page, film_path, pictures=pictures)
+    with Image.open(film_path) as moving:
+        assert moving.n_frames == 3
+        frames = [moving.seek(at) or moving.copy() for at in range(3)]
+    frames[0].save(film_path, save_all=True, append_images=frames[1:2])
+    with pytest.raises(OutputError, match="one changed since"):
+        run_film(page, film_path, pictures=2)
+
+
+def test_the_mark_of_an_mp4_is_a_box_of_its_own(tmp_path):
+    box = b"\0\0\0\x0cftypmp42"
+    path = tmp_path / "walk.mp4"
+    path.write_bytes(box)
+    film._mark_as_film(path, ".mp4")
+    data, kinds = path.read_bytes(), []
+    while data:
+        size = int.from_bytes(data[:4], "big")
+        kinds.append(data[4:8])
+        assert 8 <= size <= len(data)
+        data = data[size:]
+    assert kinds == [b"ftyp", b"free"]
+
+
 def test_a_run_without_a_belief_is_filmed_by_its_estimate(tmp_path):
     """Of Kalman-type filters no belief is recorded, and they were refused."""
     bundle = made.replay_bundle()
@@ -93,7 +130,7 @@ def seen(monkeypatch):
             )
 
         def finish(self):
-            Path(self.outfile).touch()
+            Path(self.outfile).write_bytes(b";")
 
     animation.writers.register("caught")(Caught)
     monkeypatch.setitem(film.FILM_FORMATS, ".gif", "caught")

@@ -56,7 +56,8 @@ class EvidenceOptions(Options):
         the position no more.
     full_list : int
         With so many neighbours or more a report may have left out others, weaker than these; with
-        fewer, all cells above the floor are in it.
+        fewer, all cells above the floor are in it, unless they share a carrier and the stronger
+        ones may drown them.
     bound_weight : float
         Exponent of the likelihood of bounds and of levels of one of several cells.
     beside_db, beside_m : float
@@ -216,7 +217,8 @@ class RadioSource(EvidenceSource):
         limit_dbm = self.area.floor_dbm
         neighbours = sum(row.role != SERVING for row in epoch.radio)
         if neighbours >= _NEIGHBOURS_FOR_ABSENCE:
-            if neighbours >= options.full_list:
+            drowned = not self.area.interfering.isdisjoint(inside)
+            if drowned or neighbours >= options.full_list:
                 limit_dbm = min(row.level_dbm for row in epoch.radio if isfinite(row.level_dbm))
             present = self._present(epoch)
             absent = [band for band in range(len(self.area.cell_ids)) if band not in present]

@@ -22,7 +22,12 @@ from mapfilter.models.tile_kernels import (
     pixels_from_south,
     upper_left,
 )
-from mapfilter.positioning.bayes.area_frame import AreaFrame, carriers_of, sites_of
+from mapfilter.positioning.bayes.area_frame import (
+    AreaFrame,
+    carriers_of,
+    interfering_of,
+    sites_of,
+)
 from mapfilter.positioning.bayes.area_tiles import HELD_BYTES, TILE_PX, AreaTiles
 
 SEARCH_TILES = 48
@@ -41,7 +46,7 @@ class TiledArea(AreaFrame):
 
     Parameters
     ----------
-    lattice, cell_ids, known_ids, carriers, floor_dbm, sites
+    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, interfering
         As of :class:`~mapfilter.positioning.bayes.area_frame.AreaFrame`.
     tiles : AreaTiles
         Of the database.
@@ -57,6 +62,7 @@ class TiledArea(AreaFrame):
     sites: Mapping[str, tuple[float, float, float]]
     tiles: AreaTiles
     search_tiles: int = SEARCH_TILES
+    interfering: frozenset[int] = frozenset()
 
     @classmethod
     def of_database(
@@ -98,6 +104,7 @@ class TiledArea(AreaFrame):
             sites_of(plan),
             AreaTiles(database, cells, side, largest_bytes),
             search_tiles,
+            interfering_of(plan, cells),
         )
 
     def looked_up(
