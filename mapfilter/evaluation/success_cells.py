@@ -46,7 +46,7 @@ class SuccessCell:
     coverage_95, coverage_95_low, coverage_95_high : float
         Share of the claimed epochs of all runs, wrong ones included, whose 95 % radius held the
         true position, and its 95 % interval for *these* routes; NaN of filters without radii. Runs
-        are drawn, not epochs, as those of a run are alike.
+        are drawn, not epochs, as those of a run are alike: a single one has no interval (NaN).
     coverage_95_routes_low, coverage_95_routes_high : float
         The interval for all routes of the area; NaN for a single one.
     radius_95_median_m : float

@@ -151,7 +151,8 @@ def _parts(plan: SweepPlan, world: SweepWorld, database: Path) -> tuple[int, dic
                 found = locate(moved, filter_, filter_rng(plan.seed, run)).estimate
             with timed("scored_s"):
                 truth = truth_of(log.truth)
-                accuracy(found, truth), claimed_radii(found, truth)
+                accuracy(found, truth)
+                claimed_radii(found, truth)
             epochs = len(found)
     return epochs, {name: median(times) for name, times in took.items()}
 

@@ -103,7 +103,7 @@ def test_coverage_by_hand():
     assert cell.coverage_95 == sum(held) / sum(claimed) == 60 / 84
     assert cell.claimed == 84 / (9 * 40)
     assert cell.radius_95_median_m == 27.5, "between 25 and 30 m, the middle of eight runs"
-    # Epochs of a run are alike: the interval is that of eight runs at most, not of 84 epochs.
+    # Epochs of a run are alike: the interval is far wider than that of 84 epochs.
     low, high = wilson_interval(60, 84)
     assert cell.coverage_95_high - cell.coverage_95_low > 2 * (high - low)
     assert 0.3 < cell.coverage_95_low < 0.714 < cell.coverage_95_high < 0.95

@@ -62,6 +62,18 @@ def test_rows_of_wigle_that_are_not_used_are_named(tmp_path):
         read_recording(written(tmp_path, name, lost))
 
 
+def test_types_of_a_damaged_wigle_are_few(tmp_path):
+    """Each of thousands of types was a note, and a pass over all rows."""
+    name, text = MADE["wigle"]
+    lines = text.splitlines()
+    bad = [lines[3].replace(",WIFI", f",T{i:05d}") for i in range(20_000)]
+    found = read_recording(written(tmp_path, name, "\n".join([*lines, *bad])))
+    assert found.ignored[-2:] == (
+        "1 row of type T00007 left out",
+        "19992 rows of other types left out",
+    )
+
+
 def test_forces_of_sensorlog_have_the_sign_of_all_others(tmp_path):
     """Apple's accelerations at rest point down, and are in g; a gyroscope turned the wrong way."""
     found = read_recording(written(tmp_path, *MADE["sensorlog"]))
@@ -134,6 +146,34 @@ def test_asc_in_decimal_and_relative(tmp_path):
     pd.testing.assert_frame_equal(found, hexadecimal)
     with pytest.raises(InputError, match="export with absolute timestamps"):
         read_recording(written(tmp_path, name, text.replace("absolute", "relative")))
+
+
+def test_times_since_the_frame_before_are_refused(tmp_path):
+    """Candump -td: 60 s of a drive were read as some milliseconds."""
+    delta_s = np.random.default_rng(3).uniform(0.001, 1.0, 60)
+    rows = [f" ({one:010.6f})  can0  7E8   [8]  03 41 0D 20 00 00 00 00" for one in delta_s]
+    with pytest.raises(InputError, match=r"absolute timestamps, found times that go backwards in"):
+        read_recording(written(tmp_path, "bus.log", "\n".join(rows)))
+
+
+@pytest.mark.parametrize("line", ["Base December survey", "base hex", "base decimal,1,2"])
+def test_a_title_that_begins_as_a_line_of_asc_makes_no_frames(tmp_path, line):
+    """Such a table was refused as raw frames of a bus."""
+    rows = "".join(f"{START_UTC_S + i},{60 + i / 1e4},24.9\n" for i in range(20))
+    found = read_recording(written(tmp_path, "a.csv", f"{line}\ntime,lat,lon\n{rows}"))
+    assert (found.format, len(found.tables["positions"])) == ("csv", 20)
+
+
+def test_positions_that_sensorlog_repeats_count_once_where_times_have_no_zone(tmp_path):
+    name, text = MADE["sensorlog"]
+    head, *rows = text.replace(" +0300", "").splitlines()
+    first = rows[0].split(",")
+    rows[1:9] = [
+        ",".join([row.split(",")[0], *first[1:8], *row.split(",")[8:]]) for row in rows[1:9]
+    ]
+    found = read_recording(written(tmp_path, name, "\n".join([head, *rows])))
+    assert len(found.tables["positions"]) == COUNT - 8
+    assert not any("positions" in note for note in found.ignored)
 
 
 def test_replies_that_are_no_speed_of_the_vehicle(tmp_path):

@@ -1,5 +1,7 @@
 """Tables with a row for each value, and with a row for each sensor: read as a table of columns."""
 
+import tracemalloc
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -60,6 +62,61 @@ def test_units_of_a_column_of_their_own_count(tmp_path):
     assert not found.clock.absolute
 
 
+def test_units_that_are_written_in_several_ways_make_one_column(tmp_path):
+    """Every second speed was lost, or all of those whose name states the unit, too."""
+    given = {"Vehicle speed": ("km/h", "KM/H"), "Vehicle speed [km/h]": ("km/h", "")}
+    for name, units in given.items():
+        rows = [(t, name, 30 + t % 3, units[t % 2]) for t in range(60)]
+        found = read_recording(written(tmp_path, rows, "time,name,value,unit"))
+        np.testing.assert_allclose(
+            found.tables["odometry"]["speed_mps"], (30 + np.arange(60) % 3) / 3.6
+        )
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "columns", "table"),
+    [
+        ("time,type,value", ("car", 8), {"wheel_speed_mps": "value"}, "odometry"),
+        ("time,name,x,y,z", ("car", 385e3, 6672e3, 1), {"east_m": "X", "north_m": "Y"}, "places"),
+        ("time,lat,lon,type,value", (60, 24, "rsrp", -90), {"level_dbm": "value"}, "radio"),
+    ],
+)
+def test_a_table_whose_values_are_a_column_of_a_field_stays_one(
+    tmp_path, header, row, columns, table
+):
+    """Such a map was that of a plain table before tables with a row for each value were read."""
+    path = written(tmp_path, [(t, *row) for t in TIME_S], header)
+    found = read_recording(path, options=ReadOptions(columns=columns))
+    assert found.format == "csv"
+    assert len(found.tables[table]) == 90
+
+
+def test_values_of_several_cells_at_a_time_are_not_mixed(tmp_path):
+    """The level of a second cell was that of the first, where the first one had none."""
+    rows = []
+    for t in TIME_S:
+        rows += [(t, 244, 91, 30, 257, "rsrq", -11), (t, 244, 91, 30, 258, "rsrp", -97)]
+        rows += [(t, 244, 91, 30, 259, "rsrp", -80), (t, 244, 91, 30, 259, "rsrq", -9)]
+    found = read_recording(written(tmp_path, rows, "time,mcc,mnc,tac,ci,name,value"))
+    radio = found.tables["radio"].dropna(subset="level_dbm")
+    assert set(zip(radio["ci"], radio["level_dbm"], strict=True)) == {(258, -97), (259, -80)}
+
+
+@pytest.mark.parametrize("header", ["time,name,value", "time,name,x,y,z"])
+def test_many_names_at_many_times_fit_into_memory(tmp_path, header):
+    """Where each of 150 names was a column in memory, 30,000 rows took more than 40 MB."""
+    more = (0.1, 0.2) if "x" in header else ()
+    rows = [(t / 10, f"n{t % 150}" if t % 150 else "gyroscope", 1, *more) for t in range(30_000)]
+    rows += [(9000 + t, "pressure", 1013 + t % 2, *(0,) * len(more)) for t in range(9)]
+    path = written(tmp_path, rows, header)
+    tracemalloc.start()
+    found = read_recording(path)
+    used_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(found.tables["barometer"]) == 9
+    assert used_bytes < 25e6, used_bytes
+
+
 def test_names_are_mapped_as_columns_are(tmp_path):
     rows = [(t, "Geschwindigkeit", f"{v:.3f}") for t, v in zip(TIME_S, SPEED_MPS, strict=True)]
     path = written(tmp_path, rows, "time,sensor,value")
@@ -103,6 +160,18 @@ def test_a_row_for_each_sensor(tmp_path, names, by_sensor):
         np.testing.assert_allclose(found[table].iloc[0, 1:].to_numpy(dtype=float), values[j])
         np.testing.assert_allclose(found[table]["time_s"], TIME_S)
     assert ("barometer" in found) == (names[3] == "pressure")
+
+
+def test_units_of_axes_and_sensors_of_one_value(tmp_path):
+    """Degrees a second were taken for radians, g for m/s²; a pressure with zeros was unknown."""
+    rows = []
+    for i, t in enumerate(TIME_S):
+        rows += [(t, "gyroscope", 1, 2, i % 3, "deg/s"), (t, "accelerometer", 0, 0.1, 1, "g")]
+        rows += [(t, "pressure", 1013 + i % 2, *(("0.0000", "nan") if i % 2 else ("", "0")), "hPa")]
+    found = read_recording(written(tmp_path, rows, "time,sensor,x,y,z,unit")).tables
+    np.testing.assert_allclose(found["gyroscope"]["y_radps"], np.radians(2))
+    np.testing.assert_allclose(found["accelerometer"]["z_mps2"], 9.80665)
+    assert set(found["barometer"]["pressure_hpa"]) == {1013, 1014}
 
 
 def test_sensors_by_androids_numbers(tmp_path):
@@ -169,6 +238,17 @@ def test_seconds_of_the_day_go_on_after_midnight(tmp_path, monkeypatch, parts):
     times.append(read_recording(path).tables["odometry"]["time_s"])
     for found in times:
         np.testing.assert_allclose(found, 86_350.5 + np.arange(200))
+
+
+def test_seconds_of_the_day_go_on_after_two_midnights_in_parts(tmp_path, monkeypatch):
+    """From the part after the second midnight on, times were those of the first day again."""
+    second = np.arange(80_000.0, 300_000.0, 100.0)
+    columns = {"time": second % 86_400, "Vehicle speed [km/h]": 30.0 + np.arange(2200) % 3}
+    pd.DataFrame(columns).to_csv(tmp_path / "a.csv", index=False)
+    for size in (8192, 1 << 24):
+        monkeypatch.setattr(text, "_PART_BYTES", size)
+        found = read_recording(tmp_path / "a.csv").tables["odometry"]["time_s"]
+        np.testing.assert_allclose(found, second)
 
 
 def test_a_counter_of_seconds_that_begins_anew_at_noon_is_no_midnight(tmp_path):

@@ -111,6 +111,15 @@ def test_angles_for_a_quaternion_are_refused(tmp_path):
     assert bad.lines == (9,)
 
 
+def test_a_phone_without_an_attitude_writes_zeros(tmp_path):
+    """Its whole file was refused."""
+    zeros = dict.fromkeys(("qx", "qy", "qz", "qw"), 0.0)
+    table = pd.DataFrame({"time": TIME_S, "wheel_speed_mps": 8.0, **zeros})
+    table.to_csv(tmp_path / "a.csv", index=False)
+    found = read_recording(tmp_path / "a.csv")
+    assert list(found.tables) == ["odometry"]
+
+
 @pytest.mark.parametrize("column", ["bearing", "course_deg", "Course [deg]"])
 def test_a_course_beside_a_speed_alone_tells_how_it_turns(tmp_path, column):
     """Positions were left out, or never written; the course was not used."""

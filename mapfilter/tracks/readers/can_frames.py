@@ -12,18 +12,19 @@ import numpy as np
 
 from mapfilter._constants import KMH_MPS
 from mapfilter._words import number_of
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.unknown_formats import RAW_FRAMES
 
-_UNIX_S = 1e8
 _NO_SPEED_KMH = 255
 _SPEED_SD_MPS = KMH_MPS / 12**0.5
 """Speeds are whole km/h."""
 _HEAD_LINES = 50
+_MOST_BACK_SHARE = 0.1
 _STAMP = r"^[ \t]*\((\d{1,12}\.\d{1,9})\)[ \t]+\S{1,16}[ \t]+(?:[RT]X[ \t]+\S[ \t]+\S[ \t]+)?"
 _REPLY = r"(7E[89A-F]|18DAF1[0-9A-F]{2})"
 """Identifiers by which control units reply (ISO 15765-4), of 11 and of 29 bits."""
@@ -33,9 +34,7 @@ _LENGTH = r"[ \t]+\[\d{1,2}\][ \t]+"
 _ASC = r"^[ \t]*(\d{1,12}\.\d{1,9})[ \t]+\d{1,3}[ \t]+"
 _ASC_DATA = r"x?[ \t]+[RT]x[ \t]+d[ \t]+\d{1,2}[ \t]+"
 _ASC_DECIMAL = r"(202[4-9]|203[01])" + _ASC_DATA + r"0*[3-7][ ]+0*65[ ]+0*13[ ]+(\d{1,3})\b"
-_BASE = re.compile(
-    r"base[ \t]+(hex|dec)(?:[ \t]+timestamps[ \t]+(absolute|relative))?", re.IGNORECASE
-)
+_BASE = re.compile(r"base[ \t]+(hex|dec)[ \t]+timestamps[ \t]+(absolute|relative)\b", re.IGNORECASE)
 _CANDUMP = re.compile(_STAMP + r"[0-9A-F]{3,8}(?:#|" + _LENGTH + ")", re.ASCII | re.IGNORECASE)
 
 
@@ -63,6 +62,12 @@ def _matches(text: Text) -> bool:
     return bool(_CANDUMP.match(text.first_line) or _base(text))
 
 
+def _relative(reading: Reading, got: str) -> MapfilterError:
+    """Return the error of times that count from the frame before."""
+    hint = "times since the frame before; export with absolute timestamps (candump -ta, -l)"
+    return fail(InputError, str(reading.path), "absolute timestamps", got, hint)
+
+
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     asc, base = _base(text), 16
     patterns: tuple[re.Pattern[bytes], ...] = _CANDUMP_SPEEDS
@@ -70,9 +75,8 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     if asc is not None:
         base = 10 if asc[1].lower() == "dec" else 16
         patterns = (_ASC_SPEEDS[base],)
-        if (asc[2] or "").lower() == "relative":
-            expected, hint = "times since the start", "export with absolute timestamps"
-            raise fail(InputError, str(reading.path), expected, "timestamps relative", hint)
+        if asc[2].lower() == "relative":
+            raise _relative(reading, "timestamps relative")
     reading.rows = sum(1 for line in text.data.split(b"\n") if line.strip())
     found = [match for pattern in patterns for match in pattern.finditer(text.data)]
     if not found:
@@ -86,8 +90,10 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     feeds = np.flatnonzero(np.frombuffer(text.data, dtype=np.uint8) == ord("\n"))
     line = text.line + np.searchsorted(feeds, starts)
     time_s = np.array([float(match[1]) for match in own])
+    if (back := int(np.sum(np.diff(time_s) < 0))) > _MOST_BACK_SHARE * len(own):
+        raise _relative(reading, f"times that go backwards in {number_of(back, 'place')}")
     speed_kmh = np.array([float(int(match[3], base)) for match in own])
-    reading.clock = Clock("utc" if np.median(time_s) > _UNIX_S else "monotonic")
+    reading.clock = Clock("utc" if np.median(time_s) > LEAST_UNIX_S else "monotonic")
     unknown = speed_kmh >= _NO_SPEED_KMH
     reading.refuse(line[unknown], f"speed of {_NO_SPEED_KMH} km/h: the mark of no value")
     columns = {

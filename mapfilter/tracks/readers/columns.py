@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import nan
 from typing import Any
 
@@ -15,6 +16,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.times import (
+    LEAST_UNIX_S,
     parse_times,
     seconds_of_day,
     unix_seconds,
@@ -24,7 +26,6 @@ from mapfilter.tracks.readers.times import (
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
 _FIRST_ROWS = 1000
-_LEAST_UNIX_S = 1e8
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
 _WHOLE = r"^[-+]?(\d{1,18}|[0-8]\d{18})$"
@@ -51,7 +52,9 @@ class Columns:
     names: tuple[str, ...]
     line: Ints
     decimal_comma: bool = False
-    _columns: dict[int, pa.ChunkedArray] = field(default_factory=dict, repr=False)
+    _columns: dict[int, pa.ChunkedArray | Callable[[], pa.ChunkedArray]] = field(
+        default_factory=dict, repr=False
+    )
 
     def __len__(self) -> int:
         return len(self.line)
@@ -66,7 +69,8 @@ class Columns:
 
     def _raw(self, *names: str) -> pa.ChunkedArray | None:
         name = self.find(*names)
-        return None if name is None else self._columns.get(self.names.index(name))
+        column = None if name is None else self._columns.get(self.names.index(name))
+        return column() if callable(column) else column
 
     def texts(self, *names: str) -> np.ndarray:
         """Return the first of these columns that is there as texts, "" where missing."""
@@ -111,7 +115,7 @@ class Columns:
             except pa.ArrowInvalid:
                 pass
             else:
-                return unix_seconds(np.where(np.abs(number) > _LEAST_UNIX_S, number, np.nan)), True
+                return unix_seconds(np.where(np.abs(number) > LEAST_UNIX_S, number, np.nan)), True
         if (
             column is not None
             and (found := _plain_times(column, zone, layout, after_s)) is not None
@@ -159,18 +163,21 @@ class Columns:
         changed = pc.replace_substring_regex(column, pattern, by)
         return replace(self, _columns={**self._columns, self.names.index(name): changed})
 
-    def picked(self, columns: Mapping[str, tuple[str, Ints]], line: Ints) -> Columns:
-        """Return columns of other rows: by name a column of these, and its row for each new one.
+    def picked(self, columns: Mapping[str, tuple[str, Ints, Ints]], line: Ints) -> Columns:
+        """Return columns of other rows: by name a column of these, rows of it, and their places.
 
-        ``line`` is the file's line of each new row; a row of -1 is missing.
+        ``line`` is the file's line of each new row. A column is made when it is read: most of many
+        never are, and all at once need not fit into memory.
         """
-        every = {}
-        for number, (name, row) in enumerate(columns.values()):
-            column = self._raw(name)
-            index = pa.array(row, mask=row < 0)
-            picked = pa.nulls(len(row), pa.string()) if column is None else column.take(index)
-            every[number] = pc.fill_null(pa.chunked_array(picked), "")
-        return replace(self, names=tuple(columns), line=line, _columns=every)
+        made = [partial(self._picked, len(line), *one) for one in columns.values()]
+        return replace(self, names=tuple(columns), line=line, _columns=dict(enumerate(made)))
+
+    def _picked(self, count: int, name: str, rows: Ints, places: Ints) -> pa.ChunkedArray:
+        column, index = self._raw(name), np.full(count, -1, dtype=np.int64)
+        index[places] = rows
+        if column is None:
+            return pa.chunked_array([pa.repeat("", count)])
+        return pc.fill_null(column.take(pa.array(index, mask=index < 0)), "")
 
     def first_text(self, name: str) -> str:
         """Return the first text of a column that is not blank; "" where there is none."""

@@ -30,8 +30,10 @@ def add_attitude(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     size = np.sqrt(x**2 + y**2 + z**2 + w**2)
     there = np.isfinite(size)
     unit = there & (size >= _UNIT[0]) & (size <= _UNIT[1])
-    if there.any() and unit.sum() < _MOSTLY * there.sum():
-        first = np.flatnonzero(there & ~unit)[0]
+    # All are 0 where a phone has none.
+    given = there & (size > 0)
+    if given.any() and unit.sum() < _MOSTLY * given.sum():
+        first = np.flatnonzero(given & ~unit)[0]
         where = f"{reading.path} row {mapped.rows.line[first]}, qx, qy, qz, qw"
         hint = "angles for a quaternion; or exchanged columns"
         raise fail(InputError, where, "a quaternion of length 1", f"{size[first]:.4g}", hint)

@@ -18,6 +18,7 @@ from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.times import (
+    LEAST_UNIX_S,
     parse_times,
     unix_seconds,
     utc_from_gps_s,
@@ -26,7 +27,6 @@ from mapfilter.tracks.readers.times import (
     without_midnights,
 )
 
-_UNIX_S = 1e8
 _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 _DAYS, _EPOCH_DAYS, _NEAREST_S = (36_526.0, 73_050.0), 25_569.0, 1e-3
 """Days of the years 2000 to 2099 since 1900, those until 1970, and rows a thousand a second."""
@@ -44,7 +44,8 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     mapped = _best_column(mapped, reading)
     number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
     known = number[np.isfinite(number)]
-    if known.size >= 0.5 * len(number) and known.size and abs(float(np.median(known))) < _UNIX_S:
+    usual_s = abs(float(np.median(known))) if known.size else np.inf
+    if known.size >= 0.5 * len(number) and usual_s < LEAST_UNIX_S:
         if _is_days(known):
             reading.note("time: days since 1900, as a spreadsheet writes them")
             return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)

@@ -17,6 +17,7 @@ _TURN, _LATEST = 1024, 4096
 _WEEKS_OF_YEAR = 54
 _NEAR_END_S = 3600.0
 _LONGEST_PAUSE_S = 600.0
+_OVER_MIDNIGHT = "time: seconds of the day begin anew: times go on"
 
 
 def week_column(mapped: Mapped) -> str:
@@ -67,15 +68,20 @@ def over_weeks(reading: Reading, second: Floats) -> Floats:
 def over_days(reading: Reading, second: Floats) -> Floats:
     """Return seconds of the day that go on after midnight, where they begin anew within minutes."""
     known = np.isfinite(second)
-    before_s = [reading.last_s] if np.isfinite(reading.last_s) else []
-    seconds = np.concatenate([before_s, second[known]])
     if not known.any() or second[known].min() < 0 or second[known].max() > DAY_S:
         return second
+    # Those of a part that was read before may have gone on already.
+    goes_on = _OVER_MIDNIGHT in reading.notes
+    days_s = reading.last_s // DAY_S * DAY_S if goes_on else 0.0
+    before_s = [reading.last_s - days_s] if np.isfinite(reading.last_s) else []
+    seconds = np.concatenate([before_s, second[known]])
     steps = np.diff(seconds)
     back = steps[steps < -DAY_S / 2]
-    if not back.size or back.min() < -DAY_S or back.max() > _LONGEST_PAUSE_S - DAY_S:
+    if not (goes_on or back.size) or (back < -DAY_S).any():
         return second
+    if (back > _LONGEST_PAUSE_S - DAY_S).any():
+        return second + days_s
     counted = second.copy()
-    counted[known] = np.unwrap(seconds, period=DAY_S)[len(before_s) :]
-    reading.note("time: seconds of the day begin anew: times go on")
+    counted[known] = days_s + np.unwrap(seconds, period=DAY_S)[len(before_s) :]
+    reading.note(_OVER_MIDNIGHT)
     return counted

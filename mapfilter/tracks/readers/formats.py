@@ -91,8 +91,8 @@ def format_of(path: str | Path) -> Format | None:
     except InputError:
         return None
     found = find_format(text)
-    if found is None and _below_title(text, None) is not None:
-        return plain_csv.FORMAT
+    if found is None and (below := _below_title(text, None)) is not None:
+        return find_format(below) or plain_csv.FORMAT
     return found
 
 
@@ -129,7 +129,7 @@ def read_recording(
         below = _below_title(text, options)
         if below is not None:
             text, known = below, find_format(below) or plain_csv.FORMAT
-    if own and not name and (known is None or (known is tems.FORMAT and _named(text, options))):
+    if own and not name and (known is None or _is_chosen(known, text, options)):
         # The columns of such an export are chosen, and may be named.
         known = plain_csv.FORMAT if _is_of(text, options) else None
     if known is None:
@@ -166,6 +166,13 @@ def _below_title(text: Text, options: ReadOptions | None) -> Text | None:
             any(known.matches(line) for known in tables) or (own is not None and _named(line, own))
         ),
     )
+
+
+def _is_chosen(known: Format, text: Text, options: ReadOptions | None) -> bool:
+    """Return whether a column map takes the columns of a file of some format as they are."""
+    if known is long_tables.FORMAT and options is not None:
+        return long_tables.has_columns_of(text, options.columns.values())
+    return known is tems.FORMAT and _named(text, options)
 
 
 def _named(text: Text, options: ReadOptions | None) -> bool:

@@ -18,10 +18,10 @@ from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.separated_values import split_blanks, value_columns
 from mapfilter.tracks.readers.text import Text, read_text
+from mapfilter.tracks.readers.times import LEAST_UNIX_S
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)
 _FRAME_S = 0.1
-_UNIX_S = 1e8
 _CROOKED = 0.05
 
 
@@ -134,7 +134,7 @@ def _tum_clock(text: Text) -> Literal["utc", "monotonic"]:
     comma = _comma(text, 8).decode()
     words = [line.replace(",", comma).replace(";", " ").split()[:1] for line in text.head]
     known = [float(word[0]) for word in words if word and _NUMBER.fullmatch(word[0])]
-    return "utc" if known and float(np.median(known)) > _UNIX_S else "monotonic"
+    return "utc" if known and float(np.median(known)) > LEAST_UNIX_S else "monotonic"
 
 
 def _add_poses(

@@ -26,7 +26,7 @@ _FIELDS = ("motionmagneticfield", "magnetometer")
 """Of the gyroscope and the magnetometer: calibrated ones first."""
 _LATITUDE, _LONGITUDE = "locationlatitude", "locationlongitude"
 _OLDEST_S = 10.0
-_HPA_KPA = 10.0
+_KPA_HPA = 10.0
 
 
 def _named(names: Sequence[str]) -> dict[str, str]:
@@ -57,7 +57,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         if of:
             _add_axes(rows, reading, sensor, unit, time_s, [rows.number(names[one]) for one in of])
     for table, column, name, factor in (
-        ("barometer", "pressure_hpa", "altimeterpressure", _HPA_KPA),
+        ("barometer", "pressure_hpa", "altimeterpressure", _KPA_HPA),
         ("steps", "count", "pedometernumberofsteps", 1.0),
         ("compass", "magnetic_deg", "locationmagneticheading", 1.0),
     ):
@@ -89,7 +89,8 @@ def _add_positions(
         "speed_mps": _not_negative(number("locationspeed")),
         "course_deg": _not_negative(number("locationcourse")),
     }
-    new = changed_rows(position, ("time_s", "lat_deg", "lon_deg"))
+    stamp_s = own_s if np.isfinite(own_s).any() else time_s
+    new = changed_rows({**position, "time_s": stamp_s}, ("time_s", "lat_deg", "lon_deg"))
     new &= np.isfinite(position["lat_deg"]) & np.isfinite(position["lon_deg"])
     old = new & (time_s - measured_s > _OLDEST_S)
     reading.refuse(rows.line[old], f"positions: measured more than {_OLDEST_S:g} s before the row")

@@ -36,6 +36,8 @@ _HALF_DAY = re.compile(
     re.IGNORECASE,
 )
 """Hours of half a day, minutes, and AM or PM."""
+LEAST_UNIX_S = 1e8
+"""Seconds above are Unix times (since March 1973), below those from an unknown start."""
 _MILLISECONDS = re.compile(r"(?<=[ T])(\d\d:\d\d:\d\d):(\d{3})\b", re.ASCII)
 """A time of day whose milliseconds follow a colon."""
 _UTC = re.compile(r"\s{0,3}\b(?:UTC|GMT)\s{0,3}$")
@@ -111,7 +113,7 @@ def parse_times(
     time_s = np.full(len(given), np.nan)
     if layout == "ISO8601":
         number = pd.to_numeric(given, errors="coerce").to_numpy(dtype=np.float64)
-        is_number = np.isfinite(number) & (np.abs(number) > 1e8)
+        is_number = np.isfinite(number) & (np.abs(number) > LEAST_UNIX_S)
         time_s[is_number] = unix_seconds(number[is_number])
     else:
         is_number = np.zeros(len(given), dtype=bool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -20,9 +21,10 @@ from mapfilter.tracks.readers.text import Text
 
 _TITLE = "wiglewifi-"
 _COLUMNS = {"mac", "firstseen", "rssi", "currentlatitude", "currentlongitude", "type"}
-_RELEASE = re.compile(r"\bappRelease=([^,]*)")
+_RELEASE = re.compile(r"\bappRelease=([^,]{0,20})")
 _CELL = re.compile(r"\d{5,6}_\d{1,10}_\d{1,11}", re.ASCII)
 """MCC and MNC, LAC or TAC, and the cell."""
+_MOST_TYPES = 8
 _CELLS = ("GSM", "UMTS", "LTE", "NR")
 
 
@@ -88,10 +90,12 @@ def _add_networks(rows: Columns, reading: Reading, time_s: Floats) -> None:
 
 def _note_others(rows: Columns, reading: Reading, others: Bools) -> None:
     """Note rows of other networks than cells and access points, by type."""
-    types = rows.texts("type")
-    for name in sorted({str(one) for one in types[others]}):
-        count = int(np.sum(others & (types == name)))
-        reading.ignore(f"{number_of(count, 'row')} of type {name[:20] or '(none)'} left out")
+    counts = Counter(rows.texts("type")[others])
+    for name in sorted(counts)[:_MOST_TYPES]:
+        some = number_of(counts.pop(name), "row")
+        reading.ignore(f"{some} of type {name[:20] or '(none)'} left out")
+    if counts:
+        reading.ignore(f"{number_of(counts.total(), 'row')} of other types left out")
 
 
 FORMAT = Format(
