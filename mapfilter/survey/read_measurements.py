@@ -66,7 +66,7 @@ def read_measurements(
         A longer silence begins a new session.
     recorded : callable, optional
         With "auto": reads files that are none of these formats; None for those that it does not
-        know. Raises NotMeasurementsError for those whose format holds no cells.
+        know. Raises NotMeasurementsError for recordings without cells.
 
     Raises
     ------

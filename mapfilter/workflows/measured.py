@@ -33,8 +33,8 @@ def recorded_rows(path: Path) -> Rows | None:
     Raises
     ------
     InputError
-        The recording holds no usable row, or lacks positions or cells; NotMeasurementsError where
-        its format has no cells.
+        The recording holds no usable row, or lacks positions or cells. NotMeasurementsError where
+        it lacks cells and is no plain CSV.
     """
     if is_log(path):
         return _log_rows(path)
