@@ -125,9 +125,9 @@ _CLEAR_SCORE = 0.25
 _CLEAR_CONTRAST_DB = 6.0
 _BETTER = 0.3
 _STRAY_SHARE = 0.1
-DEG_PER_GON = 0.9
+_DEG_PER_GON = 0.9
 _LEAST_SECTORS = 6
-_GONS_BETTER, _THAN_ROTATED = 0.03, 0.01
+_GONS_BETTER, _THAN_ROTATED, _ERRORS_BETTER = 0.03, 0.01, 1.5
 _ALIKE_BELOW_DEG = 90.0
 
 _READINGS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
@@ -251,20 +251,28 @@ def _whole_plan(
 def _gons(
     usable: Sequence[Cell], lobes: Mapping[str, Lobe], azimuth: Mapping[str, float]
 ) -> AzimuthMistake | None:
-    """Return the mistake of azimuths in gons, where they explain more than any rotation."""
-    if len(usable) < _LEAST_SECTORS or len({cell.site for cell in usable}) < 2:
+    """Return the mistake of azimuths in gons, where they explain more than any rotation.
+
+    Nearly all have to fit then: azimuths that are wrong in another way come closer by chance.
+    """
+    count = len(usable)
+    if count < _LEAST_SECTORS or len({cell.site for cell in usable}) < 2:
         return None
-
-    def mean_score(read: Callable[[float], float]) -> float:
-        return float(np.mean([lobes[i].score(read(a) % 360) for i, a in azimuth.items()]))
-
-    as_gons = mean_score(lambda a: DEG_PER_GON * a)
-    rotated = max(mean_score(lambda a, by=by: a + by) for by in np.arange(-30.0, 31.0, STEP_DEG))  # type: ignore[misc]
-    if as_gons - mean_score(lambda a: a) < _GONS_BETTER or as_gons - rotated < _THAN_ROTATED:
+    as_deg = {i: _DEG_PER_GON * a for i, a in azimuth.items()}
+    scores = np.array([lobes[i].score(a) for i, a in as_deg.items()])
+    gain = scores - [lobes[i].score(a) for i, a in azimuth.items()]
+    rotated = max(
+        np.mean([lobes[i].score(a + by) for i, a in azimuth.items()])
+        for by in np.arange(-30.0, 31.0, STEP_DEG)
+    )
+    least = max(_GONS_BETTER, _ERRORS_BETTER * float(gain.std(ddof=1)) / count**0.5)
+    if gain.mean() < least or scores.mean() - rotated < _THAN_ROTATED:
+        return None
+    if sum(_is_off(lobes[i], a) for i, a in as_deg.items()) > _STRAY_SHARE * count:
         return None
     # Near north both are alike.
     ids = tuple(i for i, a in azimuth.items() if a > _ALIKE_BELOW_DEG)
-    meant = {i: DEG_PER_GON * azimuth[i] for i in ids}
+    meant = {i: as_deg[i] for i in ids}
     off_deg, read_deg = (_median_off(ids, lobes, some) for some in (azimuth, meant))
     return AzimuthMistake("azimuth-gons", ids, "gons", off_deg, read_deg)
 

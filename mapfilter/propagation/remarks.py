@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from mapfilter.radio.cells import Cell, CellPlan
 
 _MOST_NAMED = 3
 _NEAR_FREQUENCY = 0.2
-_HIGH_M = 75.0
+_HIGH_M, _SPARSE_M = 75.0, 4000.0
 
 
 def outside_validity(plan: CellPlan, lattice: Lattice, model: PredictionModel) -> tuple[str, ...]:
@@ -74,19 +75,28 @@ def upward_tilts(plan: CellPlan) -> tuple[str, ...]:
 
 
 def high_antennas(plan: CellPlan) -> tuple[str, ...]:
-    """Return a remark where most outdoor antennas of a plan are as high as few masts are."""
-    heights_m = {
-        cell.id: cell.height_m
-        for cell in plan.cells
-        if not cell.indoor and "height_m" not in cell.assumes
-    }
-    high = [cell_id for cell_id, height_m in heights_m.items() if height_m >= _HIGH_M]
-    if 2 * len(high) <= len(heights_m):
+    """Return a remark where most outdoor antennas of a plan are as high as few masts are.
+
+    None where sites are kilometres apart, as those of high masts in the country are.
+    """
+    known = [cell for cell in plan.cells if not cell.indoor and "height_m" not in cell.assumes]
+    high = {cell.id: cell.height_m for cell in known if cell.height_m >= _HIGH_M}
+    if 2 * len(high) <= len(known) or _median_spacing_m(known) > _SPARSE_M:
         return ()
     return (
-        f"{_named(high)}: antennas {_HIGH_M:g} m above the ground and higher, such as "
-        f"{heights_m[high[0]]:g} m (likely: feet given for metres)",
+        f"{_named([*high])}: antennas {_HIGH_M:g} m above the ground and higher, such as "
+        f"{next(iter(high.values())):g} m (likely: feet given for metres)",
     )
+
+
+def _median_spacing_m(cells: Sequence[Cell]) -> float:
+    """Return the median distance from a site to the next; 0 for a single one."""
+    from scipy.spatial import cKDTree
+
+    places = np.unique([(cell.east_m, cell.north_m) for cell in cells], axis=0)
+    if len(places) < 2:
+        return 0.0
+    return float(np.median(cKDTree(places).query(places, k=2)[0][:, 1]))
 
 
 def _named(ids: list[str]) -> str:

@@ -31,7 +31,10 @@ DEFAULT_HINT = "set cells.{}, which is then taken for all cells without one"
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
 _HEMISPHERES = {"lat": "NS", "lon": "EW"}
 _LONGEST_SHOWN = 80
-_SLASH = "no file can have this name: give the cell that of its raster, as with _"
+_SLASH = {
+    "cell": "no file can have this name: give the cell that of its raster, as with _",
+    "site": "no file can have this name: write it otherwise, as with _",
+}
 
 
 @dataclass(slots=True)
@@ -71,7 +74,7 @@ def row_of(where: str, line: int, given: Mapping[str, str], table: Arranged, fau
     for name, key in (("cell", "id"), ("site", "site")):
         if wrong := id_fault(values[key]):
             slash = any(mark in values[key] for mark in "/\\")
-            refuse(name, *wrong, _SLASH if slash else "")
+            refuse(name, *wrong, _SLASH[name] if slash else "")
     for name, allowed in RANGES.items():
         if given.get(name):
             value = parse(name, allowed.expected)

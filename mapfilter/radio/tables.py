@@ -100,8 +100,8 @@ def read_table(path: Path, what: str) -> Table:
 
     Text has commas, semicolons or tabs, and is UTF-8, UTF-16 or UTF-32 with a byte order mark, or
     else Windows-1252 (with a note); a first line ``sep=;`` is no header, nor are up to ten lines of
-    a title, which hold no separator (with a note). Of a workbook (.xlsx,
-    .xls, .ods) the first sheet is read.
+    a title, which fill one field each (with a note). Of a workbook (.xlsx, .xls, .ods) the first
+    sheet is read.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def expected_offsets(
     Parameters
     ----------
     measured : sequence of MeasuredOffset
-        That of the cell itself does not count for it.
+        That of the cell itself counts only for how large the deviations are.
     unmeasured : sequence of str
         Sites of cells without measurements.
     """

@@ -197,8 +197,9 @@ def fit_survey(
     points = [some for some in found.values() if len(some) >= options.min_points]
     if len(points) < len(found):
         few = len(found) - len(points)
-        left = number_of(few, "cell")
-        notes.append(f"{left} left out: received in fewer than {options.min_points} squares")
+        left = "left out" if predicted is None else "without a calibration of its own"
+        cause = f"received in fewer than {options.min_points} squares"
+        notes.append(f"{number_of(few, 'cell')} {left}: {cause}")
     if not points:
         expected = f"a cell received in at least {options.min_points} squares"
         raise fail(
@@ -283,13 +284,10 @@ def _expected(
         error_db = some.level_dbm - predicted[some.cell_id](some.east_m, some.north_m)
         site = sites.get(some.cell_id, some.cell_id)
         measured.append(measured_offset(site, error_db, shadowing.covariance_db2(some)))
-    ids = [some.cell_id for some in points]
+    ids = dict.fromkeys(some.cell_id for some in points)
     others = [one for one in predicted if one in sites and one not in ids]
-    return dict(
-        zip(
-            [*ids, *others], expected_offsets(measured, [sites[one] for one in others]), strict=True
-        )
-    )
+    expected = expected_offsets(measured, [sites[one] for one in others])
+    return dict(zip([*ids, *others], expected, strict=True))
 
 
 def _renamed(strange: Collection[str], predicted: Collection[str]) -> str:

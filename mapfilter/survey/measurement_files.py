@@ -27,12 +27,8 @@ from mapfilter.survey.measurement_lines import LONGEST_LINE, is_windows, lines_o
 from mapfilter.survey.measurement_rows import FIELDS, REQUIRED, Rows
 
 _UNAVAILABLE = 1e9
-_FIRST_LINES = 20
-_PLACES = ("lat", "latitude", "lon", "lng", "long", "longitude")
-_CELLS = ("cell", "cellid", "cell_id", "cid", "ci", "mcc", "mnc")
-_LEVELS = ("level", "level_dbm", "dbm", "signal", "rsrp", "rssi", "rscp", "rxlev")
-_TELLING = frozenset((*_PLACES, *_CELLS, *_LEVELS))
-"""Names of columns in the headers of drive tests."""
+_FIRST_LINES = 100
+_FEWEST_NUMBERS = 3
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
 
 
@@ -168,19 +164,16 @@ def header_of(path: Path) -> list[str]:
     return _header(lines_of(path))[1]
 
 
-def is_like_measurements(path: Path, dialect: Dialect) -> bool:
-    """Return whether one of the first lines names cells, positions or levels.
+def may_hold_measurements(path: Path) -> bool:
+    """Return whether one of the first lines has numbers in three fields: position and level.
 
-    So does the header of a drive test whose other columns have names that are not known. What
-    cannot be read as text may hold one, but an empty file.
+    So has a drive test whose columns have other names. What cannot be read as text may hold one,
+    but an empty file.
     """
-    own = (dialect.columns.get(name, ()) for name in ("cell", *REQUIRED))
-    known = _TELLING.union(column.lower() for columns in own for column in columns)
     try:
         for _, text in islice(lines_of(path), _FIRST_LINES):
-            separator, names = _header(iter([(1, text)]))
-            shorn = {name.partition("(")[0].partition("[")[0].strip(' "') for name in names}
-            if text and text.count(separator) > 1 and not known.isdisjoint(shorn):
+            _, fields = _header(iter([(1, text)]))
+            if sum(any(map(str.isdigit, one)) for one in fields) >= _FEWEST_NUMBERS:
                 return True
     except InputError:
         return not path.is_file() or path.stat().st_size > 0

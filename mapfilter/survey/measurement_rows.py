@@ -47,7 +47,7 @@ _DOTTED = re.compile(r"(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)[ T]+(\d\d?):(.*)", re.A
 
 
 class NotMeasurementsError(InputError):
-    """A file is sound, or of no known kind, but holds no levels of cells with positions."""
+    """A file is no drive test: a text, or a recording without cells."""
 
 
 Identity = tuple[int, int, int, int]

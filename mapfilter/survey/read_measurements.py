@@ -18,8 +18,8 @@ from mapfilter.survey.antennas_log import read_antennas_log
 from mapfilter.survey.measurement_files import (
     DIALECTS,
     header_of,
-    is_like_measurements,
     mapped,
+    may_hold_measurements,
     read_csv,
 )
 from mapfilter.survey.measurement_rows import NotMeasurementsError, Rows
@@ -66,13 +66,13 @@ def read_measurements(
         A longer silence begins a new session.
     recorded : callable, optional
         With "auto": reads files that are none of these formats; None for those that it does not
-        know. Raises NotMeasurementsError for sound ones without levels of cells or positions.
+        know. Raises NotMeasurementsError for recordings without cells.
 
     Raises
     ------
     InputError
         A file cannot be read, is of another kind, or has no good row, unless it is one of a folder
-        that resembles no measurements; with the first faults of each.
+        that cannot be a drive test; with the first faults of each.
     """
     tables, strays = [], []
     faults: list[Fault] = []
@@ -109,7 +109,7 @@ def read_measurements(
     joined = _joined(tables, projected_crs(crs), session_gap_s)
     if not strays:
         return joined
-    left = f"{number_of(len(strays), 'file')} left out, without cells, positions and levels: "
+    left = f"{number_of(len(strays), 'file')} without a drive test left out: "
     note = left + listed([path.name for path, _ in strays])
     return replace(joined, notes=(note, *joined.notes))
 
@@ -128,11 +128,10 @@ def _read(
         kind = own or "csv"
     if dialect is None and kind == "antennas":
         return read_antennas_log(path)
-    dialect = dialect or DIALECTS[kind]
     try:
-        return read_csv(path, dialect)
+        return read_csv(path, dialect or DIALECTS[kind])
     except InputError as error:
-        if is_like_measurements(path, dialect):
+        if may_hold_measurements(path):
             raise
         raise NotMeasurementsError(error.faults) from error
 

@@ -20,6 +20,7 @@ from mapfilter.tracks.store import is_log, read_log
 
 _LONGEST_S = 10.0
 _UNKNOWN = -1.0
+_PLAIN = "csv"
 _EXPECTED = "levels of cells, and positions"
 
 
@@ -32,7 +33,8 @@ def recorded_rows(path: Path) -> Rows | None:
     Raises
     ------
     InputError
-        The recording holds no usable row, or lacks cells or positions (NotMeasurementsError).
+        The recording holds no usable row, or lacks positions or cells. NotMeasurementsError where
+        it lacks cells and is no plain CSV.
     """
     if is_log(path):
         return _log_rows(path)
@@ -44,10 +46,12 @@ def recorded_rows(path: Path) -> Rows | None:
     lacking = [name for name in ("radio", "positions") if name not in tables]
     if lacking:
         got = f"{known.title} of {', '.join(tables)}"
-        hint = ""
-        if "radio" in tables and {"true_places", "places"} & set(tables):
-            hint = "convert it with --origin LAT,LON, and name the log"
-        raise fail(NotMeasurementsError, str(path), _EXPECTED, got, hint)
+        # Columns of plain CSV have any names, so that levels may be in one that is not known.
+        if "radio" not in tables and known.name != _PLAIN:
+            raise fail(NotMeasurementsError, str(path), _EXPECTED, got)
+        placed = {"true_places", "places"} & set(tables)
+        hint = "convert it with --origin LAT,LON, and name the log" if placed else ""
+        raise fail(InputError, str(path), _EXPECTED, got, hint)
     rows = Rows(path, read=recording.rows)
     for unusable in recording.unusable:
         rows.aside[f"rows left out: {unusable.reason}"] += unusable.count
@@ -63,7 +67,8 @@ def _log_rows(path: Path) -> Rows:
     places = log.gnss if log.truth.empty else log.truth
     if log.radio.empty or places.empty:
         held = [name for name in TABLES if len(getattr(log, name))]
-        raise fail(InputError, str(path), _EXPECTED, f"a log of {', '.join(held) or 'nothing'}")
+        kind = NotMeasurementsError if log.radio.empty else InputError
+        raise fail(kind, str(path), _EXPECTED, f"a log of {', '.join(held) or 'nothing'}")
     lon_deg, lat_deg = unproject(log.crs, places["east_m"], places["north_m"])
     accuracy_m = np.full(len(places), np.nan)
     if log.truth.empty:

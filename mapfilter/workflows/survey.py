@@ -172,7 +172,7 @@ def _predicted(
 def _unmeasured(
     predicted: RxLevRasters | None, survey: Survey, ids: Sequence[str]
 ) -> Iterator[str]:
-    """Yield notes on cells of a prediction that were not measured."""
+    """Yield notes on cells of a prediction that were not measured, or not often enough."""
     held, cells = set(ids), predicted.cell_ids if predicted is not None else ()
     missing = [one for one in cells if one not in held]
     count = number_of(len(cells), "cell")
@@ -183,14 +183,15 @@ def _unmeasured(
     ]
     if expected:
         yield (
-            f"{len(expected)} of {count} of the prediction were not measured, and are corrected as "
-            f"the others let expect: {listed(expected, _NAMED)} (standard deviation of the offset)"
+            f"{len(expected)} of {count} of the prediction were measured too rarely or never, and "
+            f"are corrected as the others let expect: {listed(expected, _NAMED)} (standard "
+            "deviation of the offset)"
         )
     if missing:
         yield (
-            f"{len(missing)} of {count} of the prediction are not in the result, as they were not "
-            f"measured: {listed(missing, _NAMED)}; where they are needed, set "
-            "prediction.survey.fill, which keeps and corrects those of the plan"
+            f"{len(missing)} of {count} of the prediction are not in the result, measured too "
+            f"rarely or never: {listed(missing, _NAMED)} (prediction.survey.fill keeps and "
+            "corrects those that are in cells.plan)"
         )
 
 

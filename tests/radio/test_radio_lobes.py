@@ -112,6 +112,34 @@ def test_one_site_whose_azimuths_are_all_off_by_ninety():
     assert mistake.offset_read_deg <= 10
 
 
+def given_as(read, *sites):
+    """Lobes of the true azimuths of sites, and cells with what ``read`` makes of them."""
+    cells, lobes = [], {}
+    for name, azimuths_deg in zip("STUVW", sites, strict=False):
+        some, found = cells_and_lobes(azimuths_deg, name)
+        cells += [cell.__class__(**_fields(cell, read(cell.azimuth_deg))) for cell in some]
+        lobes |= found
+    return cells, lobes
+
+
+def test_azimuths_in_gons_are_told_by_all_sectors():
+    told = azimuth_mistakes(
+        *given_as(lambda a: a / 0.9, (10, 130, 250), (60, 180, 300), (100, 310))
+    )
+    assert [mistake.mistake for mistake in told] == ["azimuth-gons"]
+    assert told[0].offset_read_deg < told[0].offset_deg
+
+
+def test_other_mistakes_and_lobes_that_stray_are_no_gons():
+    """Counter-clockwise plans of 0, 120 and 240 were, as 216 is nearer to 120 than 240 is."""
+    rough = (0, 125, 230), (0, 118, 245), (0, 112, 236)
+    (mistake,) = azimuth_mistakes(*given_as(lambda a: round(-a / 120) * 120 % 360, *rough))
+    assert mistake.mistake == "azimuth-counter-clockwise"
+    # The lobe of one sector was enough, where it is 40° off, and the others are not.
+    sites = (0, 120, 260), (0, 120, 80)
+    assert azimuth_mistakes(*given_as(lambda a: 300 if a == 260 else a, *sites)) == ()
+
+
 def _fields(cell, azimuth_deg):
     return {name: getattr(cell, name) for name in cell.__slots__} | {"azimuth_deg": azimuth_deg}
 

@@ -182,9 +182,12 @@ def test_lines_of_a_title_above_the_header_are_left_out(tmp_path, name):
 
 def test_names_that_no_file_can_have_say_what_to_write(tmp_path):
     rows = [ROWS[0], ["Nord/1", *ROWS[1][1:]]]
-    assert "give the cell that of its raster" in refusal(
-        tmp_path, workbook(rows), "cells.xlsx", layout="atoll"
-    )
+    said = refusal(tmp_path, workbook(rows), "cells.xlsx", layout="atoll")
+    assert "give the cell that of its raster" in said
+    rows = [[*ROWS[0], "SITE_NAME"], [*ROWS[1], "Nord/1"]]
+    said = refusal(tmp_path, workbook(rows), "cells.xlsx", layout="atoll")
+    assert "write it otherwise" in said
+    assert "raster" not in said
 
 
 def test_faults_of_workbooks(tmp_path):

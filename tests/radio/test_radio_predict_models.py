@@ -232,8 +232,11 @@ def test_wrong_choices_are_told_together() -> None:
 
 
 def test_heights_of_feet_are_told() -> None:
-    def plan(*heights_m, **more):
-        cells = (replace(NORTH, id=f"N{n}", height_m=h, **more) for n, h in enumerate(heights_m))
+    def plan(*heights_m, apart_m=500.0, **more):
+        cells = (
+            replace(NORTH, id=f"N{n}", height_m=h, east_m=NORTH.east_m + apart_m * n, **more)
+            for n, h in enumerate(heights_m)
+        )
         return CellPlan(CRS, tuple(cells))
 
     (told,) = high_antennas(plan(98.4, 30.0, 82.0))
@@ -241,6 +244,9 @@ def test_heights_of_feet_are_told() -> None:
     # A mast among others, and what stands for a height that is not known.
     assert high_antennas(plan(98.4, 30.0)) == ()
     assert high_antennas(plan(98.4, assumed="height_m")) == ()
+    # Masts in the country, and three cells of one mast.
+    assert high_antennas(plan(90.0, 90.0, 90.0, apart_m=8000.0)) == ()
+    assert high_antennas(plan(90.0, 90.0, 90.0, apart_m=0.0))
 
 
 def test_tilts_that_a_list_counts_upwards_are_told() -> None:

@@ -239,7 +239,7 @@ def test_other_texts_of_a_folder_are_named_and_left_out(tmp_path, text):
     stray = write(tmp_path, text, "remarks.csv")
     found = read_measurements([tmp_path])
     assert len(found) == 20
-    assert found.notes == ("1 file left out, without cells, positions and levels: remarks.csv",)
+    assert found.notes == ("1 file without a drive test left out: remarks.csv",)
     assert "remarks.csv" in refused(stray)
     (tmp_path / "drive.csv").unlink()
     assert "remarks.csv" in refused(tmp_path)
@@ -249,6 +249,8 @@ def test_other_texts_of_a_folder_are_named_and_left_out(tmp_path, text):
     "text",
     [
         PLAIN.replace("level_dbm", "strength"),
+        PLAIN.replace(PLAIN.splitlines()[0], "Zelle,Breite,L\u00e4nge,Pegel,Zeit,Fehler"),
+        PLAIN.replace(PLAIN.splitlines()[0], "serving,gps_lat,gps_lon,lte_rsrp,time,fix"),
         "Drive of Monday\n" + PLAIN,
         PLAIN.replace(",-", ","),
         PLAIN.encode("utf-16"),

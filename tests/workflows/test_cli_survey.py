@@ -73,14 +73,14 @@ def test_cells_that_a_calibration_loses_and_drives_that_do_not_meet_are_noted(
     assert found["validation"]["predicted"] == 0
     notes = " ".join(found["notes"])
     assert "2 of 3 cells of the prediction are not in the result" in notes
-    assert "not measured: A, B; where they are needed, set prediction.survey.fill" in notes
+    assert "rarely or never: A, B (prediction.survey.fill keeps and corrects those" in notes
     assert "not validated: no two sessions have measurements of one cell within 20 m" in notes
     filled = [*more, *settings(prediction__survey__fill="true")]
     out = tmp_path / "filled"
     found = assert_done(mapfilter("predict", "-c", config, "--out", out, "--json", *filled)).json
     assert found["cells"] == 3
     notes = " ".join(found["notes"])
-    assert "2 of 3 cells of the prediction were not measured, and are corrected as" in notes
+    assert "2 of 3 cells of the prediction were measured too rarely or never, and are" in notes
     assert "not in the result" not in notes
     corrected = open_rasters(out / "rxlev.tif")
     change_db = corrected.read(cells=("A",)) - rasters.read(cells=("A",))

@@ -135,6 +135,30 @@ def test_files_without_cells_or_positions_are_told(made, tmp_path):
         read(other)
 
 
+def test_recordings_without_cells_of_a_folder_are_left_out(made, tmp_path):
+    made("gnettrack")
+    alone = read(tmp_path)
+    stray = made("gpx").rename(tmp_path / "watch.txt")
+    run_convert([stray], tmp_path / "track", UTM)
+    found = read(tmp_path)
+    assert len(found) == len(alone)
+    assert found.notes[0] == "2 files without a drive test left out: track, watch.txt"
+
+
+UNKNOWN_LEVEL = "time,lat_deg,lon_deg,cell_name,rx_dbm\n" + "".join(
+    f"2026-05-01T10:00:{second:02d}Z,60.1,24.9{second},A,-70\n" for second in range(20)
+)
+
+
+@pytest.mark.parametrize("text", [MADE["indoor"][1], UNKNOWN_LEVEL])
+def test_recorded_drives_with_a_fault_are_not_left_out(made, tmp_path, text):
+    """Levels without positions, and in a column that is not known."""
+    made("gnettrack")
+    (tmp_path / "other.csv").write_text(text)
+    with pytest.raises(InputError, match=r"other\.csv"):
+        read(tmp_path)
+
+
 def test_a_map_of_a_recorded_drive(made, tmp_path):
     made("gnettrack")
     config = tmp_path / "survey.toml"
