@@ -110,8 +110,8 @@ REMEDIES = {
     "sector-labels-swapped": "Exchange the labels of the rasters, or the azimuths in the plan.",
     "site-labels-swapped": "Exchange the labels of the rasters, or the positions in the plan.",
     "site-off-peak": "Correct the site's position, or take the raster that belongs to the cell.",
-    "site-outside-area": "Correct positions that are wrong. Cells beyond the area that are received "
-    "in it belong to the plan: leave them in.",
+    "site-outside-area": "Correct positions that are wrong. Leave cells in the plan that are "
+    "received in the area from beyond it.",
     "tilts-upwards": "Change the sign of the tilts: downtilts are positive below the horizon.",
     "values-implausible": "Check rasters.factor and rasters.quantity.",
     "ways-with-gaps": "Raise half widths to half a pixel, or read the rasters on finer pixels "

@@ -89,8 +89,8 @@ def test_the_noise_is_stated(with_compass):
     assert getattr(reckoned(quiet).imu, name) == pytest.approx(0.15, abs=0.002)
     assert getattr(found.imu, name) == pytest.approx(np.hypot(0.15, 0.4), rel=0.05)
     bias, drift = re.search(
-        r"gyroscope: unusually large errors at rest: a bias of (\S+) deg/s, which is subtracted, and "
-        r"noise by which headings drift (\S+) deg/sqrt\(s\)",
+        r"gyroscope: unusually large errors at rest: a bias of (\S+) deg/s, which is subtracted, "
+        r"and noise by which headings drift (\S+) deg/sqrt\(s\)",
         " ".join(found.notes),
     ).groups()
     assert float(bias) == pytest.approx(2 * 3**0.5, abs=0.15)
