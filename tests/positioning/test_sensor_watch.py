@@ -5,41 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_town import Town, walk_log
+from made_watch import CELLS, NO_STEP, STEP, STILL, report, told, walked
 from scipy.stats import multivariate_normal
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.sensors import rest
 from mapfilter.positioning.sensors.rest import Rest
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
 from mapfilter.tracks.log import make_log
-
-STEP = (MotionStep(1.4, 0.0),)
-NO_STEP = (MotionStep(float("nan"), 0.0),)
-STILL = (MotionStep(0.0, 0.0),)
-CELLS = tuple("ABCDEFG")
-
-
-def report(levels_dbm, serving="A"):
-    return tuple(
-        ReportRow("serving" if cell == serving else "neighbour", cell, None, None, float(level), 0)
-        for cell, level in zip(CELLS, levels_dbm, strict=False)
-    )
-
-
-def told(sequence, watch=None):
-    """Watch epochs; return the watch, the epochs as they come out, and the reasons."""
-    watch, found = watch or SensorWatch(), []
-    for epoch in sequence:
-        watch, seen, reasons = watched(watch, epoch)
-        found.append((seen, *reasons))
-    return watch, found
-
-
-def walked(seconds=20, motion=STEP):
-    return [Epoch(float(second), motion) for second in range(seconds)]
 
 
 def unmeasured(found):

@@ -6,40 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_town import CRS, Town, walk_log
+from made_watch import STEP, STILL, report, told, walked
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
 from mapfilter.tracks.log import make_log
 
 TOWN = Town.of(1)
 AREA = BayesFilter().over_area(TOWN.area())
-STEP = (MotionStep(1.4, 0.0),)
-NO_STEP = (MotionStep(float("nan"), 0.0),)
-STILL = (MotionStep(0.0, 0.0),)
-CELLS = tuple("ABCDEFG")
-
-
-def report(levels_dbm, serving="A"):
-    return tuple(
-        ReportRow("serving" if cell == serving else "neighbour", cell, None, None, float(level), 0)
-        for cell, level in zip(CELLS, levels_dbm, strict=False)
-    )
-
-
-def told(sequence, watch=None):
-    """Watch epochs; return the watch, the epochs as they come out, and the reasons."""
-    watch, found = watch or SensorWatch(), []
-    for epoch in sequence:
-        watch, seen, reasons = watched(watch, epoch)
-        found.append((seen, *reasons))
-    return watch, found
-
-
-def walked(seconds=20, motion=STEP):
-    return [Epoch(float(second), motion) for second in range(seconds)]
 
 
 def test_a_timing_advance_that_changes_is_no_stale_report():
