@@ -24,7 +24,7 @@ _LARGEST_BYTES = 1 << 26
 _LARGEST_UNPACKED_BYTES = 1 << 29
 _MOST_FIELDS = 5_000_000
 _MOST_COLUMNS = 1000
-_MOST_TITLES = 10
+MOST_TITLES = 10
 _SEPARATORS = (",", ";", "\t")
 _WIDE_SHARE = 0.4
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
@@ -118,7 +118,7 @@ def read_table(path: Path, what: str) -> Table:
         return _read_workbook(path, data, what)
     text, notes = _decoded(path, data)
     text = without_separator_line(text)
-    heads = [*islice((line for line in text.splitlines() if line.strip()), _MOST_TITLES + 1)]
+    heads = [*islice((line for line in text.splitlines() if line.strip()), MOST_TITLES + 1)]
     head = next((line for line in heads if any(mark in line for mark in _SEPARATORS)), "")
     separator = max(_SEPARATORS, key=head.count)
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
@@ -150,7 +150,7 @@ def _without_titles(
     """Leave out lines of one field above the header, with a note."""
     fields = (sum(bool(field.strip()) for field in row) for _, row in lines)
     titles = next((n for n, count in enumerate(fields) if count > 1), 0)
-    if not 0 < titles <= _MOST_TITLES:
+    if not 0 < titles <= MOST_TITLES:
         return lines, ()
     first = next(field.strip() for field in lines[0][1] if field.strip())
     some = number_of(titles, "line")
