@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -119,8 +119,7 @@ def read_table(path: Path, what: str) -> Table:
     text, notes = _decoded(path, data)
     text = without_separator_line(text)
     heads = [*islice((line for line in text.splitlines() if line.strip()), MOST_TITLES + 1)]
-    head = next((line for line in heads if any(mark in line for mark in _SEPARATORS)), "")
-    separator = max(_SEPARATORS, key=head.count)
+    separator = _separator(heads)
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
     lines: list[tuple[int, list[str]]] = []
     fields = 0
@@ -142,6 +141,21 @@ def read_table(path: Path, what: str) -> Table:
         expected = f"{what} of at most {_MOST_COLUMNS} columns"
         raise fail(InputError, f"{path}, header", expected, len(header), "another file")
     return Table(path, separator, header, tuple(lines[1:]), notes)
+
+
+def _separator(heads: Sequence[str]) -> str:
+    """Return what separates the fields of a table with these first lines, or commas."""
+    head = next((line for line in heads if any(mark in line for mark in _SEPARATORS)), "")
+    separator = max(_SEPARATORS, key=head.count)
+    if separator != ",":
+        return separator
+    # The commas may be those of a title above a table with another separator.
+    for mark in _SEPARATORS[1:]:
+        titles = next((n for n, line in enumerate(heads) if mark in line), 0)
+        counts = {line.count(mark) for line in heads[titles:]}
+        if titles and len(heads) > titles + 1 and len(counts) == 1 and min(counts) > 1:
+            return mark
+    return separator
 
 
 def _without_titles(
