@@ -142,7 +142,9 @@ def _names(served: pd.Series, known: Sequence[str]) -> str:
     if not known:
         return ""
     found = [str(cell) for cell in served.value_counts().index]
-    return f" (the log has {listed(found, 3)}; the database has {listed(known, 3)})"
+    same = {cell.casefold() for cell in found} & {cell.casefold() for cell in known}
+    capitals = "; some differ by capitals alone" if same else ""
+    return f" (the log has {listed(found, 3)}; the database has {listed(known, 3)}{capitals})"
 
 
 def check_places(where: str, log: TrackLog, lattice: Lattice, faults: Faults) -> None:

@@ -14,7 +14,7 @@ from mapfilter.radio.cell_places import move_from_sites, place_rows
 from mapfilter.radio.cell_rows import DEFAULT_HINT, REQUIRED, Row, row_of
 from mapfilter.radio.cell_rules import RANGES
 from mapfilter.radio.headings import Heading, places_named, resembling, unit_of
-from mapfilter.radio.tables import read_table
+from mapfilter.radio.tables import MOST_TITLES, Table, read_table
 
 _ALLOWED = {*COLUMNS, "east", "north", "crs", *OFFSETS, *chain.from_iterable(ALIASES.values())}
 _OTHER_LAYOUTS: Mapping[Layout, str] = {
@@ -52,6 +52,7 @@ def read_plan(
     table = read_table(path, "a cell plan")
     where, wrong = f"{path} header", Faults()
     if layout == "plan" and not columns:
+        _check_titles(where, table)
         _check_layout(where, table.header)
         _check_own_header(where, table.header, wrong)
     arranged = arrange(table, layout, columns or {}, defaults or {}, faults)
@@ -68,6 +69,16 @@ def read_plan(
         faults.add(f"{path}, crs", "one CRS in all rows", ", ".join(sorted(systems)))
     place_rows(path, rows, crs, faults)
     return rows, (*arranged.notes, *move_from_sites(rows, arranged))
+
+
+def _check_titles(where: str, table: Table) -> None:
+    """Raise InputError where the header is below lines of a title that hold the separator."""
+    if _ALLOWED.intersection(table.header):
+        return
+    for line, texts in table.rows[:MOST_TITLES]:
+        if "cell" in (names := {text.strip() for text in texts}) and len(names & _ALLOWED) > 2:
+            got, hint = listed(table.header), f"a title above it: delete the lines above row {line}"
+            raise fail(InputError, where, "columns of a cell plan", got, hint)
 
 
 def _check_layout(where: str, header: tuple[str, ...]) -> None:

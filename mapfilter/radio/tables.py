@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -24,7 +24,7 @@ _LARGEST_BYTES = 1 << 26
 _LARGEST_UNPACKED_BYTES = 1 << 29
 _MOST_FIELDS = 5_000_000
 _MOST_COLUMNS = 1000
-_MOST_TITLES = 10
+MOST_TITLES = 10
 _SEPARATORS = (",", ";", "\t")
 _WIDE_SHARE = 0.4
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
@@ -118,9 +118,8 @@ def read_table(path: Path, what: str) -> Table:
         return _read_workbook(path, data, what)
     text, notes = _decoded(path, data)
     text = without_separator_line(text)
-    heads = [*islice((line for line in text.splitlines() if line.strip()), _MOST_TITLES + 1)]
-    head = next((line for line in heads if any(mark in line for mark in _SEPARATORS)), "")
-    separator = max(_SEPARATORS, key=head.count)
+    heads = [*islice((line for line in text.splitlines() if line.strip()), MOST_TITLES + 1)]
+    separator = _separator(heads)
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
     lines: list[tuple[int, list[str]]] = []
     fields = 0
@@ -144,13 +143,28 @@ def read_table(path: Path, what: str) -> Table:
     return Table(path, separator, header, tuple(lines[1:]), notes)
 
 
+def _separator(heads: Sequence[str]) -> str:
+    """Return what separates the fields of a table with these first lines, or commas."""
+    head = next((line for line in heads if any(mark in line for mark in _SEPARATORS)), "")
+    separator = max(_SEPARATORS, key=head.count)
+    if separator != ",":
+        return separator
+    # The commas may be those of a title above a table with another separator.
+    for mark in _SEPARATORS[1:]:
+        titles = next((n for n, line in enumerate(heads) if mark in line), 0)
+        counts = {line.count(mark) for line in heads[titles:]}
+        if titles and len(heads) > titles + 1 and len(counts) == 1 and min(counts) > 1:
+            return mark
+    return separator
+
+
 def _without_titles(
     path: Path, lines: list[tuple[int, list[str]]]
 ) -> tuple[list[tuple[int, list[str]]], tuple[str, ...]]:
     """Leave out lines of one field above the header, with a note."""
     fields = (sum(bool(field.strip()) for field in row) for _, row in lines)
     titles = next((n for n, count in enumerate(fields) if count > 1), 0)
-    if not 0 < titles <= _MOST_TITLES:
+    if not 0 < titles <= MOST_TITLES:
         return lines, ()
     first = next(field.strip() for field in lines[0][1] if field.strip())
     some = number_of(titles, "line")

@@ -52,7 +52,7 @@ def mapped(columns: Mapping[str, str]) -> Dialect:
     """Return the dialect of a map from fields to columns; these columns are required."""
     own = {name: (name,) for name in FIELDS}
     named = {name: (column,) for name, column in columns.items()}
-    return Dialect({**own, **named}, (*REQUIRED, *columns))
+    return Dialect({**own, **named}, tuple(dict.fromkeys((*REQUIRED, *columns))))
 
 
 def _upload(**columns: str) -> Dialect:
@@ -216,7 +216,8 @@ def _places(path: Path, header: Sequence[str], dialect: Dialect) -> dict[str, tu
     for name in dialect.required:
         if not places.get(name):
             columns = " or ".join(dialect.columns.get(name, (name,)))
-            near = difflib.get_close_matches(columns.lower(), header, n=1, cutoff=0.5)
+            alike = [column for column in header if column[:1] == columns[:1].lower()]
+            near = difflib.get_close_matches(columns.lower(), alike, n=1, cutoff=0.5)
             expected = f"a column {columns}" + (f" for {name}" if columns != name else "")
             faults.add(where, expected, "none", f"{near[0]} meant" if near else "")
     for name, some in places.items():

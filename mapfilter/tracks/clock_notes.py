@@ -20,7 +20,8 @@ def zoneless_note(recordings: Sequence[Recording]) -> list[str]:
     same = ", taken for one zone" if len(names) > 1 else ""
     return [
         f"{listed(names)}: local times that state no zone{same}: UTC is unknown "
-        "(--zone gives it: that of your place, such as Europe/Brussels or +01:00)"
+        "(--zone of convert and replay gives it: that of your place, such as Europe/Brussels or "
+        "+01:00)"
     ]
 
 

@@ -57,7 +57,10 @@ def check_clocks(
     hint = _milliseconds(times)
     if gap_s > _APART_S and not hint:
         hint = week_fault(gap_s)
-        hint = hint or "seconds of the day, or Unix time, in one of them, or milliseconds for s"
+        hint = hint or (
+            "seconds of the day, or Unix time, in one of them, milliseconds for s, or local time "
+            "of another zone"
+        )
     if hint:
         spans = "; ".join(f"{name} {time[0]:.10g}..{time[-1]:.10g}" for name, time in times.items())
         whole = names.get("log", "log")

@@ -84,7 +84,7 @@ def lack_of(
     remedies = []
     if source := receiver_motion(opened):
         remedies.append(f"--course-motion, track.course_motion, makes it from {source}")
-    elif len(log.radio) and (database is None or database.cell_ids):
+    if len(log.radio) and (database is None or database.cell_ids):
         remedies.append("mapfilter locate needs none")
     if len(log.gnss):
         remedies.append("--filter ekf needs none beside positions")

@@ -217,7 +217,12 @@ def test_a_log_of_unknown_cells_says_which(database):
     assert f"(the log has {first}" in note
     assert f"the database has {database.cell_ids[0]}, " in note
     assert len(found.log.notes) == 1
+    assert "capitals" not in note
     assert repr(found).endswith("; 1 note in log.notes")
+    small = log.radio.assign(cell=log.radio["cell"].str.lower())
+    found = mf.locate(mf.make_log(log.crs, motion=log.motion, radio=small), database)
+    (note,) = [one for one in found.log.notes if "nothing is located" in one]
+    assert "some differ by capitals alone)" in note
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,21 @@ def test_what_is_no_angle_is_refused(tmp_path, wrong):
     assert f"row 2, lat: expected degrees, found {wrong!r}" in refused(tmp_path, {"lat": wrong})
 
 
+def test_a_title_that_holds_the_separator_is_refused_once(tmp_path):
+    refusal = refused(tmp_path, {}, title="Cell plan, Helsinki, 2026\n", separator=",")
+    assert refusal.count("expected") == 1
+    assert "found Cell plan, Helsinki, 2026 (likely: a title above it: delete the" in refusal
+    assert "above row 2)" in refusal
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_a_title_may_hold_commas_where_they_are_not_the_separator(tmp_path, separator):
+    found = plan(tmp_path, title="Cell plan, Helsinki, 2026\n", separator=separator)
+    assert found.ids == ("A",)
+    note = "cells.csv: 1 line above the header left out: 'Cell plan, Helsinki, 2026'"
+    assert found.notes == (note,)
+
+
 @pytest.mark.parametrize("separator", [";", ",", "\t"])
 def test_lines_of_a_title_are_left_out_and_noted(tmp_path, separator):
     found = plan(tmp_path, title="Cells of the north\n\n# of 2026\n", separator=separator)

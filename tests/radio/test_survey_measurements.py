@@ -271,9 +271,12 @@ def test_headers_that_do_not_fit_say_which_column_is_meant(tmp_path):
     text = refused(path, columns={"lon": "lng", "level_dbm": "rsrp", "session": "drive"})
     assert "expected a column rsrp for level_dbm, found none (likely: rsrp_dbm meant)" in text
     assert "expected a column drive for session" in text
+    assert text.count("for level_dbm") == 1
     text = refused(path, format="opencellid")
     for column in ("mcc", "cellid", "signal"):
         assert f"expected a column {column}" in text
+    stray = write(tmp_path, "device;serial;battery\nP7;123;98\n", "devices.csv")
+    assert "meant" not in refused(stray, columns={"lat": "latitude"})
     twice = write(tmp_path, "cell,lat,lon,lon,level_dbm\nA,60.1,24.9,24.9,-70\n", "twice.csv")
     assert "expected one column lon, found 2" in refused(twice)
 

@@ -46,6 +46,12 @@ def test_motion_in_unix_time():
     assert "Unix time" in message
 
 
+def test_radio_in_local_time_of_another_zone():
+    assert "local time of another zone" in fault_of(
+        motion=motion(TIME_S + 3600), radio=radio(TIME_S)
+    )
+
+
 def test_the_files_of_the_tables_are_named():
     with pytest.raises(InputError, match=r"walk/radio\.csv 0\.\.179"):
         make_log(

@@ -23,6 +23,8 @@ def test_an_unknown_table_names_its_columns_and_options_for_them(tmp_path):
     assert fault.got == "none of them, but a table with the columns time, speed, heading, rpm"
     such = "such as (speed_mps=speed for m/s, or speed_kmh=speed for km/h) and compass_deg=heading"
     assert fault.hint.endswith(such)
+    fault = refused(tmp_path, "time,cell_id,level,speed\n1,2,-70,4\n")
+    assert "(wheel_speed_mps=speed for m/s, or wheel_speed_kmh=speed for km/h)" in fault.hint
     fault = refused(tmp_path, "zeit,v\n1,2\n")
     assert fault.hint.startswith("a CSV without a column of times; a CSV with other names of ")
     assert fault.hint.endswith("such as lat_deg=LATITUDE and lon_deg=LONGITUDE and time=COLUMN")

@@ -158,8 +158,8 @@ def test_speed_and_course_become_motion_on_request(database, recordings, tmp_pat
     path = tmp_path / "drive.csv"
     done = replayed(database, tmp_path / "out", "--log", path, "--without", "gnss")
     assert done.code == 3
-    remedy = "no motion (--course-motion, track.course_motion, makes it from speed and course)"
-    assert remedy in done.err
+    remedy = "no motion (--course-motion, track.course_motion, makes it from speed and course; "
+    assert remedy + "mapfilter locate needs none" in done.err
     # As the truth they are no sensor any more, and yet make motion.
     given = ("--log", path, "--truth", path)
     assert remedy in replayed(database, tmp_path / "out", *given).err
@@ -170,7 +170,7 @@ def test_speed_and_course_become_motion_on_request(database, recordings, tmp_pat
     # Without speed and course it is made from positions.
     drive.drop(columns=["speed_mps", "bearing"]).to_csv(path, index=False)
     done = replayed(database, tmp_path / "out", *given[:2], *given[3:])
-    assert "track.course_motion, makes it from positions)" in done.err
+    assert "makes it from positions; mapfilter locate needs none)" in done.err
     # Positions are enough for a Kalman-type filter.
     drive[["time", "lat", "lon"]].to_csv(tmp_path / "fixes.csv", index=False)
     alone = ("--log", tmp_path / "fixes.csv")

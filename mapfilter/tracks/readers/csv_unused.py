@@ -20,7 +20,7 @@ from mapfilter.tracks.readers.csv_speed_units import speed_unit
 
 _OF_PLACES = ("altitude_m", "accuracy_m", "hdop", "course_deg", "speed_mps", "speed_kmh")
 _OF_ODOMETRY = ("speed_mps", "speed_kmh", "yaw_rate_radps", "yaw_rate_degps")
-_OF_WHEELS = {"speed_mps": "wheel_speed_mps", "speed_kmh": "wheel_speed_kmh"}
+OF_WHEELS = {"speed_mps": "wheel_speed_mps", "speed_kmh": "wheel_speed_kmh"}
 _OF_STEPS = ("compass_deg", "turn_rad", "turn_deg")
 _OF_COUNTED_STEPS = (*_OF_STEPS, "yaw_rate_radps", "yaw_rate_degps")
 _LATE_GUESSES = ("altitude_m", "odometer_m")
@@ -49,7 +49,7 @@ def unused_columns(mapped: Mapped, time_s: Floats) -> tuple[str, ...]:
         if not name or name in taken:
             continue
         likely = (
-            [_OF_WHEELS.get(columns[name], "")] if name in columns else likely_fields(name, found)
+            [OF_WHEELS.get(columns[name], "")] if name in columns else likely_fields(name, found)
         )
         if likely == ["compass_deg"] and "heading" in name and not _walks(mapped):
             # Beside positions alone a compass is of no use, a course is.

@@ -12,11 +12,13 @@ from mapfilter._header_units import parted_unit
 from mapfilter.errors import InputError, MapfilterError, fail, listed
 from mapfilter.tracks.readers.csv_fields import by_unit, usual_fields
 from mapfilter.tracks.readers.csv_headers import likely_fields, stated_fields
+from mapfilter.tracks.readers.csv_unused import OF_WHEELS
 from mapfilter.tracks.readers.format import Format
 from mapfilter.tracks.readers.separated_values import header_names, likely_separator
 from mapfilter.tracks.readers.text import Text
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+_CELLS, _PLACES = {"cell", "cgi", "ci"}, {"lat_deg", "lon_deg", "east_m", "north_m"}
 _LIST = "docs/howto/recordings.rst lists them"
 JSON = ('{"', '[{"')
 _FIELD_OF_UNIT = {
@@ -90,6 +92,9 @@ def other_names(names: Sequence[str]) -> str:
     found = {*usual, *stated}
     others = [name for name in names if name and name not in (*usual.values(), *stated.values())]
     likely = {name: fields for name in others if (fields := likely_fields(name, found))}
+    if _CELLS & found and not _PLACES & found.union(*likely.values()):
+        # Beside cells alone a phone's speed is no motion, a vehicle's is.
+        likely = {name: [OF_WHEELS.get(one, one) for one in some] for name, some in likely.items()}
     several = Counter(tuple(fields) for fields in likely.values())
     such = [
         _pairs(name, fields)
