@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite, nan
 
 from matplotlib.axes import Axes
@@ -40,11 +40,7 @@ def plot_coverage_curves(
 
     Parameters are those of :func:`mapfilter.report.success.plot_success_curves`.
     """
-    axes = single_axes(ax, *_SIZE_IN)
-    _draw_coverage(axes, curves, axis)
-    axes.set_title(title)
-    legend(axes, ax, 3)
-    return axes
+    return _alone(_draw_coverage, curves, ax, title, axis)
 
 
 @styled
@@ -55,11 +51,7 @@ def plot_radius_curves(
 
     Parameters are those of :func:`mapfilter.report.success.plot_success_curves`.
     """
-    axes = single_axes(ax, *_SIZE_IN)
-    _draw_radius(axes, curves, axis)
-    axes.set_title(title)
-    legend(axes, ax, 3)
-    return axes
+    return _alone(_draw_radius, curves, ax, title, axis)
 
 
 @styled
@@ -76,6 +68,20 @@ def plot_claimed_radii(curves: Curves, *, title: str, axis: str = HEADING) -> Fi
     # Both panels have the same curves: each is named once.
     bottom_legend(figure, 4, coverage.get_legend_handles_labels()[0])
     return figure
+
+
+def _alone(
+    draw: Callable[[Axes, Curves, str], None],
+    curves: Curves,
+    ax: Axes | None,
+    title: str,
+    axis: str,
+) -> Axes:
+    axes = single_axes(ax, *_SIZE_IN)
+    draw(axes, curves, axis)
+    axes.set_title(title)
+    legend(axes, ax, 3)
+    return axes
 
 
 def _draw_coverage(axes: Axes, curves: Curves, axis: str) -> None:

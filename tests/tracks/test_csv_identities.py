@@ -132,3 +132,13 @@ def test_whole_identities_in_a_column_of_numbers(read):
     assert radio["cell"].tolist() == ["244-91-7-1234", "244-91-7-1235"] * (COUNT // 2)
     assert "cell_id: taken for identities" in notes
     assert radio["ci"].tolist() == [1234, 1235] * (COUNT // 2)
+
+
+def test_names_of_a_plan_in_a_file_read_in_parts(read, monkeypatch):
+    """A later part may have no name at all, or one that looks like a number."""
+    monkeypatch.setattr(text, "_PART_BYTES", 1 << 9)
+    given = np.array(["S1"] * 15 + [None] * 15 + ["12"] * 10, dtype=object)
+    radio, notes = read(cell_id=given)
+    assert radio["cell"].dropna().tolist() == ["S1"] * 15 + ["12"] * 10
+    assert notes.count("cell_id: taken for the plan's names of cells") == 1
+    assert "ci" not in radio

@@ -203,28 +203,36 @@ def _with_signals(mapped: Mapped, reading: Reading) -> Mapped:
 
 
 def _with_names(mapped: Mapped, reading: Reading) -> Mapped:
-    """Return columns with ids of cells as whole identities or a plan's names, if no numbers.
-
-    Hexadecimal ones have four digits or more, and the network's numbers beside them: A1 and C101
-    are names else.
-    """
+    """Return columns with ids of cells as whole identities or a plan's names, if no numbers."""
     name = mapped.rows.find(*_OF_CELLS)
     owned = name in {column.lower() for column in mapped.own.values()}
     if name is None or owned or any(map(mapped.has, ("cell", "cgi"))):
         return mapped
+    # Later parts of a large file are read as the first one.
+    before = [field for field in ("cgi", "cell") if reading.columns.get(field) == name]
+    field = before[0] if before else _names_in(mapped, name)
+    if not field:
+        return mapped
+    meaning = "identities, as 262-01-1234-5678"
+    if field == "cell":
+        meaning = "the plan's names of cells, as they are no numbers"
+    reading.note(f"{name}: taken for {meaning}")
+    return replace(mapped, stated={**mapped.stated, field: name})
+
+
+def _names_in(mapped: Mapped, name: str) -> str:
+    """Return the field of most texts of a column: whole identities, a plan's names, "" of numbers.
+
+    Hexadecimal ones have four digits or more, and the network's numbers beside them: A1 and C101
+    are names else.
+    """
     words = {word.strip() for word in set(mapped.rows.texts(name))} - {""}
     kinds = [_DECIMAL, _HEXADECIMAL] if any(map(mapped.has, ("lac", "mcc", "mnc"))) else [_DECIMAL]
     numbers = sum(any(kind.fullmatch(word) for kind in kinds) for word in words)
-    # Of hexadecimal numbers a tenth or so have no letter.
-    named = len(words) - numbers > 0.5 * len(words)
-    if not (named or name in (reading.columns.get("cell"), reading.columns.get("cgi"))):
-        return mapped
+    if len(words) <= 2 * numbers:
+        return ""
     whole = np.isfinite(parse_identities(np.array(sorted(words), dtype=object))["ci"])
-    if whole.mean() > _MOSTLY or reading.columns.get("cgi") == name:
-        reading.note(f"{name}: taken for identities, as 262-01-1234-5678")
-        return replace(mapped, stated={**mapped.stated, "cgi": name})
-    reading.note(f"{name}: taken for the plan's names of cells, as they are no numbers")
-    return replace(mapped, stated={**mapped.stated, "cell": name})
+    return "cgi" if whole.mean() > _MOSTLY else "cell"
 
 
 def with_dates(mapped: Mapped) -> Mapped:

@@ -126,10 +126,10 @@ def _add_forces(rows: Columns, reading: Reading, names: dict[str, str], time_s: 
 def _add_axes(
     rows: Columns, reading: Reading, sensor: str, unit: str, time_s: Floats, parts: list[Floats]
 ) -> None:
-    """Add a sensor of three axes; all of them are 0 where it has no value."""
-    there = np.isfinite(parts[0]) & (np.abs(parts).sum(axis=0) > 0)
-    if sensor == "gyroscope":
-        there = np.isfinite(parts[0])
+    """Add a sensor of three axes; all are 0 where it has no value, or a gyroscope rests."""
+    there = np.isfinite(parts[0])
+    if sensor != "gyroscope":
+        there &= np.abs(parts).sum(axis=0) > 0
     columns = {f"{axis}_{unit}": part for axis, part in zip(_AXES, parts, strict=True)}
     add_rows(reading, sensor, {"time_s": time_s, **columns}, rows, there)
 
