@@ -46,15 +46,19 @@ def weigh_by_serving(
     pixel: Any,
     predicted: Prediction,
     cell: int,
+    strongest: int,
     table: Any,
     weight: float,
     odds: Any,
     other: float,
     log_weight: Any,
 ) -> None:
-    """Add the log-likelihood of the serving cell to weights, and update its fault, in place."""
+    """Add the log-likelihood of the serving cell to weights, and update its fault, in place.
+
+    ``strongest`` is the band with the strongest level of its layer; the next is the second.
+    """
     level, bands = predicted.level_dbm, predicted.bands
-    given = pixel, level, bands, cell, table, weight, odds, other, log_weight
+    given = pixel, level, bands, cell, strongest, table, weight, odds, other, log_weight
     _cuda.start(_weigh_by_serving, pixel.size, *given)
 
 
@@ -118,13 +122,15 @@ def _age(kept, decay, fault_keep, fault_log_odds):  # type: ignore[no-untyped-de
 
 
 @cuda.jit
-def _weigh_by_serving(pixel, level_dbm, bands, cell, table, weight, odds, other, log_weight):  # type: ignore[no-untyped-def]
+def _weigh_by_serving(  # type: ignore[no-untyped-def]
+    pixel, level_dbm, bands, cell, strongest, table, weight, odds, other, log_weight
+):
     i = cuda.grid(1)
     if i >= pixel.size:
         return
     at, w = pixel[i] * bands, _F(weight)
-    level, best = level_dbm[at + cell], level_dbm[at + bands - 2]
-    beside = level_dbm[at + bands - 1] if level >= best else best
+    level, best = level_dbm[at + cell], level_dbm[at + strongest]
+    beside = level_dbm[at + strongest + 1] if level >= best else best
     place = (level - beside) * _F(STEPS_PER_DB) + _F(REACH_DB * STEPS_PER_DB) + _HALF
     place = place if place > _ZERO else _ZERO
     last = _F(2 * REACH_DB * STEPS_PER_DB)

@@ -3,9 +3,10 @@
 With handover hysteresis and prediction errors the serving cell is often not the one predicted best.
 Its probability is a smooth function of the margin m, its predicted level above the best other
 cell's: ``Φ((m + h) / σ)``, with h the hysteresis in the serving cell's favour. It is never hard.
+The other cells are those of its layer (:mod:`mapfilter.radio.layers`).
 
 In the kernels, hypotheses are given by flat pixels, shape (N,), and levels as one flat array of
-shape (pixels * bands,), whose last two bands are the best and the second best level of all cells.
+shape (pixels * bands,), of which some bands are the best and the second best level of a layer.
 Levels themselves are compared in :mod:`mapfilter.models.level_errors`.
 """
 
@@ -49,6 +50,23 @@ class BoundReading(NamedTuple):
     censored: int
     sd_db: float
     weight: float
+
+
+class ServingBands(NamedTuple):
+    """Where a serving cell is compared with others.
+
+    Parameters
+    ----------
+    all : int
+        Bands of a pixel.
+    serving, strongest, second : int
+        Its band, and those with the strongest and the second strongest level of its layer.
+    """
+
+    all: int
+    serving: int
+    strongest: int
+    second: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,8 +228,7 @@ def weigh_by_serving(
     stop: int,
     pixel: Ints32,
     level_dbm: Floats32,
-    bands: int,
-    cell: int,
+    cells: ServingBands,
     table: Floats32,
     weight: float,
     odds: Floats32,
@@ -220,7 +237,7 @@ def weigh_by_serving(
 ) -> None:
     """Add the log-likelihood of the serving cell, times a weight, to weights, in place.
 
-    It is that of hypotheses ``first`` to ``stop``. ``cell`` is its band, ``table`` that of
+    It is that of hypotheses ``first`` to ``stop``; ``table`` is that of
     :func:`serving_table`. ``odds`` (N,) are the log odds of its fault, updated in place, and
     ``other`` is the log-likelihood with a fault.
     """
@@ -228,8 +245,8 @@ def weigh_by_serving(
     middle = _F(REACH_DB * STEPS_PER_DB)
     zero, last = _F(0.0), _F(2 * REACH_DB * STEPS_PER_DB)
     per_db, w, half, wrong = _F(STEPS_PER_DB), _F(weight), _F(0.5), _F(weight * other)
-    own, strongest, second = np.uint32(cell), np.uint32(bands - 2), np.uint32(bands - 1)
-    width = np.uint32(bands)
+    own, strongest = np.uint32(cells.serving), np.uint32(cells.strongest)
+    width, second = np.uint32(cells.all), np.uint32(cells.second)
     right = np.empty(pixel.size, dtype=np.float32)
     # Loops that look up are apart from the one that computes, which is vectorised.
     for i in range(pixel.size):

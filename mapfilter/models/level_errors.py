@@ -24,6 +24,7 @@ the innovation.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log
 from typing import NamedTuple
@@ -112,8 +113,8 @@ class LevelReport(NamedTuple):
         Their levels.
     absent : ndarray of int32, shape (J,)
         Bands of cells that would be in the report if they were stronger than ``limit_dbm``.
-    limit_dbm : float
-        Weakest level that is reported.
+    limit_dbm : ndarray of float32, shape (J,)
+        Weakest level that would be reported of each.
     offset_db : float
         Standard deviation that is added as hypotheses lie beside the true position.
     """
@@ -121,8 +122,13 @@ class LevelReport(NamedTuple):
     cell: Ints32
     level_dbm: Floats32
     absent: Ints32
-    limit_dbm: float
+    limit_dbm: Floats32
     offset_db: float
+
+    def with_absent(self, some: Sequence[int]) -> LevelReport:
+        """Return the report with some of the absent cells only, by their places."""
+        chosen = np.asarray(some, dtype=np.intp)
+        return self._replace(absent=self.absent[chosen], limit_dbm=self.limit_dbm[chosen])
 
 
 def roughness_px(resolution_m: float) -> int:

@@ -177,15 +177,15 @@ def gained(before: Floats, after: Floats, share: float) -> Floats:
 
 @njit(error_model="numpy", cache=True)
 def shares_above(
-    pixel: Ints32, every: int, predicted: Prediction, cell: Ints32, limit_dbm: float
+    pixel: Ints32, every: int, predicted: Prediction, cell: Ints32, limit_dbm: Floats32
 ) -> Floats:
-    """Return the share of hypotheses, one of ``every``, that predict cells (K,) above a level."""
-    limit, bands = _F(limit_dbm), predicted.bands
+    """Return the share of hypotheses, one of ``every``, that predict cells (K,) above levels."""
+    bands = predicted.bands
     share = np.zeros(cell.size)
     for i in range(0, pixel.size, every):
         first = pixel[i] * bands
         for k in range(cell.size):
-            share[k] += predicted.level_dbm[first + cell[k]] > limit
+            share[k] += predicted.level_dbm[first + cell[k]] > limit_dbm[k]
     return share / ((pixel.size + every - 1) // every)
 
 

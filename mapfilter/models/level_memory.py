@@ -296,16 +296,18 @@ class LevelMemory:
         return self
 
     def absence(self, report: LevelReport) -> LevelTerms:
-        """Return the terms of absent cells that have slots; levels are the limit."""
+        """Return the terms of absent cells that have slots; levels are their limits."""
         slot_of = self.slot_of
-        held = [(band, slot_of[band]) for band in report.absent.tolist() if band in slot_of]
-        cell, slot = np.array(held, dtype=np.int32).reshape(-1, 2).T.copy()
+        absent = report.absent.tolist()
+        held = report.with_absent([k for k, band in enumerate(absent) if band in slot_of])
+        cell = held.absent
+        slot = np.array([slot_of[band] for band in cell.tolist()], dtype=np.int32)
         more_db2 = self.errors.white_db**2 + report.offset_db**2 + self.errors.absent_db**2
         gain, variance = absence_gains(self.covariance_db2, slot, more_db2, _NEGLIGIBLE)
         return LevelTerms(
             cell,
             slot,
-            np.full(cell.size, report.limit_dbm, dtype=np.float32),
+            held.limit_dbm,
             gain,
             variance,
             np.full(cell.size, _ABSENT_BY_FAULT, dtype=np.float32),

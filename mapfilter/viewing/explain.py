@@ -219,14 +219,14 @@ def _prefixes(
     if levels is not None:
         for k in range(levels.cell.size):
             some = slice(k + 1)
-            part = levels._replace(
-                cell=levels.cell[some], level_dbm=levels.level_dbm[some], absent=_NONE
+            part = levels.with_absent(())._replace(
+                cell=levels.cell[some], level_dbm=levels.level_dbm[some]
             )
             so_far = replace(so_far, levels=part)
             yield _Prefix("level", int(levels.cell[k]), float(levels.level_dbm[k]), so_far)
         so_far = replace(so_far, levels=levels)
         if levels.absent.size:
-            yield _Prefix("absent", -1, levels.limit_dbm, so_far)
+            yield _Prefix("absent", -1, float(levels.limit_dbm.min()), so_far)
     for count, bound in enumerate(reading.bounds, start=1):
         so_far = replace(so_far, bounds=reading.bounds[:count])
         cell = int(bound.cells[0]) if bound.cells.size == 1 else -1

@@ -103,7 +103,7 @@ def _mean_rough_db2(area: AreaFrame, share: float) -> float:
     # In an area that is held by tiles most cells are received nearly nowhere.
     if not area.cell_ids or not isinstance(area, AreaMap):
         return 0.0
-    rough_db = 0.1 * area.flat_rough_db.reshape(-1, len(area.cell_ids) + 2)[::97, :-2]
+    rough_db = 0.1 * area.flat_rough_db.reshape(-1, area.bands)[::97, : len(area.cell_ids)]
     return float(share * np.mean(rough_db.astype(np.float64) ** 2))
 
 

@@ -186,7 +186,8 @@ def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInput
     level = area.level_dbm[int(pixel[0]), int(pixel[1]), : len(area.cell_ids)]
     cell = np.argsort(-level, kind="stable")[:_LEVELS].astype(np.int32)
     absent = np.setdiff1d(np.arange(len(area.cell_ids), dtype=np.int32), cell)
-    levels = LevelReport(cell, level[cell] + np.float32(3.0), absent, float(level[cell].min()), 3.0)
+    limit_dbm = np.full(absent.size, level[cell].min(), dtype=np.float32)
+    levels = LevelReport(cell, level[cell] + np.float32(3.0), absent, limit_dbm, 3.0)
     reading = RadioReading(int(cell[0]), 5 / 40, levels, length_m=5.0)
     # As in a filter under way, particles know of the errors of levels by an earlier report, and
     # what they keep of these is still to be copied from those that were chosen then.

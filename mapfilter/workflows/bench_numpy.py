@@ -109,7 +109,8 @@ class NumpyModel:
         area, reading = self.model.whole, self.reading
         pixel = self._pixels(state[EAST], state[NORTH])
         now = area.level_dbm[pixel]
-        level, best, second = now[:, reading.serving], now[:, -2], now[:, -1]
+        top = area.strongest(reading.serving)
+        level, best, second = now[:, reading.serving], now[:, top], now[:, top + 1]
         margin = level - np.where(level >= best, second, best)
         middle = _TABLE_DB * _PER_DB
         place = np.clip(margin * _PER_DB + middle + 0.5, 0, 2 * middle).astype(np.int64)
@@ -145,7 +146,7 @@ class NumpyModel:
         self, now: Floats32, rough: Floats, pixel: Ints32, memory: LevelMemory, held: Any
     ) -> tuple[Floats, Floats]:
         errors, report, predicted = self.model.evidence.levels, self.levels, self.model.prediction
-        report = report._replace(absent=expected_absent(predicted, pixel, report))
+        report = expected_absent(predicted, pixel, report)
         cells = np.concatenate([report.cell, report.absent])[: memory.slots]
         memory, held = memory.with_cells(cells, held, in_place=True)
         memory, heard = memory.updated(report, mean_rough_db2(predicted, pixel, report.cell))

@@ -72,7 +72,7 @@ def compile_evidence() -> None:
     """Compile the weighing by reports."""
     model, cloud, log_weight = _made()
     one, none = np.full(1, -60, dtype=np.float32), np.zeros(1, dtype=np.int32)
-    levels = LevelReport(none, one, none, -100.0, 1.0)
+    levels = LevelReport(none, one, none, one - 40, 1.0)
     plain = RadioReading(0, 1.0, levels)
     # What is kept of a first report decays until the second.
     cloud, _ = model.weigh(cloud, log_weight, plain)

@@ -168,7 +168,7 @@ def test_a_place_where_a_cell_was_not_measured_says_less_of_its_level(found, mad
     np.testing.assert_array_equal(held[~np.isnan(told)], told[~np.isnan(told)])
     assert np.isfinite(database.field().level_dbm).all()
     level = LevelReport(
-        np.array([0], np.int32), np.array([-100.0], np.float32), np.zeros(0, np.int32), -120.0, 0.0
+        np.array([0], "i4"), np.array([-100], "f4"), np.zeros(0, "i4"), np.zeros(0, "f4"), 0.0
     )
     state = np.zeros((STATES, model.area.points.shape[1]), dtype=np.float32)
     state[:2] = model.area.points

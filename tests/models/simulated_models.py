@@ -106,10 +106,10 @@ def test_the_serving_cell(cell):
     level = p.level_dbm.reshape(-1, BANDS)
     level[:, -1:-3:-1] = np.sort(level[:, :-2], axis=1)[:, -2:]
     _, given, _ = serving(p)
-    pixel, _, _, _, table, weight, odds, other, _ = given
-    given[3], before = cell, odds.copy()
+    pixel, _, bands, table, weight, odds, other, _ = given
+    given[2], before = bands._replace(serving=cell), odds.copy()
     fingerprint.weigh_by_serving(0, COUNT, *given)
-    best = prediction(p), cell, table, weight, before, other, found.log_weight
+    best = prediction(p), cell, bands.strongest, table, weight, before, other, found.log_weight
     cuda_reports.weigh_by_serving(pixel, *best)
     np.testing.assert_allclose(before, odds, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(found.log_weight, p.log_weight, rtol=0, atol=1e-5)

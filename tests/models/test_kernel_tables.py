@@ -127,7 +127,7 @@ def test_a_margin_is_looked_up_at_the_nearest_quarter():
     level[:, 4] = np.where(np.array(MARGINS_DB) > 0, 0.0, level[:, 4])
     found, pixel = np.zeros(len(MARGINS_DB)), np.arange(len(MARGINS_DB), dtype=np.int32)
     sound = np.full(len(MARGINS_DB), -80.0, dtype=np.float32)
-    given = 5, 1, marked(), 1.0, sound, -0.7
+    given = fingerprint.ServingBands(5, 1, 3, 4), marked(), 1.0, sound, -0.7
     fingerprint.weigh_by_serving(0, pixel.size, pixel, level.ravel(), *given, found)
     np.testing.assert_array_equal(found, PLACES)
 

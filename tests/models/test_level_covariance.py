@@ -85,9 +85,10 @@ def test_some_hypotheses_stand_for_all(rng, every):
     pixel, cell = rng.integers(0, 40, 301).astype(np.int32), np.array([4, 0, 2], dtype=np.int32)
     predicted = Prediction(levels.ravel(), rough.ravel(), 6, 1.0)
     some = pixel[::every]
-    above = levels[some][:, cell] > np.float32(-85.0)
+    limit_dbm = np.array([-85.0, -70.0, -100.0], dtype=np.float32)
+    above = levels[some][:, cell] > limit_dbm
     np.testing.assert_array_equal(
-        shares_above(pixel, every, predicted, cell, -85.0), above.mean(axis=0)
+        shares_above(pixel, every, predicted, cell, limit_dbm), above.mean(axis=0)
     )
     found = rough_squares(pixel, every, predicted, cell)
     np.testing.assert_array_equal(found, ((0.1 * rough[some][:, cell]) ** 2).T)

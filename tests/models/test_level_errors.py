@@ -37,7 +37,7 @@ def raster(bands, seed=1):
 def report(levels, absent=(), limit_dbm=-120.0, offset_db=0.0):
     cell, level = np.array(list(levels)), np.array(list(levels.values()))
     given = cell.astype(np.int32), level.astype(np.float32), np.array(absent, dtype=np.int32)
-    return LevelReport(*given, limit_dbm, offset_db)
+    return LevelReport(*given, np.full(len(absent), limit_dbm, dtype=np.float32), offset_db)
 
 
 def weighed(memory, kept, pixel, table, given, rough_db=None):

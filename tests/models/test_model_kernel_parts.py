@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from mapfilter.filters.resampling import copy_with_jitter, taken
 from mapfilter.models import fingerprint
 from mapfilter.models.ageing import Ageing, age, as_it_is
-from mapfilter.models.fingerprint import RasterFrame, ServingWeights, bound_table, serving_table
+from mapfilter.models.fingerprint import (
+    RasterFrame,
+    ServingBands,
+    ServingWeights,
+    bound_table,
+    serving_table,
+)
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_kernels import (
     LevelTerms,
@@ -93,7 +99,8 @@ def aged(p, chosen):
 
 def serving(p):
     odds = p.kept[2 * SLOTS + 2]
-    given_ = p.pixel, p.level_dbm, BANDS, 1, serving_table(ServingWeights()), 0.3, odds, -0.7
+    bands, table = ServingBands(BANDS, 1, BANDS - 2, BANDS - 1), serving_table(ServingWeights())
+    given_ = p.pixel, p.level_dbm, bands, table, 0.3, odds, -0.7
     return fingerprint.weigh_by_serving, [*given_, p.log_weight], [p.kept, p.log_weight]
 
 

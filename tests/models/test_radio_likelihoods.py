@@ -31,7 +31,8 @@ def by_serving(table, cell, weights, weight=1.0, before=0.0, odds=None):
     found = np.full(EVERY.size, before)
     odds = np.full(EVERY.size, -80.0, dtype=np.float32) if odds is None else odds
     margins = fingerprint.serving_table(weights)
-    given = BANDS, cell, margins, weight, odds, -weights.fault_nats
+    bands = fingerprint.ServingBands(BANDS, cell, BANDS - 2, BANDS - 1)
+    given = bands, margins, weight, odds, -weights.fault_nats
     fingerprint.weigh_by_serving(0, EVERY.size, EVERY, table.reshape(-1), *given, found)
     return found
 

@@ -52,7 +52,8 @@ def inside(reading):
 
 def absent(reading):
     """Bands of absent cells, and what they are weaker than."""
-    return reading.levels.absent.tolist(), reading.levels.limit_dbm
+    limit_dbm = set(reading.levels.limit_dbm.tolist())
+    return reading.levels.absent.tolist(), limit_dbm.pop() if len(limit_dbm) == 1 else limit_dbm
 
 
 def others(reading):

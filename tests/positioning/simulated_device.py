@@ -66,6 +66,7 @@ def report(limit_dbm=-95.0, offset_db=3.0, cells=(0, 2)):
     cell = np.array(cells, dtype=np.int32)
     level = np.array([-71.5, -88.25, -80.0, -90.0][: cell.size], dtype=np.float32)
     absent = np.setdiff1d(np.arange(4, dtype=np.int32), cell)
+    limit_dbm = np.full(absent.size, limit_dbm, dtype=np.float32)
     return LevelReport(cell, level, absent, limit_dbm, offset_db)
 
 

@@ -356,7 +356,7 @@ def test_when_a_belief_is_doubted(null, lead, expected):
 # The null hypothesis by hand
 
 LEVELS = LevelReport(
-    np.zeros(1, np.int32), np.zeros(1, np.float32), np.zeros(0, np.int32), -110.0, 0.0
+    np.zeros(1, "i4"), np.zeros(1, "f4"), np.zeros(0, "i4"), np.zeros(0, "f4"), 0.0
 )
 
 

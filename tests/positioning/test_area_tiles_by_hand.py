@@ -51,7 +51,7 @@ class Reader:
 
 @pytest.fixture
 def tiles(monkeypatch):
-    made, read = AreaTiles(Database(), ("A", "B", "C"), SIDE), []
+    made, read = AreaTiles(Database(), ("A", "B", "C"), (), SIDE), []
 
     def levels_of(part, lattice):
         assert lattice is LATTICE
@@ -144,12 +144,14 @@ def test_cells_that_may_be_above_a_level(tiles, limit_dbm, bands):
             if max(level_at(band, one) for one in points) > limit_dbm
         ]  # fmt: skip
         for _ in range(2):
-            found = tiles.strong(number, np.array(bands, dtype=np.int32), limit_dbm)
+            limits_dbm = np.full(len(bands), limit_dbm, dtype=np.float32)
+            found = tiles.strong(number, np.array(bands, dtype=np.int32), limits_dbm)
             assert found.tolist() == strong
 
 
 def test_cells_whose_parts_are_weaker_are_not_read_for_it(tiles):
-    assert tiles.strong(0, np.array([0, 1], dtype=np.int32), -54.0).tolist() == []
+    limits_dbm = np.full(2, -54.0, dtype=np.float32)
+    assert tiles.strong(0, np.array([0, 1], dtype=np.int32), limits_dbm).tolist() == []
     assert tiles.read == []
 
 
@@ -166,7 +168,7 @@ def test_ranges_of_levels_by_tiles(tiles):
 
 
 def test_other_processes_read_for_themselves():
-    given = AreaTiles(Database(), ("A", "B"), SIDE, 12_345)
+    given = AreaTiles(Database(), ("A", "B"), (), SIDE, 12_345)
     again = pickle.loads(pickle.dumps(given))
     assert (again.cell_ids, again.side, again.largest_bytes) == (("A", "B"), SIDE, 12_345)
     assert (again.rows, again.cols, again.quiet_dbm) == (2, 3, QUIET_DBM)

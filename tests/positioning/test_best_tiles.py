@@ -107,7 +107,11 @@ def numbers_of(searched):
 
 def levels(cells, levels_dbm):
     return LevelReport(
-        np.array(cells, dtype=np.int32), np.array(levels_dbm, dtype=np.float32), NONE, -110.0, 0.0
+        np.array(cells, dtype=np.int32),
+        np.array(levels_dbm, dtype=np.float32),
+        NONE,
+        NONE.astype("f4"),
+        0.0,
     )
 
 

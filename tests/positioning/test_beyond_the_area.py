@@ -29,7 +29,7 @@ STILL = MotionErrors(
 MODEL = BayesModel(make_area(), STILL, MapWeights(), evidence=OPTIONS)
 REPORT = LevelReport(
     np.array([BANDS["A"], BANDS["B"]], dtype=np.int32), np.array([-75, -83], dtype=np.float32),
-    np.zeros(0, dtype=np.int32), -110.0, 0.0,
+    np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.float32), 0.0,
 )  # fmt: skip
 
 

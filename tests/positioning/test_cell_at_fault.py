@@ -35,7 +35,7 @@ def log_weights(fault_probability, *, levels):
         np.array([ROTATED, *SOUND], dtype=np.int32),
         level_dbm[[ROTATED, *SOUND]],
         np.zeros(0, dtype=np.int32),
-        -110.0,
+        np.zeros(0, dtype=np.float32),
         0.0,
     )
     for k in range(REPORTS):

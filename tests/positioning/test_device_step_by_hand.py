@@ -70,7 +70,7 @@ def test_a_step_is_moved_and_weighed_by_the_map(calls, step_m, cells, per_m):
 
 LEVELS = LevelReport(
     np.array([0, 2], dtype=np.int32), np.array([-70.0, -82.0], dtype=np.float32),
-    np.array([1, 3], dtype=np.int32), -95.0, 1.5,
+    np.array([1, 3], dtype=np.int32), np.full(2, -95.0, dtype=np.float32), 1.5,
 )  # fmt: skip
 BOUND = SimpleNamespace(
     cells=np.array([1, 2], np.int32), level_dbm=-84.0, censored=-1, sd_db=8.0, weight=0.4
@@ -116,10 +116,11 @@ def test_a_report_is_weighed_part_by_part(calls):
     np.testing.assert_allclose(weight, -1.0 - 2.0 - 4.0 - 16.0)
     ((state, frame, pixel),) = named(calls, "pixels")
     assert (state is INSIDE.state, frame, pixel.dtype) == (True, AREA.frame, np.int32)
-    ((at, predicted, serving, table, serving_weight, odds, fault, _),) = named(
+    ((at, predicted, serving, strongest, table, serving_weight, odds, fault, _),) = named(
         calls, "weigh_by_serving"
     )
     assert (at is pixel, serving, serving_weight) == (True, 0, 0.2)
+    assert strongest == len(AREA.cell_ids)
     assert fault == -OPTIONS.serving.fault_nats
     assert odds.shape == (2,)
     np.testing.assert_array_equal(predicted.level_dbm, MODEL.prediction.level_dbm)
@@ -141,7 +142,7 @@ def test_absent_cells_are_expected_by_a_sample_of_256_or_more(monkeypatch, calls
 
     def expected(*given):
         asked.append(given[1:])
-        return given[2].absent[:1]
+        return given[2].with_absent([0])
 
     monkeypatch.setattr(device_step, "expected_absent", expected)
     step, cloud = DeviceStep(MODEL, Placed()), cloud_at(count=count)
@@ -159,12 +160,12 @@ def test_absent_cells_are_expected_by_a_sample_of_256_or_more(monkeypatch, calls
 
 
 def test_levels_or_absent_cells_alone_and_none(monkeypatch, calls):
-    monkeypatch.setattr(device_step, "expected_absent", lambda *given: given[2].absent)
+    monkeypatch.setattr(device_step, "expected_absent", lambda *given: given[2])
     none = np.zeros(0, dtype=np.int32)
     for report, names in (
-        (LEVELS._replace(absent=none), ["weigh_by_levels"]),
+        (LEVELS.with_absent([]), ["weigh_by_levels"]),
         (LEVELS._replace(cell=none, level_dbm=np.zeros(0, "f4")), ["weigh_by_absence"]),
-        (LEVELS._replace(cell=none, level_dbm=np.zeros(0, "f4"), absent=none), []),
+        (LEVELS._replace(cell=none, level_dbm=np.zeros(0, "f4")).with_absent([]), []),
     ):
         calls.clear()
         DeviceStep(MODEL, Placed()).weigh(INSIDE, np.zeros(2), RadioReading(levels=report))
@@ -174,7 +175,7 @@ def test_levels_or_absent_cells_alone_and_none(monkeypatch, calls):
 def test_what_wrong_predictions_say_is_the_weighted_sum_of_levels_and_absent_cells(
     monkeypatch, calls
 ):
-    monkeypatch.setattr(device_step, "expected_absent", lambda *given: given[2].absent)
+    monkeypatch.setattr(device_step, "expected_absent", lambda *given: given[2])
     cloud, _ = DeviceStep(MODEL, Placed()).weigh(INSIDE, np.zeros(2), RadioReading(levels=LEVELS))
     ((*_, levels, weight, _),) = named(calls, "weigh_by_levels")
     ((*_, absent, _, _, _),) = named(calls, "weigh_by_absence")

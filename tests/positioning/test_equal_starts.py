@@ -101,7 +101,8 @@ def test_points_are_as_likely_from_memory_as_weighed_anew(area):
 def test_reports_are_equal_by_their_numbers(area):
     reading, key = report(area), known_reading(report(area))
     assert key == known_reading(report(area))
-    levels = reading.levels
+    levels, limit_dbm = reading.levels, np.full(1, -99.0, dtype=np.float32)
+    absent = levels._replace(absent=np.array([2], dtype=np.int32), limit_dbm=limit_dbm)
     others = [
         report(area, -71.0),
         report(area, serving="E"),
@@ -111,9 +112,9 @@ def test_reports_are_equal_by_their_numbers(area):
         replace(reading, timing_advance=2.0),
         replace(reading, serving_under_null=-3.0),
         replace(reading, levels=None),
-        replace(reading, levels=levels._replace(limit_dbm=-99.0)),
+        replace(reading, levels=absent._replace(limit_dbm=absent.limit_dbm - 1)),
         replace(reading, levels=levels._replace(offset_db=levels.offset_db + 1.0)),
-        replace(reading, levels=levels._replace(absent=np.array([2], dtype=np.int32))),
+        replace(reading, levels=absent),
     ]
     keys = [known_reading(other) for other in others]
     assert key not in keys

@@ -218,7 +218,7 @@ def test_a_report_by_itself_is_as_the_model_has_it(town_filter, steps):
     rng, why = np.random.default_rng(8), constants(town_filter.model)
     _, updates, _ = town_filter.evidence_at(steps[0][0], steps[0][1], np.random.default_rng(0))
     reading = next(update.radio for update in updates if update.radio is not None)
-    reading = replace(reading, levels=reading.levels._replace(absent=np.empty(0, dtype=np.int32)))
+    reading = replace(reading, levels=reading.levels.with_absent([]))
     # Pixels of even predictions, so that the share of roughness under a fault hardly matters.
     place_m = rng.uniform(20, 880, (2, 40)).astype(np.float32)
     state = np.zeros((STATES, 40), dtype=np.float32)

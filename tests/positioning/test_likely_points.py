@@ -92,7 +92,9 @@ def test_likelihoods_of_reports_are_kept_for_areas_of_a_size(monkeypatch, most, 
 
 def reading(**changes):
     cell, absent = np.array([1, 2], dtype=np.int32), np.array([3], dtype=np.int32)
-    levels = LevelReport(cell, np.array([-70.0, -80.0], dtype=np.float32), absent, -110.0, 2.0)
+    levels = LevelReport(
+        cell, np.array([-70, -80], "f4"), absent, np.full(absent.size, -110, "f4"), 2.0
+    )
     bound = BoundReading(np.array([1, 4], dtype=np.int32), -60.0, 1, 8.0, 0.5)
     return RadioReading(**({"serving": 1, "serving_weight": 0.5, "levels": levels,
                             "bounds": (bound,)} | changes))  # fmt: skip
@@ -112,7 +114,8 @@ def test_equal_reports_are_known_by_their_numbers():
         {"levels": None}, {"bounds": ()}, {"bounds": (bound, bound)},
         {"levels": levels._replace(cell=more)}, {"levels": levels._replace(absent=more)},
         {"levels": levels._replace(level_dbm=levels.level_dbm - 1)},
-        {"levels": levels._replace(limit_dbm=-100.0)}, {"levels": levels._replace(offset_db=3.0)},
+        {"levels": levels._replace(limit_dbm=levels.limit_dbm - 1)},
+        {"levels": levels._replace(offset_db=3.0)},
         {"bounds": (bound._replace(cells=more),)}, {"bounds": (bound._replace(censored=-1),)},
         {"bounds": (bound._replace(level_dbm=-61.0),)}, {"bounds": (bound._replace(sd_db=9.0),)},
         {"bounds": (bound._replace(weight=0.4),)},

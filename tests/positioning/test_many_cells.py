@@ -49,6 +49,7 @@ def hypotheses(rng, count=COUNT):
 
 def report(cells, level_dbm, absent=NONE, limit_dbm=-120.0):
     given = np.asarray(cells, np.int32), np.asarray(level_dbm, np.float32)
+    limit_dbm = np.full(len(absent), limit_dbm, dtype=np.float32)
     return LevelReport(*given, np.asarray(absent, np.int32), limit_dbm, 0.0)
 
 

@@ -71,12 +71,13 @@ def test_the_mean_roughness_of_predicted_levels():
 def test_absent_cells_that_hypotheses_expect_come_by_how_many_do(limit_dbm):
     pixel, absent = np.arange(63, dtype=np.int32), np.array([0, 1, 2, 3], dtype=np.int32)
     none = np.zeros(0, dtype=np.int32)
-    report = LevelReport(none, none.astype(np.float32), absent, limit_dbm, 0.0)
+    limits_dbm = np.full(absent.size, limit_dbm, dtype=np.float32)
+    report = LevelReport(none, none.astype(np.float32), absent, limits_dbm, 0.0)
     share = (LEVEL_DBM.reshape(63, 4) > limit_dbm).mean(axis=0)
     order = [k for k in np.argsort(-share, kind="stable").tolist() if share[k] > 0.02]
-    assert expected_absent(MODEL.prediction, pixel, report).tolist() == order
-    nothing = report._replace(absent=none)
-    assert expected_absent(MODEL.prediction, pixel, nothing).tolist() == []
+    assert expected_absent(MODEL.prediction, pixel, report).absent.tolist() == order
+    nothing = report.with_absent([])
+    assert expected_absent(MODEL.prediction, pixel, nothing).absent.tolist() == []
 
 
 @dataclass(frozen=True, eq=False)

@@ -267,7 +267,8 @@ def reading(area, town, place_m):
     level = town.levels_dbm(np.asarray(place_m))
     received = [k for k in np.argsort(-level) if level[k] > FLOOR_DBM][:4]
     bands = np.array([area.band_of[NAMES[k]] for k in received], dtype=np.int32)
-    report = LevelReport(bands, level[received].astype("f4"), NONE, FLOOR_DBM, 0.0)
+    level_dbm = level[received].astype("f4")
+    report = LevelReport(bands, level_dbm, NONE, NONE.astype("f4"), 0.0)
     return RadioReading(int(bands[0]), 1.0, report)
 
 
@@ -643,11 +644,11 @@ def test_cells_are_read_only_where_they_may_be_strong(database, whole):
     pixel = np.random.default_rng(4).integers(whole.on_way.size, size=500).astype(np.int32)
     limits_dbm = (0.0, -60.0, -80.0, FLOOR_DBM, FLOOR_DBM - 20)
     for limit_dbm in limits_dbm:
-        share = tiled.shares_above(pixel, bands, limit_dbm)
+        share = tiled.shares_above(pixel, bands, np.full(bands.size, limit_dbm, dtype=np.float32))
         assert np.array_equal(share, (flat[pixel] > limit_dbm).mean(axis=0))
         assert limit_dbm < 0 or not _parts_read(tiled)
     some = bands[[0, 3, 5]]
-    share = tiled.shares_above(pixel, some, -80.0)
+    share = tiled.shares_above(pixel, some, np.full(some.size, -80.0, dtype=np.float32))
     assert np.array_equal(share, (flat[pixel][:, some] > -80.0).mean(axis=0))
 
 

@@ -121,7 +121,7 @@ def test_shares_of_pixels_above_a_level(limit_dbm):
     """Cells that are nowhere received are above what is below the quiet level."""
     cell = np.array([3, 0, 2, 1], dtype=np.int32)
     pixel = np.array([2, 9, 9, 0, 13, 14, 19], dtype=np.int32)
-    found = area().shares_above(pixel, cell, limit_dbm)
+    found = area().shares_above(pixel, cell, np.full(cell.size, limit_dbm, dtype=np.float32))
     share = [np.mean([expected_dbm(one, k) > limit_dbm for one in pixel.tolist()]) for k in cell]
     np.testing.assert_allclose(found, share)
 
@@ -130,7 +130,8 @@ def test_a_level_at_the_limit_is_not_above_it_where_quiet_ones_are():
     tiles = Tiles()
     tiles.quiet_dbm = -50.0
     cell = np.array([1, 2, 0], dtype=np.int32)
-    found = area(tiles).shares_above(np.array([9, 8], dtype=np.int32), cell, -79.0)
+    limit_dbm = np.full(3, -79.0, dtype=np.float32)
+    found = area(tiles).shares_above(np.array([9, 8], dtype=np.int32), cell, limit_dbm)
     # Of the first cell -79 and -78 dBm; the second one is nowhere received.
     assert found.tolist() == [0.5, 1.0, 1.0]
 
@@ -201,9 +202,9 @@ def test_an_area_has_fewer_pixels_than_32_bits_count(monkeypatch):
         TiledArea.of_database(database(1 << 16, 1 << 15))
     large = database((1 << 16) - 1, 1 << 15)
     found = TiledArea.of_database(large)
-    assert found.tiles == (large, ("A",), tiled_area.TILE_PX, tiled_area.HELD_BYTES)
+    assert found.tiles == (large, ("A",), (0,), tiled_area.TILE_PX, tiled_area.HELD_BYTES)
     assert (found.search_tiles, found.cell_ids, found.known_ids) == (48, ("A",), {"A", "B"})
     assert (found.lattice, found.floor_dbm) == (large.lattice, -110.0)
     given = TiledArea.of_database(large, 7, 99, 5)
-    assert given.tiles == (large, ("A",), 7, 99)
+    assert given.tiles == (large, ("A",), (0,), 7, 99)
     assert given.search_tiles == 5

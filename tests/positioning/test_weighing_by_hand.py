@@ -211,7 +211,7 @@ def test_levels_count_under_the_null_hypothesis_as_no_prediction_has_them(shared
     kept = None if shared is None else SimpleNamespace(other_log_likelihood=shared)
     given = replace(STATE, belief=replace(belief(), shared=kept))
     none = np.zeros(0, dtype=np.int32)
-    levels = LevelReport(none, none.astype(np.float32), none, -110.0, 0.0)
+    levels = LevelReport(none, none.astype("f4"), none, none.astype("f4"), 0.0)
     found, _ = weighed(
         state=given, updates=[EvidenceUpdate(None, radio=RadioReading(levels=levels))]
     )

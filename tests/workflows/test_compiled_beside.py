@@ -37,7 +37,7 @@ rng = np.random.default_rng(0)
 filter_ = particle.ParticleFilter(made, particle.ParticleOptions(500, 400, 300))
 belief = filter_.init(model.Start(None, True, 10.0, 10.0, 2.0), rng)
 none = np.zeros(1, np.int32)
-levels = kernels.LevelReport(none, np.full(1, -60, np.float32), none, -100.0, 1.0)
+levels = kernels.LevelReport(none, *(np.full(1, -60, "f4"), none, np.full(1, -100, "f4")), 1.0)
 bound = fingerprint.BoundReading(none, -60.0, 1, 8.0, 1.0)
 for _ in range(3):
     belief, _ = filter_.predict(belief, MotionStep(1.0, 0.3), rng)

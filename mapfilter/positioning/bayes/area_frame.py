@@ -40,6 +40,9 @@ class AreaFrame(ABC):
         East, north and height of all cells of the database.
     interfering : frozenset of int
         Bands of the cells whose neighbours send on the same carrier (:func:`interfering_of`).
+    layers : tuple of int
+        Number of each band's layer, from 0 (:mod:`mapfilter.radio.layers`); empty where all are of
+        one.
     """
 
     lattice: Lattice
@@ -49,6 +52,7 @@ class AreaFrame(ABC):
     floor_dbm: float
     sites: Mapping[str, tuple[float, float, float]]
     interfering: frozenset[int]
+    layers: tuple[int, ...]
 
     @abstractmethod
     def levels_at(self, pixel: Ints32, band: Ints) -> Floats32:
@@ -70,6 +74,21 @@ class AreaFrame(ABC):
         way_id : int
             0 where the largest share lies in squares, off all ways.
         """
+
+    @cached_property
+    def layer_of(self) -> Ints:
+        """Number of each band's layer, (C,)."""
+        layers = self.layers or (0,) * len(self.cell_ids)
+        return np.array(layers, dtype=np.int64)
+
+    @cached_property
+    def bands(self) -> int:
+        """Number of bands: of cells, and of each layer its strongest and second strongest level."""
+        return len(self.cell_ids) + 2 * (max(self.layers, default=0) + 1)
+
+    def strongest(self, band: int) -> int:
+        """Return the band with the strongest level of a cell's layer; the next is the second."""
+        return len(self.cell_ids) + 2 * int(self.layer_of[band])
 
     @cached_property
     def checksum(self) -> str:

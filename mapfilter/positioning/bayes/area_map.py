@@ -22,6 +22,7 @@ from mapfilter.positioning.bayes.area_frame import (
     sites_of,
 )
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.layers import layers_of
 
 _CARRIAGEWAY_SHARE, _LEAST_CARRIAGEWAY_M = 0.3, 2.0
 """Of half a way's width, pavements included, and at least, but no more than half of its width: the
@@ -34,15 +35,15 @@ class AreaMap(AreaFrame):
 
     Parameters
     ----------
-    level_dbm : ndarray of float32, shape (rows, cols, C + 2)
-        Levels, and the strongest and second strongest of each pixel.
+    level_dbm : ndarray of float32, shape (rows, cols, C + 2L)
+        Levels, and the strongest and second strongest of each of the L layers.
     distance_m : ndarray of float32, shape (rows, cols)
         To the edge of the nearest way, 0 on it.
     way_id : ndarray of int64, shape (rows, cols)
         Id of the way of the nearest point; 0 where that belongs to no way.
     on_way : ndarray of bool, shape (rows, cols)
         Whether the pixel is a point of the database.
-    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, interfering
+    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, interfering, layers
         As of :class:`AreaFrame`.
     carriageway_m : ndarray of float32, shape (rows, cols), or None
         To the edge of the nearest carriageway; None in a database with cells.
@@ -60,6 +61,7 @@ class AreaMap(AreaFrame):
     sites: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     carriageway_m: Floats32 | None = None
     interfering: frozenset[int] = frozenset()
+    layers: tuple[int, ...] = ()
 
     @classmethod
     def of_field(cls, field: RadioField, plan: CellPlan, floor_dbm: float) -> AreaMap:
@@ -68,19 +70,24 @@ class AreaMap(AreaFrame):
         Where a cell is below the floor, a level a little below it is assumed.
         """
         rows, cols, count = field.level_dbm.shape
-        level = np.empty((rows, cols, count + 2), dtype=np.float32)
+        layers = layers_of(plan, field.cell_ids)
+        layer_of = np.array(layers, dtype=np.int64)
+        total = count + 2 * (max(layers, default=0) + 1)
+        level = np.empty((rows, cols, total), dtype=np.float32)
         quiet_dbm = np.float32(floor_dbm - BELOW_FLOOR_DB)
         np.copyto(level[..., :count], field.level_dbm)
         received = level[..., :count]
         received[np.isnan(received)] = quiet_dbm
         level[..., count:] = quiet_dbm
-        if count > 1:
+        for layer in range((total - count) // 2 if count else 0):
+            own, first = np.flatnonzero(layer_of == layer), count + 2 * layer
+            if own.size == 1:
+                level[..., first] = received[..., own[0]]
+                continue
             # One row at a time, as sorting all of them at once would double the memory.
             for row in range(rows):
-                top = np.partition(received[row], count - 2, axis=-1)
-                level[row, :, count], level[row, :, count + 1] = top[:, -1], top[:, -2]
-        elif count:
-            level[..., count] = received[..., 0]
+                top = np.partition(received[row][:, own], own.size - 2, axis=-1)
+                level[row, :, first], level[row, :, first + 1] = top[:, -1], top[:, -2]
         lane_m = None
         if not field.cell_ids:
             share_m = np.float32(_CARRIAGEWAY_SHARE) * field.half_width_m
@@ -100,6 +107,7 @@ class AreaMap(AreaFrame):
             sites_of(plan),
             lane_m,
             interfering_of(plan, field.cell_ids),
+            layers,
         )
 
     def of_carriageways(self) -> AreaMap | None:
@@ -115,7 +123,7 @@ class AreaMap(AreaFrame):
 
     def levels_at(self, pixel: Ints32, band: Ints) -> Floats32:
         """Return the levels of cells (N,), by their bands, each at a pixel (N,)."""
-        found: Floats32 = self.level_dbm.reshape(-1, len(self.cell_ids) + 2)[pixel, band]
+        found: Floats32 = self.level_dbm.reshape(-1, self.bands)[pixel, band]
         return found
 
     @cached_property

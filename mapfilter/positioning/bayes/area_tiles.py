@@ -96,6 +96,8 @@ class AreaTiles:
     ----------
     cell_ids : tuple of str
         Bands.
+    layers : tuple of int
+        Number of each band's layer; empty where all are of one.
     side : int
         Of a tile, pixels.
     largest_bytes : int
@@ -106,10 +108,11 @@ class AreaTiles:
         self,
         database: RadioRouteDatabase,
         cell_ids: tuple[str, ...],
+        layers: tuple[int, ...] = (),
         side: int = TILE_PX,
         largest_bytes: int = HELD_BYTES,
     ) -> None:
-        self.database, self.cell_ids, self.side = database, cell_ids, side
+        self.database, self.cell_ids, self.layers, self.side = database, cell_ids, layers, side
         self.largest_bytes = largest_bytes
         lattice = database.lattice
         self.rows, self.cols = -(-lattice.rows // side), -(-lattice.cols // side)
@@ -122,7 +125,7 @@ class AreaTiles:
 
     def __getstate__(self) -> tuple[Any, ...]:
         # Other processes read for themselves.
-        return self.database, self.cell_ids, self.side, self.largest_bytes
+        return self.database, self.cell_ids, self.layers, self.side, self.largest_bytes
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         self.__init__(*state)  # type: ignore[misc]
@@ -171,12 +174,16 @@ class AreaTiles:
     def levels(self, number: int, band: int) -> Floats32 | None:
         """Return a cell's levels at a tile's nearest points, (P,); None where it has none.
 
-        Bands C and C + 1 are the strongest and the second strongest level.
+        Bands from C on are the strongest and the second strongest level of each layer.
         """
         points, count = self.tile(number).points, len(self.cell_ids)
-        if band >= count:
+        if band >= count and max(self.layers, default=0) == 0:
             top_dbm = points.best_dbm if band == count else points.second_dbm
             return np.where(np.isnan(top_dbm), self.quiet_dbm, top_dbm)
+        if band >= count:
+            layer, place = divmod(band - count, 2)
+            level_dbm: Floats32 = self._strongest(number, layer)[place]
+            return level_dbm
         reaching = self._reaching(number).band
         at = int(np.searchsorted(reaching, band))
         if at == reaching.size or reaching[at] != band:
@@ -197,6 +204,21 @@ class AreaTiles:
 
         return self.held.get(("levels", number, band), make, _array_bytes)
 
+    def _strongest(self, number: int, layer: int) -> Floats32:
+        """Return the strongest and the second strongest level of a layer's cells, (2, P)."""
+
+        def make() -> Floats32:
+            points = self.tile(number).points.point
+            top_dbm = np.full((2, points.size), self.quiet_dbm, dtype=np.float32)
+            for band in self._reaching(number).band.tolist():
+                level_dbm = self.levels(number, band) if self.layers[band] == layer else None
+                if level_dbm is not None:
+                    top_dbm[1] = np.maximum(top_dbm[1], np.minimum(top_dbm[0], level_dbm))
+                    top_dbm[0] = np.maximum(top_dbm[0], level_dbm)
+            return top_dbm
+
+        return self.held.get(("strongest", number, layer), make, _array_bytes)
+
     def rough_db(self, number: int, band: int) -> Bytes | None:
         """Return the roughness of a cell's levels at a tile's pixels; None where it has none."""
         level_dbm = self.levels(number, band)
@@ -210,20 +232,22 @@ class AreaTiles:
 
         return self.held.get(("rough", number, band), make, _array_bytes)
 
-    def strong(self, number: int, bands: Ints32, limit_dbm: float) -> Ints:
-        """Return the places in ``bands`` of cells that may be above a level in a tile.
+    def strong(self, number: int, bands: Ints32, limit_dbm: Floats32) -> Ints:
+        """Return the places in ``bands`` of cells that may be above levels (K,) in a tile.
 
         ``bands`` (K,) ascend, and so do the places. Cells are read for it only where the footers
         of their parts leave it open.
         """
         reaching = self._reaching(number)
-        for k in np.flatnonzero((reaching.bound_dbm > limit_dbm) & ~reaching.exact).tolist():
+        if not bands.size:
+            return np.empty(0, dtype=np.intp)
+        place = np.minimum(np.searchsorted(bands, reaching.band), bands.size - 1)
+        limit = np.where(bands[place] == reaching.band, limit_dbm[place], np.inf)
+        for k in np.flatnonzero((reaching.bound_dbm > limit) & ~reaching.exact).tolist():
             level_dbm = self.levels(number, int(reaching.band[k]))
             reaching.bound_dbm[k] = -np.inf if level_dbm is None else level_dbm.max()
             reaching.exact[k] = True
-        strong = reaching.band[reaching.bound_dbm > limit_dbm]
-        place = np.minimum(np.searchsorted(bands, strong), max(bands.size - 1, 0))
-        found: Ints = place[bands[place] == strong] if bands.size else place[:0]
+        found: Ints = place[reaching.bound_dbm > limit]
         return found
 
     def _reaching(self, number: int) -> _Reaching:

@@ -174,6 +174,7 @@ class DeviceStep:
             pixel,
             self._prediction,
             reading.serving,
+            self.model.area.strongest(reading.serving),
             self._serving_table,
             reading.serving_weight,
             odds,
@@ -192,7 +193,7 @@ class DeviceStep:
     ) -> Cloud:
         """Add the log-likelihood of levels and absent cells; ``some`` are pixels of a sample."""
         model, memory, kept = self.model, cloud.shared, cloud.kept
-        report = report._replace(absent=expected_absent(model.prediction, some, report))
+        report = expected_absent(model.prediction, some, report)
         cells = np.concatenate([report.cell, report.absent])
         memory, kept = memory.with_cells(cells[: memory.slots], kept, in_place=True)
         if report.cell.size > memory.slots:

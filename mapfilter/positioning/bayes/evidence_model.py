@@ -165,7 +165,7 @@ class EvidenceModel:
     def prediction(self) -> Prediction:
         """Predicted levels of the area, as kernels take them."""
         share = self.evidence.levels.roughness
-        return Prediction(self.whole.flat_level_dbm, self.rough_db(), self._bands, share)
+        return Prediction(self.whole.flat_level_dbm, self.rough_db(), self.area.bands, share)
 
     def _looked_up(
         self, pixel: Ints32, cell: Ints32, *, rough: bool = True
@@ -177,10 +177,6 @@ class EvidenceModel:
         if isinstance(self.area, TiledArea):
             return self.area.predicted(pixel, cell, self.evidence.levels.roughness, rough=rough)
         return self.prediction, pixel, cell
-
-    @property
-    def _bands(self) -> int:
-        return len(self.area.cell_ids) + 2
 
     def _found(self, cloud: Cloud, reading: RadioReading) -> tuple[LevelMemory, Ageing, Ints32]:
         """Return what a reading finds: the memory, what hypotheses keep, and their pixels.
@@ -231,11 +227,13 @@ class EvidenceModel:
         table, weight = self._serving_table, reading.serving_weight
         row = memory.fault_row(reading.serving)
         other = -self.evidence.serving.fault_nats
-        # Its own level, the strongest and the second strongest.
-        cells = np.array([reading.serving, self._bands - 2, self._bands - 1], dtype=np.int32)
-        predicted, pixel, cells = self._looked_up(pixel, cells, rough=False)
-        flat, bands, cell = predicted.level_dbm, predicted.bands, int(cells[0])
-        given = pixel, flat, bands, cell, table, weight, kept.now[row], other, log_weight
+        # Its own level, the strongest and the second strongest of its layer.
+        top = self.area.strongest(reading.serving)
+        some = np.array([reading.serving, top, top + 1], dtype=np.int32)
+        predicted, pixel, some = self._looked_up(pixel, some, rough=False)
+        cells = fingerprint.ServingBands(predicted.bands, *some.tolist())
+        flat, odds = predicted.level_dbm, kept.now[row]
+        given = pixel, flat, cells, table, weight, odds, other, log_weight
         calls = [(age, kept.of_row(row)), (fingerprint.weigh_by_serving, *given)]
         return kept.without_row(row), calls
 
@@ -272,7 +270,7 @@ class EvidenceModel:
         assert report is not None
         weight = self.level_weight(reading)
         # Cells that nobody expects say nothing, neither for the belief nor against it.
-        report = report._replace(absent=self._expected_absent(pixel, report))
+        report = self._expected_absent(pixel, report)
         cells = np.concatenate([report.cell, report.absent])
         memory, kept, calls = self._with_cells(memory, kept, calls, cells[: memory.slots])
         if report.cell.size > memory.slots:
@@ -292,9 +290,9 @@ class EvidenceModel:
         self.threads.over(log_weight.size, *calls)
         return memory.with_other(weight * (float(terms.other.sum()) + float(absent.other.sum())))
 
-    def _expected_absent(self, pixel: Ints32, report: LevelReport) -> Ints32:
+    def _expected_absent(self, pixel: Ints32, report: LevelReport) -> LevelReport:
         if not isinstance(self.area, TiledArea):
             return expected_absent(self.prediction, pixel, report)
         some = np.ascontiguousarray(pixel[:: sample_stride(pixel)])
         share = self.area.shares_above(some, report.absent, report.limit_dbm)
-        return most_expected(report.absent, share)
+        return most_expected(report, share)

@@ -41,8 +41,8 @@ def known_reading(reading: RadioReading) -> KnownReading | None:
     levels: tuple[Hashable, ...] = ()
     if reading.levels is not None:
         cell, level_dbm, absent, limit_dbm, offset_db = reading.levels
-        numbers = cell.tobytes(), level_dbm.tobytes(), absent.tobytes()
-        levels = (*numbers, float(limit_dbm), float(offset_db))
+        arrays = (cell, level_dbm, absent, limit_dbm)
+        levels = (*(one.tobytes() for one in arrays), float(offset_db))
     bounds = tuple((one.cells.tobytes(), *map(float, one[1:])) for one in reading.bounds)
     # As a text NaN is equal to itself.
     rest = repr((reading.serving, reading.serving_weight, reading.length_m, reading.tracked))

@@ -76,9 +76,10 @@ class MeasuredMapModel(BayesModel):
 
     @cached_property
     def _rough_db(self) -> Bytes:
-        sd_db = np.zeros((self.whole.on_way.size, self._bands))
+        count = len(self.area.cell_ids)
+        sd_db = np.zeros((self.whole.on_way.size, self.area.bands))
         if self.level_sd_db is not None:
-            sd_db[:, :-2] = self.level_sd_db.reshape(len(self.area.cell_ids), -1).T
+            sd_db[:, :count] = self.level_sd_db.reshape(count, -1).T
         more_db = np.sqrt(np.maximum(sd_db**2 - self.evidence.levels.total_db**2, 0.0))
         tenths: Bytes = np.minimum(np.rint(10 * more_db), 255).astype(np.uint8).reshape(-1)
         return tenths

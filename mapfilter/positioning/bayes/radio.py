@@ -7,7 +7,7 @@ distance, because errors of a predicted map last for tens of metres; those of le
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import exp, isfinite, nan, sqrt
 from typing import Annotated, ClassVar
@@ -212,35 +212,60 @@ class RadioSource(EvidenceSource):
         self, inside: dict[int, float], epoch: Epoch, particle_spacing_m: float
     ) -> LevelReport:
         """Return levels, and the cells that are absent though a report has room for them."""
-        options, count = self.options, len(inside)
-        absent: list[int] = []
-        limit_dbm = self.area.floor_dbm
-        neighbours = sum(row.role != SERVING for row in epoch.radio)
-        if neighbours >= _NEIGHBOURS_FOR_ABSENCE:
-            drowned = not self.area.interfering.isdisjoint(inside)
-            if drowned or neighbours >= options.full_list:
-                limit_dbm = min(row.level_dbm for row in epoch.radio if isfinite(row.level_dbm))
-            present = self._present(epoch)
-            absent = [band for band in range(len(self.area.cell_ids)) if band not in present]
+        absent, count = self._absent(inside, epoch), len(inside)
         return LevelReport(
             np.fromiter(inside, np.int32, count),
             np.fromiter(inside.values(), np.float32, count),
-            np.array(absent, dtype=np.int32),
-            limit_dbm,
-            options.offset_db(particle_spacing_m),
+            np.fromiter(absent, np.int32, len(absent)),
+            np.fromiter(absent.values(), np.float32, len(absent)),
+            self.options.offset_db(particle_spacing_m),
         )
+
+    def _absent(self, inside: Iterable[int], epoch: Epoch) -> dict[int, float]:
+        """Return cells that would be in a report if they were stronger, and than which level.
+
+        They are of layers of which the phone measures neighbours.
+        """
+        area, present = self.area, self._present(epoch)
+        drowned = not area.interfering.isdisjoint(inside)
+        neighbours = sum(row.role != SERVING for row in epoch.radio)
+        full = drowned or neighbours >= self.options.full_list
+        rows: dict[int, list[ReportRow]] = {}
+        for row in epoch.radio:
+            for layer in self._layers_of(row):
+                rows.setdefault(layer, []).append(row)
+        found: dict[int, float] = {}
+        for layer, some in rows.items():
+            if sum(row.role != SERVING for row in some) < _NEIGHBOURS_FOR_ABSENCE:
+                continue
+            levels = [row.level_dbm for row in some if isfinite(row.level_dbm)]
+            limit_dbm = min(levels) if full and levels else area.floor_dbm
+            of_layer = np.flatnonzero(area.layer_of == layer).tolist()
+            found.update(dict.fromkeys((b for b in of_layer if b not in present), limit_dbm))
+        return dict(sorted(found.items()))
+
+    def _layers_of(self, row: ReportRow) -> set[int]:
+        """Return the layers that a row is of, or may be of, also of a cell that is not known."""
+        layer_of = self.area.layer_of
+        if not layer_of.any():
+            return {0}
+        bands = self._bands_of(row)
+        if not bands and row.cell is None and row.arfcn is not None:
+            bands = self.area.carriers.get((row.arfcn, -1), ())
+        return {int(layer_of[band]) for band in bands}
 
     def _present(self, epoch: Epoch) -> set[int]:
         """Return the bands that rows of a report are of, or may be of, with and without levels."""
-        area, present = self.area, set[int]()
-        for row in epoch.radio:
-            if row.cell is not None:
-                present.update({area.band_of[row.cell]} if row.cell in area.band_of else ())
-            elif row.arfcn is not None:
-                present.update(area.carriers.get(_carrier(row), ()))
-            else:
-                return set(range(len(area.cell_ids)))
-        return present
+        if any(row.cell is None and row.arfcn is None for row in epoch.radio):
+            return set(range(len(self.area.cell_ids)))
+        return {band for row in epoch.radio for band in self._bands_of(row)}
+
+    def _bands_of(self, row: ReportRow) -> tuple[int, ...]:
+        """Return the bands that a row with a cell or a carrier is of, or may be of."""
+        if row.cell is not None:
+            band = self.area.band_of.get(row.cell)
+            return () if band is None else (band,)
+        return () if row.arfcn is None else self.area.carriers.get(_carrier(row), ())
 
     def _bound(self, bands: tuple[int, ...], row: ReportRow, counted_m: float) -> BoundReading:
         weight = self.options.bound_weight * (1.0 - exp(-2.0 * counted_m / _BOUND_M))

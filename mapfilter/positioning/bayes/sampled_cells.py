@@ -19,21 +19,23 @@ def mean_rough_db2(predicted: Prediction, pixel: Ints32, cell: Ints32) -> Floats
     return np.asarray(predicted.share * (squares.sum(axis=1) / squares.shape[1]))
 
 
-def expected_absent(predicted: Prediction, pixel: Ints32, report: LevelReport) -> Ints32:
-    """Return absent cells that hypotheses expect to be in the report, most expected first."""
-    absent = report.absent
-    if not absent.size:
-        return absent
-    share = shares_above(pixel, sample_stride(pixel), predicted, absent, report.limit_dbm)
-    return most_expected(absent, share)
+def expected_absent(predicted: Prediction, pixel: Ints32, report: LevelReport) -> LevelReport:
+    """Return a report with those absent cells that hypotheses expect, most expected first."""
+    if not report.absent.size:
+        return report
+    stride = sample_stride(pixel)
+    share = shares_above(pixel, stride, predicted, report.absent, report.limit_dbm)
+    return most_expected(report, share)
 
 
-def most_expected(absent: Ints32, share: Floats) -> Ints32:
-    """Return the cells that enough hypotheses expect, by the share that does, largest first."""
+def most_expected(report: LevelReport, share: Floats) -> LevelReport:
+    """Return a report with the absent cells that enough hypotheses expect.
+
+    They come by the share (J,) that does, largest first.
+    """
     expected = [k for k, part in enumerate(share.tolist()) if part > _LEAST_EXPECTED]
     expected.sort(key=lambda k: -share[k])
-    found: Ints32 = absent[expected]
-    return found
+    return report.with_absent(expected)
 
 
 def sample_stride(pixel: Ints32) -> int:

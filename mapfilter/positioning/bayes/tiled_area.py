@@ -29,6 +29,7 @@ from mapfilter.positioning.bayes.area_frame import (
     sites_of,
 )
 from mapfilter.positioning.bayes.area_tiles import HELD_BYTES, TILE_PX, AreaTiles
+from mapfilter.radio.layers import layers_of
 
 SEARCH_TILES = 48
 """Most tiles in which the first hypotheses are drawn."""
@@ -46,7 +47,7 @@ class TiledArea(AreaFrame):
 
     Parameters
     ----------
-    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, interfering
+    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, interfering, layers
         As of :class:`~mapfilter.positioning.bayes.area_frame.AreaFrame`.
     tiles : AreaTiles
         Of the database.
@@ -63,6 +64,7 @@ class TiledArea(AreaFrame):
     tiles: AreaTiles
     search_tiles: int = SEARCH_TILES
     interfering: frozenset[int] = frozenset()
+    layers: tuple[int, ...] = ()
 
     @classmethod
     def of_database(
@@ -95,6 +97,7 @@ class TiledArea(AreaFrame):
             hint = "cut it to the region of the log, or merge fewer regions"
             raise fail(StoreError, str(database.path), expected, got, hint)
         plan, cells = database.plan, received_cells(database)
+        layers = layers_of(plan, cells)
         return cls(
             database.lattice,
             cells,
@@ -102,9 +105,10 @@ class TiledArea(AreaFrame):
             carriers_of(plan, cells),
             database.floor_dbm,
             sites_of(plan),
-            AreaTiles(database, cells, side, largest_bytes),
+            AreaTiles(database, cells, layers, side, largest_bytes),
             search_tiles,
             interfering_of(plan, cells),
+            layers,
         )
 
     def looked_up(
@@ -157,9 +161,9 @@ class TiledArea(AreaFrame):
         own = np.arange(pixel.size, dtype=np.int32)
         return predicted, own, np.arange(cell.size, dtype=np.int32)
 
-    def shares_above(self, pixel: Ints32, cell: Ints32, limit_dbm: float) -> Floats:
-        """Return the share of pixels (N,) at which each cell (K,) is above a level."""
-        above, tiles, limit = np.zeros(cell.size), self.tiles, np.float32(limit_dbm)
+    def shares_above(self, pixel: Ints32, cell: Ints32, limit_dbm: Floats32) -> Floats:
+        """Return the share of pixels (N,) at which each cell (K,) is above a level (K,)."""
+        above, tiles = np.zeros(cell.size), self.tiles
         for number, which in self._by_tile(pixel):
             with tiles.lock:
                 tile = tiles.tile(number)
@@ -168,11 +172,12 @@ class TiledArea(AreaFrame):
                 for k in tiles.strong(number, cell, limit_dbm).tolist():
                     level_dbm = tiles.levels(number, int(cell[k]))
                     if level_dbm is not None:
-                        above[k] += np.count_nonzero(level_dbm[point] > limit)
-        if tiles.quiet_dbm > limit:
+                        above[k] += np.count_nonzero(level_dbm[point] > limit_dbm[k])
+        low = np.flatnonzero(tiles.quiet_dbm > limit_dbm)
+        if low.size:
             # Cells that are nowhere received are above such a limit everywhere.
-            found_dbm, _ = self.looked_up(pixel, cell, rough=False)
-            above = np.count_nonzero(found_dbm > limit, axis=0).astype(np.float64)
+            found_dbm, _ = self.looked_up(pixel, cell[low], rough=False)
+            above[low] = np.count_nonzero(found_dbm > limit_dbm[low], axis=0)
         return above / pixel.size
 
     def log_map_at(self, state: Floats32, sd_m: float) -> Floats32:

@@ -31,5 +31,5 @@ def run_kernels(small: BayesPositioner) -> None:
 
 def _every_kind() -> RadioReading:
     one, none = np.full(1, -60, dtype=np.float32), np.zeros(1, dtype=np.int32)
-    levels = LevelReport(none, one, none, -100.0, 1.0)
+    levels = LevelReport(none, one, none, one - 40, 1.0)
     return RadioReading(0, 1.0, levels, (BoundReading(none, -60.0, 1, 8.0, 1.0),))
