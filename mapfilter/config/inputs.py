@@ -207,7 +207,7 @@ class Database(Section):
         Whether it holds cells; without them it is built of the roads alone, for positioning by map
         and dead reckoning.
     margin_db : float
-        A point belongs to its best server and to cells at most this much weaker.
+        A point belongs to the best server of each layer, and to cells at most this much weaker.
     floor_dbm : float, optional
         Weaker levels are left out. By default -104, -115 where the plan has UMTS cells, -125 where
         it has LTE or NR cells.

@@ -87,7 +87,8 @@ def build(
 ) -> RadioRouteDatabase:
     """Build a database folder and open it.
 
-    A point belongs to its best server and to every cell at most ``margin_db`` weaker. All levels
+    A point belongs to the best server of each layer (:mod:`mapfilter.radio.layers`) and to every
+    cell at most ``margin_db`` weaker than that of its own. All levels
     above the floor are kept, so the margin can be changed when the database is read; points with
     no cell above the floor are left out and counted. Levels are kept to 0.01 dB.
 

@@ -31,6 +31,7 @@ from mapfilter.database.tiles import (
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.layers import layer_numbers
 
 _PLACE = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")
 
@@ -169,7 +170,7 @@ def _tiles(
     windows: Sequence[Window],
 ) -> Iterator[TileRows]:
     sources = [_Source(database, lattice) for database in databases]
-    floor_dbm = databases[0].floor_dbm
+    floor_dbm, layer = databases[0].floor_dbm, layer_numbers(plan.cells)
     for window in windows:
         inside = [(source, overlap(lattice, source.database.lattice, window)) for source in sources]
         covering = [(source, part) for source, part in inside if part is not None]
@@ -178,7 +179,7 @@ def _tiles(
         by_cell = _levels(covering, plan, point, lattice.cols)
         cells = sorted(by_cell)
         level = [by_cell[cell] for cell in cells] or [np.full(point.size, np.nan)]
-        levels = received_levels(np.stack(level), floor_dbm)
+        levels = received_levels(np.stack(level), floor_dbm, layer[cells] if cells else None)
         yield TileRows(places, levels.of_cells(cells) if cells else levels)
 
 

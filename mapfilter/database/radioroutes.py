@@ -45,7 +45,7 @@ class RadioRouteDatabase:
     plan : CellPlan
         The cells, in the lattice's CRS; none in a database of roads alone.
     margin_db : float
-        A point belongs to its best server and to every cell at most this much weaker.
+        A point belongs to the best server of each layer and to cells at most this much weaker.
     floor_dbm : float
         Weakest level that is kept.
     manifest : mapping
@@ -150,8 +150,9 @@ class RadioRouteDatabase:
         Parameters
         ----------
         margin_db : float or None
-            A point belongs to the cell when the cell is at most this much weaker than the point's
-            best server; infinity gives all points above the floor, None takes the database's own.
+            A point belongs to the cell when the cell is at most this much weaker than the best
+            server of its layer there; infinity gives all points above the floor, None takes the
+            database's own.
 
         Returns
         -------

@@ -20,6 +20,7 @@ from mapfilter.database.tiles import TileRows, places_table, received_levels, ti
 from mapfilter.errors import InputError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.layers import layer_numbers
 from mapfilter.roads.lattice import RouteLattice
 
 
@@ -90,7 +91,8 @@ def rewrite(
     windows = tile_windows(database.lattice, parameters["tile_px"])
     old = InputFile("database", database.path.name, database.generation)
     with atomic_dir(out) as folder:
-        tiles = _tiles(database.lattice, windows, routes, level_dbm, database.floor_dbm)
+        layer = layer_numbers(plan.cells)
+        tiles = _tiles(database.lattice, windows, routes, level_dbm, database.floor_dbm, layer)
         crs, ids = database.lattice.crs, plan.ids
         written = write_parts(folder, crs, ids, tiles, len(windows), 1, progress)
         if written.received == 0:
@@ -123,6 +125,7 @@ def _tiles(
     routes: RouteLattice,
     level_dbm: Floats32,
     floor_dbm: float,
+    layer: Ints,
 ) -> Iterator[TileRows]:
     for top, left, rows, cols in windows:
         inside = (routes.row >= top) & (routes.row < top + rows)
@@ -132,7 +135,7 @@ def _tiles(
         places = places_table(part, lattice)
         order = np.searchsorted(part.point, places["point"].to_numpy())
         levels = level_dbm[:, own][:, order].astype(np.float64)
-        yield TileRows(places, received_levels(levels, floor_dbm))
+        yield TileRows(places, received_levels(levels, floor_dbm, layer))
 
 
 def _part(routes: RouteLattice, own: Ints) -> RouteLattice:

@@ -16,6 +16,7 @@ from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.layers import layer_numbers
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.sampling import Places, levels_at
 from mapfilter.roads.lattice import RouteLattice
@@ -56,7 +57,8 @@ class TileLevels:
     Of each point: the strongest cell (of equals the first in the plan; -1 when none is above the
     floor), its level (of one weaker than the floor, too; NaN without any), and its margin over the
     second strongest (NaN without one). Of each level, sorted by both: its cell, and the index of
-    its point; and the level, rounded to 0.01 dB.
+    its point; the level, rounded to 0.01 dB; and how much weaker it is than the strongest of its
+    layer.
     """
 
     best: Ints32
@@ -163,10 +165,12 @@ def read_tile(task: TileTask) -> TileRows:
 def tiles_of(tasks: Sequence[TileTask]) -> Iterator[TileRows]:
     """Lay the points of some tiles near each other, and read their levels: each file once."""
     laid = [_laid(task) for task in tasks]
-    levels = levels_at([places for _, places in laid])
+    read = levels_at([places for _, places in laid])
     for task, (table, _) in zip(tasks, laid, strict=True):
-        level = levels.pop(0).astype(np.float64)
-        yield TileRows(table, received_levels(level, task.floor_dbm).of_cells(task.numbers))
+        level = read.pop(0).astype(np.float64)
+        layer = layer_numbers(task.plan.cells) if task.numbers else None
+        levels = received_levels(level, task.floor_dbm, layer)
+        yield TileRows(table, levels.of_cells(task.numbers))
 
 
 def _laid(task: TileTask) -> tuple[pa.Table, Places]:
@@ -183,8 +187,11 @@ def roads_tile(part: RoutePart, lattice: Lattice) -> TileRows:
     return TileRows(places_table(routes, lattice), received_levels(np.empty((0, len(routes))), 0.0))
 
 
-def received_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
+def received_levels(level_dbm: Floats, floor_dbm: float, layer: Ints | None = None) -> TileLevels:
     """Return the levels above the floor of those of shape (cells, points), NaN where unknown.
+
+    ``layer`` (cells,) are the numbers of their layers (:mod:`mapfilter.radio.layers`); None where
+    all are of one.
 
     Examples
     --------
@@ -207,6 +214,11 @@ def received_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
         margin = np.where(np.isfinite(second_dbm), best_dbm - second_dbm, np.nan)
     cell, which = np.nonzero(np.isfinite(strength))
     kept_dbm = strength[cell, which]
+    leading_dbm = best_dbm[which]
+    if layer is not None and layer.any():
+        for one in np.unique(layer).tolist():
+            of_layer = layer[cell] == one
+            leading_dbm[of_layer] = strength[layer == one].max(axis=0)[which[of_layer]]
     return TileLevels(
         np.where(received, best, -1).astype(np.int32),
         strongest_dbm.astype(np.float32),
@@ -214,7 +226,7 @@ def received_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
         cell.astype(np.int32),
         which.astype(np.int32),
         kept_dbm.astype(np.float32),
-        np.round(best_dbm[which] - kept_dbm, 2).astype(np.float32),
+        np.round(leading_dbm - kept_dbm, 2).astype(np.float32),
     )
 
 

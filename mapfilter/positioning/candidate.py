@@ -31,8 +31,8 @@ class CandidateFilter(CandidateOptions):
     Parameters
     ----------
     margin_db : float or None
-        A point belongs to every cell within this margin of its best server; by default the margin
-        that the database was built with.
+        A point belongs to every cell within this margin of its layer's best server; by default
+        the margin that the database was built with.
     """
 
     margin_db: NotNegative | None = None
