@@ -227,9 +227,8 @@ class RadioSource(EvidenceSource):
         They are of layers of which the phone measures neighbours.
         """
         area, present = self.area, self._present(epoch)
-        drowned = not area.interfering.isdisjoint(inside)
-        neighbours = sum(row.role != SERVING for row in epoch.radio)
-        full = drowned or neighbours >= self.options.full_list
+        drowned = area.interfering.intersection(inside)
+        full = sum(row.role != SERVING for row in epoch.radio) >= self.options.full_list
         rows: dict[int, list[ReportRow]] = {}
         for row in epoch.radio:
             for layer in self._layers_of(row):
@@ -238,9 +237,10 @@ class RadioSource(EvidenceSource):
         for layer, some in rows.items():
             if sum(row.role != SERVING for row in some) < _NEIGHBOURS_FOR_ABSENCE:
                 continue
-            levels = [row.level_dbm for row in some if isfinite(row.level_dbm)]
-            limit_dbm = min(levels) if full and levels else area.floor_dbm
             of_layer = np.flatnonzero(area.layer_of == layer).tolist()
+            levels = [row.level_dbm for row in some if isfinite(row.level_dbm)]
+            listed = levels and (full or not drowned.isdisjoint(of_layer))
+            limit_dbm = min(levels) if listed else area.floor_dbm
             found.update(dict.fromkeys((b for b in of_layer if b not in present), limit_dbm))
         return dict(sorted(found.items()))
 
