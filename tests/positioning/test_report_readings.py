@@ -109,6 +109,25 @@ def test_only_the_first_serving_cell_serves():
     assert reading.timing_advance == 3.0
 
 
+def test_a_serving_cell_of_another_layer_is_a_level():
+    """5G beside LTE, or a second card: which of them serves best, no level tells."""
+    rows = serving("A", -70.0, 0, 3.0), serving("B", -60.0, 0, 5.0), serving("C", -65.0)
+    _, reading, reason, unused = read(*rows, area=replace(AREA, layers=(0, 1, 0, 1)))
+    assert (reading.serving, inside(reading), reason) == (A, {A: -70.0, B: -60.0}, Reason.USED)
+    assert unused == unknown_cells(rows[2], why=Reason.SECOND_SERVING_CELL)
+    assert reading.timing_advance == 3.0
+
+
+def test_the_first_serving_cell_with_points_serves():
+    """As that of LTE after one of 5G which the plan lacks, or which is received nowhere."""
+    for name, why in (("X", Reason.UNKNOWN_CELL), ("E", Reason.NO_POINTS_IN_CELL)):
+        lacking, known = serving(name, -80.0), serving("B", -60.0, 0, 5.0)
+        _, reading, reason, unused = read(lacking, known, named("C", -90.0))
+        assert (reading.serving, inside(reading), reason) == (B, {B: -60.0, C: -90.0}, Reason.USED)
+        assert unused == unknown_cells(lacking, why=why)
+        assert reading.timing_advance == 5.0
+
+
 def test_without_levels_only_the_serving_cell_counts():
     rows = (serving("A", -70.0), named("C", -80.0), named("D", -110.5, -1))
     _, reading, _, _ = read(*rows, options=replace(OPTIONS, use_levels=False))
