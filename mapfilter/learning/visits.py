@@ -4,7 +4,8 @@ Reports of a journey in one square of some tens of metres are one visit for each
 are the same. Its level is the median over the reports, in which a cell that is missing counts as
 weaker than what a report could hold: the weakest level in a full report, else the receiver's
 sensitivity. Where the median is such a bound, the cell was not received. A report of the serving
-cell alone says nothing of other cells, unless most reports of its journey have neighbours.
+cell alone says nothing of other cells, unless most reports of its journey have neighbours, and none
+says anything of a layer (:mod:`mapfilter.radio.layers`) of which the phone measures nothing.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.database.field import RadioField
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.layers import layer_numbers
 from mapfilter.tracks.schema import SERVING
 
 SQUARE_M = 40.0
@@ -27,6 +29,8 @@ LARGEST_RADIUS_M = 60.0
 """Reports whose place is less sure make no visit."""
 _APART_DB = 15.0
 _AT_SENSITIVITY_DBM = -104.0
+_ROWS_OF_A_LAYER = 2
+"""With fewer of another layer than the serving cell's, what is missing may not be measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +175,7 @@ class _Resolver:
             key: tuple(plan.index(name) for name in ids) for key, ids in plan.ids_by_carrier.items()
         }
         self.band = {plan.index(name): i for i, name in enumerate(field.cell_ids)}
+        self.layer = layer_numbers(plan.cells)
 
     def cell(self, row: ReportRow, serving: int, east_m: float, north_m: float) -> int:
         if row.cell is not None:
@@ -247,17 +252,26 @@ def _report(
     """Return (level, bound) of each cell in one report, shape (cells, 2); NaN where unknown."""
     cells = len(resolver.plan)
     level, bound = np.full(cells, np.nan), np.full(cells, bound_dbm)
+    counts: dict[int, int] = {}
     rows = [row for row in epoch.radio if _is_level(row)]
     serving = -1
     for row in sorted(rows, key=lambda row: row.role != SERVING):
         cell = resolver.cell(row, serving, *place)
         serving = cell if row.role == SERVING else serving
+        if cell >= 0:
+            layer = int(resolver.layer[cell])
+            counts[layer] = counts.get(layer, 0) + 1
         if cell >= 0 and np.isnan(level[cell]):
             level[cell] = row.level_dbm
         if row.arfcn is not None and row.bsic is not None:
             # The phone reports the strongest cell of a carrier and BSIC only.
             hidden = [c for c in resolver.carriers.get((row.arfcn, row.bsic), ()) if c != cell]
             bound[hidden] = np.nan
+    if resolver.layer.any():
+        # Of other layers than the serving cell's a phone measures few cells, or none.
+        measured = {layer for layer, count in counts.items() if count >= _ROWS_OF_A_LAYER}
+        measured |= {int(resolver.layer[serving])} if serving >= 0 else set()
+        bound[~np.isin(resolver.layer, list(measured))] = np.nan
     return np.column_stack([level, np.where(np.isnan(level), bound, np.nan)])
 
 

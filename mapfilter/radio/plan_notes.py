@@ -1,4 +1,4 @@
-"""Notes on a plan: fields that hold usual values, and powers that phones do not report."""
+"""Notes on a plan: usual values, powers that phones do not report, and layers."""
 
 from __future__ import annotations
 
@@ -6,10 +6,34 @@ from collections import Counter
 
 from mapfilter._words import number_of
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.layers import layer_of
 from mapfilter.radio.reported_power import MOST_SUBCARRIER_DBM
 
 _SUBCARRIERS = ("LTE", "NR")
 """Technologies whose phones report the power of one subcarrier."""
+
+
+_SAME_BAND = 1.15
+"""Frequencies within this factor are of one band."""
+
+
+def layer_notes(plan: CellPlan) -> tuple[str, ...]:
+    """Return notes on the layers of a network; none where all cells are of one, in one band."""
+    notes: list[str] = []
+    counts = Counter(map(layer_of, plan.cells))
+    if len(counts) > 1:
+        notes.append(
+            f"{len(counts)} layers (carriers of UMTS, LTE and NR, networks of GSM): a serving cell "
+            "is compared with cells of its own layer, also where those of others are stronger"
+        )
+    unknown = sorted({cell.frequency_mhz for cell in plan.cells if cell.technology is None})
+    if unknown and unknown[-1] > _SAME_BAND * unknown[0]:
+        notes.append(
+            f"technology of {number_of(counts[None], 'cell')} is unknown, at {unknown[0]:g} to "
+            f"{unknown[-1]:g} MHz: the strongest of them is expected to serve. Where bands have "
+            "priorities, as in LTE, state technology (and earfcn)"
+        )
+    return tuple(notes)
 
 
 def assumed_notes(plan: CellPlan) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from typing import Any
@@ -17,6 +17,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.level_errors import roughness
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.layers import layers_of
 from mapfilter.roads.ways import Bounds
 from mapfilter.viewing.arrays import cell_numbers, packed, places, starts
 from mapfilter.viewing.streets import middle_lines
@@ -178,7 +179,6 @@ def level_fields(
     quiet_dbm = database.floor_dbm - BELOW_FLOOR_DB
     quiet = np.float32(quiet_dbm)
     level = np.where(np.isnan(field.level_dbm), quiet, field.level_dbm)
-    order = np.sort(level, axis=2) if level.shape[2] else level
     rough = roughness(level, field.lattice.resolution_m)
     chosen = list(range(len(field.cell_ids)))
     step = _step(field, len(chosen))
@@ -188,7 +188,7 @@ def level_fields(
         chosen, step = needed, _step(field, len(needed))
     some = np.s_[step // 2 :: step, step // 2 :: step]
     west_m, _, _, north_m = field.lattice.bounds_m
-    plan = database.plan
+    plan, layers = database.plan, layers_of(database.plan, field.cell_ids)
     found = {
         "grid": frame.grid(
             west_m, north_m, step * field.lattice.resolution_m, level[some].shape[:2]
@@ -197,8 +197,9 @@ def level_fields(
         "level": _levels(np.moveaxis(field.level_dbm[some][..., chosen], 2, 0), quiet_dbm),
         "rough": packed(np.moveaxis(rough[some][..., chosen], 2, 0), "u1", scale=0.25),
         "quiet_dbm": quiet_dbm,
-        "best": _levels(_nth(order[some], 1, quiet), quiet_dbm),
-        "second": _levels(_nth(order[some], 2, quiet), quiet_dbm),
+        "layer": [layers[i] for i in chosen],
+        "best": _levels(_of_layers(level[some], layers, 1, quiet), quiet_dbm),
+        "second": _levels(_of_layers(level[some], layers, 2, quiet), quiet_dbm),
         "distance": packed(
             np.maximum(field.distance_to_way_m - field.half_width_m, 0)[some], "u1", none=255
         ),
@@ -207,11 +208,17 @@ def level_fields(
     return found, {field.cell_ids[i]: band for band, i in enumerate(chosen)}
 
 
-def _nth(order: Floats32, nth: int, quiet: np.float32) -> Floats32:
-    """Return the strongest, second strongest... level of each pixel; the quiet one without any."""
-    if order.shape[2] < nth:
-        return np.full(order.shape[:2], quiet)
-    found: Floats32 = order[..., -nth]
+def _of_layers(level_dbm: Floats32, layers: Sequence[int], nth: int, quiet: np.float32) -> Floats32:
+    """Return the strongest, second strongest... level of each layer and pixel, (L, rows, cols).
+
+    The quiet one stands where a layer has no such cell.
+    """
+    count = max(layers, default=0) + 1
+    found = np.full((count, *level_dbm.shape[:2]), quiet)
+    for layer in range(count):
+        own = np.flatnonzero(np.array(layers) == layer)
+        if own.size >= nth:
+            found[layer] = np.sort(level_dbm[..., own], axis=2)[..., -nth]
     return found
 
 

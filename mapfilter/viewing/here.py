@@ -56,7 +56,7 @@ class Place:
     level_dbm, rough_db : (C,) arrays
         Predicted level of each band, and its local deviation.
     best_dbm, second_dbm : float
-        Strongest and second strongest level of all cells.
+        Strongest and second strongest level of the serving cell's layer.
     distance_m : float
         To the edge of the nearest way.
     """

@@ -24,6 +24,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import get_ready_to_read
 from mapfilter.errors import ConfigError, StoreError, fail, listed
+from mapfilter.radio.plan_notes import layer_notes
 from mapfilter.rasters.geotiff import READINGS_TAG, tag_of
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -116,6 +117,7 @@ def run_build(
         notes=(
             *rasters.notes,
             *plan.notes,
+            *layer_notes(plan),
             *_cells_notes(database),
             *floor,
             *cover,

@@ -1,6 +1,7 @@
 """Building a database against the same computed point by point from the whole rasters."""
 
 import errno
+from dataclasses import replace
 from pathlib import Path
 
 import duckdb
@@ -24,10 +25,12 @@ from mapfilter._parallel import SerialExecutor, local_executor
 from mapfilter.database import parts
 from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run
+from mapfilter.database.merge import merge
 from mapfilter.database.store import info
 from mapfilter.database.tiles import z_order
 from mapfilter.errors import InputError, OutputError
 from mapfilter.lattice import Lattice
+from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
@@ -87,6 +90,28 @@ def test_points_of_a_cell_are_those_within_the_margin(world, database, margin_db
         np.testing.assert_array_equal(row, world.routes.row[expected])
         np.testing.assert_array_equal(col, world.routes.col[expected])
         np.testing.assert_array_equal(level, at_points[n, expected].astype(np.float32))
+
+
+def test_points_of_a_cell_are_near_the_best_server_of_its_layer(world, tmp_path):
+    """Built, and merged: with a cell of GSM beside two of one carrier of LTE."""
+    kinds = ("LTE", 1300), ("GSM", 20), ("LTE", 1300)
+    cells = tuple(
+        replace(cell, technology=technology, arfcn=arfcn)
+        for cell, (technology, arfcn) in zip(world.plan.cells, kinds, strict=True)
+    )
+    plan, layers = CellPlan(CRS, cells), ([0, 2], [1], [0, 2])
+    options = {"floor_dbm": FLOOR_DBM, "tile_px": 16}
+    built = build(world.rasters, plan, world.routes, tmp_path / "db", **options)
+    at_points = world.levels_dbm[:, world.routes.row, world.routes.col]
+    for n, cell in enumerate(IDS):
+        best = np.fmax.reduce(at_points[layers[n]], axis=0)
+        with np.errstate(invalid="ignore"):
+            near = np.round(best - at_points[n], 2) <= 3.0
+        expected = np.flatnonzero(near & (at_points[n] >= FLOOR_DBM))
+        for database in (built, merge([built], tmp_path / f"merged-{n}")):
+            row, col, _ = database.cell_points(cell, 3.0)
+            np.testing.assert_array_equal(row, world.routes.row[expected])
+            np.testing.assert_array_equal(col, world.routes.col[expected])
 
 
 def test_every_point_belongs_to_its_best_server_and_to_no_other_at_margin_0(database):

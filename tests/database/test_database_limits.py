@@ -94,6 +94,24 @@ def test_what_is_heard_of_four_cells_at_six_points():
     assert numbered.cell.tolist() == [5, 5, 5, 5, 7, 7, 7, 8, 9, 9, 9]
 
 
+def test_levels_are_compared_with_the_strongest_of_their_layer():
+    """Best server and margin of a point are those of all cells; where one is alone it leads."""
+    level_dbm = np.array(
+        [[-60.0, -60.0, NAN], [-80.0, -110.0, -90.0], [-70.5, NAN, -61.0], [-92.0, -88.0, -95.0]]
+    )
+    heard = received_levels(level_dbm, -104.0, np.array([0, 1, 0, 1]))
+    assert heard.best.tolist() == [0, 0, 2]
+    np.testing.assert_allclose(heard.margin_db, [10.5, 28.0, 29.0], atol=1e-5)
+    assert heard.cell.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 3]
+    assert heard.which.tolist() == [0, 1, 0, 2, 0, 2, 0, 1, 2]
+    expected = [0.0, 0.0, 0.0, 0.0, 10.5, 0.0, 12.0, 0.0, 5.0]
+    np.testing.assert_allclose(heard.below_best_db, expected, atol=1e-5)
+    alike = received_levels(level_dbm, -104.0, np.zeros(4, dtype=np.int64))
+    plain = received_levels(level_dbm, -104.0)
+    np.testing.assert_array_equal(alike.below_best_db, plain.below_best_db)
+    assert not np.array_equal(plain.below_best_db, heard.below_best_db)
+
+
 def test_a_tile_comes_back_from_its_bytes_and_is_split_by_cell():
     heard = received_levels(np.array([[-70.0, NAN, -90.0], [-72.5, NAN, -88.0]]), -104.0)
     places = pa.table({name: np.arange(3) + n for n, name in enumerate(("point", "row", "col"))})

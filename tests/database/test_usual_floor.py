@@ -39,7 +39,7 @@ def test_the_lowest_of_the_technologies_counts(technologies, floor_dbm, named):
 def test_technologies_for_which_another_floor_is_usual_are_named():
     (note,) = floor_notes(_plan("GSM", "UMTS", "LTE"))
     assert note.endswith(
-        "; it holds for GSM (usually -104) and UMTS (usually -115), too: a database has one"
+        "; it holds for GSM (usually -104) and UMTS (usually -115), too: a database has one floor"
     )
     for alike in ("NR", "LTE", None):
         assert ";" not in floor_notes(_plan("LTE", "NR", alike))[0]

@@ -98,6 +98,27 @@ def test_what_a_report_can_hold_is_that_of_its_own_journey():
     assert table(journey(small), journey(large))[0, "C"] == (-70.0, False)
 
 
+def test_reports_say_nothing_of_layers_of_which_a_phone_measures_nothing():
+    """A and B are of LTE, C and D of GSM: one neighbour of these is not all that is there."""
+    kinds = zip(PLAN.cells, (("LTE", 5), ("LTE", 5), ("GSM", 3), ("GSM", 3)), strict=True)
+    cells = (replace(one, technology=kind, arfcn=arfcn, bsic=None) for one, (kind, arfcn) in kinds)
+    plan = CellPlan(CRS, tuple(cells))
+
+    def heard(*rows):
+        found = visits_of([journey(rows)], plan, field())
+        return {plan.ids[c]: bool(one) for c, one in zip(found.cell, found.received, strict=True)}
+
+    def named(name, level):
+        return ReportRow("neighbour", name, None, None, level, 0)
+
+    alone = serving("A", -70.0), named("A", -70.0)
+    assert heard(*alone) == {"A": True, "B": False}
+    assert heard(*alone, named("C", -90.0)) == {"A": True, "B": False, "C": True}
+    other = named("C", -90.0), named("C", -91.0)
+    assert heard(*alone, *other) == {"A": True, "B": False, "C": True, "D": False}
+    assert heard(serving("D", -80.0), named("A", -70.0)) == {"D": True, "C": False, "A": True}
+
+
 def test_of_cells_with_one_carrier_it_is_the_one_that_is_clearly_stronger():
     report = (serving("A", -60.0), neighbour(3, -77.0))
     found = table(journey(report))

@@ -1,6 +1,7 @@
 """An area that is held whole: its levels with the two strongest, its ways and carriageways."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from mapfilter.database.field import RadioField
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.cells import Cell, CellPlan
 
 LATTICE = Lattice("EPSG:32632", 0.0, 20.0, 10.0, 2, 3)
 LEVELS_DBM = np.array([
@@ -62,6 +63,31 @@ def test_the_two_strongest_of_many_cells(monkeypatch, partition):
     found = AreaMap.of_field(field, CellPlan(LATTICE.crs, ()), -130.0)
     strongest = np.sort(levels_dbm, axis=-1)[..., :-3:-1]
     np.testing.assert_array_equal(found.level_dbm[..., 16:], strongest)
+
+
+def test_the_two_strongest_of_each_layer():
+    """Layers of three, two and one cells, of which some are nowhere near the others' level."""
+    rng = np.random.default_rng(4)
+    levels_dbm = np.round(rng.uniform(-115.0, -60.0, (2, 3, 6)), 1).astype(np.float32)
+    levels_dbm[0, 1, [0, 3]] = np.nan
+    names, arfcn = tuple("ABCDEF"), (100, 200, 100, 200, 100, 300)
+    cells = tuple(
+        Cell(n, n, 0.0, 0.0, 30.0, None, 30.0, 1800.0, "omni", technology="LTE", arfcn=a)
+        for n, a in zip(names, arfcn, strict=True)
+    )
+    ways = TO_WAY_M, HALF_WIDTH_M, WAY, TO_WAY_M < 4.5
+    found = AreaMap.of_field(
+        RadioField(LATTICE, names, levels_dbm, *ways), CellPlan(LATTICE.crs, cells), -110.0
+    )
+    assert (found.bands, found.level_dbm.shape) == (12, (2, 3, 12))
+    assert found.layer_of.tolist() == [0, 1, 0, 1, 0, 2]
+    assert [found.strongest(band) for band in range(6)] == [6, 8, 6, 8, 6, 10]
+    for (row, col), layer in product(np.ndindex(2, 3), range(3)):
+        own = [k for k in range(6) if arfcn[k] == 100 * (layer + 1)]
+        heard = [float(levels_dbm[row, col, k]) for k in own]
+        best = sorted((QUIET_DBM if np.isnan(v) else v for v in heard), reverse=True)
+        top = found.level_dbm[row, col, 6 + 2 * layer : 8 + 2 * layer]
+        assert top.tolist() == [*best, QUIET_DBM][:2]
 
 
 def test_distances_are_to_the_edges_of_ways():

@@ -125,29 +125,31 @@ def test_drawn_reports_have_the_strongest_cells_only(strongest):
     np.testing.assert_array_equal(some, expected)
 
 
-def planned(carrier, step_m=100.0, common_db=0.0):
+def planned(layer, step_m=100.0, common_db=0.0):
     sites = np.column_stack([531_000.0 + 700.0 * np.arange(4), np.full(4, 4_555_900.0)])
-    return Planned(sites, np.full(4, step_m), np.array(carrier, dtype=np.int64), common_db)
+    return Planned(sites, np.full(4, step_m), np.array(layer, dtype=np.int64), common_db)
 
 
-def test_carriers_besides_that_of_the_serving_cell_are_measured_half_of_the_time():
-    """A and B share one, C has another; D counts always. Carriers are measured as a whole."""
-    made = predicted(planned([0, 0, 1, -1]), sd_db=1e-6)
+def test_layers_besides_that_of_the_serving_cell_are_measured_half_of_the_time():
+    """A and B are of one, C and D of others. Layers are measured as a whole, and each may serve."""
+    made = predicted(planned([0, 0, 1, 2]), sd_db=1e-6)
     drawn = simulated_reports(made, COUNT, 4, 0.0, np.random.default_rng(3))
-    there = np.isfinite(table_of(drawn))
-    assert there[:, [0, 1, 3]].all()
-    assert abs(there[:, 2].mean() - 0.5) < 5 * 0.5 / COUNT**0.5
-    assert {drawn.cell_ids[n] for n in drawn.serving} == {"A"}
-    other = replace(made, level_dbm=np.tile(LEVELS_DBM[[2, 1, 0, 3]], COUNT))
-    there = np.isfinite(table_of(simulated_reports(other, COUNT, 4, 0.0, np.random.default_rng(3))))
-    assert there[:, [2, 3]].all()
+    there, serving = np.isfinite(table_of(drawn)), np.array(drawn.cell_ids)[drawn.serving]
     np.testing.assert_array_equal(there[:, 0], there[:, 1])
-    assert abs(there[:, 0].mean() - 0.5) < 5 * 0.5 / COUNT**0.5
+    for name, column in (("A", 0), ("C", 2), ("D", 3)):
+        own = serving == name
+        assert abs(own.mean() - 1 / 3) < 5 * (2 / 9 / COUNT) ** 0.5
+        assert there[own, column].all()
+        others = there[own][:, [k for k in (0, 2, 3) if k != column]].mean(axis=0)
+        assert np.all(abs(others - 0.5) < 5 * 0.5 / own.sum() ** 0.5)
+    other = replace(made, level_dbm=np.tile(LEVELS_DBM[[1, 0, 2, 3]], COUNT))
+    drawn = simulated_reports(other, COUNT, 4, 0.0, np.random.default_rng(3))
+    assert set(np.array(drawn.cell_ids)[drawn.serving]) == {"B", "C", "D"}
 
 
 @pytest.mark.parametrize("timed", [0.0, 0.3, 1.0])
 def test_some_reports_have_a_timing_advance_of_the_serving_cell(timed):
-    made = predicted(planned([-1] * 4), sd_db=1e-6)
+    made = predicted(planned([0] * 4), sd_db=1e-6)
     drawn = simulated_reports(made, COUNT, 4, 0.0, np.random.default_rng(4), timed)
     known = np.isfinite(drawn.timing_advance)
     assert abs(known.mean() - timed) <= 5 * (timed * (1 - timed) / COUNT) ** 0.5
@@ -158,7 +160,7 @@ def test_some_reports_have_a_timing_advance_of_the_serving_cell(timed):
 
 
 def test_the_common_error_of_a_plan_adds_to_that_which_cells_share():
-    made = predicted(planned([-1] * 4, common_db=4.0), sd_db=1e-6)
+    made = predicted(planned([0] * 4, common_db=4.0), sd_db=1e-6)
     off = table_of(simulated_reports(made, COUNT, 4, 3.0, np.random.default_rng(5))) - LEVELS_DBM
     np.testing.assert_allclose(np.cov(off.T), 25.0, atol=5 * 25 * (2 / COUNT) ** 0.5)
 

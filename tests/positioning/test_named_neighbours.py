@@ -127,17 +127,14 @@ def test_a_phone_reports_a_serving_cell_and_six_neighbours():
 
 
 def test_drawn_reports_are_served_by_their_strongest_cell_and_have_no_timing_advance_unasked():
-    """Two carriers of LTE, of each place another cell is the strongest."""
-    cells = tuple(
-        replace(cell, technology="LTE", frequency_mhz=mhz)
-        for cell, mhz in zip(PLAN.cells[:3], (800.0, 1800.0, 2600.0), strict=True)
-    )
+    """One carrier of LTE; of each place another cell is the strongest."""
+    cells = tuple(replace(cell, technology="LTE", arfcn=6200) for cell in PLAN.cells[:3])
     at = [1, 2, 3], [5, 6, 7]
     levels_dbm = [-60.0, -80.0, -90.0], [-70.0, -61.0, -91.0], [-75.0, -76.0, -62.0]
     made = database(**{name: (*at, own) for name, own in zip("ABC", levels_dbm, strict=True)})
     made.plan = CellPlan(CRS, cells)
     known = reports_of_database(made)
-    assert known.planned.carrier.tolist() == [0, 1, 2]
+    assert known.planned.layer.tolist() == [0, 0, 0]
     exact = replace(known, sd_db=np.zeros(9), planned=replace(known.planned, common_db=0.0))
     found = simulated_reports(exact, 3, 7, 0.0, np.random.default_rng(1))
     assert np.isnan(found.timing_advance).all()

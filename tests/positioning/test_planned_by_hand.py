@@ -1,4 +1,4 @@
-"""What a plan adds to predicted levels, by hand: deviations, steps of timing advance, carriers."""
+"""What a plan adds to predicted levels, by hand: deviations, steps of timing advance, layers."""
 
 from dataclasses import replace
 from math import atan, cos, hypot, nan, pi, radians, sin, sqrt, tan
@@ -51,8 +51,8 @@ def test_deviations_of_what_is_assumed_add_up_by_their_squares(assumed, own_db, 
     assert planned(cell, replace(CELL, id="B")).common_db == pytest.approx(common_db / 2)
 
 
-def test_steps_and_carriers_of_cells():
-    """Phones measure most carriers of GSM; those of others are numbered by their frequency."""
+def test_steps_and_layers_of_cells():
+    """Layers are numbered in the order of their first cells."""
     given = [("GSM", 900.0), ("LTE", 2600.0), (None, 800.0), ("UMTS", 2100.0), ("LTE", 800.0),
              ("NR", 2600.0)]  # fmt: skip
     cells = [
@@ -62,12 +62,12 @@ def test_steps_and_carriers_of_cells():
     found = planned(*cells)
     assert found.site_m.tolist() == [[EAST_M + k, NORTH_M] for k in range(6)]
     np.testing.assert_allclose(found.step_m, [GSM_M, LTE_M, nan, nan, LTE_M, nan], rtol=1e-5)
-    assert found.carrier.tolist() == [-1, 3, -1, 2, 0, 3]
-    assert found.measured_with(np.array([1], dtype=np.int32)).tolist() == [
-        True, True, True, False, False, True,
+    assert found.layer.tolist() == [0, 1, 2, 3, 4, 5]
+    assert found.measured_with(np.array([1, 4], dtype=np.int32)).tolist() == [
+        False, True, False, False, True, False,
     ]  # fmt: skip
     few = found.some(np.array([4, 0]))
-    assert (few.carrier.tolist(), few.site_m[0].tolist()) == ([0, -1], [EAST_M + 4, NORTH_M])
+    assert (few.layer.tolist(), few.site_m[0].tolist()) == ([4, 0], [EAST_M + 4, NORTH_M])
     none = Planned.of(CellPlan(CRS, ()), ())
     assert (none.site_m.shape, none.step_m.shape, none.common_db) == ((0, 2), (0,), 0.0)
 

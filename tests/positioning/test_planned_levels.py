@@ -184,21 +184,25 @@ def test_a_timing_advance_is_normal_about_the_middle_of_its_step_and_clipped(tec
         assert planned.log_timing(places, serving, steps).tolist() == [0.0] * 7
 
 
-def test_cells_of_one_carrier_are_measured_with_each_other_and_others_always():
-    """In GSM, and where the technology is unknown, every cell may be measured."""
+def test_cells_of_one_layer_are_measured_with_each_other():
+    """In GSM, and where the technology is unknown, carriers make no difference."""
     kinds = [("LTE", 1800.0), ("LTE", 1800.0), ("NR", 800.0), ("GSM", 800.0), (None, 1800.0),
-             ("UMTS", 2100.0)]  # fmt: skip
+             ("UMTS", 2100.0), ("GSM", 1800.0), (None, 900.0)]  # fmt: skip
     cells = tuple(
         replace(_cell(f"c{k}", 0, 0, mhz), technology=technology)
         for k, (technology, mhz) in enumerate(kinds)
     )
     made = Planned.of(CellPlan(CRS, cells), tuple(cell.id for cell in cells))
-    for reported, alike in (([0], [0, 1]), ([2], [2]), ([5], [5]), ([1, 2], [0, 1, 2]), ([3], [])):
-        found = np.flatnonzero(made.measured_with(np.array(reported)))
-        assert found.tolist() == sorted({*alike, 3, 4})
-    np.testing.assert_array_equal(np.isnan(made.step_m), [False, False, True, False, True, True])
+    for reported, alike in (
+        ([0], [0, 1]), ([2], [2]), ([5], [5]), ([1, 2], [0, 1, 2]), ([3], [3, 6]), ([7], [4, 7]),
+        ([], []),
+    ):  # fmt: skip
+        found = np.flatnonzero(made.measured_with(np.array(reported, dtype=np.int32)))
+        assert found.tolist() == alike
+    known = [False, False, True, False, True, True, False, True]
+    np.testing.assert_array_equal(np.isnan(made.step_m), known)
     kept = made.some(np.array([3, 0]))
-    assert kept.carrier.tolist() == [made.carrier[3], made.carrier[0]]
+    assert kept.layer.tolist() == [made.layer[3], made.layer[0]]
     assert kept.common_db == made.common_db
 
 

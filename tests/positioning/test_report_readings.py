@@ -21,7 +21,7 @@ from made_radio import (
     serving,
     unknown_cells,
 )
-from small_area import FLOOR_DBM, OPTIONS
+from small_area import CARRIERS, FLOOR_DBM, OPTIONS
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.path import DeadReckoning
@@ -109,6 +109,25 @@ def test_only_the_first_serving_cell_serves():
     assert reading.timing_advance == 3.0
 
 
+def test_a_serving_cell_of_another_layer_is_a_level():
+    """5G beside LTE, or a second card: which of them serves best, no level tells."""
+    rows = serving("A", -70.0, 0, 3.0), serving("B", -60.0, 0, 5.0), serving("C", -65.0)
+    _, reading, reason, unused = read(*rows, area=replace(AREA, layers=(0, 1, 0, 1)))
+    assert (reading.serving, inside(reading), reason) == (A, {A: -70.0, B: -60.0}, Reason.USED)
+    assert unused == unknown_cells(rows[2], why=Reason.SECOND_SERVING_CELL)
+    assert reading.timing_advance == 3.0
+
+
+def test_the_first_serving_cell_with_points_serves():
+    """As that of LTE after one of 5G which the plan lacks, or which is received nowhere."""
+    for name, why in (("X", Reason.UNKNOWN_CELL), ("E", Reason.NO_POINTS_IN_CELL)):
+        lacking, known = serving(name, -80.0), serving("B", -60.0, 0, 5.0)
+        _, reading, reason, unused = read(lacking, known, named("C", -90.0))
+        assert (reading.serving, inside(reading), reason) == (B, {B: -60.0, C: -90.0}, Reason.USED)
+        assert unused == unknown_cells(lacking, why=why)
+        assert reading.timing_advance == 5.0
+
+
 def test_without_levels_only_the_serving_cell_counts():
     rows = (serving("A", -70.0), named("C", -80.0), named("D", -110.5, -1))
     _, reading, _, _ = read(*rows, options=replace(OPTIONS, use_levels=False))
@@ -185,6 +204,47 @@ def test_a_full_list_leaves_out_what_is_weaker_than_its_weakest():
     longer = replace(OPTIONS, full_list=4)
     _, reading, _, _ = read(*rows, options=longer)
     assert absent(reading) == ([C, D], FLOOR_DBM)
+
+
+LAYERED = replace(AREA, layers=(0, 1, 0, 1))
+"""A and C on one carrier, B and D on another."""
+
+
+def test_cells_of_layers_that_a_phone_does_not_measure_are_not_absent():
+    """With two neighbours of a layer, each is; and they are weaker than the weakest of it."""
+    rows = serving("A", -70.0), named("C", -95.5), named("C", -96.0)
+    _, reading, _, _ = read(*rows, area=replace(LAYERED, layers=(0, 1, 0, 0)))
+    assert absent(reading) == ([D], FLOOR_DBM)
+    _, reading, _, _ = read(*rows, area=LAYERED)
+    assert absent(reading) == ([], set())
+    # One neighbour of another layer is not all that is there.
+    _, reading, _, _ = read(*rows, named("B", -80.0), area=LAYERED)
+    assert absent(reading) == ([], set())
+    shared = replace(LAYERED, layers=(0, 1, 0, 0), interfering=frozenset(range(4)))
+    _, reading, _, _ = read(*rows, named("B", -99.0), area=shared)
+    assert absent(reading) == ([D], -96.0)
+    three = replace(AREA, layers=(0, 1, 1, 1), interfering=frozenset({A, B, C, D}))
+    two = named("B", -80.25), named("B", -91.5)
+    _, reading, _, _ = read(serving("A", -99.0), *two, area=three)
+    assert absent(reading) == ([C, D], -91.5)
+    both = replace(AREA, layers=(0, 1, 0, 1), interfering=frozenset({A}))
+    _, reading, _, _ = read(*two, *rows[1:], area=both, options=replace(OPTIONS, full_list=6))
+    assert absent(reading) == ([A, D], FLOOR_DBM)
+    both = replace(both, interfering=frozenset({C}))
+    _, reading, _, _ = read(*two, *rows[1:], area=both, options=replace(OPTIONS, full_list=6))
+    bands, limit_dbm = reading.levels.absent.tolist(), reading.levels.limit_dbm.tolist()
+    assert (bands, limit_dbm) == ([A, D], [-96.0, FLOOR_DBM])
+
+
+def test_a_neighbour_of_an_unknown_code_is_of_the_layer_of_its_carrier():
+    """A cell that no plan has tells of no layer, where there are several."""
+    (arfcn, _), unknown = CARRIERS["A"], 7
+    rows = serving("A", -70.0), carrier(arfcn, unknown, -88.0), carrier(arfcn, unknown - 1, -90.0)
+    layers = replace(AREA, layers=(0, 1, 0, 1))
+    _, reading, _, _ = read(*rows, area=layers)
+    assert absent(reading) == ([C], FLOOR_DBM)
+    _, reading, _, _ = read(rows[0], named("X", -88.0), named("Y", -90.0), area=layers)
+    assert absent(reading) == ([], set())
 
 
 def test_cells_on_one_carrier_may_be_drowned_by_those_of_the_report():

@@ -42,6 +42,7 @@ from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs
+from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.simulation.satellites import ReceptionModel, receive
 from mapfilter.tracks.log import make_log
@@ -650,6 +651,26 @@ def test_cells_are_read_only_where_they_may_be_strong(database, whole):
     some = bands[[0, 3, 5]]
     share = tiled.shares_above(pixel, some, np.full(some.size, -80.0, dtype=np.float32))
     assert np.array_equal(share, (flat[pixel][:, some] > -80.0).mean(axis=0))
+
+
+def test_tiles_have_the_two_strongest_of_each_layer(database):
+    """Of two carriers of LTE and GSM: all levels and all roughness are those of the whole."""
+    kinds = ("LTE", 1300), ("GSM", 20), ("LTE", 3050), ("LTE", 1300), ("LTE", 3050), ("GSM", 61)
+    cells = tuple(
+        replace(cell, technology=technology, arfcn=arfcn)
+        for cell, (technology, arfcn) in zip(database.plan.cells, kinds, strict=True)
+    )
+    given = replace(database, plan=CellPlan(CRS, cells))
+    whole = AreaMap.of_field(given.field(), given.plan, given.floor_dbm)
+    tiled = TiledArea.of_database(given, side=30)
+    assert tiled.layers == whole.layers == (0, 1, 2, 0, 2, 1)
+    assert tiled.bands == whole.bands == 12
+    assert [tiled.strongest(band) for band in range(6)] == [6, 8, 10, 6, 10, 8]
+    level_dbm, rough_db = tiled.looked_up(every_pixel(whole), np.arange(12, dtype=np.int32))
+    assert np.array_equal(level_dbm, whole.level_dbm.reshape(-1, 12))
+    assert np.array_equal(rough_db, whole.flat_rough_db.reshape(-1, 12))
+    again = pickle.loads(pickle.dumps(tiled.tiles))
+    assert again.layers == tiled.layers
 
 
 def test_the_nearest_point_may_be_far_beyond_the_window(tmp_path, town):

@@ -1,11 +1,11 @@
-"""Notes on plans: fields that hold usual values, and powers that phones do not report."""
+"""Notes on plans: usual values, powers that phones do not report, and layers."""
 
 from dataclasses import replace
 
 import pytest
 
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.plan_notes import assumed_notes, carrier_notes
+from mapfilter.radio.plan_notes import assumed_notes, carrier_notes, layer_notes
 
 CRS = "EPSG:32632"
 GSM = Cell("a", "s", 500_000.0, 5_000_000.0, 30.0, 90.0, 58.0, 900.0, "sector", technology="GSM")
@@ -36,3 +36,20 @@ def test_usual_values_are_counted():
     (note,) = assumed_notes(CellPlan(CRS, cells))
     assert "eirp_dbm of 1, height_m of 2 cells" in note
     assert assumed_notes(CellPlan(CRS, (GSM,))) == ()
+
+
+def test_several_layers_are_counted_and_unknown_technologies_of_several_bands_named():
+    low, high = replace(LTE, frequency_mhz=800.0), replace(LTE, id="c", arfcn=3050)
+    assert layer_notes(CellPlan(CRS, (LTE, replace(LTE, id="c")))) == ()
+    (note,) = layer_notes(CellPlan(CRS, (GSM, low, high)))
+    assert note.startswith("3 layers")
+    unknown = [
+        replace(GSM, id=f"u{mhz}", technology=None, frequency_mhz=mhz) for mhz in (900.0, 1000.0)
+    ]
+    assert layer_notes(CellPlan(CRS, tuple(unknown))) == ()
+    wide = (*unknown, replace(unknown[0], id="w", frequency_mhz=1842.5))
+    (note,) = layer_notes(CellPlan(CRS, wide))
+    assert note.startswith("technology of 3 cells is unknown, at 900 to 1842.5 MHz")
+    first, second = layer_notes(CellPlan(CRS, (*wide, low)))
+    assert (first.startswith("2 layers"), second) == (True, note)
+    assert layer_notes(CellPlan(CRS, ())) == ()

@@ -117,6 +117,7 @@ def database_bundle(title="Made database"):
             "level": packed(level, "u1", **quiet),
             "rough": packed(np.full(level.shape, 2.0), "u1", scale=0.25),
             "quiet_dbm": QUIET_DBM,
+            "layer": [0, 0, 0],
             "best": packed(ordered[-1], "u1", **quiet),
             "second": packed(ordered[-2], "u1", **quiet),
             "distance": packed(distances(), "u1", none=255),

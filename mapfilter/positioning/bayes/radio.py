@@ -165,17 +165,35 @@ class RadioSource(EvidenceSource):
     def _serving(self, epoch: Epoch) -> tuple[ReportRow | None, int, Reason, list[_Unplaced]]:
         """Return the row of the serving cell and its band, or None, -1 and the reason.
 
-        Also return further serving rows.
+        That is the first one with a band. Also return further serving rows that are not used.
         """
         named = [row for row in epoch.radio if row.role == SERVING and row.cell is not None]
         if not named:
             return None, -1, Reason.NO_SERVING_CELL if epoch.radio else Reason.NO_READING, []
-        more = [(row, Reason.SECOND_SERVING_CELL) for row in named[1:]]
-        cell = str(named[0].cell)
-        if cell in self.area.band_of:
-            return named[0], self.area.band_of[cell], Reason.USED, more
-        known = cell in self.area.known_ids
-        return None, -1, Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL, more
+        placed = [k for k, row in enumerate(named) if row.cell in self.area.band_of]
+        if not placed:
+            more = [(row, Reason.SECOND_SERVING_CELL) for row in named[1:]]
+            return None, -1, self._why_unknown(named[0]), more
+        served = named[placed[0]]
+        rows = [(row, self._why_unknown(row)) for row in named[: placed[0]]]
+        for row in named[placed[0] + 1 :]:
+            if not self._serves_beside(row, served):
+                rows.append((row, Reason.SECOND_SERVING_CELL))
+        return served, self.area.band_of[str(served.cell)], Reason.USED, rows
+
+    def _why_unknown(self, row: ReportRow) -> Reason:
+        known = row.cell in self.area.known_ids
+        return Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL
+
+    def _serves_beside(self, row: ReportRow, served: ReportRow | None) -> bool:
+        """Return whether a serving row is of another layer than the serving cell.
+
+        Phones with two connections (5G beside LTE) or two cards report such.
+        """
+        band_of, layer_of = self.area.band_of, self.area.layer_of
+        if served is None or row.cell not in band_of:
+            return False
+        return bool(layer_of[band_of[row.cell]] != layer_of[band_of[str(served.cell)]])
 
     def _placed(
         self, epoch: Epoch, served: ReportRow | None, serving: int
@@ -185,11 +203,12 @@ class RadioSource(EvidenceSource):
         others: list[tuple[tuple[int, ...], ReportRow]] = []
         unplaced: list[_Unplaced] = []
         for row in epoch.radio:
-            if row.role == SERVING:
+            bands: tuple[int, ...]
+            if row.role == SERVING and row is not served and not self._serves_beside(row, served):
                 # A second, unknown or nameless serving cell has its reason already.
-                if row is not served:
-                    continue
-                bands: tuple[int, ...] = (serving,)
+                continue
+            if row is served:
+                bands = (serving,)
             elif row.cell is not None:
                 band = self.area.band_of.get(row.cell)
                 bands = (band,) if band is not None else ()
@@ -227,9 +246,8 @@ class RadioSource(EvidenceSource):
         They are of layers of which the phone measures neighbours.
         """
         area, present = self.area, self._present(epoch)
-        drowned = not area.interfering.isdisjoint(inside)
-        neighbours = sum(row.role != SERVING for row in epoch.radio)
-        full = drowned or neighbours >= self.options.full_list
+        drowned = area.interfering.intersection(inside)
+        full = sum(row.role != SERVING for row in epoch.radio) >= self.options.full_list
         rows: dict[int, list[ReportRow]] = {}
         for row in epoch.radio:
             for layer in self._layers_of(row):
@@ -238,9 +256,10 @@ class RadioSource(EvidenceSource):
         for layer, some in rows.items():
             if sum(row.role != SERVING for row in some) < _NEIGHBOURS_FOR_ABSENCE:
                 continue
-            levels = [row.level_dbm for row in some if isfinite(row.level_dbm)]
-            limit_dbm = min(levels) if full and levels else area.floor_dbm
             of_layer = np.flatnonzero(area.layer_of == layer).tolist()
+            levels = [row.level_dbm for row in some if isfinite(row.level_dbm)]
+            listed = levels and (full or not drowned.isdisjoint(of_layer))
+            limit_dbm = min(levels) if listed else area.floor_dbm
             found.update(dict.fromkeys((b for b in of_layer if b not in present), limit_dbm))
         return dict(sorted(found.items()))
 

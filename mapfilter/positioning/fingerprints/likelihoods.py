@@ -161,24 +161,24 @@ class Likelihoods:
 
     def _above(self, cell: Ints32, threshold_dbm: float) -> Floats:
         """Return the sums above a threshold of cells that would be reported with some, (R,)."""
-        found, carriers = np.zeros(self.by_cell.count), self._carrier
+        found, layers = np.zeros(self.by_cell.count), self._layer
         if self.planned is not None:
-            carriers = carriers[self.planned.measured_with(cell)]
-        # Sums are kept by carrier, of which there are few; reports may have any set of carriers.
-        for carrier in np.unique(carriers).tolist():
-            if carrier not in self._prepared:
-                own = np.repeat(self._carrier == carrier, np.diff(self.by_cell.first))
+            layers = layers[self.planned.measured_with(cell)]
+        # Sums are kept by layer, of which there are few; reports may have any set of them.
+        for layer in np.unique(layers).tolist():
+            if layer not in self._prepared:
+                own = np.repeat(self._layer == layer, np.diff(self.by_cell.first))
                 report, level_dbm = self.by_cell.report[own], self.level_dbm[own]
-                self._prepared[carrier] = _Excess.of(self.by_cell.count, report, level_dbm)
-            found += self._prepared[carrier].above(threshold_dbm)
+                self._prepared[layer] = _Excess.of(self.by_cell.count, report, level_dbm)
+            found += self._prepared[layer].above(threshold_dbm)
         return found
 
     @cached_property
-    def _carrier(self) -> Ints:
-        """Number of each cell's carrier, (C,); -1 of all cells where no plan tells them apart."""
+    def _layer(self) -> Ints:
+        """Number of each cell's layer, (C,); one for all where no plan tells them apart."""
         if self.planned is None:
-            return np.full(len(self.by_cell.first) - 1, -1)
-        return self.planned.carrier
+            return np.zeros(len(self.by_cell.first) - 1, dtype=np.int64)
+        return self.planned.layer
 
     @cached_property
     def _log_variance(self) -> Floats:

@@ -1,4 +1,4 @@
-"""What a cell plan adds to predicted levels: their errors, distances to sites, and carriers.
+"""What a cell plan adds to predicted levels: their errors, distances to sites, and layers.
 
 A plan of a public list lacks heights, powers or azimuths, and usual values stand for them
 (:attr:`mapfilter.radio.cells.Cell.assumed`). Levels predicted with these err by more than those of
@@ -20,6 +20,7 @@ from mapfilter.geodesy import azimuth_from_heading_deg, grid_convergence_rad, un
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.identities import TIMING_STEP_M
+from mapfilter.radio.layers import layer_numbers
 
 OWN_DB: Mapping[str, float] = {"eirp_dbm": 4.0, "height_m": 4.0, "azimuth_deg": 9.0}
 """Deviation of a cell's level by each of its fields that is assumed; 9 dB is that of a sector's
@@ -30,8 +31,6 @@ PATTERN_SHARE = 0.4
 """Deviation off an assumed cell's boresight, as a share of the attenuation that was predicted."""
 TIMING_SD_M, TIMING_CLIP_SD = 200.0, 3.0
 """Of a timing advance against the distance; those of the Bayes map filter."""
-_BY_CARRIER = ("UMTS", "LTE", "NR")
-"""Technologies in which cells share carriers. Phones measure few others than the serving one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,44 +42,37 @@ class Planned:
     site_m : ndarray, shape (C, 2)
     step_m : ndarray, shape (C,)
         Of timing advance; NaN where the technology is unknown, or has no one step.
-    carrier : ndarray of int64, shape (C,)
-        Cells of one carrier have one number; -1 where all cells count, whatever was received.
+    layer : ndarray of int64, shape (C,)
+        Number of each cell's layer (:mod:`mapfilter.radio.layers`). Phones measure few cells of
+        others than the serving one's.
     common_db : float
         Deviation of the error that all levels of a report share, besides that of the phone.
     """
 
     site_m: Floats
     step_m: Floats
-    carrier: Ints
+    layer: Ints
     common_db: float
 
     @classmethod
     def of(cls, plan: CellPlan, cell_ids: tuple[str, ...]) -> Planned:
         """Return what a plan states of some of its cells."""
         cells = [plan[cell_id] for cell_id in cell_ids]
-        carriers = {mhz: i for i, mhz in enumerate(sorted({cell.frequency_mhz for cell in cells}))}
         common = [_deviation_db(cell, COMMON_DB) for cell in cells]
         return cls(
             np.array([(cell.east_m, cell.north_m) for cell in cells]).reshape(-1, 2),
             np.array([TIMING_STEP_M.get(cell.technology or "", np.nan) for cell in cells]),
-            np.array(
-                [
-                    carriers[cell.frequency_mhz] if cell.technology in _BY_CARRIER else -1
-                    for cell in cells
-                ],
-                dtype=np.int64,
-            ),
+            layer_numbers(cells),
             float(np.mean(common)) if common else 0.0,
         )
 
     def some(self, kept: Ints) -> Planned:
         """Return some of the cells, by their indices."""
-        return Planned(self.site_m[kept], self.step_m[kept], self.carrier[kept], self.common_db)
+        return Planned(self.site_m[kept], self.step_m[kept], self.layer[kept], self.common_db)
 
     def measured_with(self, cell: Ints32) -> Bools:
         """Return which cells would have been reported with those of a report, shape (C,)."""
-        carrier = self.carrier
-        return np.asarray((carrier < 0) | np.isin(carrier, np.unique(carrier[cell])))
+        return np.asarray(np.isin(self.layer, np.unique(self.layer[cell])))
 
     def log_timing(self, places: Floats, serving: int, steps: float) -> Floats:
         """Return the log-likelihood of a timing advance at places, (R,); 0 without a known step."""

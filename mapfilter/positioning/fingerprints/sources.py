@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mapfilter._types import Ints, Ints32
 from mapfilter.database.measured import Readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
@@ -27,8 +28,8 @@ MOST_POINTS = 20_000
 STRONGEST = 7
 """Cells in a report of a phone: a serving cell and six neighbours."""
 
-_OTHER_CARRIERS = 0.5
-"""Share of the carriers besides that of the serving cell that a phone measures."""
+_OTHER_LAYERS = 0.5
+"""Share of the layers besides that of the serving cell that a phone measures."""
 
 
 def reports_of_logs(logs: Sequence[TrackLog], plan: CellPlan | None = None) -> Reports:
@@ -154,8 +155,9 @@ def simulated_reports(
 ) -> Reports:
     """Draw reports at places of predicted levels, with the errors that are stated for these.
 
-    Each has the strongest cells, with independent errors and one that all share. Where cells share
-    carriers, these are of the serving cell's carrier and, with even odds, of each other one.
+    Each has the strongest cells, with independent errors and one that all share. Of a network of
+    several layers the serving cell is the strongest of one of them, each as likely as another, and
+    the cells are of that layer and, with even odds, of each other one.
 
     Parameters
     ----------
@@ -172,11 +174,10 @@ def simulated_reports(
     order = np.lexsort((-level_dbm, report))
     best = drawn.cell[order[drawn.first[:-1]]]
     if planned is not None:
-        measured = rng.random((len(drawn), int(planned.carrier.max()) + 2)) < _OTHER_CARRIERS
-        measured[np.arange(len(drawn)), planned.carrier[best]] = True
-        # The last column is that of -1: cells that count always.
-        measured[:, -1] = True
-        order = order[measured[report[order], planned.carrier[drawn.cell[order]]]]
+        best = _served(drawn, order, planned.layer, rng)
+        measured = rng.random((len(drawn), int(planned.layer.max()) + 1)) < _OTHER_LAYERS
+        measured[np.arange(len(drawn)), planned.layer[best]] = True
+        order = order[measured[report[order], planned.layer[drawn.cell[order]]]]
     begins = np.searchsorted(report[order], np.arange(len(drawn)))
     rank = np.arange(len(order)) - begins[report[order]]
     kept = order[rank < strongest]
@@ -195,6 +196,21 @@ def simulated_reports(
         serving=None if planned is None else names[best],
         timing_advance=steps,
     )
+
+
+def _served(drawn: Reports, order: Ints, layer: Ints, rng: np.random.Generator) -> Ints32:
+    """Return the strongest cell (R,) of a layer that is received there, drawn for each report.
+
+    ``order`` (L,) has the levels of each report one after the other, strongest first.
+    """
+    count = int(layer.max()) + 1
+    key = drawn.report[order] * count + layer[drawn.cell[order]]
+    leading, first = np.unique(key, return_index=True)
+    chance = rng.random(leading.size) if count > 1 else np.zeros(leading.size)
+    by_chance = np.lexsort((chance, leading // count))
+    begins = np.searchsorted(leading[by_chance] // count, np.arange(len(drawn)))
+    served: Ints32 = drawn.cell[order[first[by_chance[begins]]]]
+    return served
 
 
 def is_table(path: Path) -> bool:

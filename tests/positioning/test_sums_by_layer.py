@@ -1,4 +1,4 @@
-"""Absence over predicted levels: sums of what carriers have, whatever carriers a report has."""
+"""Absence over predicted levels: sums of what layers have, whatever layers a report has."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -11,8 +11,8 @@ from mapfilter.positioning.fingerprints.likelihoods import LevelErrors, Likeliho
 from mapfilter.positioning.fingerprints.planned import Planned
 from mapfilter.positioning.fingerprints.reports import make_reports
 
-CARRIER = np.array([-1, 0, 0, 1, 2, 2, 3, 4])
-NAMES = tuple(f"c{i}" for i in range(len(CARRIER)))
+LAYER = np.array([5, 0, 0, 1, 2, 2, 3, 4])
+NAMES = tuple(f"c{i}" for i in range(len(LAYER)))
 PLACES = 30
 ERRORS = LevelErrors(4.0, 3.0, 0.2, -120.0)
 
@@ -24,7 +24,7 @@ def _levels():
     return level
 
 
-def _likelihoods(level, carrier):
+def _likelihoods(level, layer):
     place, cell = np.nonzero(np.isfinite(level))
     reports = make_reports(
         CRS,
@@ -36,18 +36,18 @@ def _likelihoods(level, carrier):
     )
     assert reports.cell_ids == NAMES
     planned = None
-    if carrier is not None:
-        unknown = np.full(len(carrier), np.nan)
-        planned = Planned(np.zeros((len(carrier), 2)), unknown, carrier, 0.0)
+    if layer is not None:
+        unknown = np.full(len(layer), np.nan)
+        planned = Planned(np.zeros((len(layer), 2)), unknown, layer, 0.0)
     return Likelihoods.at(replace(reports, predicted=True, planned=planned), ERRORS)
 
 
-def _expected(level, asked, asked_dbm, carrier):
+def _expected(level, asked, asked_dbm, layer):
     """Return the loss by the cells that one of both lacks, cell by cell."""
     lost, least_dbm = np.zeros(PLACES), max(asked_dbm.min(), ERRORS.floor_dbm)
     for place, one in np.ndindex(level.shape):
         known_dbm = level[place, one]
-        counts = carrier is None or carrier[one] < 0 or carrier[one] in carrier[asked]
+        counts = layer is None or layer[one] in layer[asked]
         if one in asked and np.isnan(known_dbm):
             own_dbm = asked_dbm[asked.tolist().index(one)]
             lost[place] -= ERRORS.absence_per_db * (own_dbm - ERRORS.floor_dbm)
@@ -56,19 +56,19 @@ def _expected(level, asked, asked_dbm, carrier):
     return lost
 
 
-@pytest.mark.parametrize("carrier", [CARRIER, None])
-def test_every_set_of_carriers_has_its_sums_and_none_is_kept_by_itself(carrier):
+@pytest.mark.parametrize("layer", [LAYER, None])
+def test_every_set_of_layers_has_its_sums_and_none_is_kept_by_itself(layer):
     level, rng = _levels(), np.random.default_rng(3)
-    likelihoods = _likelihoods(level, carrier)
+    likelihoods = _likelihoods(level, layer)
     for count in range(1, 5):
         for cells in combinations(range(len(NAMES)), count):
             asked = np.array(cells, dtype=np.int32)
             asked_dbm = rng.uniform(-110, -70, count)
             found, _ = likelihoods.of(asked, asked_dbm)
-            expected = _expected(level, asked, asked_dbm, carrier)
+            expected = _expected(level, asked, asked_dbm, layer)
             np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
-    # A client that asks for all sets of carriers must not fill the memory with them.
-    assert len(likelihoods._prepared) <= len(set(CARRIER.tolist()))
+    # A client that asks for all sets of layers must not fill the memory with them.
+    assert len(likelihoods._prepared) <= len(set(LAYER.tolist()))
 
 
 @pytest.mark.parametrize(
