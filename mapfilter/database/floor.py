@@ -53,7 +53,8 @@ def floor_notes(plan: CellPlan, floor_dbm: float | None = None) -> tuple[str, ..
     higher = [f"{name} (usually {floor:g})" for name, floor in usual.items() if floor > taken_dbm]
     note = f"database.floor_dbm = {taken_dbm:g} is taken"
     note += f", the usual one of {' and '.join(names)} cells"
-    note += f"; it holds for {' and '.join(higher)}, too: a database has one floor" if higher else ""
+    if higher:
+        note += f"; it holds for {' and '.join(higher)}, too: a database has one floor"
     return (note,)
 
 
