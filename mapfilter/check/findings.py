@@ -6,11 +6,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import groupby
 from operator import attrgetter
-from typing import Literal
+from typing import Literal, Self, get_args
 
 from mapfilter.errors import Fault, MapfilterError
 
-Severity = Literal["error", "warning"]
+Severity = Literal["error", "warning", "note"]
+"""The worst one first."""
 
 _MOST_ALIKE = 3
 
@@ -48,7 +49,8 @@ REMEDIES = {
     "move the raster by half a pixel.",
     "identity-repeated": "Correct mcc, mnc, lac or ci of all but one, or take out the cell "
     "that is no more.",
-    "identical-rasters": "Export the raster of each cell anew; one was copied over the other.",
+    "identical-rasters": "Export the raster of each cell anew (likely: one was copied over the "
+    "other), or correct the plan, by which they differ.",
     "journeys-disagree": "Look at the cell; mapfilter learn proposes a patch with the evidence.",
     "journeys-off-map": "Add the way to the map; mapfilter learn proposes a patch.",
     "journeys-unlisted-cell": "Add the cell to the plan, and build again.",
@@ -110,8 +112,8 @@ REMEDIES = {
     "sector-labels-swapped": "Exchange the labels of the rasters, or the azimuths in the plan.",
     "site-labels-swapped": "Exchange the labels of the rasters, or the positions in the plan.",
     "site-off-peak": "Correct the site's position, or take the raster that belongs to the cell.",
-    "site-outside-area": "Correct positions that are wrong. Leave cells in the plan that are "
-    "received in the area from beyond it.",
+    "site-outside-area": "Leave cells in the plan that are received in the area from beyond it; "
+    "correct positions that are wrong.",
     "tilts-upwards": "Change the sign of the tilts: downtilts are positive below the horizon.",
     "values-implausible": "Check rasters.factor and rasters.quantity.",
     "ways-with-gaps": "Raise half widths to half a pixel, or read the rasters on finer pixels "
@@ -171,8 +173,8 @@ class Finding:
     ----------
     code : str
         A short name that programs can rely on.
-    severity : {"error", "warning"}
-        Errors stop a command or spoil its result.
+    severity : {"error", "warning", "note"}
+        Errors stop a command or spoil its result; what a note says is usual.
     where : str
         File, cells or fields.
     evidence : str
@@ -195,6 +197,13 @@ class CheckResult:
 
     ok: bool
     findings: tuple[Finding, ...]
+
+    @classmethod
+    def of(cls, findings: Iterable[Finding]) -> Self:
+        """Put findings in order, those that are alike as they came."""
+        severities = get_args(Severity)
+        ordered = sorted(findings, key=lambda finding: severities.index(finding.severity))
+        return cls(all(finding.severity != "error" for finding in ordered), tuple(ordered))
 
 
 @dataclass(slots=True)
@@ -228,8 +237,7 @@ class Findings:
 
     def result(self) -> CheckResult:
         """Return everything found, errors first."""
-        ordered = sorted(self.found, key=lambda finding: finding.severity)
-        return CheckResult(all(f.severity != "error" for f in ordered), tuple(ordered))
+        return CheckResult.of(self.found)
 
 
 def paragraphs(result: CheckResult) -> Iterable[str]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.check.plan_gain import gain_by_plan_db
 from mapfilter.check.samples import RasterSample
+from mapfilter.radio.cells import Cell
 
 _SIDE = 40
 _LEAST_SQUARES = 60
@@ -95,6 +98,28 @@ def _solved(products: Floats, with_levels: Floats) -> tuple[Floats, Floats]:
     return factors, np.einsum("pi,pi->p", factors, with_levels)
 
 
+def fits_with_antenna(
+    squares: MeanLevels, crs: str, cell: Cell, places_m: Floats
+) -> tuple[float, ...]:
+    """Return how well a cell explains levels at its own place and at others, 0..1 each.
+
+    Two harmonics of the direction do not draw a narrow beam below the horizon, whose levels grow
+    with the distance up to hundreds of metres; so the gain of the plan's antenna is taken off
+    before. 0 where that is a pattern file.
+    """
+    fits = []
+    for east_m, north_m in ((cell.east_m, cell.north_m), *places_m.tolist()):
+        there = replace(cell, east_m=east_m, north_m=north_m)
+        gain_db = gain_by_plan_db(there, crs, squares.east_m, squares.north_m)
+        if gain_db is None:
+            return (0.0,) * (1 + len(places_m))
+        rest = squares._replace(level_db=squares.level_db - gain_db)
+        explained = place_fits(rest, np.array([(east_m, north_m)]))[0] ** 2
+        unexplained = (1.0 - explained) * rest.level_db.var() / squares.level_db.var()
+        fits.append(float(np.sqrt(max(1.0 - unexplained, 0.0))))
+    return tuple(fits)
+
+
 def peak_m(sample: RasterSample) -> tuple[float, float]:
     """Return east and north of the strongest pixels' middle (the strongest 0.2 %, at least 9)."""
     value = np.where(np.isnan(sample.values), -np.inf, sample.values).ravel()
@@ -104,8 +129,8 @@ def peak_m(sample: RasterSample) -> tuple[float, float]:
     return float(np.median(east.ravel()[strongest])), float(np.median(north.ravel()[strongest]))
 
 
-def best_place(squares: MeanLevels, sample: RasterSample) -> tuple[float, tuple[float, float]]:
-    """Return the best fit and its place, among a grid over the raster and its peak."""
+def places_to_try(sample: RasterSample) -> Floats:
+    """Return a grid of places over a raster, and its peak, shape (101, 2)."""
     west, south, east, north = sample.lattice.bounds_m
     along = (np.arange(_PLACES) + 0.5) / _PLACES
     places = [
@@ -114,6 +139,4 @@ def best_place(squares: MeanLevels, sample: RasterSample) -> tuple[float, tuple[
         for y in south + along * (north - south)
     ]
     places.append(peak_m(sample))
-    fits = place_fits(squares, np.array(places))
-    best = int(np.argmax(fits))
-    return float(fits[best]), places[best]
+    return np.array(places)

@@ -11,10 +11,11 @@ from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
 from mapfilter._types import Floats32
+from mapfilter.check.copies import check_copies
 from mapfilter.check.findings import Findings
+from mapfilter.check.plan_gain import PHONE_M
 from mapfilter.check.samples import RasterSample, sample_raster
 from mapfilter.errors import Fault, InputError, listed
-from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.files import check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters, in_other_case
@@ -25,7 +26,6 @@ _HIGHEST_RXLEV = 63
 _LEAST_LOSS_DB = 20.0
 _NO_LEVEL_BELOW = -300.0
 _MOST_SHARE = 0.5
-_PHONE_M = 1.5
 _NEAREST_RING_M = 64.0
 _LEAST_IN_RING = 50
 
@@ -85,7 +85,7 @@ def above_free_space_db(sample: RasterSample, cell: Cell) -> float:
         off_deg = (azimuth_deg - cell.azimuth_deg + 180.0) % 360.0 - 180.0
         used &= np.abs(off_deg) <= cell.beamwidth_deg / 2
     ground_m = ground_m[used]
-    distance_km = np.hypot(ground_m, cell.height_m - _PHONE_M) / 1000
+    distance_km = np.hypot(ground_m, cell.height_m - PHONE_M) / 1000
     loss_db = 32.44 + 20 * np.log10(distance_km) + 20 * np.log10(cell.frequency_mhz)
     above_db = sample.values[used] - cell.eirp_dbm + loss_db
     ring = np.log2(ground_m).astype(np.int64)
@@ -192,7 +192,7 @@ def sampled(
     useful: list[RasterSample] = []
     marked = {one[0] for one in nodata}
     for kind, samples in kinds.items():
-        _check_copies(samples, where, findings)
+        check_copies(samples, plan, rasters.quantity, where, findings)
         falls = kind == "loss" and _falls_away(samples, plan)
         below_db = 0.0 if falls or kind != "loss" else _below_free_space_db(samples, plan)
         unsigned = below_db > _TOO_SMALL_DB
@@ -223,6 +223,15 @@ def sampled(
     return useful
 
 
+def strongest(samples: Sequence[RasterSample], plan: CellPlan, quantity: str) -> dict[str, float]:
+    """Return the strongest level of each cell of the plan, in dBm; losses are taken from EIRPs."""
+    return {
+        s.cell_id: float(s.known.max()) + (plan[s.cell_id].eirp_dbm if quantity == "loss" else 0.0)
+        for s in samples
+        if s.cell_id in plan
+    }
+
+
 def _beyond(sample: RasterSample, rasters: RxLevRasters, kind: Kind, tile_px: int) -> Fault | None:
     """Return the fault of numbers that the declared quantity cannot have, and a build refuses.
 
@@ -239,16 +248,6 @@ def _beyond(sample: RasterSample, rasters: RxLevRasters, kind: Kind, tile_px: in
     except InputError as error:
         return error.faults[0]
     return None
-
-
-def _check_copies(samples: Sequence[RasterSample], where: str, findings: Findings) -> None:
-    by_sum: dict[tuple[str, Lattice], list[str]] = {}
-    for sample in samples:
-        by_sum.setdefault((sample.checksum, sample.lattice), []).append(sample.cell_id)
-    for same in by_sum.values():
-        if len(same) > 1:
-            evidence = f"The same numbers in all pixels of {len(same)} rasters."
-            findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
 
 
 def _below_free_space_db(samples: Sequence[RasterSample], plan: CellPlan | None) -> float:

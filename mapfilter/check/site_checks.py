@@ -2,7 +2,8 @@
 
 A level is explained by a constant, the logarithm of the distance from the place, and two harmonics
 of the direction, which draw any lobe: no azimuth has to be right. The share of the levels' variance
-that is explained compares places over the same pixels.
+that is explained compares places over the same pixels, those that differ also with the plan's
+antenna there, as a narrow beam below the horizon is strongest away from its mast.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from mapfilter._types import Floats32
 from mapfilter.check.findings import Findings
 from mapfilter.check.lobes import Lobe, azimuth_mistakes, find_lobe
-from mapfilter.check.place_fits import best_place, in_squares, place_fits
+from mapfilter.check.place_fits import fits_with_antenna, in_squares, place_fits, places_to_try
 from mapfilter.check.raster_checks import above_free_space_db, falls_with_distance
 from mapfilter.check.samples import RasterSample
 from mapfilter.errors import listed
@@ -81,19 +82,20 @@ def _fits(seen: Sequence[RasterSample], plan: CellPlan) -> dict[str, _Fit]:
         if squares is None:
             continue
         cell = plan[sample.cell_id]
-        best, (east_m, north_m) = best_place(squares, sample)
+        places_to_try_m = places_to_try(sample)
+        tried = place_fits(squares, places_to_try_m)
+        best, (east_m, north_m) = float(tried.max()), places_to_try_m[tried.argmax()]
         off_m = np.hypot(*(places_m - (east_m, north_m)).T)
         about = [names[index] for index in np.argsort(off_m, kind="stable")[:_SITES]]
         away_m = float(np.hypot(east_m - cell.east_m, north_m - cell.north_m))
         tried_m = np.array([(cell.east_m, cell.north_m), *(site_at[site] for site in about)])
         own, *others = place_fits(squares, tried_m).tolist()
-        found[cell.id] = _Fit(
-            own,
-            dict(zip(about, others, strict=True)) | {cell.site: own},
-            best,
-            away_m,
-            away_m >= max(_FAR_M, _FAR_PX * sample.lattice.resolution_m),
-        )
+        by_site = dict(zip(about, others, strict=True)) | {cell.site: own}
+        far = away_m >= max(_FAR_M, _FAR_PX * sample.lattice.resolution_m)
+        if far and best - own > _BETTER:
+            with_antenna = fits_with_antenna(squares, sample.lattice.crs, cell, places_to_try_m)
+            far = max(best, *with_antenna[1:]) - max(own, with_antenna[0]) > _BETTER
+        found[cell.id] = _Fit(own, by_site, best, away_m, far)
     return found
 
 

@@ -41,13 +41,21 @@ def floor_of(plan: CellPlan, floor_dbm: float | None = None) -> float:
 
 
 def floor_notes(plan: CellPlan, floor_dbm: float | None = None) -> tuple[str, ...]:
-    """Return a note on the floor that was taken, where it is neither given nor that of GSM."""
+    """Return a note on the floor that was taken, where it is neither given nor that of GSM.
+
+    Technologies that have a higher one usually are named, as it holds for their cells, too.
+    """
     taken_dbm = floor_of(plan, floor_dbm)
     if floor_dbm is not None or taken_dbm == FLOOR_DBM:
         return ()
-    names = (name for name in _technologies(plan) if FLOORS_DBM[name] == taken_dbm)
-    reason = f"the usual one of {' and '.join(sorted(names))} cells"
-    return (f"database.floor_dbm = {taken_dbm:g} is taken, {reason}",)
+    usual = {name: FLOORS_DBM[name] for name in sorted(_technologies(plan))}
+    names = [name for name, floor in usual.items() if floor == taken_dbm]
+    higher = [f"{name} (usually {floor:g})" for name, floor in usual.items() if floor > taken_dbm]
+    note = f"database.floor_dbm = {taken_dbm:g} is taken"
+    note += f", the usual one of {' and '.join(names)} cells"
+    if higher:
+        note += f"; it holds for {' and '.join(higher)}, too: a database has one floor"
+    return (note,)
 
 
 def weak_points_note(counts: Mapping[str, int], floor_dbm: float) -> tuple[str, ...]:

@@ -41,20 +41,30 @@ def outside_published_range(
     """Return remarks on the values that lie outside the range a model was published for.
 
     ``used`` are values by the names in :data:`PUBLISHED`; its ``distance_m`` is the longest one.
+    The remark on a frequency names the models that were published for it.
 
     Examples
     --------
     >>> used = {"base_height_m": 30.0, "mobile_height_m": 1.5, "distance_m": 900.0}
-    >>> outside_published_range("cost231_walfisch_ikegami", used | {"frequency_mhz": 2600.0})
-    ('frequency_mhz 2600 is outside 800..2000',)
-    >>> outside_published_range("tr38901_uma", used | {"frequency_mhz": 2600.0})
+    >>> used["frequency_mhz"] = 2600.0
+    >>> print(*outside_published_range("cost231_walfisch_ikegami", used))
+    frequency_mhz 2600 is outside 800..2000, set prediction.model = "tr38901_uma" or "tr38901_umi"
+    >>> outside_published_range("tr38901_uma", used)
     ('base_height_m 30 is not 25',)
     """
     remarks = []
     for name, (low, high) in PUBLISHED[model].items():
         limits = f"outside {low:g}..{high:g}" if low < high else f"not {low:g}"
         if not low <= used[name] <= high:
-            remarks.append(f"{name} {used[name]:g} is {limits}")
+            others = _models_for(used[name]) if name == "frequency_mhz" else ""
+            remarks.append(f"{name} {used[name]:g} is {limits}{others}")
         if name == "distance_m" and nearest_distance_m < low <= used[name]:
             remarks.append(f"distance_m from {nearest_distance_m:g} on is {limits}")
     return tuple(remarks)
+
+
+def _models_for(frequency_mhz: float) -> str:
+    """Return how to set a model that was published for a frequency, or "" if there is none."""
+    ranges = {model: of["frequency_mhz"] for model, of in PUBLISHED.items() if of}
+    names = [f'"{model}"' for model, (low, high) in ranges.items() if low <= frequency_mhz <= high]
+    return f", set prediction.model = {' or '.join(names)}" if names else ""

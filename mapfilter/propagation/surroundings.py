@@ -83,7 +83,7 @@ class Surroundings:
         if not needs_sight(self.model):
             return np.zeros((self.lattice.rows, self.lattice.cols), dtype=np.float32)
         if self.heights_m is None or self.model.line_of_sight == "probability":
-            probability = probability_of_sight(self.model, np.hypot(*self._offsets_m(*mast[:2])))
+            probability = probability_of_sight(self.model, self._distances_m(*mast[:2]))
             return np.asarray(probability, dtype=np.float32)
         seen = line_of_sight(self.heights_m, self.lattice, mast, self.model.mobile_height_m)
         return seen.astype(np.float32)
@@ -98,14 +98,16 @@ class Surroundings:
         sight : ndarray of float32, shape (rows, cols)
             From :meth:`sight`.
         """
-        right_m, up_m = self._offsets_m(cell.east_m, cell.north_m)
-        distance_m = np.maximum(np.hypot(right_m, up_m), shortest_distance_m(self.model))
+        ground_m = self._distances_m(cell.east_m, cell.north_m)
+        distance_m = np.maximum(ground_m, shortest_distance_m(self.model))
         # The loss goes by lg d, so stretching lg(d / 100 m) stretches its slope alone.
         stretched_m = _SLOPE_REFERENCE_M * (distance_m / _SLOPE_REFERENCE_M) ** slope_factor
         loss_db = path_loss_db(
             self.model, stretched_m, cell.frequency_mhz, cell.height_m, self.roof_height_m, sight
         )
-        level_dbm = cell.eirp_dbm - loss_db + self._gain_db(cell, right_m, up_m)
+        place_m, phone_m = pixels_m(self.lattice), self.model.mobile_height_m
+        gain_db = antenna_gain_db(cell, self.lattice.crs, *place_m, phone_m, self.antennas)
+        level_dbm = cell.eirp_dbm - loss_db + gain_db
         if cell.indoor:
             inside: Bools = np.zeros((self.lattice.rows, self.lattice.cols), dtype=np.bool_)
             if self.heights_m is not None:
@@ -113,36 +115,66 @@ class Surroundings:
             level_dbm -= np.where(inside, 0.0, cell.penetration_loss_db)
         return np.asarray(level_dbm)
 
-    def _offsets_m(self, east_m: float, north_m: float) -> tuple[Floats, Floats]:
-        """Return how far east and north of a place the columns and rows are."""
-        column_m, _ = self.lattice.east_north(0, np.arange(self.lattice.cols))
-        _, row_m = self.lattice.east_north(np.arange(self.lattice.rows), 0)
-        return (column_m - east_m)[None, :], (row_m - north_m)[:, None]
+    def _distances_m(self, east_m: float, north_m: float) -> Floats:
+        column_m, row_m = pixels_m(self.lattice)
+        return np.hypot(column_m - east_m, row_m - north_m)
 
-    def _gain_db(self, cell: Cell, right_m: Floats, up_m: Floats) -> Floats:
-        """Return the antenna's gain against its boresight."""
-        if cell.antenna == "omni":
-            return np.zeros(())
-        lon_deg, lat_deg = unproject(self.lattice.crs, cell.east_m, cell.north_m)
-        convergence = grid_convergence_rad(self.lattice.crs, float(lon_deg), float(lat_deg))
-        # Without an azimuth the antenna is round, and any boresight will do.
-        heading_rad = heading_from_azimuth_rad(cell.azimuth_deg or 0.0, convergence)
-        offset_rad = np.arctan2(up_m, right_m) - heading_rad
-        below_m = cell.height_m - self.model.mobile_height_m
-        depression_rad = np.arctan2(below_m, np.hypot(right_m, up_m))
-        own = leaning(offset_rad, depression_rad, np.radians(cell.mechanical_downtilt_deg))
-        measured = self.antennas.get(cell.antenna)
-        if measured is not None:
-            return measured.gain_db(*own, cell.downtilt_deg or None)
-        beamwidth_rad = np.radians(cell.beamwidth_deg)
-        vertical_deg = cell.vertical_beamwidth_deg
-        if vertical_deg is None and cell.antenna == "3gpp":
-            vertical_deg = _VERTICAL_BEAMWIDTH_DEG
-        if vertical_deg is None:
-            return sector_gain_db(offset_rad, beamwidth_rad, cell.max_attenuation_db)
-        tilt_rad, vertical_rad = np.radians(cell.downtilt_deg), np.radians(vertical_deg)
-        return combined_gain_db(
-            sector_gain_db(own[0], beamwidth_rad, cell.max_attenuation_db),
-            vertical_gain_db(own[1], tilt_rad, vertical_rad, cell.side_lobe_db),
-            cell.max_attenuation_db,
-        )
+
+def antenna_gain_db(
+    cell: Cell,
+    crs: str,
+    east_m: Floats,
+    north_m: Floats,
+    mobile_height_m: float,
+    antennas: Antennas,
+) -> Floats:
+    """Return the gain of a cell's antenna against its boresight at places.
+
+    Parameters
+    ----------
+    crs : str
+        Of the cell and the places.
+    east_m, north_m : ndarray
+        The places; they broadcast.
+    mobile_height_m : float
+        Height of the phone above ground.
+    antennas : mapping of str to MeasuredAntenna
+        By the name that cells have for them; others are by formula.
+
+    Returns
+    -------
+    ndarray, shape of the places, or () for an omnidirectional antenna
+        In dB, 0 or less.
+    """
+    if cell.antenna == "omni":
+        return np.zeros(())
+    right_m, up_m = east_m - cell.east_m, north_m - cell.north_m
+    lon_deg, lat_deg = unproject(crs, cell.east_m, cell.north_m)
+    convergence = grid_convergence_rad(crs, float(lon_deg), float(lat_deg))
+    # Without an azimuth the antenna is round, and any boresight will do.
+    heading_rad = heading_from_azimuth_rad(cell.azimuth_deg or 0.0, convergence)
+    offset_rad = np.arctan2(up_m, right_m) - heading_rad
+    depression_rad = np.arctan2(cell.height_m - mobile_height_m, np.hypot(right_m, up_m))
+    own = leaning(offset_rad, depression_rad, np.radians(cell.mechanical_downtilt_deg))
+    measured = antennas.get(cell.antenna)
+    if measured is not None:
+        return measured.gain_db(*own, cell.downtilt_deg or None)
+    beamwidth_rad = np.radians(cell.beamwidth_deg)
+    vertical_deg = cell.vertical_beamwidth_deg
+    if vertical_deg is None and cell.antenna == "3gpp":
+        vertical_deg = _VERTICAL_BEAMWIDTH_DEG
+    if vertical_deg is None:
+        return sector_gain_db(offset_rad, beamwidth_rad, cell.max_attenuation_db)
+    tilt_rad, vertical_rad = np.radians(cell.downtilt_deg), np.radians(vertical_deg)
+    return combined_gain_db(
+        sector_gain_db(own[0], beamwidth_rad, cell.max_attenuation_db),
+        vertical_gain_db(own[1], tilt_rad, vertical_rad, cell.side_lobe_db),
+        cell.max_attenuation_db,
+    )
+
+
+def pixels_m(lattice: Lattice) -> tuple[Floats, Floats]:
+    """Return east of the columns, shape (1, cols), and north of the rows, shape (rows, 1)."""
+    column_m, _ = lattice.east_north(0, np.arange(lattice.cols))
+    _, row_m = lattice.east_north(np.arange(lattice.rows), 0)
+    return column_m[None, :], row_m[:, None]

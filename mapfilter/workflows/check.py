@@ -15,7 +15,12 @@ from mapfilter._parallel import Progress
 from mapfilter.check.extent_checks import check_extents
 from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.identity_checks import check_identities
-from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
+from mapfilter.check.raster_checks import (
+    check_ids,
+    is_surveyed,
+    sampled,
+    strongest,
+)
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, MapfilterError, listed
@@ -216,7 +221,8 @@ class _Checks:
         if config.surveyed_plan is not None and config.cells.plan is None:
             # Antennas were located from the same levels, and may well stand outside.
             return
-        outside = check_sites(plan, rasters.lattice, self.plan_name, findings)
+        strongest_dbm = strongest(samples, plan, rasters.quantity) if as_declared else {}
+        outside = check_sites(plan, rasters.lattice, self.plan_name, findings, strongest_dbm)
         # Where a raster lies elsewhere, it tells nothing of its site.
         outside |= check_extents(rasters, plan, findings)
         if is_surveyed(rasters):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 import shapely
@@ -12,6 +12,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter.check.findings import Findings
 from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
+from mapfilter.database.floor import floor_of
 from mapfilter.errors import InputError, listed
 from mapfilter.geodesy import project, projected_crs, same_crs, unproject, utm_zone, utm_zone_crs
 from mapfilter.lattice import Lattice, outside_m
@@ -30,6 +31,10 @@ _OUTSIDE_SHARE = 0.05
 _AT_EDGE_M = 1.0
 _MOST_ZONES = 2
 _NEARLY_ALL = 0.9
+_MOST_NAMED = 3
+_RARELY_BEYOND_M = 10_000.0
+_FARTHEST_M = 35_000.0
+"""The largest timing advance of GSM."""
 
 
 def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Findings) -> bool:
@@ -57,25 +62,51 @@ def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Finding
     return False
 
 
-def check_sites(plan: CellPlan, lattice: Lattice, where: str, findings: Findings) -> frozenset[str]:
-    """Return the ids of cells outside the area; report them with the mistake that explains it."""
+def check_sites(
+    plan: CellPlan,
+    lattice: Lattice,
+    where: str,
+    findings: Findings,
+    strongest_dbm: Mapping[str, float] | None = None,
+) -> frozenset[str]:
+    """Return the ids of cells outside the area; report them with the mistake that explains it.
+
+    An area that is cut out of a network has most cells beside it, which is noted. Cells that are
+    too far away to be received there are a warning.
+
+    Parameters
+    ----------
+    strongest_dbm : mapping of str to float, optional
+        The strongest level of each cell in the area, as far as it is known.
+    """
     east = np.array([cell.east_m for cell in plan.cells])
     north = np.array([cell.north_m for cell in plan.cells])
     outside = ~_inside(east, north, lattice)
     if not outside.any():
         return frozenset()
     ids = [cell.id for cell, out in zip(plan.cells, outside, strict=True) if out]
-    beyond_m = outside_m(east, north, lattice)[outside].max()
-    far = f"{beyond_m / 1000:.1f} km" if beyond_m >= 10_000 else f"{beyond_m:.0f} m"
-    named = f"{where}, cells {listed(ids)}"
-    seen = f"{len(ids)} of {len(plan)} cells lie up to {far} outside the area."
+    beyond_m = dict(zip(ids, outside_m(east, north, lattice)[outside].tolist(), strict=True))
+    named = f"{where}, cells {listed(ids, _MOST_NAMED)}"
+    seen = f"{len(ids)} of {len(plan)} cells lie up to {_far(max(beyond_m.values()))} outside "
+    seen += "the area"
     for code, words, move in _moves(lattice):
         moved = _inside(*move(east[outside], north[outside]), lattice)
         if moved.mean() >= _NEARLY_ALL:
-            evidence = f"{seen} {words}, {int(moved.sum())} of them lie inside."
+            evidence = f"{seen}. {words}, {int(moved.sum())} of them lie inside."
             findings.add(code, named, evidence)
             return frozenset(ids)
-    findings.add("site-outside-area", named, seen, "warning")
+    floor_dbm = floor_of(plan)
+    received = {i for i, dbm in (strongest_dbm or {}).items() if dbm >= floor_dbm}
+    lost = [
+        i for i, m in beyond_m.items() if m >= (_FARTHEST_M if i in received else _RARELY_BEYOND_M)
+    ]
+    if lost:
+        nearest = _far(min(beyond_m[i] for i in lost))
+        seen += f", {len(lost)} of them {nearest} and more: too far to be received in it"
+        named = f"{where}, cells {listed(lost, _MOST_NAMED)}"
+    elif heard := received.intersection(ids):
+        seen += f", {len(heard)} of them received in it"
+    findings.add("site-outside-area", named, f"{seen}.", "warning" if lost else "note")
     return frozenset(ids)
 
 
@@ -196,6 +227,10 @@ def _half_step(lattice: Lattice, west_m: float, north_m: float) -> str:
     if any(half) and all(h or w for h, w in zip(half, whole, strict=True)):
         return f"{right % 1:.2f} pixels east and {up % 1:.2f} north"
     return ""
+
+
+def _far(away_m: float) -> str:
+    return f"{away_m / 1000:.1f} km" if away_m >= 10_000 else f"{away_m:.0f} m"
 
 
 def _shown(box: BoxDeg) -> str:

@@ -41,8 +41,7 @@ def run_check_suspects(config: Config, progress: Progress | None = None) -> Chec
 
 def checked_together(one: CheckResult, other: CheckResult) -> CheckResult:
     """Return two results as one, errors first."""
-    ordered = sorted((*one.findings, *other.findings), key=lambda finding: finding.severity)
-    return CheckResult(one.ok and other.ok, tuple(ordered))
+    return CheckResult.of((*one.findings, *other.findings))
 
 
 _SAYS = {

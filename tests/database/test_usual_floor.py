@@ -32,7 +32,17 @@ def test_the_lowest_of_the_technologies_counts(technologies, floor_dbm, named):
     plan = _plan(*technologies)
     assert floor_of(plan) == floor_dbm
     note = f"database.floor_dbm = {floor_dbm:g} is taken, the usual one of {named} cells"
-    assert floor_notes(plan) == ((note,) if named else ())
+    notes = floor_notes(plan)
+    assert [text.partition(";")[0] for text in notes] == ([note] if named else [])
+
+
+def test_technologies_for_which_another_floor_is_usual_are_named():
+    (note,) = floor_notes(_plan("GSM", "UMTS", "LTE"))
+    assert note.endswith(
+        "; it holds for GSM (usually -104) and UMTS (usually -115), too: a database has one floor"
+    )
+    for alike in ("NR", "LTE", None):
+        assert ";" not in floor_notes(_plan("LTE", "NR", alike))[0]
 
 
 def _levels(database):

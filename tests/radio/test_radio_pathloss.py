@@ -127,11 +127,22 @@ def test_never_below_free_space_and_rising_with_distance(
         assert loss[1] > loss[0]
 
 
+TOO_LOW = {"frequency_mhz": 100.0, "base_height_m": 30.0, "distance_m": 1000.0}
+
+
 def test_what_is_extrapolated_is_told() -> None:
     used = {"base_height_m": 20.0, "mobile_height_m": 1.5, "distance_m": 500.0}
     notes = outside_published_range("cost231_hata", used | {"frequency_mhz": 900.0})
     assert notes == (
-        "frequency_mhz 900 is outside 1500..2000",
+        "frequency_mhz 900 is outside 1500..2000, set prediction.model = "
+        '"okumura_hata" or "cost231_walfisch_ikegami" or "tr38901_uma" or "tr38901_umi"',
         "base_height_m 20 is outside 30..200",
         "distance_m 500 is outside 1000..20000",
     )
+    notes = outside_published_range("cost231_walfisch_ikegami", used | {"frequency_mhz": 2630.0})
+    assert notes == (
+        "frequency_mhz 2630 is outside 800..2000, set prediction.model = "
+        '"tr38901_uma" or "tr38901_umi"',
+    )
+    (note,) = outside_published_range("okumura_hata", {"mobile_height_m": 1.5, **TOO_LOW})
+    assert note == "frequency_mhz 100 is outside 150..1500"

@@ -7,7 +7,6 @@ from check_world import base_levels, box_deg, make_world, shifted
 from command_line import mapfilter
 from rasterio.transform import Affine
 
-from mapfilter.check import place_fits as places
 from mapfilter.check import site_checks as check_peaks
 from mapfilter.check.place_fits import place_fits
 from mapfilter.lattice import Lattice
@@ -202,7 +201,6 @@ def test_planted_faults(code, plant, world):
 WARNINGS = [
     ("half-pixel-shift", lambda w: setattr(w, "lattice", shifted(5, -5))),
     ("half-pixel-shift", lambda w: setattr(w, "landuse_shift_m", 5.0)),
-    ("site-outside-area", lambda w: put(w, "I1", lat=60.1700, lon=24.9180)),
     ("eirp-watts", lambda w: in_watts(w)),
     ("levels-above-eirp", lambda w: w.each(lambda v: v + 40)),
     ("antenna-missing", pattern_files),
@@ -221,15 +219,20 @@ def test_planted_doubts(code, plant, world):
     assert {(f["code"], f["severity"]) for f in found} == {(code, "warning")}, found
 
 
+def test_a_site_beside_the_area_is_a_note(world):
+    put(world, "I1", lat=60.1700, lon=24.9180)
+    (found,) = check(world)
+    assert (found["code"], found["severity"]) == ("site-outside-area", "note")
+
+
 def test_of_many_sites_only_those_about_the_best_place_are_tried(world, monkeypatch):
     tried = []
     monkeypatch.setattr(check_peaks, "_SITES", 1)
-    for module in (check_peaks, places):
-        monkeypatch.setattr(
-            module,
-            "place_fits",
-            lambda squares, places_m: tried.extend(places_m) or place_fits(squares, places_m),
-        )
+    monkeypatch.setattr(
+        check_peaks,
+        "place_fits",
+        lambda squares, places_m: tried.extend(places_m) or place_fits(squares, places_m),
+    )
     exchange_sites(world)
     assert [f["code"] for f in check(world)] == ["site-labels-swapped"]
     on_a_grid_and_at_the_peak = 10 * 10 + 1
