@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from mapfilter._types import Floats32
+from mapfilter._types import Floats32, Ints
 from mapfilter.database.field import RadioField
 from mapfilter.database.points import Points
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.level_errors import roughness
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.layers import layers_of
 from mapfilter.roads.ways import Bounds
 from mapfilter.viewing.arrays import cell_numbers, packed, places, starts
 from mapfilter.viewing.streets import middle_lines
@@ -178,7 +179,6 @@ def level_fields(
     quiet_dbm = database.floor_dbm - BELOW_FLOOR_DB
     quiet = np.float32(quiet_dbm)
     level = np.where(np.isnan(field.level_dbm), quiet, field.level_dbm)
-    order = np.sort(level, axis=2) if level.shape[2] else level
     rough = roughness(level, field.lattice.resolution_m)
     chosen = list(range(len(field.cell_ids)))
     step = _step(field, len(chosen))
@@ -189,16 +189,20 @@ def level_fields(
     some = np.s_[step // 2 :: step, step // 2 :: step]
     west_m, _, _, north_m = field.lattice.bounds_m
     plan = database.plan
+    layer = np.array(layers_of(plan, field.cell_ids), dtype=np.int64)
+    layers, layer_of = np.unique(layer[chosen], return_inverse=True)
+    best, second = _two_strongest(level[some], layer, layers, quiet)
     found = {
         "grid": frame.grid(
             west_m, north_m, step * field.lattice.resolution_m, level[some].shape[:2]
         ),
         "cells": [plan.index(field.cell_ids[i]) for i in chosen],
+        "layer": layer_of.tolist(),
         "level": _levels(np.moveaxis(field.level_dbm[some][..., chosen], 2, 0), quiet_dbm),
         "rough": packed(np.moveaxis(rough[some][..., chosen], 2, 0), "u1", scale=0.25),
         "quiet_dbm": quiet_dbm,
-        "best": _levels(_nth(order[some], 1, quiet), quiet_dbm),
-        "second": _levels(_nth(order[some], 2, quiet), quiet_dbm),
+        "best": _levels(best, quiet_dbm),
+        "second": _levels(second, quiet_dbm),
         "distance": packed(
             np.maximum(field.distance_to_way_m - field.half_width_m, 0)[some], "u1", none=255
         ),
@@ -207,12 +211,19 @@ def level_fields(
     return found, {field.cell_ids[i]: band for band, i in enumerate(chosen)}
 
 
-def _nth(order: Floats32, nth: int, quiet: np.float32) -> Floats32:
-    """Return the strongest, second strongest... level of each pixel; the quiet one without any."""
-    if order.shape[2] < nth:
-        return np.full(order.shape[:2], quiet)
-    found: Floats32 = order[..., -nth]
-    return found
+def _two_strongest(
+    level_dbm: Floats32, layer: Ints, layers: Ints, quiet: np.float32
+) -> tuple[Floats32, Floats32]:
+    """Return the strongest and second strongest level of some layers, each (layers, rows, cols).
+
+    Without any it is the quiet one. ``layer`` is that of each cell.
+    """
+    found = np.full((2, layers.size, *level_dbm.shape[:2]), quiet)
+    for number, one in enumerate(layers):
+        order = np.sort(level_dbm[..., layer == one], axis=2)
+        for nth in range(min(order.shape[2], 2)):
+            found[nth, number] = order[..., -1 - nth]
+    return found[0], found[1]
 
 
 def _step(field: RadioField, cells: int) -> int:
