@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import ceil
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from mapfilter._types import Floats32
+from mapfilter._types import Floats32, Ints
 from mapfilter.database.field import RadioField
 from mapfilter.database.points import Points
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -188,18 +188,21 @@ def level_fields(
         chosen, step = needed, _step(field, len(needed))
     some = np.s_[step // 2 :: step, step // 2 :: step]
     west_m, _, _, north_m = field.lattice.bounds_m
-    plan, layers = database.plan, layers_of(database.plan, field.cell_ids)
+    plan = database.plan
+    layer = np.array(layers_of(plan, field.cell_ids), dtype=np.int64)
+    layers, layer_of = np.unique(layer[chosen], return_inverse=True)
+    best, second = _two_strongest(level[some], layer, layers, quiet)
     found = {
         "grid": frame.grid(
             west_m, north_m, step * field.lattice.resolution_m, level[some].shape[:2]
         ),
         "cells": [plan.index(field.cell_ids[i]) for i in chosen],
+        "layer": layer_of.tolist(),
         "level": _levels(np.moveaxis(field.level_dbm[some][..., chosen], 2, 0), quiet_dbm),
         "rough": packed(np.moveaxis(rough[some][..., chosen], 2, 0), "u1", scale=0.25),
         "quiet_dbm": quiet_dbm,
-        "layer": [layers[i] for i in chosen],
-        "best": _levels(_of_layers(level[some], layers, 1, quiet), quiet_dbm),
-        "second": _levels(_of_layers(level[some], layers, 2, quiet), quiet_dbm),
+        "best": _levels(best, quiet_dbm),
+        "second": _levels(second, quiet_dbm),
         "distance": packed(
             np.maximum(field.distance_to_way_m - field.half_width_m, 0)[some], "u1", none=255
         ),
@@ -208,18 +211,19 @@ def level_fields(
     return found, {field.cell_ids[i]: band for band, i in enumerate(chosen)}
 
 
-def _of_layers(level_dbm: Floats32, layers: Sequence[int], nth: int, quiet: np.float32) -> Floats32:
-    """Return the strongest, second strongest... level of each layer and pixel, (L, rows, cols).
+def _two_strongest(
+    level_dbm: Floats32, layer: Ints, layers: Ints, quiet: np.float32
+) -> tuple[Floats32, Floats32]:
+    """Return the strongest and second strongest level of some layers, each (layers, rows, cols).
 
-    The quiet one stands where a layer has no such cell.
+    Without any it is the quiet one. ``layer`` is that of each cell.
     """
-    count = max(layers, default=0) + 1
-    found = np.full((count, *level_dbm.shape[:2]), quiet)
-    for layer in range(count):
-        own = np.flatnonzero(np.array(layers) == layer)
-        if own.size >= nth:
-            found[layer] = np.sort(level_dbm[..., own], axis=2)[..., -nth]
-    return found
+    found = np.full((2, layers.size, *level_dbm.shape[:2]), quiet)
+    for number, one in enumerate(layers):
+        order = np.sort(level_dbm[..., layer == one], axis=2)
+        for nth in range(min(order.shape[2], 2)):
+            found[nth, number] = order[..., -1 - nth]
+    return found[0], found[1]
 
 
 def _step(field: RadioField, cells: int) -> int:

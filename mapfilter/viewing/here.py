@@ -55,16 +55,16 @@ class Place:
     ----------
     level_dbm, rough_db : (C,) arrays
         Predicted level of each band, and its local deviation.
-    best_dbm, second_dbm : float
-        Strongest and second strongest level of the serving cell's layer.
+    best_dbm, second_dbm : (C,) arrays
+        Strongest and second strongest level of the cells of each band's layer.
     distance_m : float
         To the edge of the nearest way.
     """
 
     level_dbm: Floats
     rough_db: Floats
-    best_dbm: float
-    second_dbm: float
+    best_dbm: Floats
+    second_dbm: Floats
     distance_m: float
 
 
@@ -122,8 +122,8 @@ def report_terms(
     rows = [("streets", -1, _streets(place.distance_m, why))]
     odds = np.full(len(site), float(why["fault_log_odds"]))
     if report.serving >= 0:
-        own = place.level_dbm[report.serving]
-        margin = own - (place.second_dbm if own >= place.best_dbm else place.best_dbm)
+        own, best_dbm = place.level_dbm[report.serving], place.best_dbm[report.serving]
+        margin = own - (place.second_dbm[report.serving] if own >= best_dbm else best_dbm)
         weight = why["serving_weight"] * (why["serving_with_levels"] if report.cells else 1.0)
         right = weight * float(log_ndtr((margin + why["hysteresis_db"]) / why["sd_db"]))
         other, before = -weight * why["fault_nats"], float(odds[report.serving])

@@ -1,24 +1,26 @@
 """Why is the belief here: contributions of readings, against the filter's own evidence."""
 
 import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite, nan
 
 import numpy as np
 import pytest
-from made_town import NAMES, SOUTH_M, WEST_M, Town, walk_log
+from made_town import CRS, NAMES, SOUTH_M, WEST_M, Town, walk_log
 from scipy.special import logsumexp
 
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Status
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
+from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import Hypotheses
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs
+from mapfilter.radio.cells import CellPlan
 from mapfilter.viewing import explain as module
 from mapfilter.viewing.explain import explain
 from mapfilter.viewing.here import Place, Report, constants, report_terms
@@ -26,12 +28,24 @@ from mapfilter.viewing.trace import Thinned, TraceRecorder, density
 
 TOWN = Town.of(1)
 EVERYWHERE_M = 1e9
+OPTIONS = BayesFilter(max_particles=2000, min_search_particles=1500, min_particles=500)
+
+
+@dataclass(frozen=True)
+class LteTown(Town):
+    """A town whose cells take turns on some carriers."""
+
+    carriers: int = 1
+
+    def plan(self):
+        cells = super().plan().cells
+        each = ((cell, 6300 + k % self.carriers) for k, cell in enumerate(cells))
+        return CellPlan(CRS, tuple(replace(c, technology="LTE", arfcn=n) for c, n in each))
 
 
 @pytest.fixture(scope="module")
 def town_filter():
-    options = BayesFilter(max_particles=2000, min_search_particles=1500, min_particles=500)
-    return options.over_area(TOWN.area())
+    return OPTIONS.over_area(TOWN.area())
 
 
 @pytest.fixture(scope="module")
@@ -212,11 +226,14 @@ def test_recording_changes_nothing_and_keeps_every_status(town_filter, walk):
     assert set(changes) <= set(recorder.frames.kept)
 
 
-def test_a_report_by_itself_is_as_the_model_has_it(town_filter, steps):
+@pytest.mark.parametrize("carriers", [1, 2, 6])
+def test_a_report_by_itself_is_as_the_model_has_it(walk, carriers):
     """The page's arithmetic against the model's kernels, for a report without any before it."""
-    model, area = town_filter.model, town_filter.area
-    rng, why = np.random.default_rng(8), constants(town_filter.model)
-    _, updates, _ = town_filter.evidence_at(steps[0][0], steps[0][1], np.random.default_rng(0))
+    filter_ = OPTIONS.over_area(replace(LteTown.of(1), carriers=carriers).area())
+    model, area = filter_.model, filter_.area
+    rng, why = np.random.default_rng(8), constants(model)
+    start, first = filter_.begin(), next(iter(epochs(walk)))
+    _, updates, _ = filter_.evidence_at(start, first, np.random.default_rng(0))
     reading = next(update.radio for update in updates if update.radio is not None)
     reading = replace(reading, levels=reading.levels.with_absent([]))
     # Pixels of even predictions, so that the share of roughness under a fault hardly matters.
@@ -233,8 +250,11 @@ def test_a_report_by_itself_is_as_the_model_has_it(town_filter, steps):
     mean = np.mean([_pixel(rough_db, at)[report.cells] ** 2 for at in place_m.T], axis=0)
     why["other_rough_db2"] = float(np.mean(mean))
     for at, expected in zip(place_m.T, weighed, strict=True):
-        levels = _pixel(area.level_dbm, at).astype(np.float64)
-        place = Place(levels[:-2], _pixel(rough_db, at)[:-2], levels[-2], levels[-1], 0.0)
+        levels = _pixel(area.level_dbm, at)[: len(NAMES)].astype(np.float64)
+        quiet_dbm = area.floor_dbm - BELOW_FLOOR_DB
+        of_layer = [np.sort([quiet_dbm, *levels[k % carriers :: carriers]]) for k in range(6)]
+        best_dbm, second_dbm = (np.array([one[-nth] for one in of_layer]) for nth in (1, 2))
+        place = Place(levels, _pixel(rough_db, at)[: len(NAMES)], best_dbm, second_dbm, 0.0)
         rows = report_terms(report, place, why, area.site_of.tolist())
         # The tables of the kernels have quarters of a dB.
         assert sum(nats for what, _, nats in rows if what != "streets") == pytest.approx(

@@ -37,6 +37,7 @@ WHY = {
 GRID = {"west": 0.0, "north": ROWS * STEP_M, "step": STEP_M, "rows": ROWS, "cols": COLS}
 DBM = {"scale": 0.5, "offset": -150.0, "none": 255}
 QUIET_DBM = -110.0
+QUIET = {"scale": 0.3, "offset": QUIET_DBM, "none": 255}
 
 
 def level_rasters():
@@ -49,6 +50,28 @@ def level_rasters():
     return np.round((level - QUIET_DBM) / 0.3) * 0.3 + QUIET_DBM
 
 
+def two_strongest(level, layer):
+    """Strongest and second strongest level of each layer, (layers, ROWS, COLS) each."""
+    filled = np.where(np.isnan(level), QUIET_DBM, level)
+    quiet = np.full((1, ROWS, COLS), QUIET_DBM)
+    own = [filled[[k for k in range(3) if layer[k] == one]] for one in range(max(layer) + 1)]
+    ordered = [np.sort(np.concatenate([quiet, cells]), axis=0) for cells in own]
+    return [np.stack([one[-nth] for one in ordered]) for nth in (1, 2)]
+
+
+def with_layers(bundle, layer):
+    """The bundle with cells of these layers; None for a page from before there were any."""
+    best, second = two_strongest(level_rasters(), layer or (0, 0, 0))
+    levels = dict(bundle["levels"])
+    if layer is None:
+        del levels["layer"]
+        best, second = best[0], second[0]
+    else:
+        levels["layer"] = list(layer)
+    strongest = {"best": packed(best, "u1", **QUIET), "second": packed(second, "u1", **QUIET)}
+    return bundle | {"levels": levels | strongest}
+
+
 def distances():
     return np.abs(np.arange(ROWS)[:, None] - 30) * STEP_M * np.ones((1, COLS))
 
@@ -57,7 +80,7 @@ def database_bundle(title="Made database"):
     level = level_rasters()
     filled = np.where(np.isnan(level), QUIET_DBM, level)
     ordered = np.sort(filled, axis=0)
-    quiet = {"scale": 0.3, "offset": QUIET_DBM, "none": 255}
+    best, second = two_strongest(level, (0, 0, 0))
     cells = [
         {
             "id": name,
@@ -114,12 +137,12 @@ def database_bundle(title="Made database"):
         "levels": {
             "grid": GRID,
             "cells": [0, 1, 2],
-            "level": packed(level, "u1", **quiet),
+            "layer": [0, 0, 0],
+            "level": packed(level, "u1", **QUIET),
             "rough": packed(np.full(level.shape, 2.0), "u1", scale=0.25),
             "quiet_dbm": QUIET_DBM,
-            "layer": [0, 0, 0],
-            "best": packed(ordered[-1], "u1", **quiet),
-            "second": packed(ordered[-2], "u1", **quiet),
+            "best": packed(best, "u1", **QUIET),
+            "second": packed(second, "u1", **QUIET),
             "distance": packed(distances(), "u1", none=255),
             "complete": True,
         },

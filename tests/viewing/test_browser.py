@@ -45,13 +45,13 @@ def page(browser, file, **options):
     watched.close()
 
 
-def place_at(level, east_m, north_m):
+def place_at(level, east_m, north_m, layer=(0, 0, 0)):
     """What the made map has at a place, by its own rasters."""
     row = floor((made.GRID["north"] - north_m) / made.STEP_M)
     col = floor(east_m / made.STEP_M)
     here = np.where(np.isnan(level[:, row, col]), made.QUIET_DBM, level[:, row, col])
-    ordered = np.sort(here)
-    return Place(here, np.full(3, 2.0), ordered[-1], ordered[-2], made.distances()[row, col])
+    best, second = (one[list(layer), row, col] for one in made.two_strongest(level, layer))
+    return Place(here, np.full(3, 2.0), best, second, made.distances()[row, col])
 
 
 def test_plays_pauses_steps_and_seeks(browser, replay):
@@ -106,17 +106,23 @@ def test_contributions_shown_add_up(browser, replay):
         assert "ARFCN 1: too near" in view.page.inner_text("#side")
 
 
-def test_why_not_there_is_what_the_model_says(browser, replay):
-    with page(browser, replay, at="#t=80&at=321,222") as view:
+@pytest.mark.parametrize("layer", [(0, 0, 0), (1, 0, 1), (1, 0, 0), None])
+def test_why_not_there_is_what_the_model_says(browser, tmp_path, layer):
+    """The serving cell among those of its layer; in pages from before, among all."""
+    write_page(made.with_layers(made.replay_bundle(), layer), tmp_path / "replay.html")
+    with page(browser, tmp_path / "replay.html", at="#t=80&at=321,222") as view:
         rows = [
             float(one.get_attribute("data-nats"))
             for one in view.page.query_selector_all(".why tbody tr")
         ]
         level = made.level_rasters()
         report = Report(0, [0, 1], [-61.5, -72.0])
+        places = (
+            place_at(level, *at, layer or (0, 0, 0)) for at in ((240.0, 153.0), (321.0, 222.0))
+        )
         here, there = (
-            [nats for *_, nats in report_terms(report, place_at(level, *at), made.WHY, [0, 1, 2])]
-            for at in ((240.0, 153.0), (321.0, 222.0))
+            [nats for *_, nats in report_terms(report, place, made.WHY, [0, 1, 2])]
+            for place in places
         )
         assert rows == pytest.approx(np.subtract(here, there).tolist(), abs=1e-6)
         shown = float(view.page.get_attribute(".why tfoot tr", "data-sum"))

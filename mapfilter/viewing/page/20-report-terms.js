@@ -46,7 +46,7 @@
     return Math.max(why.map_weight_per_m * why.map_m * Math.log(near), -why.off_cost_per_m * why.map_m);
   };
 
-  // What the map has at a place: levels and roughness of each band, the two strongest of its layer; null outside the map.
+  // What the map has at a place: of each band level, roughness, and the two strongest levels of its layer; null outside the map.
   MF.mapAt = (levels, east, north) => {
     const { grid } = levels;
     const col = Math.floor((east - grid.west) / grid.step);
@@ -54,11 +54,13 @@
     if (!(col >= 0 && row >= 0 && col < grid.cols && row < grid.rows)) return null;
     const at = row * grid.cols + col;
     const quiet = (value) => (Number.isFinite(value) ? value : levels.quiet_dbm);
+    // Pages of earlier versions have one layer.
+    const ofLayer = (values, band) => quiet(values.at((levels.layer?.[band] ?? 0) * levels.size + at));
     return {
       level: (band) => quiet(levels.level.at(band * levels.size + at)),
       rough: (band) => levels.rough.at(band * levels.size + at) || 0,
-      best: (band) => quiet(levels.best.at(levels.layer[band] * levels.size + at)),
-      second: (band) => quiet(levels.second.at(levels.layer[band] * levels.size + at)),
+      best: (band) => ofLayer(levels.best, band),
+      second: (band) => ofLayer(levels.second, band),
       distance: levels.distance.raw[at] === levels.distance.none ? 255 : levels.distance.at(at),
     };
   };
