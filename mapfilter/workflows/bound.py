@@ -21,6 +21,8 @@ from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, bound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.layers import layer_numbers
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.coverage import plot_point_values, plot_twins
 from mapfilter.report.saving import save
@@ -36,6 +38,10 @@ NOTES = (
     "cells_unclear, levels_unclear: share of the journeys on which not even an ideal filter "
     "converges; levels_wrong: of the others, the share in a wrong place; twins: share with a place "
     "that looks alike",
+)
+LAYERS_NOTE = (
+    "the network has several layers: the strongest of all cells serves here, and all are reported; "
+    "a phone on one carrier has fewer. Build a database of its cells alone for a bound of that"
 )
 _DECIMALS = 3
 _FILES = ("bound.tif", "bound.gpkg", "ways.parquet", "twins.parquet")
@@ -124,7 +130,7 @@ def run_bound(
     }
     drawn = [save(picture, out / name) for name, picture in pictures.items()]
     tables = [out / name for name in _FILES]
-    return _summary(found, began_s, (*tables, *drawn))
+    return _summary(found, database.plan, began_s, (*tables, *drawn))
 
 
 def _ways_as_points(ways: pd.DataFrame, found: MapBound) -> gpd.GeoDataFrame:
@@ -147,7 +153,9 @@ def _twins_as_lines(twins: pd.DataFrame, found: MapBound) -> gpd.GeoDataFrame:
     return gpd.GeoDataFrame(twins, geometry=lines, crs=found.radio.lattice.crs)
 
 
-def _summary(found: MapBound, began_s: float, outputs: tuple[Path, ...]) -> BoundResult:
+def _summary(
+    found: MapBound, plan: CellPlan, began_s: float, outputs: tuple[Path, ...]
+) -> BoundResult:
     fix, options, radio = found.fix, found.options, found.radio
     plane, along = found.position.plane_m, found.position.along_m
     clear = np.isfinite(fix.levels_m)
@@ -170,7 +178,7 @@ def _summary(found: MapBound, began_s: float, outputs: tuple[Path, ...]) -> Boun
         levels_wrong=_rounded((~fix.right[clear]).mean()) if clear.any() else float("nan"),
         twins=_rounded((fix.twin_error >= TWIN_ERROR).mean()),
         seconds=round(time.perf_counter() - began_s, 2),
-        notes=NOTES,
+        notes=(*NOTES, *([LAYERS_NOTE] if layer_numbers(plan.cells).any() else [])),
         outputs=outputs,
     )
 

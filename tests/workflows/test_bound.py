@@ -1,7 +1,8 @@
 """``mapfilter bound``: a small made city from its database to raster, tables and pictures."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import geopandas
 import numpy as np
@@ -12,7 +13,8 @@ from command_line import assert_done, assert_refused, mapfilter
 
 import mapfilter as mf
 from mapfilter.evaluation.map_bound import BANDS
-from mapfilter.workflows.bound import NOTES, BoundResult
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.workflows.bound import LAYERS_NOTE, NOTES, BoundResult, _summary
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -36,6 +38,33 @@ def database(tmp_path_factory):
     assert_done(mapfilter("predict", *given))
     assert_done(mapfilter("build", *given))
     return folder / "database"
+
+
+def test_several_layers_are_noted():
+    cell = Cell("A", "S", 0.0, 0.0, 30.0, None, 30.0, 900.0, "omni", technology="GSM")
+    other = replace(cell, id="B", technology="LTE", arfcn=1300)
+    found = SimpleNamespace(
+        fix=SimpleNamespace(
+            start=np.zeros(1), levels_m=np.ones(1), cells_m=np.ones(1), cells_bits=np.ones(1),
+            levels_bits=np.ones(1), right=np.ones(1, bool), twin_error=np.ones(1),
+        ),
+        options=SimpleNamespace(path_m=1.0, most_m=9.0),
+        radio=Radio(),
+        position=SimpleNamespace(plane_m=np.ones(1), along_m=np.ones(1)),
+        distinct=SimpleNamespace(cell_bits=np.ones(1), level_bits=np.ones(1)),
+    )  # fmt: skip
+    for cells, noted in (((cell,), False), ((cell, other), True)):
+        result = _summary(found, CellPlan("EPSG:32631", cells), 0.0, ())
+        assert (LAYERS_NOTE in result.notes) is noted
+
+
+class Radio:
+    """A map of one point."""
+
+    cell_ids, way_id = ("A",), np.ones(1)
+
+    def __len__(self):
+        return 1
 
 
 def test_a_database_is_bound(database, tmp_path):
