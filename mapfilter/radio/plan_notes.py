@@ -6,15 +6,15 @@ from collections import Counter
 
 from mapfilter._words import number_of
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.layers import layer_of
+from mapfilter.radio.layers import SHARED_CARRIER, layer_of
 from mapfilter.radio.reported_power import MOST_SUBCARRIER_DBM
 
 _SUBCARRIERS = ("LTE", "NR")
 """Technologies whose phones report the power of one subcarrier."""
 
 
-_SAME_BAND = 1.15
-"""Frequencies within this factor are of one band."""
+_SAME_BAND, _SOME = 1.15, 3
+"""Frequencies within this factor are of one band; with fewer cells each may have a carrier."""
 
 
 def layer_notes(plan: CellPlan) -> tuple[str, ...]:
@@ -26,6 +26,14 @@ def layer_notes(plan: CellPlan) -> tuple[str, ...]:
             f"{len(counts)} layers (carriers of UMTS, LTE and NR, networks of GSM): a serving cell "
             "is compared with cells of its own layer, also where those of others are stronger"
         )
+    for technology in sorted(SHARED_CARRIER):
+        cells = [cell for cell in plan.cells if cell.technology == technology]
+        if len(cells) >= _SOME and max(counts[layer_of(cell)] for cell in cells) == 1:
+            notes.append(
+                f"each of {len(cells)} cells of {technology} has a carrier (arfcn, or else "
+                "frequency_mhz) of its own, so a serving cell is compared with none: cells of one "
+                "carrier have the same number"
+            )
     unknown = sorted({cell.frequency_mhz for cell in plan.cells if cell.technology is None})
     if unknown and unknown[-1] > _SAME_BAND * unknown[0]:
         notes.append(

@@ -50,6 +50,12 @@ def test_several_layers_are_counted_and_unknown_technologies_of_several_bands_na
     wide = (*unknown, replace(unknown[0], id="w", frequency_mhz=1842.5))
     (note,) = layer_notes(CellPlan(CRS, wide))
     assert note.startswith("technology of 3 cells is unknown, at 900 to 1842.5 MHz")
+    alone = [replace(LTE, id=f"l{k}", arfcn=1300 + 50 * k) for k in range(3)]
+    (few,), (many, lonely) = (layer_notes(CellPlan(CRS, tuple(alone[:k]))) for k in (2, 3))
+    assert (few[:8], many[:8]) == ("2 layers", "3 layers")
+    assert lonely.startswith("each of 3 cells of LTE has a carrier")
+    pair = (*alone, replace(alone[0], id="twin"))
+    assert len(layer_notes(CellPlan(CRS, pair))) == 1
     first, second = layer_notes(CellPlan(CRS, (*wide, low)))
     assert (first.startswith("2 layers"), second) == (True, note)
     assert layer_notes(CellPlan(CRS, ())) == ()

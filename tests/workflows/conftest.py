@@ -123,7 +123,11 @@ def database(tmp_path_factory):
     folder = tmp_path_factory.mktemp("identified")
     head, *rows = PLAN.splitlines()
     lines = [f"{head},technology,mcc,mnc,lac,ci"]
-    lines += [f"{row},LTE,244,91,{','.join(map(str, IDENTITIES[row[0]]))}" for row in rows]
+    for number, row in enumerate(rows):
+        # One carrier, as cells of LTE share it.
+        place, _, _ = row.rsplit(",", 2)
+        identity = ",".join(map(str, IDENTITIES[row[0]]))
+        lines.append(f"{place},1300,{17 + number},LTE,244,91,{identity}")
     (folder / "cells.csv").write_text("\n".join(lines) + "\n")
     (folder / "world.toml").write_text(TOML)
     for command in ("predict", "build"):
