@@ -128,6 +128,13 @@ def test_the_first_serving_cell_with_points_serves():
         assert reading.timing_advance == 5.0
 
 
+def test_of_serving_cells_without_points_the_first_tells_why():
+    lacking = serving("E", -80.0), serving("X", -70.0)
+    _, _, reason, unused = read(*lacking)
+    assert reason is Reason.NO_POINTS_IN_CELL
+    assert unused == unknown_cells(lacking[1], why=Reason.SECOND_SERVING_CELL)
+
+
 def test_without_levels_only_the_serving_cell_counts():
     rows = (serving("A", -70.0), named("C", -80.0), named("D", -110.5, -1))
     _, reading, _, _ = read(*rows, options=replace(OPTIONS, use_levels=False))
@@ -238,11 +245,13 @@ def test_cells_of_layers_that_a_phone_does_not_measure_are_not_absent():
 
 def test_a_neighbour_of_an_unknown_code_is_of_the_layer_of_its_carrier():
     """A cell that no plan has tells of no layer, where there are several."""
-    (arfcn, _), unknown = CARRIERS["A"], 7
-    rows = serving("A", -70.0), carrier(arfcn, unknown, -88.0), carrier(arfcn, unknown - 1, -90.0)
-    layers = replace(AREA, layers=(0, 1, 0, 1))
+    arfcn, layers = CARRIERS["B"][0], replace(AREA, layers=(0, 1, 1, 1))
+    rows = serving("A", -70.0), carrier(arfcn, 7, -88.0), carrier(arfcn, 8, -90.0)
     _, reading, _, _ = read(*rows, area=layers)
-    assert absent(reading) == ([C], FLOOR_DBM)
+    assert absent(reading) == ([B, C, D], FLOOR_DBM)
+    both = [replace(row, cell="X") for row in rows[1:]]
+    _, reading, _, _ = read(rows[0], *both, area=layers)
+    assert absent(reading) == ([B, C, D], FLOOR_DBM)
     _, reading, _, _ = read(rows[0], named("X", -88.0), named("Y", -90.0), area=layers)
     assert absent(reading) == ([], set())
 

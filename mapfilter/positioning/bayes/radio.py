@@ -269,7 +269,7 @@ class RadioSource(EvidenceSource):
         if not layer_of.any():
             return {0}
         bands = self._bands_of(row)
-        if not bands and row.cell is None and row.arfcn is not None:
+        if not bands and row.arfcn is not None:
             bands = self.area.carriers.get((row.arfcn, -1), ())
         return {int(layer_of[band]) for band in bands}
 
