@@ -234,10 +234,10 @@ def test_cells_of_layers_that_a_phone_does_not_measure_are_not_absent():
     two = named("B", -80.25), named("B", -91.5)
     _, reading, _, _ = read(serving("A", -99.0), *two, area=three)
     assert absent(reading) == ([C, D], -91.5)
-    both = replace(AREA, layers=(0, 1, 0, 1), interfering=frozenset({A}))
+    both = replace(AREA, layers=(0, 1, 0, 1))
     _, reading, _, _ = read(*two, *rows[1:], area=both, options=replace(OPTIONS, full_list=6))
     assert absent(reading) == ([A, D], FLOOR_DBM)
-    both = replace(both, interfering=frozenset({C}))
+    both = replace(both, interfering=frozenset({A, C}))
     _, reading, _, _ = read(*two, *rows[1:], area=both, options=replace(OPTIONS, full_list=6))
     bands, limit_dbm = reading.levels.absent.tolist(), reading.levels.limit_dbm.tolist()
     assert (bands, limit_dbm) == ([A, D], [-96.0, FLOOR_DBM])
@@ -259,12 +259,21 @@ def test_a_neighbour_of_an_unknown_code_is_of_the_layer_of_its_carrier():
 def test_cells_on_one_carrier_may_be_drowned_by_those_of_the_report():
     """A phone finds them by what is left beside the stronger ones, and not down to the floor."""
     rows = serving("A", -70.0), named("B", -80.0), named("X", -84.5)
-    for bands, limit_dbm in (({A}, -84.5), ({B, D}, -84.5), ({C, D}, FLOOR_DBM), ((), FLOOR_DBM)):
+    for bands, limit_dbm in (({A, B, C, D}, -84.5), ((), FLOOR_DBM)):
         _, reading, _, _ = read(*rows, area=replace(AREA, interfering=frozenset(bands)))
         assert absent(reading) == ([C, D], limit_dbm)
     # One neighbour may still be all that a phone measures.
     _, reading, _, _ = read(*rows[:2], area=replace(AREA, interfering=frozenset({A})))
     assert reading.levels.absent.size == 0
+
+
+def test_cells_may_be_drowned_by_those_of_which_no_one_cell_is_known():
+    """Ambiguous codes, and codes that no cell of the plan has, are received all the same."""
+    both = replace(AREA, layers=(0, 1, 1, 1), interfering=frozenset({A, B, C, D}))
+    arfcn = CARRIERS["B"][0]
+    rows = carrier(arfcn, 7, -88.0), carrier(arfcn, 8, -90.0)
+    _, reading, _, _ = read(serving("A", -70.0), *rows, area=both)
+    assert absent(reading) == ([B, C, D], -90.0)
 
 
 def test_no_cell_of_a_report_is_absent_however_it_is_named():

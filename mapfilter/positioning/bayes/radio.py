@@ -7,7 +7,7 @@ distance, because errors of a predicted map last for tens of metres; those of le
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import exp, isfinite, nan, sqrt
 from typing import Annotated, ClassVar
@@ -231,7 +231,7 @@ class RadioSource(EvidenceSource):
         self, inside: dict[int, float], epoch: Epoch, particle_spacing_m: float
     ) -> LevelReport:
         """Return levels, and the cells that are absent though a report has room for them."""
-        absent, count = self._absent(inside, epoch), len(inside)
+        absent, count = self._absent(epoch), len(inside)
         return LevelReport(
             np.fromiter(inside, np.int32, count),
             np.fromiter(inside.values(), np.float32, count),
@@ -240,13 +240,12 @@ class RadioSource(EvidenceSource):
             self.options.offset_db(particle_spacing_m),
         )
 
-    def _absent(self, inside: Iterable[int], epoch: Epoch) -> dict[int, float]:
+    def _absent(self, epoch: Epoch) -> dict[int, float]:
         """Return cells that would be in a report if they were stronger, and than which level.
 
         They are of layers of which the phone measures neighbours.
         """
         area, present = self.area, self._present(epoch)
-        drowned = area.interfering.intersection(inside)
         full = sum(row.role != SERVING for row in epoch.radio) >= self.options.full_list
         rows: dict[int, list[ReportRow]] = {}
         for row in epoch.radio:
@@ -258,7 +257,7 @@ class RadioSource(EvidenceSource):
                 continue
             of_layer = np.flatnonzero(area.layer_of == layer).tolist()
             levels = [row.level_dbm for row in some if isfinite(row.level_dbm)]
-            listed = levels and (full or not drowned.isdisjoint(of_layer))
+            listed = levels and (full or not area.interfering.isdisjoint(of_layer))
             limit_dbm = min(levels) if listed else area.floor_dbm
             found.update(dict.fromkeys((b for b in of_layer if b not in present), limit_dbm))
         return dict(sorted(found.items()))
