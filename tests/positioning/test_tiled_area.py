@@ -653,6 +653,20 @@ def test_cells_are_read_only_where_they_may_be_strong(database, whole):
     assert np.array_equal(share, (flat[pixel][:, some] > -80.0).mean(axis=0))
 
 
+def test_layers_count_in_the_size_of_an_area(database, monkeypatch):
+    cells = tuple(
+        replace(cell, technology="LTE", arfcn=k) for k, cell in enumerate(database.plan.cells)
+    )
+    given = replace(database, plan=CellPlan(CRS, cells))
+    values = given.lattice.rows * given.lattice.cols * 3 * len(cells)
+    monkeypatch.setattr(opened_area, "WHOLE_VALUES", values)
+    found = open_area(given)
+    assert isinstance(found, AreaMap)
+    assert found.level_dbm.size == values
+    monkeypatch.setattr(opened_area, "WHOLE_VALUES", values - 1)
+    assert isinstance(open_area(given), TiledArea)
+
+
 def test_tiles_have_the_two_strongest_of_each_layer(database):
     """Of two carriers of LTE and GSM: all levels and all roughness are those of the whole."""
     kinds = ("LTE", 1300), ("LTE", 1300), ("LTE", 1300), ("GSM", 20), ("LTE", 3050), ("LTE", 3050)
