@@ -16,6 +16,7 @@ from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.far_cells import check_cells_near
+from mapfilter.radio.layers import layer_numbers
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
@@ -29,7 +30,7 @@ class BuildJob:
     """A build cut into tiles; no tile's points are laid before its turn.
 
     The plan is in the rasters' CRS; ``windows`` are the tiles on the rasters' lattice that may hold
-    points, along the Z-order curve.
+    points, along the Z-order curve; ``layers`` are the numbers of the cells' layers.
     """
 
     rasters: RxLevRasters
@@ -37,6 +38,7 @@ class BuildJob:
     routes: Routes
     floor_dbm: float
     windows: tuple[Window, ...]
+    layers: tuple[int, ...]
 
     @classmethod
     def of(
@@ -66,7 +68,8 @@ class BuildJob:
             raise fail(InputError, str(rasters.path), "points of the roads", "none", hint)
         plan = plan.to_crs(lattice.crs)
         check_cells_near(plan, lattice, "plan")
-        return cls(rasters, plan, source, floor_dbm, tuple(windows))
+        layers = tuple(layer_numbers(plan.cells).tolist())
+        return cls(rasters, plan, source, floor_dbm, tuple(windows), layers)
 
     def task(self, number: int) -> TileTask:
         """Return the task that makes a tile."""
@@ -78,7 +81,8 @@ class BuildJob:
             numbers = tuple(sorted(plan.index(cell_id) for cell_id in rasters.cell_ids))
             # A plan of no cells is none.
             plan = CellPlan(plan.crs, tuple(plan.cells[n] for n in numbers or (0,)))
-        return TileTask(rasters, plan, numbers, window, part, self.floor_dbm)
+        layers = tuple(self.layers[n] for n in numbers)
+        return TileTask(rasters, plan, numbers, layers, window, part, self.floor_dbm)
 
     def covered(self, window: Window) -> Lattice:
         """Return the part of a tile that the roads cover."""

@@ -16,7 +16,6 @@ from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.layers import layer_numbers
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.sampling import Places, levels_at
 from mapfilter.roads.lattice import RouteLattice
@@ -34,12 +33,14 @@ class TileTask:
     """Inputs of a tile, small enough to be sent to a worker.
 
     ``plan`` has the cells of the ``rasters`` that reach the tile (any cell where none does), whose
-    numbers in the whole plan are ``numbers``; ``window`` lies on the rasters' lattice.
+    numbers in the whole plan are ``numbers``, and whose layers in it are ``layers``; ``window``
+    lies on the rasters' lattice.
     """
 
     rasters: RxLevRasters
     plan: CellPlan
     numbers: tuple[int, ...]
+    layers: tuple[int, ...]
     window: Window
     part: RoutePart
     floor_dbm: float
@@ -168,8 +169,7 @@ def tiles_of(tasks: Sequence[TileTask]) -> Iterator[TileRows]:
     read = levels_at([places for _, places in laid])
     for task, (table, _) in zip(tasks, laid, strict=True):
         level = read.pop(0).astype(np.float64)
-        layer = layer_numbers(task.plan.cells) if task.numbers else None
-        levels = received_levels(level, task.floor_dbm, layer)
+        levels = received_levels(level, task.floor_dbm, np.array(task.layers, dtype=np.int64))
         yield TileRows(table, levels.of_cells(task.numbers))
 
 
@@ -216,9 +216,9 @@ def received_levels(level_dbm: Floats, floor_dbm: float, layer: Ints | None = No
     kept_dbm = strength[cell, which]
     leading_dbm = best_dbm[which]
     if layer is not None and layer.any():
-        for one in np.unique(layer).tolist():
-            of_layer = layer[cell] == one
-            leading_dbm[of_layer] = strength[layer == one].max(axis=0)[which[of_layer]]
+        numbers, own = np.unique(layer, return_inverse=True)
+        of_layers = [strength[own == number].max(axis=0) for number in range(numbers.size)]
+        leading_dbm = np.stack(of_layers)[own[cell], which]
     return TileLevels(
         np.where(received, best, -1).astype(np.int32),
         strongest_dbm.astype(np.float32),

@@ -7,7 +7,8 @@ where one at 800 MHz is 20 dB stronger; and of other carriers it measures few ne
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Sequence
 
 import numpy as np
 
@@ -17,24 +18,17 @@ from mapfilter.radio.cells import Cell, CellPlan
 SHARED_CARRIER = frozenset({"UMTS", "LTE", "NR"})
 """Technologies in which cells send on one carrier, of which a network has several."""
 
-
-def layer_of(cell: Cell) -> Hashable:
-    """Return what the cells of a layer have in common.
-
-    In UMTS, LTE and NR that is the carrier: its number, or where that is unknown the frequency and
-    the operator. In GSM, where each cell has a carrier of its own, it is the operator. Cells of
-    unknown technology are one layer.
-    """
-    technology = cell.technology
-    if technology in SHARED_CARRIER and cell.arfcn is not None:
-        return technology, cell.arfcn
-    if technology in SHARED_CARRIER:
-        return technology, cell.mcc, cell.mnc, cell.frequency_mhz
-    return technology if technology is None else (technology, cell.mcc, cell.mnc)
+_Network = tuple[int | None, int | None]
 
 
-def layer_numbers(cells: Iterable[Cell]) -> Ints:
+def layer_numbers(cells: Sequence[Cell]) -> Ints:
     """Return the number of each cell's layer, shape (C,), from 0 in the order of their first cells.
+
+    In UMTS, LTE and NR a layer is a carrier: its number, or where that is unknown the frequency and
+    the network. In GSM, where each cell has a carrier of its own, it is a network (MCC and MNC).
+    Cells of unknown technology are one layer. A cell without a network is of the only one of its
+    technology, and one without a carrier of the only one of its network at its frequency, if there
+    is one; so all cells of a plan belong together here.
 
     Examples
     --------
@@ -46,16 +40,48 @@ def layer_numbers(cells: Iterable[Cell]) -> Ints:
     >>> layer_numbers([low, high, low]).tolist()
     [0, 1, 0]
     """
+    networks: dict[Hashable, set[_Network]] = defaultdict(set)
+    for cell in cells:
+        if cell.mcc is not None and cell.mnc is not None:
+            networks[cell.technology].add((cell.mcc, cell.mnc))
+    bands = [
+        (cell.technology, *_network(cell, networks[cell.technology]), cell.frequency_mhz)
+        for cell in cells
+    ]
+    carriers: dict[Hashable, set[int]] = defaultdict(set)
+    for cell, band in zip(cells, bands, strict=True):
+        if cell.arfcn is not None:
+            carriers[band].add(cell.arfcn)
     numbers: dict[Hashable, int] = {}
-    return np.array([numbers.setdefault(layer_of(cell), len(numbers)) for cell in cells], np.int64)
+    keys = (_key(cell.arfcn, band, carriers[band]) for cell, band in zip(cells, bands, strict=True))
+    return np.array([numbers.setdefault(key, len(numbers)) for key in keys], dtype=np.int64)
+
+
+def _network(cell: Cell, known: set[_Network]) -> _Network:
+    """Return a cell's network, or else the only one that is known."""
+    stated = cell.mcc is not None and cell.mnc is not None
+    return next(iter(known)) if not stated and len(known) == 1 else (cell.mcc, cell.mnc)
+
+
+def _key(
+    arfcn: int | None, band: tuple[str | None, int | None, int | None, float], known: set[int]
+) -> tuple[Hashable, ...]:
+    """Return what the cells of a layer have in common; ``known`` are the carriers in its band."""
+    technology, mcc, mnc, _ = band
+    if technology is None:
+        return (None,)
+    if technology not in SHARED_CARRIER:
+        return technology, mcc, mnc
+    if arfcn is None and len(known) == 1:
+        (arfcn,) = known
+    return band if arfcn is None else (technology, arfcn)
 
 
 def layers_of(plan: CellPlan, cell_ids: Iterable[str]) -> tuple[int, ...]:
-    """Return the number of the layer of each of some cells of a plan.
+    """Return the number of the layer of each of some cells of a plan, from 0 as they come.
 
     Cells that the plan lacks are of a layer together.
     """
-    known = {cell.id: cell for cell in plan.cells}
-    numbers: dict[Hashable, int] = {}
-    keys = (layer_of(known[name]) if name in known else "unknown" for name in cell_ids)
-    return tuple(numbers.setdefault(key, len(numbers)) for key in keys)
+    layer_of = dict(zip(plan.ids, layer_numbers(plan.cells).tolist(), strict=True))
+    numbers: dict[int, int] = {}
+    return tuple(numbers.setdefault(layer_of.get(name, -1), len(numbers)) for name in cell_ids)

@@ -6,7 +6,7 @@ from collections import Counter
 
 from mapfilter._words import number_of
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.layers import SHARED_CARRIER, layer_of
+from mapfilter.radio.layers import SHARED_CARRIER, layer_numbers
 from mapfilter.radio.reported_power import MOST_SUBCARRIER_DBM
 
 _SUBCARRIERS = ("LTE", "NR")
@@ -20,7 +20,8 @@ _SAME_BAND, _SOME = 1.15, 3
 def layer_notes(plan: CellPlan) -> tuple[str, ...]:
     """Return notes on the layers of a network; none where all cells are of one, in one band."""
     notes: list[str] = []
-    counts = Counter(map(layer_of, plan.cells))
+    layers = layer_numbers(plan.cells).tolist()
+    counts, own = Counter(layers), dict(zip(plan.ids, layers, strict=True))
     if len(counts) > 1:
         notes.append(
             f"{len(counts)} layers (carriers of UMTS, LTE and NR, networks of GSM): a serving cell "
@@ -28,16 +29,16 @@ def layer_notes(plan: CellPlan) -> tuple[str, ...]:
         )
     for technology in sorted(SHARED_CARRIER):
         cells = [cell for cell in plan.cells if cell.technology == technology]
-        if len(cells) >= _SOME and max(counts[layer_of(cell)] for cell in cells) == 1:
+        if len(cells) >= _SOME and max(counts[own[cell.id]] for cell in cells) == 1:
             notes.append(
                 f"each of {len(cells)} cells of {technology} has a carrier (arfcn, or else "
                 "frequency_mhz) of its own, so a serving cell is compared with none: cells of one "
                 "carrier have the same number"
             )
-    unknown = sorted({cell.frequency_mhz for cell in plan.cells if cell.technology is None})
+    unknown = sorted(cell.frequency_mhz for cell in plan.cells if cell.technology is None)
     if unknown and unknown[-1] > _SAME_BAND * unknown[0]:
         notes.append(
-            f"technology of {number_of(counts[None], 'cell')} is unknown, at {unknown[0]:g} to "
+            f"technology of {number_of(len(unknown), 'cell')} is unknown, at {unknown[0]:g} to "
             f"{unknown[-1]:g} MHz: the strongest of them is expected to serve. Where bands have "
             "priorities, as in LTE, state technology (and earfcn)"
         )

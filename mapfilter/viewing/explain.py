@@ -37,7 +37,6 @@ TERMS = (
 """Kinds of contributions."""
 
 _OF_SOURCE = {"timing": "timing", "first fix": "fix", "gnss": "gnss", "map": "map"}
-_NONE = np.empty(0, dtype=np.int32)
 
 
 class Contribution(NamedTuple):

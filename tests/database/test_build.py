@@ -24,6 +24,7 @@ from small_world import (
 from mapfilter._parallel import SerialExecutor, local_executor
 from mapfilter.database import parts
 from mapfilter.database.build import build
+from mapfilter.database.build_job import BuildJob
 from mapfilter.database.estimate import dry_run
 from mapfilter.database.merge import merge
 from mapfilter.database.store import info
@@ -112,6 +113,18 @@ def test_points_of_a_cell_are_near_the_best_server_of_its_layer(world, tmp_path)
             row, col, _ = database.cell_points(cell, 3.0)
             np.testing.assert_array_equal(row, world.routes.row[expected])
             np.testing.assert_array_equal(col, world.routes.col[expected])
+
+
+def test_a_build_has_the_layers_of_its_whole_plan(world):
+    """A cell that lacks its carrier is of the only one at its frequency."""
+    frequency = {"frequency_mhz": 806.0, "technology": "LTE"}
+    carriers = zip(world.plan.cells, (None, 6300, 6300), strict=True)
+    cells = tuple(replace(cell, arfcn=arfcn, **frequency) for cell, arfcn in carriers)
+    job = BuildJob.of(world.rasters, CellPlan(CRS, cells), world.routes, FLOOR_DBM, 16)
+    assert job.layers == (0, 0, 0)
+    other = (*cells[:2], replace(cells[2], arfcn=6350))
+    job = BuildJob.of(world.rasters, CellPlan(CRS, other), world.routes, FLOOR_DBM, 16)
+    assert job.layers == (0, 1, 2)
 
 
 def test_every_point_belongs_to_its_best_server_and_to_no_other_at_margin_0(database):

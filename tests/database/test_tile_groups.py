@@ -29,7 +29,8 @@ def tasks_of(folder, windows, tile_px=TILE_PX):
         cells.append(Cell(cell, "S", *place, 30.0, None, 50.0, 1800.0, antenna="omni"))
     routes = SimpleNamespace(lattice=WHOLE, part=lambda _: None)
     plan, windows = CellPlan(WHOLE.crs, tuple(cells)), tuple(tile_windows(WHOLE, tile_px))
-    job = BuildJob(open_rasters(folder), plan, routes, -110.0, windows)
+    layers = tuple(10 * number for number in range(len(cells)))
+    job = BuildJob(open_rasters(folder), plan, routes, -110.0, windows, layers)
     return [job.task(number) for number in range(len(windows))]
 
 
@@ -49,6 +50,10 @@ def test_cells_elsewhere_do_not_make_groups_smaller(tmp_path):
     apart = tasks_of(tmp_path / "apart", QUARTERS)
     inside = [task for task in apart if not {24, 32} & set(task.window[:2])]
     assert {task.pixels for task in inside} == {TILE_PX**2}
+    # The layers of its cells are those of the whole plan.
+    assert {(task.numbers, task.layers) for task in inside} == {
+        ((number,), (10 * number,)) for number in range(4)
+    }
 
 
 def test_a_town_gets_groups_of_its_own(tmp_path):

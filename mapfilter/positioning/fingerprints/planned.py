@@ -20,7 +20,7 @@ from mapfilter.geodesy import azimuth_from_heading_deg, grid_convergence_rad, un
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.identities import TIMING_STEP_M
-from mapfilter.radio.layers import layer_numbers
+from mapfilter.radio.layers import layers_of
 
 OWN_DB: Mapping[str, float] = {"eirp_dbm": 4.0, "height_m": 4.0, "azimuth_deg": 9.0}
 """Deviation of a cell's level by each of its fields that is assumed; 9 dB is that of a sector's
@@ -62,7 +62,7 @@ class Planned:
         return cls(
             np.array([(cell.east_m, cell.north_m) for cell in cells]).reshape(-1, 2),
             np.array([TIMING_STEP_M.get(cell.technology or "", np.nan) for cell in cells]),
-            layer_numbers(cells),
+            np.array(layers_of(plan, cell_ids), dtype=np.int64),
             float(np.mean(common)) if common else 0.0,
         )
 
