@@ -82,6 +82,7 @@ def layers_of(plan: CellPlan, cell_ids: Iterable[str]) -> tuple[int, ...]:
 
     Cells that the plan lacks are of a layer together.
     """
-    layer_of = dict(zip(plan.ids, layer_numbers(plan.cells).tolist(), strict=True))
+    layers = layer_numbers(plan.cells).tolist()
+    layer_of = {cell.id: layer for cell, layer in zip(plan.cells, layers, strict=True)}
     numbers: dict[int, int] = {}
     return tuple(numbers.setdefault(layer_of.get(name, -1), len(numbers)) for name in cell_ids)

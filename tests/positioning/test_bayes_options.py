@@ -14,6 +14,7 @@ from mapfilter.positioning.bayes import opened_area
 from mapfilter.positioning.bayes import options as tested
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.radio.cells import CellPlan
 
 TOTAL_DB = 75.89**0.5
 """Of a slow, a fast and a white error of 7, 4 and 3.3 dB: 49 + 16 + 10.89."""
@@ -192,16 +193,16 @@ def test_a_grid_is_on_the_device_that_is_asked_for():
     ],
 )
 def test_which_areas_are_held_by_tiles(monkeypatch, rows, cells, whole, tiled):
-    lattice = SimpleNamespace(rows=rows, cols=1000)
+    lattice, plan = SimpleNamespace(rows=rows, cols=1000), CellPlan("EPSG:32632", ())
     database = SimpleNamespace(
-        lattice=lattice, field=lambda: "field", plan="plan", floor_dbm=FLOOR_DBM
+        lattice=lattice, field=lambda: "field", plan=plan, floor_dbm=FLOOR_DBM
     )
     monkeypatch.setattr(opened_area, "received_cells", lambda _: ("A", "B", "C")[:cells])
     by_tiles = SimpleNamespace(of_database=lambda one: ("tiles", one))
     monkeypatch.setattr(opened_area, "TiledArea", by_tiles)
     held = SimpleNamespace(of_field=lambda *given: given)
     monkeypatch.setattr(opened_area, "AreaMap", held)
-    expected = ("tiles", database) if tiled else ("field", "plan", FLOOR_DBM)
+    expected = ("tiles", database) if tiled else ("field", plan, FLOOR_DBM)
     assert opened_area.open_area(database, whole=whole) == expected
     if not whole:
         assert opened_area.open_area(database) == expected
@@ -211,7 +212,7 @@ def test_which_areas_are_held_by_tiles(monkeypatch, rows, cells, whole, tiled):
     monkeypatch.setattr(tested.BayesFilter, "over_area", lambda _, area: opened.append(area))
     for one in (BayesFilter(), GridFilter()):
         one.over(given)
-    assert opened[1] == ("field", "plan", FLOOR_DBM)
+    assert opened[1] == ("field", plan, FLOOR_DBM)
     if not whole:
         assert (opened[0][0] == "tiles") is tiled
 
