@@ -24,6 +24,7 @@ from mapfilter.serving.documents import (
 )
 from mapfilter.serving.places import in_metres
 from mapfilter.tracks.identify import PlanNames, ReportedCell
+from mapfilter.tracks.neighbour_codes import CodedRow, neighbours_by_code
 from mapfilter.tracks.schema import (
     LEAST_PLACE_M,
     MISSING_SIGNS,
@@ -49,6 +50,7 @@ _PACED_ROWS, _SELDOM_S, _SOMEWHERE_M, _SLOW_MPS = 5, 50.0, 25.0, 0.04
 the speed: what gets somewhere is faster."""
 _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
+_CODED = ("role", "cell", "technology", "ci", "arfcn", "bsic")
 _COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
 
 
@@ -130,7 +132,7 @@ def check_pace(pace: Pace, travelled_m: float) -> None:
 def _rows(
     table: str, given: object, where: str, names: PlanNames, faults: Faults, technology: str
 ) -> list[tuple[Any, ...]]:
-    found: dict[tuple[Any, ...], None] = {}
+    found: list[dict[str, Any]] = []
     for index, row in enumerate(rows_of(given, where, faults, _MOST_ROWS)):
         place = f"{where}[{index}]"
         before = len(faults.found)
@@ -153,9 +155,15 @@ def _rows(
             values["cell"] = names.name(_reported(values))
         if table == "motion" and isfinite(values["heading_rad"]):
             values["heading_rad"] = float(wrap_rad(values["heading_rad"]))
-        # Rows that repeat another one exactly count once, as in a log.
-        found[tuple(values[name] for name in epoch_columns(table))] = None
-    return list(found)
+        found.append(values)
+    if table == "radio":
+        rows = [CodedRow(0.0, *(values[name] for name in _CODED)) for values in found]
+        told = neighbours_by_code(rows, names.plan)
+        for values, (carrier, cell) in zip(found, told, strict=True):
+            values.update(arfcn=carrier, cell=cell)
+    # Rows that repeat another one exactly count once, as in a log.
+    columns = epoch_columns(table)
+    return list(dict.fromkeys(tuple(values[name] for name in columns) for values in found))
 
 
 def _value(column: Column, value: object, where: str, faults: Faults) -> Any:

@@ -14,9 +14,15 @@ from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.identities import IDENTITY, UNIQUE_IN_NETWORK, parse_cgi
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.neighbour_codes import (
+    CodedRow,
+    has_codes_without_carrier,
+    neighbours_by_code,
+)
 from mapfilter.tracks.schema import SERVING
 
 _KEYS = ("technology", *IDENTITY, "arfcn", "bsic")
+_CODED = ("role", "cell", "technology", "ci", "arfcn", "bsic")
 _SHORT_CI = 1 << 16
 
 
@@ -43,7 +49,9 @@ def name_by_plan(log: TrackLog, plan: CellPlan) -> TrackLog:
     not state are not compared, and a single cell must fit; the tracking area does not count in LTE
     and NR, and the RNC is dropped in UMTS where the plan has 16-bit identities. A serving cell
     without any identity is looked up by carrier and code. Neighbours without an identity are left
-    to the filter, unless the plan has their carrier and code in several technologies.
+    to the filter, unless the plan has their carrier and code in several technologies; in UMTS, LTE
+    and NR they get a carrier, or a cell, where their code tells it
+    (:mod:`mapfilter.tracks.neighbour_codes`).
 
     Returns
     -------
@@ -67,11 +75,36 @@ def name_by_plan(log: TrackLog, plan: CellPlan) -> TrackLog:
         reported = ReportedCell(*map(_plain, values))
         named.append(table.name(reported))
         found.add(reported, named[-1], plan, count)
-    if not any(found.named.values()) and not found.hidden:
+    if any(found.named.values()) or found.hidden:
+        # Without the dtype pandas 3 makes these strings, and None becomes NaN.
+        new = pd.Series([named[i] for i in numbers], index=radio.index, dtype=object)
+        log = replace(log, radio=radio.assign(cell=new), notes=(*log.notes, *found.notes()))
+    return _by_codes(log, plan)
+
+
+def _by_codes(log: TrackLog, plan: CellPlan) -> TrackLog:
+    """Return a log whose neighbours of a code have the carriers and cells that it tells."""
+    radio = log.radio
+    bare = radio["arfcn"].isna() & radio["bsic"].notna() & (radio["role"] != SERVING)
+    if not bare.any() and not has_codes_without_carrier(plan):
         return log
-    # Without the dtype pandas 3 makes these strings, and None becomes NaN.
-    new = pd.Series([named[i] for i in numbers], index=radio.index, dtype=object)
-    return replace(log, radio=radio.assign(cell=new), notes=(*log.notes, *found.notes()))
+    columns = [_values(radio, name) for name in _CODED]
+    rows = [CodedRow(*values) for values in zip(radio["time_s"], *columns, strict=True)]
+    found = neighbours_by_code(rows, plan)
+    changes = list(zip(rows, found, strict=True))
+    carried = sum(row.arfcn is None and carrier is not None for row, (carrier, _) in changes)
+    named = sum(row.cell is None and cell is not None for row, (_, cell) in changes)
+    notes: list[str] = []
+    if carried:
+        radio = radio.assign(arfcn=pd.array([carrier for carrier, _ in found], dtype="Int64"))
+        taken = number_of(carried, "neighbour has", "neighbours have")
+        notes.append(f"radio: {taken} no carrier, taken to be on the serving cell's")
+    if named:
+        cells = pd.Series([cell for _, cell in found], index=radio.index, dtype=object)
+        radio = radio.assign(cell=cells)
+        taken = number_of(named, "neighbour")
+        notes.append(f"radio: {taken} named by code alone, as the plan lacks carriers")
+    return replace(log, radio=radio, notes=(*log.notes, *notes)) if notes else log
 
 
 def _values(table: pd.DataFrame, name: str) -> list[Any]:

@@ -161,6 +161,18 @@ def test_faults_of_such_positions_are_named(cross, changes, where):
     assert [fault.where for fault in caught.value.faults] == [where]
 
 
+def test_neighbours_without_a_carrier_have_that_of_the_serving_cell(cross):
+    """As in a log."""
+    cell = replace(cross.plan.cells[0], technology="LTE", arfcn=6300, bsic=7)
+    names = PlanNames(CellPlan(cross.plan.crs, (cell,)))
+    rows = [
+        {"role": "serving", "cell": cell.id, "level_dbm": -80},
+        {"role": "neighbour", "bsic": 8, "level_dbm": -90},
+    ]
+    radio = read_epochs(epoch(radio=rows), names, nan)[0].radio
+    assert {row.role: row.arfcn for row in radio} == {"serving": None, "neighbour": 6300}
+
+
 def test_all_faults_of_a_request_are_named_together(cross):
     body = epoch(
         motion=[{"step_m": "1"}], radio=[{"role": "x"}, SERVING, {"role": "neighbour", "cell": ""}]

@@ -1,5 +1,7 @@
 """Cells of a log get the ids of a plan: by identity, by carrier and code, by technology."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -161,3 +163,106 @@ def test_lost_cells_are_named_by_how_often_they_occur():
     (note,) = [note for note in name_by_plan(log, PLAN).notes if "lacks" in note]
     named_cells = ", ".join(f"244-91-1-{i}" for i in range(19, 11, -1))
     assert note == f"radio: 210 rows of 20 cells that the plan lacks ({named_cells} and 12 more)"
+
+
+def _carriers(*rows):
+    """Return the carriers of the rows of one report, and the log's notes."""
+    table = pd.DataFrame(
+        [{"time_s": 0.5, "role": "neighbour", "level_dbm": -90.0, **r} for r in rows]
+    )
+    log = name_by_plan(make_log(CRS, radio=table), PLAN)
+    found = dict(zip(log.radio["level_dbm"], log.radio["arfcn"], strict=True))
+    return [None if pd.isna(found[r["level_dbm"]]) else found[r["level_dbm"]] for r in rows], log
+
+
+LTE = {"role": "serving", "cell": "lte", "level_dbm": -80.0}
+NR = {"role": "serving", "cell": "nr", "level_dbm": -81.0}
+BARE = {"bsic": 9, "level_dbm": -91.0}
+
+
+@pytest.mark.parametrize(
+    ("rows", "carrier"),
+    [
+        # The plan states the serving cell's carrier, or the report does.
+        ([LTE, BARE], 100),
+        ([{**LTE, "cell": "1-2-3-4", "technology": "LTE", "arfcn": 0}, BARE], 0),
+        ([{**LTE, "cell": "1-2-3-4", "technology": "LTE"}, BARE], None),
+        ([LTE, {**BARE, "technology": "LTE"}], 100),
+        ([LTE, {**BARE, "technology": "NR"}], None),
+        ([LTE, NR, BARE], None),
+        ([LTE, NR, {**BARE, "technology": "NR"}], 640_000),
+        ([{**LTE, "arfcn": 300}, {**LTE, "level_dbm": -82.0}, BARE], None),
+        # In GSM neighbours are on carriers of their own; a row with an identity needs none.
+        ([{**LTE, "cell": "gsm"}, BARE], None),
+        ([LTE, {**BARE, "ci": 4}], None),
+        ([LTE, {**BARE, "arfcn": 7}], 7),
+        ([{**LTE, "role": "neighbour"}, BARE], None),
+    ],
+)
+def test_a_code_without_a_carrier_is_of_the_serving_cells(rows, carrier):
+    carriers, log = _carriers(*rows)
+    assert carriers[-1] == carrier
+    assert name_by_plan(log, PLAN) is log
+    taken = "radio: 1 neighbour has no carrier, taken to be on the serving cell's"
+    assert (taken in log.notes) == (carrier is not None and "arfcn" not in rows[-1])
+
+
+def test_carriers_are_those_of_the_same_report():
+    rows = [
+        {"time_s": 1.0, "role": "serving", "cell": "lte"},
+        {"time_s": 1.5, "role": "neighbour", "bsic": 9},
+        {"time_s": 2.0, "role": "serving", "cell": "umts"},
+        {"time_s": 2.0, "role": "neighbour", "bsic": 9},
+    ]
+    log = name_by_plan(make_log(CRS, radio=pd.DataFrame(rows)), PLAN)
+    assert log.radio["arfcn"].isna().tolist() == [True, True, True, False]
+    assert log.radio["arfcn"].iloc[3] == 10737
+
+
+UNCARRIED = CellPlan(
+    CRS,
+    tuple(
+        replace(cell(name, technology=family, bsic=bsic, arfcn=arfcn), east_m=385_000.0 + away_m)
+        for name, family, bsic, arfcn, away_m in [
+            ("here", "LTE", 1, None, 0.0),
+            ("near", "LTE", 2, None, 1_000.0),
+            ("far", "LTE", 2, None, 2_100.0),
+            ("one", "LTE", 3, None, -1_000.0),
+            ("other", "LTE", 3, None, 1_900.0),
+            ("away", "LTE", 4, None, 36_000.0),
+            ("gsm", "GSM", 5, None, 100.0),
+            ("stated", "LTE", 6, 700, 100.0),
+            ("bare", "LTE", 6, None, 200.0),
+            ("5g", "NR", 2, None, 100.0),
+        ]
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("bsic", "arfcn", "technology", "expected"),
+    [
+        (2, None, None, "near"),
+        (2, 6300, None, "near"),
+        (2, 6300, "NR", None),
+        (3, 6300, None, None),
+        (4, 6300, None, None),
+        (5, 6300, None, None),
+        (1, 6300, None, None),
+        # A cell whose carrier the plan states is preferred, and left to the filter.
+        (6, 700, None, None),
+        (6, 701, None, "bare"),
+    ],
+)
+def test_a_plan_without_carriers_tells_neighbours_by_code_and_distance(
+    bsic, arfcn, technology, expected
+):
+    rows = [
+        {"time_s": 0.0, "role": "serving", "cell": "here"},
+        {"role": "neighbour", "bsic": bsic, "arfcn": arfcn, "technology": technology},
+    ]
+    table = pd.DataFrame([{"time_s": 0.0, "level_dbm": -90.0, **row} for row in rows])
+    log = name_by_plan(make_log(CRS, radio=table), UNCARRIED)
+    assert [None if pd.isna(one) else one for one in log.radio["cell"]] == ["here", expected]
+    taken = "radio: 1 neighbour named by code alone, as the plan lacks carriers"
+    assert (taken in log.notes) == (expected is not None)
