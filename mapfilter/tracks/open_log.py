@@ -16,6 +16,7 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import scaled_log
 from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.pdr.options import without_effect
+from mapfilter.tracks.readers.zipped import zip_of
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.tracks.store import HEAD, files_in, is_log, list_logs, read_log
@@ -51,7 +52,7 @@ def open_log(
     Parameters
     ----------
     paths : path, or sequence of paths
-        A track log; or recordings, or a folder of them, of one journey.
+        A track log; or recordings, or a folder or ZIP of them, of one journey.
     crs : str
         Projected CRS for recordings: that of the database. "" for the UTM zone of their positions.
         A track log keeps its own.
@@ -120,7 +121,7 @@ def list_journeys(path: str | Path) -> list[Path]:
 
 def _is_own(path: Path) -> bool:
     """Return whether a path is a track log, or is refused best by its reader."""
-    if path.is_file():
+    if path.is_file() or zip_of(path) is not None:
         return _is_part(path)
     return is_log(path) or not path.is_dir() or any(_is_table(inner) for inner in files_in(path))
 

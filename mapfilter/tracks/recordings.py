@@ -12,13 +12,14 @@ from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.readers.times import parse_zone
+from mapfilter.tracks.readers.zipped import check_zipped, files_in_zip, is_zip
 from mapfilter.tracks.store import files_in, is_log
 
 
 def read_recordings(
     paths: Sequence[Path], options: OpenOptions
 ) -> tuple[list[Recording], tuple[str, ...]]:
-    """Read recordings, and those in folders; notes name files of folders that are none.
+    """Read recordings, and those in folders and ZIPs; notes name files of these that are none.
 
     Raises
     ------
@@ -68,20 +69,25 @@ def with_measured(options: CombineOptions, paths: Sequence[Path]) -> CombineOpti
 
 
 def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
-    """Return files, and of folders the recordings in them; notes name the other files."""
+    """Return files, and of folders and ZIPs the recordings in them; notes name other files."""
     found: list[Path] = []
     notes = []
     for path in paths:
-        if not path.is_dir():
+        is_folder = path.is_dir()
+        if not (is_folder or is_zip(path)):
             found.append(path)
             continue
-        if is_log(path):
+        if is_folder and is_log(path):
             got, hint = "a track log", "name it alone; recordings cannot be added to it"
             raise fail(InputError, str(path), "recordings of other programs", got, hint)
-        inner = files_in(path)
+        inner = files_in(path) if is_folder else files_in_zip(path)
         known = [p for p in inner if format_of(p) is not None]
+        if not is_folder:
+            for other in (p for p in inner if p not in known):
+                check_zipped(other, path)
         if not known:
-            raise fail(InputError, str(path), "recordings in the folder", "none in a known format")
+            expected = f"recordings in the {'folder' if is_folder else 'ZIP'}"
+            raise fail(InputError, str(path), expected, "none in a known format")
         others = [p.name for p in inner if p not in known]
         if others:
             notes.append(f"{path.name}: {', '.join(others)[:200]} left out, no recordings")

@@ -71,7 +71,8 @@ def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = 
     Parameters
     ----------
     files : sequence of Path
-        Recordings, as many as there are: cells from one, sensors from another; or folders of them.
+        Recordings, as many as there are: cells from one, sensors from another; or folders
+        or ZIPs of them.
     out : Path
         The log's folder; must be absent, empty or a log that mapfilter wrote.
 

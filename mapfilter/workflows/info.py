@@ -6,6 +6,7 @@ imports take longer than the description.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -63,11 +64,8 @@ def run_info(path: Path) -> dict[str, Any]:
         return {"kind": "logs", "logs": len(logs), "first": logs[0].name, "last": logs[-1].name}
     if (found := result_info(path)) is not None:
         return found
-    recordings = _recordings_in(path)
-    if recordings:
-        counts = {name: recordings.count(name) for name in sorted(set(recordings))}
-        held = {"kind": "recordings", "files": len(recordings), "formats": counts}
-        return {**held, "use": _USE_OF_FOLDERS}
+    if found := _recordings_info(_recordings_in(path)):
+        return found
     inner = sorted(p.name for p in path.iterdir() if not p.name.startswith("."))
     hint = f"name one of {', '.join(inner)[:200]}" if inner else "an empty folder"
     from mapfilter.rasters.opening import is_raster_folder
@@ -124,9 +122,14 @@ def _file_info(path: Path) -> dict[str, Any]:
         load_config(path, [])
         return {"kind": "configuration", "use": f"mapfilter check -c {path.name}"}
     from mapfilter.tracks.readers.formats import format_of
+    from mapfilter.tracks.readers.zipped import files_in_zip, is_zip
 
     if format_of(path) is not None:
         return _recording_info(path)
+    if is_zip(path):
+        formats = [known.name for one in files_in_zip(path) if (known := format_of(one))]
+        if found := _recordings_info(formats):
+            return found
     if suffix in _TABLES and _INDEX_COLUMN not in _first_line(path):
         return _table_info(path)
     from mapfilter.workflows.info_geo import raster_info, tiff_info
@@ -156,6 +159,15 @@ def _recordings_in(folder: Path) -> list[str]:
     files = (p for p in sorted(folder.iterdir()) if p.is_file() and not p.name.startswith("."))
     found = (format_of(file) for file in files)
     return [known.name for known in found if known is not None]
+
+
+def _recordings_info(formats: Sequence[str]) -> dict[str, Any]:
+    """Describe several recordings by their formats; empty without any."""
+    if not formats:
+        return {}
+    counts = {name: formats.count(name) for name in sorted(set(formats))}
+    held = {"kind": "recordings", "files": len(formats), "formats": counts}
+    return {**held, "use": _USE_OF_FOLDERS}
 
 
 def _table_info(path: Path) -> dict[str, Any]:

@@ -41,6 +41,7 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
+from mapfilter.tracks.placeless import in_frame
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.learn_lacks import log_notes, unused_notes
 from mapfilter.workflows.logs import journeys_of, open_journey
@@ -297,7 +298,8 @@ def _opened(config: Config, paths: Sequence[Path], database: RadioRouteDatabase)
         except MapfilterError as error:
             faults.take(error)
             continue
-        check_log(path, opened.log, database.lattice, faults)
-        logs.append(replace(opened, log=name_by_plan(opened.log, database.plan)))
+        log = in_frame(opened.log, database.lattice.crs)
+        check_log(path, log, database.lattice, faults)
+        logs.append(replace(opened, log=name_by_plan(log, database.plan)))
     faults.raise_if_any(InputError)
     return logs

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
+from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import OutputError, fail, listed
 from mapfilter.rasters.raster_set import check_against_plan
@@ -62,6 +63,13 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
             if progress is not None:
                 progress(done, total)
     notes = [*rasters.notes, *raster_cover(config.area, world.lattice)]
+    nameless = sum(cell.arfcn is None or cell.bsic is None for cell in plan.cells)
+    if nameless and settings.reports.max_neighbours:
+        cells = number_of(nameless, "cell has", "cells have")
+        notes.append(
+            f"{cells} no carrier and code (arfcn, bsic) in the plan: neighbours of them are "
+            "reported without a name, and filters cannot use them"
+        )
     if silent:
         notes.append(f"no cell is received in {len(silent)} of {total} journeys ({listed(silent)})")
     return SimulateResult(total, track_m, config.track_path, tuple(notes), len(silent) == total)

@@ -343,6 +343,7 @@ ALLOWED = {
     ("tracks/table_files.py", "read_csv"), ("tracks/table_files.py", "open_parquet"),
     ("tracks/readers/lines.py", "read_csv"), ("positioning/fingerprints/tables.py", "read_csv"),
     ("experiments/benchmarks/ottawa_sessions.py", "read_csv"), ("radio/tables.py", "ZipFile"),
+    ("tracks/readers/zipped.py", "ZipFile"), ("tracks/readers/zipped.py", "open"),
     ("roads/osm_xml.py", "read_dataframe"), ("roads/osm_xml.py", "GzipFile"),
     ("roads/osm_xml.py", "open"),
     ("workflows/info_geo.py", "list_layers"), ("workflows/info_geo.py", "read_info"),

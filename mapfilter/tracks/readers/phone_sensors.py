@@ -17,6 +17,7 @@ from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
 from mapfilter.tracks.readers.text import Text, read_text
 from mapfilter.tracks.readers.times import unix_seconds
+from mapfilter.tracks.readers.zipped import has_recording
 
 _AXES = ("x", "y", "z")
 _UNITS = {
@@ -102,7 +103,7 @@ def _add_axes(
 def _phyphox_time(seconds: Floats, reading: Reading) -> Floats:
     """Return UTC seconds where the export's ``meta/time.csv`` is beside the file."""
     path = Path(reading.path).parent / "meta" / "time.csv"
-    if not path.is_file():
+    if not has_recording(path):
         return seconds
     aside = Reading(path)
     try:

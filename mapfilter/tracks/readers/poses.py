@@ -19,6 +19,7 @@ from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.separated_values import split_blanks, value_columns
 from mapfilter.tracks.readers.text import Text, read_text
 from mapfilter.tracks.readers.times import LEAST_UNIX_S
+from mapfilter.tracks.readers.zipped import has_recording
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)
 _FRAME_S = 0.1
@@ -103,7 +104,7 @@ def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # 
 def _frame_times(text: Text, reading: Reading) -> Floats | None:
     """Return times by ``times.txt`` beside the file, as in KITTI's odometry; None without it."""
     path = Path(reading.path).parent / "times.txt"
-    if path.is_file():
+    if has_recording(path):
         try:
             aside = Reading(path)
             rows = value_columns(memoryview(split_blanks(read_text(path).data)), aside, ["t"], " ")

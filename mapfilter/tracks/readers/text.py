@@ -13,6 +13,7 @@ from pathlib import Path
 from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.zipped import read_zipped, zip_of
 
 _HINTS = {
     "an OpenStreetMap extract": "a map; use it as area.map",
@@ -95,7 +96,7 @@ def parts_of(text: Text) -> Iterator[Text]:
 
 
 def read_text(path: Path, most_bytes: int = -1) -> Text:
-    r"""Read a file as text: plain or gzip, any line ends.
+    r"""Read a file as text: plain, gzip, or in a ZIP that its path leads into; any line ends.
 
     It is UTF-8, UTF-16 or UTF-32, else Windows-1252, with a note.
 
@@ -114,15 +115,11 @@ def read_text(path: Path, most_bytes: int = -1) -> Text:
     ...     read_text(Path(file.name)).data
     b'a,b\n1,2'
     """
-    try:
-        with open_input(path) as stream:
-            size = os.fstat(stream.fileno()).st_size
-            if size > _LARGEST_BYTES and most_bytes < 0:
-                raise fail(InputError, str(path), "a recording of at most 2 GiB", f"{size} bytes")
-            data = stream.read(most_bytes)
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
     notes: list[str] = []
+    if (within := zip_of(path)) is not None:
+        data = read_zipped(path, within, most_bytes, _LARGEST_UNPACKED_BYTES)
+    else:
+        data = _bytes_of(path, most_bytes)
     if data.startswith(b"\x1f\x8b"):
         data = _unpacked(path, data, notes)
     for start, what in _ARCHIVES.items():
@@ -135,6 +132,17 @@ def read_text(path: Path, most_bytes: int = -1) -> Text:
     if not data or data.isspace():
         raise fail(InputError, str(path), "a recording", "an empty file")
     return Text(path, without_separator_line(data), tuple(notes))
+
+
+def _bytes_of(path: Path, most_bytes: int) -> bytes:
+    try:
+        with open_input(path) as stream:
+            size = os.fstat(stream.fileno()).st_size
+            if size > _LARGEST_BYTES and most_bytes < 0:
+                raise fail(InputError, str(path), "a recording of at most 2 GiB", f"{size} bytes")
+            return stream.read(most_bytes)
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
 
 
 def _unpacked(path: Path, data: bytes, notes: list[str]) -> bytes:

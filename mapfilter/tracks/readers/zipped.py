@@ -1,0 +1,122 @@
+"""Recordings in a ZIP, as apps share them: its files have paths below that of the ZIP.
+
+``walk.zip/Accelerometer.csv`` is the file of that name in ``walk.zip``. Nothing is unpacked on the
+disk, and names in a ZIP reach no other file.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from mapfilter._inputs import open_input
+from mapfilter._words import number_of
+from mapfilter.errors import InputError, MapfilterError, fail
+
+_BEGIN = b"PK\x03\x04"
+_WORKBOOK = "[Content_Types].xml"
+_MOST_FILES = 1000
+_CHECKED_BYTES = 1 << 18
+_DAMAGE = (OSError, EOFError, NotImplementedError, ValueError, zipfile.BadZipFile, zlib.error)
+
+
+def is_zip(path: Path) -> bool:
+    """Return whether a path is a ZIP, and no workbook of Excel, which is a ZIP, too."""
+    try:
+        with open_input(path) as stream:
+            if stream.read(len(_BEGIN)) != _BEGIN:
+                return False
+        with _archive(path) as archive:
+            return _WORKBOOK not in archive.namelist()
+    except OSError:
+        return False
+    except MapfilterError:
+        # A cut-off ZIP is named as that where its files are asked for.
+        return path.is_file()
+
+
+def files_in_zip(path: Path) -> list[Path]:
+    """Return the files of a ZIP that are in no folder, or else those of its one folder, by name.
+
+    Hidden ones, and those of further folders within that one, are left out.
+
+    Raises
+    ------
+    InputError
+        It is damaged, a name leads out of it, it has no file or more than a thousand, or several
+        folders and no file beside them.
+    """
+    with _archive(path) as archive:
+        names = [PurePosixPath(one.filename) for one in archive.infolist() if not one.is_dir()]
+    for name in names:
+        if name.is_absolute() or ".." in name.parts or "\\" in str(name):
+            got = repr(str(name)[:80])
+            raise fail(InputError, str(path), "names within the ZIP", got, "a damaged ZIP")
+    names = [name for name in names if not any(part[:1] in (".", "_") for part in name.parts)]
+    if not 0 < len(names) <= _MOST_FILES:
+        expected = f"a ZIP with at most {_MOST_FILES} files"
+        raise fail(InputError, str(path), expected, number_of(len(names), "file"))
+    least = min(len(name.parts) for name in names)
+    shallow = sorted(name for name in names if len(name.parts) == least)
+    folders = sorted({str(name.parent) for name in shallow})
+    if len(folders) > 1:
+        got = ", ".join(folders[:5]) + (", …" if len(folders) > 5 else "")
+        hint = "several journeys; unpack it, and name one folder"
+        raise fail(InputError, str(path), "a ZIP with the recordings of one journey", got, hint)
+    return [path / name for name in shallow]
+
+
+def zip_of(path: Path) -> Path | None:
+    """Return the ZIP that a path leads into; None for a path that leads into no file."""
+    return next((parent for parent in path.parents if parent.is_file()), None)
+
+
+def has_recording(path: Path) -> bool:
+    """Return whether there is a file of this path, which may lead into a ZIP."""
+    if (found := zip_of(path)) is None:
+        return path.is_file()
+    with _archive(found) as archive:
+        return path.relative_to(found).as_posix() in archive.namelist()
+
+
+def read_zipped(path: Path, within: Path, most_bytes: int, largest_bytes: int) -> bytes:
+    """Return the bytes of a file in a ZIP, at most ``most_bytes`` of them if that is not negative.
+
+    Raises
+    ------
+    InputError
+        There is no such file, it is damaged or needs a password, or it is larger than
+        ``largest_bytes``, unpacked.
+    """
+    name = path.relative_to(within).as_posix()
+    with _archive(within) as archive:
+        if name not in archive.namelist():
+            hint = "a mistyped path"
+            raise fail(InputError, str(path), "a file in the ZIP", "no such file", hint)
+        try:
+            with archive.open(name) as stream:
+                data = stream.read(largest_bytes + 1 if most_bytes < 0 else most_bytes)
+        except RuntimeError as error:
+            raise fail(InputError, str(path), "a file without a password", str(error)) from error
+    if len(data) > largest_bytes:
+        expected, got = f"at most {largest_bytes >> 20} MiB", "more, unpacked"
+        raise fail(InputError, str(path), expected, got, "possible decompression bomb")
+    return data
+
+
+def check_zipped(path: Path, within: Path) -> None:
+    """Check that a file in a ZIP can be read, as far as its beginning; InputError as above."""
+    read_zipped(path, within, _CHECKED_BYTES, _CHECKED_BYTES)
+
+
+@contextmanager
+def _archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    try:
+        with open_input(path) as stream, zipfile.ZipFile(stream) as archive:
+            yield archive
+    except _DAMAGE as error:
+        hint = "cut off, or damaged"
+        raise fail(InputError, str(path), "a ZIP that can be read", str(error), hint) from error
