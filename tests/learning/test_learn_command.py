@@ -22,7 +22,7 @@ from mapfilter.learning.patch import read_patch
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.store import write_log
+from mapfilter.tracks.store import read_log, write_log
 from mapfilter.workflows import learn_study
 from mapfilter.workflows.check_suspects import run_check_suspects
 from mapfilter.workflows.learn import run_learn
@@ -192,6 +192,14 @@ def test_logs_of_another_crs_are_refused(faulty, tmp_path):
     with pytest.raises(InputError, match="EPSG:32632"):
         run_learn(configured(faulty[0], logs), tmp_path / "out")
     assert not (tmp_path / "out" / "patch.toml").exists()
+
+
+def test_a_log_without_positions_is_taken_to_be_in_the_databases_frame(faulty, tmp_path):
+    """As `replay` takes it."""
+    log = read_log(faulty[1] / "j0")
+    local = "+proj=tmerc +lat_0=0 +lon_0=0 +type=crs"
+    logs = write(tmp_path / "logs", replace(log, truth=log.truth[:0], crs=local))
+    assert run_learn(configured(faulty[0], logs), tmp_path / "out").logs == 1
 
 
 @pytest.mark.parametrize("kind", ["no levels", "no radio"])

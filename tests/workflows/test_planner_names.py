@@ -136,3 +136,15 @@ def test_journeys_without_any_cell_are_told(own_world, export):
     assert outcome.code == 3
     done = outcome.json
     assert done["notes"][-1].startswith("no cell is received in 2 of 2 journeys (journey-")
+
+
+def test_neighbours_that_no_report_can_name_are_told(own_world, export):
+    """A plan without carriers or codes leaves a phone's neighbours without a name."""
+    export("{}")
+    plan = own_world.folder / "cells.csv"
+    rows = [line.split(",") for line in plan.read_text().splitlines()]
+    drop = {rows[0].index("arfcn"), rows[0].index("bsic")}
+    kept = [",".join(v for k, v in enumerate(row) if k not in drop) for row in rows]
+    plan.write_text("\n".join(kept) + "\n")
+    notes = assert_done(mapfilter("simulate", "-c", own_world.toml, "--json")).json["notes"]
+    assert notes[-1].startswith(f"{len(rows) - 1} cells have no carrier and code")
