@@ -101,6 +101,55 @@ def test_signals_beside_cells_are_levels_where_they_look_like_them(tmp_path, col
         assert any("(level_dbm?)" in name for name in found.unread)
 
 
+NETWORK_SURVEY = {
+    "LTE": ("tac", "eci", "earfcn", "pci", "rsrp", 1300),
+    "NR": ("tac", "nci", "narfcn", "pci", "ssRsrp", 640_000),
+    "UMTS": ("lac", "cid", "uarfcn", "psc", "rscp", 10_700),
+}
+
+
+@pytest.mark.parametrize("family", NETWORK_SURVEY)
+def test_network_survey_states_serving_cells_and_technologies_by_columns(tmp_path, family):
+    """The app for Android writes a file for each technology, with a row for each cell."""
+    area, identity, carrier, code, level, number = NETWORK_SURVEY[family]
+    shared = {"deviceTime": stamps("%Y-%m-%dT%H:%M:%S.123Z"), "latitude": LAT_DEG}
+    shared |= {"longitude": LON_DEG, "speed": 1.2, "accuracy": 8.5, "groupNumber": 1 + TIME_S}
+    network = {"mcc": 244, "mnc": 91, area: 500}
+    serving = {**shared, **network, identity: CI, carrier: number, code: 101, level: LEVEL_DBM}
+    other = {**serving, **dict.fromkeys([*network, identity], ""), code: 102, level: LEVEL_DBM - 9}
+    named = {**serving, identity: CI + 1, code: 103, level: LEVEL_DBM - 5}
+    tables = [(serving, "true"), (other, "false"), (named, "false")]
+    rows = pd.concat([pd.DataFrame(rows).assign(servingCell=served) for rows, served in tables])
+    path = tmp_path / "log.csv"
+    path.write_text("# CSV Version=0.4.0\n" + rows.to_csv(index=False))
+    found = read_recording(path)
+    radio = found.tables["radio"]
+    assert radio["role"].value_counts().to_dict() == {"neighbour": 240, "serving": 120}
+    assert set(radio["technology"]) == {family}
+    assert set(radio["arfcn"]) == {number}
+    served = radio[radio["role"] == "serving"]
+    np.testing.assert_array_equal(served["ci"], CI)
+    np.testing.assert_array_equal(served["level_dbm"], LEVEL_DBM)
+    assert set(radio[radio["bsic"] == 103]["ci"]) == set(CI + 1)
+    assert not any("servingcell" in name for name in found.unread)
+
+
+@pytest.mark.parametrize(
+    ("columns", "family"),
+    [
+        ({"arfcn": 1300, "cid": 77}, None),
+        ({"earfcn": 1300, "nci": 77}, None),
+        ({"enodeb": 300, "cid": 7}, "LTE"),
+        ({"earfcn": 1300, "tech": "3G"}, "UMTS"),
+    ],
+)
+def test_a_technology_is_that_of_its_columns(tmp_path, columns, family):
+    table = {"time": START_S + TIME_S, "pci": 7, "rsrp": LEVEL_DBM, **columns}
+    radio = read_recording(written(tmp_path, table)).tables["radio"]
+    stated = radio["technology"].tolist() if "technology" in radio else [None]
+    assert {None if pd.isna(one) else one for one in stated} == {family}
+
+
 def test_signals_without_cells_are_those_of_something_else(tmp_path):
     columns = gps_logger() | {"signal": -70}
     assert "radio" not in read_recording(written(tmp_path, columns)).tables

@@ -7,10 +7,18 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import only
+from mapfilter.tracks.readers.csv_fields import FIELDS
 from mapfilter.tracks.readers.csv_identities import cell_identities, roles
 from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.readers.identities import add_radio
 from mapfilter.tracks.readers.reading import Reading
+
+_FAMILY_OF = {
+    **dict.fromkeys(("earfcn", "eci", *FIELDS["enodeb"]), "LTE"),
+    **dict.fromkeys(("nrarfcn", "nr_arfcn", "narfcn", "nci"), "NR"),
+    "uarfcn": "UMTS",
+}
+"""Technologies of columns: the carrier, or the identity, has a name of its own in each."""
 
 
 def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
@@ -26,6 +34,9 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     }
     if mapped.has("technology"):
         columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
+    elif (family := _family(mapped)) is not None:
+        known = ~np.isnan(columns["arfcn"]) | ~np.isnan(identity["ci"])
+        columns["technology"] = np.array([None, family], dtype=object)[known.astype(np.int64)]
     if mapped.has("bars"):
         _add_bars(mapped, columns)
     cell = mapped.texts("cell")
@@ -35,6 +46,13 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         columns["cell"] = cell
     columns["role"] = roles(mapped, identified)
     add_radio(reading, *only(columns, mapped.rows.line, there))
+
+
+def _family(mapped: Mapped) -> str | None:
+    """Return the technology that the names of columns state, if they state one."""
+    columns = [mapped.rows.find(*mapped.names(field)) for field in ("arfcn", "ci", "enodeb")]
+    found = {_FAMILY_OF[name] for name in columns if name in _FAMILY_OF}
+    return found.pop() if len(found) == 1 else None
 
 
 def _add_bars(mapped: Mapped, columns: dict[str, np.ndarray]) -> None:

@@ -58,6 +58,8 @@ def _role(word: str) -> str | None:
     """Return the role that a word means, "" where it is missing, None for other words."""
     word = word.strip().lower()
     known = {"": "", "serving": "serving", "s": "serving", "n": "neighbour"}
+    known |= dict.fromkeys(("true", "yes", "1"), "serving")
+    known |= dict.fromkeys(("false", "no", "0"), "neighbour")
     known |= dict.fromkeys(("neighbour", "neighbor", "neighboring", "neighbouring"), "neighbour")
     return known.get(word)
 
