@@ -54,6 +54,7 @@ class Beliefs:
     lead: bool = False
     map_may_start: bool = False
     left: bool = False
+    anywhere: bool = False
     why: Reason = Reason.USED
     asked: list = field(default_factory=list)
 
@@ -73,6 +74,11 @@ class Beliefs:
 
     def may_have_left(self, state):
         return self.left
+
+    def may_be_anywhere(self, state, rest, time_s):
+        if rest is not None:
+            self.asked.append(("anywhere", rest.since_s, time_s))
+        return self.anywhere and rest is not None
 
     def positions_lead(self, state):
         return self.lead
@@ -333,9 +339,27 @@ def test_hypotheses_are_carried_on_once_steps_are_counted_again(left, rest, carr
     rested = replace(rested, watch=rested.watch._replace(rest=Rest(4.0)))
     found, _, asked = move(rested, beliefs=Beliefs(left=left), watch=watch)
     # Since the last step at the usual pace, at 4 s.
-    assert asked == ([("carried on", 6.0)] if carried else [])
+    carry = [("carried on", 6.0)] if carried else []
+    assert asked == ([("anywhere", 4.0, 10.0)] if rest is None else []) + carry
     assert (found.belief.log_evidence == -77.0) is carried
     assert found.watch is watch
+
+
+def test_after_a_ride_the_search_begins_anew():
+    other = AlternativeHypothesis(belief(SEARCHING, name=5), 0.0, 0.0)
+    state = replace(walking(alternative=other, held=(turned_phone(),)), proven=True)
+    state = replace(state, watch=state.watch._replace(rest=Rest(4.0)))
+    beliefs = Beliefs(anywhere=True, left=True)
+    found, _, asked = move(state, STEP, beliefs=beliefs, watch=SensorWatch())
+    assert asked == [("anywhere", 4.0, 10.0)]
+    assert (found.belief, found.alternative, found.held) == (None, None, ())
+    assert (found.status, found.proven) == (Status.LOST, False)
+    assert found.null == NullHypothesis()
+    # While it lasts the belief is kept.
+    rest = SensorWatch(rest=Rest(4.0))
+    assert move(state, STEP, beliefs=beliefs, watch=rest)[0].belief is not None
+    searching = replace(state, status=SEARCHING)
+    assert move(searching, STEP, beliefs=beliefs, watch=SensorWatch())[0].status is SEARCHING
 
 
 def test_an_alternative_reads_headings_as_they_are_and_lengths_in_its_unit():

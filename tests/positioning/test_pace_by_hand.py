@@ -66,10 +66,22 @@ def test_a_first_row_covers_no_time_and_is_a_walk_however_short():
 
 @pytest.mark.parametrize(("rows", "step_s"), [(1, 2.5), (2, 1.0), (3, 1.0)])
 def test_a_step_after_a_pause_counts_for_the_usual_interval(rows, step_s):
-    """The second row has no usual interval yet."""
+    """The second row has no usual interval yet. Before it the walker stood."""
     pace = Pace(motion_s=0.0, rows=rows, interval_s=1.0)
-    gained = (1 - exp(-step_s / 2.5)) * (2.0 / step_s - 1.4)
-    assert after(pace, 2.5, 2.0).recent_mps == pytest.approx(1.4 + gained)
+    before_mps = 1.4 * exp(-(2.5 - step_s) / 2.5)
+    gained = (1 - exp(-step_s / 2.5)) * (2.0 / step_s - before_mps)
+    assert after(pace, 2.5, 2.0).recent_mps == pytest.approx(before_mps + gained)
+
+
+@pytest.mark.parametrize(("rests", "moving"), [(False, [False, True, True]), (True, [True] * 3)])
+def test_in_a_log_of_steps_a_single_one_after_a_pause_is_no_walk(rests, moving):
+    """Where rows come at rest, too, a pause is one of the recording."""
+    pace = Pace(motion_s=0.0, rows=50, interval_s=0.5, irregular_s=0.1, rests=rests)
+    found = []
+    for k in range(3):
+        pace, going = pace.read(60.0 + 0.5 * k, (MotionStep(0.7, 0.1),), 1.0)
+        found.append(going.moves)
+    assert found == moving
 
 
 def test_a_row_at_a_tenth_of_a_metre_a_second_is_a_rest():

@@ -201,6 +201,22 @@ def test_the_probability_of_having_left():
     assert Rest(0.0, left_nats=2.0).left_probability == pytest.approx(1 / (1 + exp(-2)))
 
 
+@pytest.mark.parametrize(
+    ("changes", "ride"),
+    [
+        ({}, True),
+        ({"since_s": 41.0}, False),
+        ({"carried_nats": 5.9}, False),
+        ({"pace_mps": 2.6}, False),
+        ({"carried_mps": 4.0}, False),
+    ],
+)
+def test_a_walker_who_is_carried_for_a_minute_may_be_anywhere(changes, ride):
+    """Not in a vehicle, and not where positions show how fast it goes."""
+    given = {"since_s": 40.0, "carried_nats": 6.0, "pace_mps": 2.5, **changes}
+    assert Rest(**given).was_ride(100.0) is ride
+
+
 def turning(rest, turns_rad, *, period_s=1.0, heading_rad=nan):
     """The rest after rows of turns without a way."""
     for k, turn_rad in enumerate(turns_rad):

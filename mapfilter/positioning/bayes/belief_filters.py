@@ -26,6 +26,7 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
+from mapfilter.positioning.sensors.rest import Rest
 
 MapFilter = BeliefFilter[Start, Any, RadioReading]
 
@@ -259,6 +260,16 @@ class BeliefFilters:
             return False
         gnss: GnssState = state.sources[GnssSource.name]
         return state.reckoning.travelled_m > gnss.used_at_m
+
+    def may_be_anywhere(self, state: BayesState, rest: Rest | None, time_s: float) -> bool:
+        """Return whether what was known before a rest that has ended tells nothing of the place.
+
+        ``rest`` is that rest, or None; a walker took a bus then, and no position was measured.
+        """
+        if rest is None or not self.holds.watched or not rest.was_ride(time_s):
+            return False
+        gnss: GnssState = state.sources[GnssSource.name]
+        return gnss.compared_at_s < rest.since_s
 
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""

@@ -95,6 +95,9 @@ def moved(
         Motion that was not used.
     """
     unused: list[UnusedReading] = []
+    rested = state.watch.rest if watch.rest is None else None
+    if beliefs.may_be_anywhere(state, rested, epoch.time_s):
+        state = state.begun_anew()
     belief, compass, alternative = state.belief, state.compass, state.alternative
     reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
     twin = state.twin
@@ -122,7 +125,6 @@ def moved(
         gone_m, pulls = reckoning.travelled_m, beliefs.pulls
         alone = without_positions(pulls, belief, state.null, hold, gone_m, own.beginning)
         unaided = (*unaided, alone)
-    rested = state.watch.rest if watch.rest is None else None
     if belief is not None and rested is not None and beliefs.may_have_left(state):
         gone_s = epoch.time_s - rested.since_s
         belief = carried_on(belief, rested, gone_s, own_rng(epoch.time_s, _AWAY))

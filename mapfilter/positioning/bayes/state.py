@@ -145,6 +145,25 @@ class BayesState:
             area=self.area,
         )
 
+    def begun_anew(self) -> BayesState:
+        """Return the state without its belief, of which nothing is left, or nothing is to be used.
+
+        What was found out beside it, too, begins with the next one.
+        """
+        found = self.status in (Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN)
+        return replace(
+            self,
+            belief=None,
+            status=Status.LOST if found else self.status,
+            null=NullHypothesis(),
+            alternative=None,
+            recovery=None,
+            twin=None,
+            held=(),
+            unaided=(),
+            proven=False,
+        )
+
     @property
     def rivals(self) -> tuple[HeldOtherwise, ...]:
         """Beliefs that compete with the main one, by what they assume of phone and positions."""

@@ -12,7 +12,6 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.positioning.bayes.alternative import (
     MapBelief,
-    NullHypothesis,
 )
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
@@ -125,7 +124,7 @@ class Weighing:
         reading = evidence.weighing(before, tracked=tracked, doubted=doubt)
         belief, info = update(before, reading, rng)
         if info.reason is Reason.NO_CANDIDATES_LEFT and not belief.count:
-            return _begun_anew(state), info.reason
+            return state.begun_anew(), info.reason
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
         null = challenged(rules, state.null, reading, before, belief)
@@ -233,23 +232,3 @@ def _holds(area: AreaFrame, belief: MapBelief) -> bool:
     if east_m.size and area.holds_all(east_m, north_m):
         return True
     return area.holds(east_m, north_m, belief.weight)
-
-
-def _begun_anew(state: BayesState) -> BayesState:
-    """Return a state without its belief, of which nothing is left in the area.
-
-    What was found out beside it, too, begins with the next one.
-    """
-    found = state.status in (Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN)
-    status = Status.LOST if found else state.status
-    return replace(
-        state,
-        belief=None,
-        status=status,
-        null=NullHypothesis(),
-        alternative=None,
-        recovery=None,
-        twin=None,
-        unaided=(),
-        proven=False,
-    )

@@ -7,7 +7,7 @@ has rows of zero between, and a step covers the time of these, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import expm1, isfinite, nan
+from math import exp, expm1, isfinite, nan
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep
@@ -114,6 +114,9 @@ class Pace:
         recent_mps = self.recent_mps
         # A step after a pause covers the usual interval at most.
         step_s = min(row_s, self.interval_s) if self.rows > 1 else row_s
+        if not self.reports_always and isfinite(since_s):
+            # Where rows are steps, none came in between.
+            recent_mps *= exp(-max(since_s - step_s, 0.0) / _RECENT_S)
         if measured and step_s > 0:
             recent_mps += -expm1(-step_s / _RECENT_S) * (gone_m / step_s - recent_mps)
         goes = gone_m > _REST_MPS * row_s

@@ -48,6 +48,8 @@ _STROLL_SHARE = 0.5
 """Share of that variance which a way as measured explains, where it is compared with being
 elsewhere: with all of it, the two could hardly be told apart after 30 m."""
 _LEFT_M, _SHOWABLE_NATS = 45.0, -2.5
+_RIDE_S = 60.0
+"""After so long a bus is half a kilometre away."""
 _DRIFT_MPS = 1.5
 """Slower positions of a vehicle whose wheels stand drift by their errors."""
 _BRAKES_MPS2 = 5.0
@@ -209,6 +211,14 @@ class Rest:
     def is_carried(self) -> bool:
         """Whether the phone is carried on though no motion is reported."""
         return self.carried_nats >= _CARRIED_NATS
+
+    def was_ride(self, time_s: float) -> bool:
+        """Return whether a walker was carried on for so long that it may be anywhere.
+
+        Not where positions show how far that was.
+        """
+        is_long = self.is_carried and time_s - self.since_s >= _RIDE_S
+        return is_long and self.pace_mps <= WALKERS_MPS and self.carried_mps == 0
 
     @property
     def left_probability(self) -> float:
