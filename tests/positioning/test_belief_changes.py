@@ -193,3 +193,45 @@ def test_whether_a_walker_may_have_left_during_a_rest(doubtful, used_at_m, expec
     state = with_rest(rest, fix_used_at_m=used_at_m)
     assert FILTERS.may_have_left(state) is expected
     assert not replace(FILTERS, holds=HoldRules(watched=False)).may_have_left(state)
+
+
+@pytest.mark.parametrize(
+    ("ended", "is_ride", "rode_unheard", "compared_at_s", "expected"),
+    [
+        (True, True, False, -inf, True),
+        (True, True, False, 39.0, True),
+        # A position was compared during the ride.
+        (True, True, False, 40.0, False),
+        (True, False, False, -inf, False),
+        # It goes on.
+        (False, True, False, -inf, False),
+        (False, False, True, -inf, True),
+        (False, False, True, 30.0, False),
+        (False, False, True, 29.0, True),
+    ],
+)
+def test_after_a_ride_a_walker_may_be_anywhere(
+    ended, is_ride, rode_unheard, compared_at_s, expected
+):
+    rest = SimpleNamespace(since_s=40.0, was_ride=lambda time_s: is_ride and time_s == 100.0)
+    state = with_rest(rest, compared_at_s=compared_at_s)
+    state.watch.times = SimpleNamespace(report_s=30.0)
+    watch = SimpleNamespace(rest=None if ended else rest, rode_unheard=rode_unheard)
+    assert FILTERS.may_be_anywhere(state, watch, 100.0) is expected
+    unwatched = replace(FILTERS, holds=HoldRules(watched=False))
+    assert not unwatched.may_be_anywhere(state, watch, 100.0)
+    state.watch.rest = None
+    assert FILTERS.may_be_anywhere(state, watch, 100.0) is (expected and rode_unheard)
+
+
+@pytest.mark.parametrize(
+    ("unit_m", "compared_at_s", "expected"),
+    [(1.0, -inf, True), (1.0, 29.0, True), (1.0, 30.0, False), (0.3, -inf, False)],
+)
+def test_a_place_is_in_doubt_while_nothing_is_heard(unit_m, compared_at_s, expected):
+    state = with_rest(None, compared_at_s=compared_at_s)
+    state.hold = SimpleNamespace(step_unit_m=unit_m)
+    state.watch.times = SimpleNamespace(report_s=30.0)
+    state.watch.is_unheard = lambda unit: unit == 1.0
+    assert FILTERS.is_unheard(state) is expected
+    assert not replace(FILTERS, holds=HoldRules(watched=False)).is_unheard(state)

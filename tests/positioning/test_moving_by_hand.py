@@ -75,10 +75,8 @@ class Beliefs:
     def may_have_left(self, state):
         return self.left
 
-    def may_be_anywhere(self, state, rest, time_s):
-        if rest is not None:
-            self.asked.append(("anywhere", rest.since_s, time_s))
-        return self.anywhere and rest is not None
+    def may_be_anywhere(self, state, watch, time_s):
+        return self.anywhere and watch.rest is None
 
     def positions_lead(self, state):
         return self.lead
@@ -339,8 +337,7 @@ def test_hypotheses_are_carried_on_once_steps_are_counted_again(left, rest, carr
     rested = replace(rested, watch=rested.watch._replace(rest=Rest(4.0)))
     found, _, asked = move(rested, beliefs=Beliefs(left=left), watch=watch)
     # Since the last step at the usual pace, at 4 s.
-    carry = [("carried on", 6.0)] if carried else []
-    assert asked == ([("anywhere", 4.0, 10.0)] if rest is None else []) + carry
+    assert asked == ([("carried on", 6.0)] if carried else [])
     assert (found.belief.log_evidence == -77.0) is carried
     assert found.watch is watch
 
@@ -351,7 +348,7 @@ def test_after_a_ride_the_search_begins_anew():
     state = replace(state, watch=state.watch._replace(rest=Rest(4.0)))
     beliefs = Beliefs(anywhere=True, left=True)
     found, _, asked = move(state, STEP, beliefs=beliefs, watch=SensorWatch())
-    assert asked == [("anywhere", 4.0, 10.0)]
+    assert asked == []
     assert (found.belief, found.alternative, found.held) == (None, None, ())
     assert (found.status, found.proven) == (Status.LOST, False)
     assert found.null == NullHypothesis()

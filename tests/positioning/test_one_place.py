@@ -55,7 +55,10 @@ class State:
         return self.held
 
 
-def judged(state, *, weighed=True, positioned=False, contested=False, left=False, by_fixes=-inf):
+def judged(
+    state, *, weighed=True, positioned=False, contested=False, left=False, unheard=False,
+    by_fixes=-inf,
+):  # fmt: skip
     rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0)
     beliefs = SimpleNamespace(
         options=SimpleNamespace(split_mass=0.4),
@@ -63,6 +66,7 @@ def judged(state, *, weighed=True, positioned=False, contested=False, left=False
         rules_of=lambda _: rules,
         is_contested=lambda _: contested,
         may_have_left=lambda _: left,
+        is_unheard=lambda _: unheard,
         log_odds_of_fixes=lambda _: by_fixes,
     )
     return claims.judged(beliefs, state, weighed=weighed, positioned=positioned)
@@ -133,6 +137,7 @@ def test_a_loss_begins_a_recovery_unless_a_rest_alone_is_in_doubt(status):
     assert judged(given).recovery == Recovery()
     assert judged(State(Belief()), contested=True).recovery == Recovery()
     assert judged(State(Belief()), left=True).recovery is None
+    assert judged(State(Belief()), unheard=True).recovery is None
     assert judged(State(Belief()), left=True, contested=True).recovery == Recovery()
 
 
@@ -284,5 +289,7 @@ def test_terms_of_timing_are_clipped_normal_densities(weight):
 
 
 def test_a_rest_in_doubt_makes_it_contested():
+    silent = judged(State(Belief(0.99)), unheard=True)
+    assert (silent.status, silent.contested) == (Status.LOST, True)
     found = judged(State(Belief(0.99)), left=True)
     assert (found.status, found.contested) == (Status.LOST, True)

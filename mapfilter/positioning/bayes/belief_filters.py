@@ -26,7 +26,7 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
-from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.watch import SensorWatch
 
 MapFilter = BeliefFilter[Start, Any, RadioReading]
 
@@ -261,15 +261,34 @@ class BeliefFilters:
         gnss: GnssState = state.sources[GnssSource.name]
         return state.reckoning.travelled_m > gnss.used_at_m
 
-    def may_be_anywhere(self, state: BayesState, rest: Rest | None, time_s: float) -> bool:
-        """Return whether what was known before a rest that has ended tells nothing of the place.
+    def may_be_anywhere(self, state: BayesState, watch: SensorWatch, time_s: float) -> bool:
+        """Return whether what is known so far tells nothing of the place at an epoch.
 
-        ``rest`` is that rest, or None; a walker took a bus then, and no position was measured.
+        A walker took a bus or a train underground, and no position was measured then.
+
+        Parameters
+        ----------
+        state : BayesState
+            After the epoch before.
+        watch : SensorWatch
+            After this epoch's readings.
         """
-        if rest is None or not self.holds.watched or not rest.was_ride(time_s):
+        if not self.holds.watched:
+            return False
+        since_s, rest = inf, state.watch.rest
+        if rest is not None and watch.rest is None and rest.was_ride(time_s):
+            since_s = rest.since_s
+        if watch.rode_unheard:
+            since_s = min(since_s, state.watch.times.report_s)
+        gnss: GnssState = state.sources[GnssSource.name]
+        return gnss.compared_at_s < since_s < inf
+
+    def is_unheard(self, state: BayesState) -> bool:
+        """Return whether a walker who stands may have left, as nothing is heard any more."""
+        if not (self.holds.watched and state.watch.is_unheard(state.hold.step_unit_m)):
             return False
         gnss: GnssState = state.sources[GnssSource.name]
-        return gnss.compared_at_s < rest.since_s
+        return gnss.compared_at_s < state.watch.times.report_s
 
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""

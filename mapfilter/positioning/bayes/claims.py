@@ -67,6 +67,7 @@ def _in_one_place(beliefs: BeliefFilters, state: BayesState) -> BayesState:
     if belief.summary.mass_50m < beliefs.options.split_mass:
         belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
         return replace(state, belief=belief, status=Status.LOST, proven=False)
-    if beliefs.is_contested(state) or beliefs.may_have_left(state):
+    left = beliefs.may_have_left(state) or beliefs.is_unheard(state)
+    if left or beliefs.is_contested(state):
         return replace(state, status=Status.LOST, contested=True)
     return state

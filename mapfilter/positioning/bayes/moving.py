@@ -96,7 +96,7 @@ def moved(
     """
     unused: list[UnusedReading] = []
     rested = state.watch.rest if watch.rest is None else None
-    if beliefs.may_be_anywhere(state, rested, epoch.time_s):
+    if beliefs.may_be_anywhere(state, watch, epoch.time_s):
         state = state.begun_anew()
     belief, compass, alternative = state.belief, state.compass, state.alternative
     reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad

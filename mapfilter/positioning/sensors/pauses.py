@@ -49,9 +49,14 @@ class RowTimes(NamedTuple):
             interval_s += (lasted_s - interval_s) / min(self.reports, _RECENT_REPORTS)
         return RowTimes(time_s, time_s, interval_s, self.reports + 1)
 
+    @property
+    def is_known(self) -> bool:
+        """Whether enough reports have come to know how often they do."""
+        return self.reports >= _KNOWN_REPORTS
+
     def silent_s(self, time_s: float) -> float:
         """Return how long nothing was recorded before an epoch; 0 where that is as usual."""
-        if self.reports < _KNOWN_REPORTS:
+        if not self.is_known:
             return 0.0
         silent_s = time_s - self.epoch_s
         return silent_s if silent_s > max(_SILENT_S, GAP_INTERVALS * self.interval_s) else 0.0

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.sensors import unheard
 from mapfilter.positioning.sensors.impossible_steps import without_impossible
 from mapfilter.positioning.sensors.pace import Going, Pace
 from mapfilter.positioning.sensors.pauses import RowTimes, longest_s, unrecorded_s
@@ -65,6 +66,10 @@ class SensorWatch(NamedTuple):
         Positions since steps became fewer than usual.
     undirected : UndirectedWay
         Whether steps have directions, and the way since a position where they have none.
+    stepped_m : float
+        Length of all steps since the last report, in their unit.
+    rode_unheard : bool
+        Whether this epoch's report is the first one after a ride without reception.
     """
 
     pace: Pace = Pace()
@@ -79,6 +84,12 @@ class SensorWatch(NamedTuple):
     times: RowTimes = RowTimes()
     places: Places = Places()
     undirected: UndirectedWay = UndirectedWay()
+    stepped_m: float = 0.0
+    rode_unheard: bool = False
+
+    def is_unheard(self, step_unit_m: float) -> bool:
+        """Return whether a walker may have left though hardly a step is counted."""
+        return unheard.is_in_doubt(self.pace, self.times, self.stepped_m, step_unit_m)
 
     def positioned(self, time_s: float) -> SensorWatch:
         """Return the watch after a position was measured and used.
@@ -143,10 +154,22 @@ def watched(
         why = Reason.IMPOSSIBLE_STEP
     why = repeated if why is Reason.USED else why
     report, moved_m, nats = before.report, watch.moved_m, before.repeated_nats
+    stepped_m, rode = watch.stepped_m, False
     if epoch.radio:
         nats = repeated_nats(nats, report, epoch.radio, step_unit_m * moved_m)
-        report, moved_m = epoch.radio, 0.0
-    watch = watch._replace(moved_m=moved_m, report=report, repeated_nats=nats, repeats=repeats)
+        heard = report, epoch.radio
+        rode = unheard.was_ride(
+            before.pace, before.times, epoch.time_s, stepped_m, heard, step_unit_m
+        )
+        report, moved_m, stepped_m = epoch.radio, 0.0, 0.0
+    watch = watch._replace(
+        moved_m=moved_m,
+        report=report,
+        repeated_nats=nats,
+        repeats=repeats,
+        stepped_m=stepped_m,
+        rode_unheard=rode,
+    )
     if epoch.radio and nats >= STALE_NATS:
         return watch, replace(epoch, radio=()), (why, Reason.STALE_RADIO)
     return watch, epoch, (why, Reason.USED)
@@ -162,6 +185,7 @@ def _followed(
     watch = watch._replace(
         pace=pace,
         moved_m=before_m + going.gone_m,
+        stepped_m=watch.stepped_m + going.gone_m,
         times=times.read(time_s, has_report=bool(epoch.radio)),
     )
     if isfinite(watch.moving_s):
