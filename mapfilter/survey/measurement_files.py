@@ -32,6 +32,12 @@ _FEWEST_NUMBERS = 3
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
 
 
+_CODES = {
+    "arfcn": ("arfcn", "earfcn", "uarfcn", "nr_arfcn"),
+    "bsic": ("bsic", "pci", "psc"),
+}
+
+
 class Dialect(NamedTuple):
     """Names of the columns of one kind of file.
 
@@ -50,7 +56,7 @@ class Dialect(NamedTuple):
 
 def mapped(columns: Mapping[str, str]) -> Dialect:
     """Return the dialect of a map from fields to columns; these columns are required."""
-    own = {name: (name,) for name in FIELDS}
+    own = {name: (name,) for name in FIELDS} | _CODES
     named = {name: (column,) for name, column in columns.items()}
     return Dialect({**own, **named}, tuple(dict.fromkeys((*REQUIRED, *columns))))
 
@@ -70,6 +76,7 @@ DIALECTS: Mapping[str, Dialect] = {
         accuracy_m="rating",
         technology="act",
         timing_advance="ta",
+        bsic="pci psc",
     ),
     "towercollector": _upload(
         lac="lac",
@@ -78,6 +85,8 @@ DIALECTS: Mapping[str, Dialect] = {
         accuracy_m="accuracy",
         timing_advance="ta",
         neighbour="neighboring",
+        arfcn="arfcn",
+        bsic="psc",
     ),
 }
 """Columns named as the fields are; uploads to OpenCellID; exports of Tower Collector."""

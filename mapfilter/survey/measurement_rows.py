@@ -36,7 +36,7 @@ REQUIRED = ("lat", "lon", "level_dbm")
 """Fields without which a row is of no use."""
 FIELDS = (
     *("cell", *IDENTITY, *REQUIRED, "time", "accuracy_m", "session"),
-    *("timing_advance", "neighbour"),
+    *("timing_advance", "neighbour", "arfcn", "bsic"),
 )
 """Fields that a column map may name."""
 
@@ -52,6 +52,8 @@ class NotMeasurementsError(InputError):
 
 Identity = tuple[int, int, int, int]
 """mcc, mnc, lac (tac in LTE) and ci."""
+Code = tuple[int, int]
+"""Carrier and code (BSIC, PSC or PCI), by which reports name neighbours."""
 
 
 @dataclass(slots=True)
@@ -59,9 +61,9 @@ class Rows:
     """Good rows as columns, the faults of bad ones, and counts of what is set aside.
 
     ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``technologies`` has
-    GSM, UMTS, LTE or NR of cells where that is known; ``identified`` is the
-    cell of identities that were looked at before, ``odd_time`` the first time not understood;
-    ``remarks`` are on the file as a whole.
+    GSM, UMTS, LTE or NR of cells where that is known, ``codes`` their carriers and codes;
+    ``identified`` is the cell of identities that were looked at before, ``odd_time`` the first
+    time not understood; ``remarks`` are on the file as a whole.
     """
 
     path: Path
@@ -73,6 +75,7 @@ class Rows:
     values: array[float] = field(default_factory=lambda: array("d"))
     identities: dict[str, Identity] = field(default_factory=dict)
     technologies: dict[str, str] = field(default_factory=dict)
+    codes: dict[str, Code] = field(default_factory=dict)
     identified: dict[tuple[str, ...], str] = field(default_factory=dict)
     refused: int = 0
     faults: list[Fault] = field(default_factory=list)
@@ -163,6 +166,9 @@ class Rows:
         steps = number(given["timing_advance"])
         if steps is None or not 0 <= steps <= _MOST_STEPS:
             steps = math.nan
+        arfcn, bsic = _whole(given["arfcn"]), _whole(given["bsic"])
+        if arfcn is not None and bsic is not None:
+            self.codes.setdefault(cell, (arfcn, bsic))
         said = given["neighbour"].lower()
         serving = 0.0 if said in _YES else 1.0 if said in _NO else math.nan
         self.values.extend((time_s, lat_deg, lon_deg, level_dbm, accuracy_m, steps, serving))

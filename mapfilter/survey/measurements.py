@@ -10,7 +10,7 @@ import numpy as np
 from mapfilter._types import Bools, Floats, Ints32
 from mapfilter._words import number_of
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.measurement_rows import Identity
+from mapfilter.survey.measurement_rows import Code, Identity
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,8 @@ class Measurements:
         Steps, NaN where it was not reported; None as for ``serving``.
     technologies : mapping of str to str
         GSM, UMTS, LTE or NR of the cells of which it is known. Their levels are other quantities.
+    codes : mapping of str to (arfcn, bsic)
+        Carrier and code of the cells of which both are in the files.
     """
 
     crs: str
@@ -59,6 +61,7 @@ class Measurements:
     serving: Bools | None = None
     timing_advance: Floats | None = None
     technologies: Mapping[str, str] = field(default_factory=dict)
+    codes: Mapping[str, Code] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.level_dbm)
@@ -104,11 +107,12 @@ def named_after(measurements: Measurements, plan: CellPlan) -> Measurements:
     identities = {
         name: measurements.identities[old] for old, name in known if old in measurements.identities
     }
-    kinds = measurements.technologies
+    kinds, codes = measurements.technologies, measurements.codes
     return replace(
         measurements,
         cell_ids=tuple(names.tolist()),
         identities=identities,
         technologies={name: kinds[old] for old, name in known if old in kinds},
+        codes={name: codes[old] for old, name in known if old in codes},
         cell=places[measurements.cell].astype(np.int32),
     )

@@ -213,6 +213,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         np.where(np.isnan(role), _alone(of_session, time_s), role > 0).astype(np.bool_),
         timing_advance,
         {cell: name for table in tables for cell, name in table.technologies.items()},
+        {cell: code for table in tables for cell, code in table.codes.items()},
     )
     placed = np.isfinite(east_m) & np.isfinite(north_m)
     if not placed.all():

@@ -16,13 +16,14 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.lattice import Lattice
+from mapfilter.radio.cell_rules import technology_faults
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.undeclared import check_nodata_stated
 from mapfilter.survey.level_trend import Covariate
 from mapfilter.survey.measured_map import Survey, SurveyedCell
-from mapfilter.survey.measurement_rows import Identity
+from mapfilter.survey.measurement_rows import Code, Identity
 from mapfilter.survey.weakest_reported import WeakestReported, mean_below, scale_of
 
 _FIELD_LENGTHS = 4.0
@@ -107,10 +108,13 @@ def surveyed_plan(
     height_m: float,
     eirp_dbm: float,
     frequency_mhz: float,
+    technologies: Mapping[str, str] | None = None,
+    codes: Mapping[str, Code] | None = None,
 ) -> CellPlan:
     """Return a plan of surveyed cells: as given, else with the antenna where it was located.
 
-    An antenna that could not be located is put amid the strongest quarter of its readings.
+    An antenna that could not be located is put amid the strongest quarter of its readings. What
+    is known of a cell, its identity, technology, carrier and code, is in the plan.
     """
     known = plan.to_crs(survey.crs) if plan is not None else None
     cells = []
@@ -121,7 +125,12 @@ def surveyed_plan(
         place = survey.cells[cell_id].antenna or _amid_strongest(survey.cells[cell_id])
         mcc, mnc, lac, ci = identities.get(cell_id, (None, None, None, None))
         cell = Cell(cell_id, cell_id, *place, height_m, None, eirp_dbm, frequency_mhz, "omni")
-        cells.append(replace(cell, mcc=mcc, mnc=mnc, lac=lac, ci=ci))
+        cell = replace(cell, mcc=mcc, mnc=mnc, lac=lac, ci=ci)
+        arfcn, bsic = (codes or {}).get(cell_id, (None, None))
+        told = replace(cell, arfcn=arfcn, bsic=bsic, technology=(technologies or {}).get(cell_id))
+        # What no plan may state would make this one unreadable.
+        odd = technology_faults(told.technology, partial(getattr, told))
+        cells.append(cell if odd else told)
     return CellPlan(survey.crs, tuple(cells))
 
 

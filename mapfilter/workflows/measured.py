@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.radio.identities import IDENTITY
@@ -19,6 +20,8 @@ from mapfilter.tracks.schema import SERVING, TABLES
 from mapfilter.tracks.store import is_log, read_log
 
 _LONGEST_S = 10.0
+_CODE_REACH_M, _M_PER_DEG = 2000.0, 111_320.0
+"""Beyond what is known of a cell its carrier and code may be another one's; of latitude."""
 _UNKNOWN = -1.0
 _PLAIN = "csv"
 _EXPECTED = "levels of cells, and positions"
@@ -85,9 +88,10 @@ def _log_rows(path: Path) -> Rows:
 
 
 def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: bool) -> None:
+    places, placed = _places(positions, radio["time_s"].to_numpy(dtype=np.float64))
+    radio = _with_coded(rows, radio, places, placed)
     named = radio["cell"].notna().to_numpy()
     level = radio["level_dbm"].notna().to_numpy() & (radio["censored"].fillna(0) == 0).to_numpy()
-    places, placed = _places(positions, radio["time_s"].to_numpy(dtype=np.float64))
     for reason, bad in (
         ("levels of cells without identity", ~named),
         ("cells without a level", named & ~level),
@@ -112,6 +116,10 @@ def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: 
     level_dbm = radio["level_dbm"].to_numpy(dtype=np.float64)
     columns = [time_s, *places[:2], level_dbm, places[2], advance, serving]
     rows.values.frombytes(np.ascontiguousarray(np.stack(columns)[:, kept].T).tobytes())
+    coded = (kept & radio["arfcn"].notna() & radio["bsic"].notna()).to_numpy()
+    codes = radio[["arfcn", "bsic"]].to_numpy(dtype=object)[coded]
+    for cell, (arfcn, bsic) in zip(radio["cell"].to_numpy(dtype=object)[coded], codes, strict=True):
+        rows.codes.setdefault(cell, (int(arfcn), int(bsic)))
     parts = radio[list(IDENTITY)].fillna(_UNKNOWN).to_numpy(dtype=np.int64)[kept]
     whole = (parts >= 0).all(axis=1)
     for cell, identity in zip(cells[whole], parts[whole].tolist(), strict=True):
@@ -122,6 +130,45 @@ def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: 
         kinds = technology.where(technology.notna(), "").to_numpy()[kept]
         pairs = zip(cells, kinds, strict=True)
         rows.technologies.update({cell: kind for cell, kind in pairs if kind})
+
+
+def _with_coded(rows: Rows, radio: pd.DataFrame, places: Floats, placed: Bools) -> pd.DataFrame:
+    """Return levels whose neighbours without an identity have the cell of their carrier and code.
+
+    The file itself tells it where a cell is identified, within 2 km of all places at which it is;
+    where several cells have that carrier and code, none is taken.
+    """
+    columns = ["technology", "arfcn", "bsic"] if "technology" in radio else ["arfcn", "bsic"]
+    coded = (radio[["arfcn", "bsic"]].notna().all(axis=1) & placed).to_numpy()
+    named = coded & radio["cell"].notna().to_numpy()
+    bare = coded & ~radio["cell"].notna().to_numpy() & (radio["role"] != SERVING).to_numpy()
+    if not (named.any() and bare.any()):
+        return radio
+    keys = radio[columns].astype(object).fillna("").astype(str).agg(" ".join, axis=1).to_numpy()
+    known = pd.DataFrame({"key": keys, "cell": radio["cell"], "lat": places[0], "lon": places[1]})
+    cells = (
+        known[named]
+        .groupby("key")
+        .agg(
+            count=("cell", "nunique"),
+            cell=("cell", "first"),
+            south=("lat", "min"),
+            north=("lat", "max"),
+            west=("lon", "min"),
+            east=("lon", "max"),
+        )
+    )
+    found = cells[cells["count"] == 1].reindex(keys[bare])
+    reach_deg = _CODE_REACH_M / _M_PER_DEG
+    wide_deg = reach_deg / np.cos(np.radians(places[0][bare]))
+    lat_deg, lon_deg = places[0][bare], places[1][bare]
+    near = (found["south"] - reach_deg <= lat_deg) & (lat_deg <= found["north"] + reach_deg)
+    near &= (found["west"] - wide_deg <= lon_deg) & (lon_deg <= found["east"] + wide_deg)
+    names = radio["cell"].astype(object).to_numpy(copy=True)
+    names[bare] = np.where(near.to_numpy(), found["cell"].to_numpy(dtype=object), None)
+    if count := int(near.sum()):
+        rows.remarks.append(f"{number_of(count, 'neighbour')} named by carrier and code")
+    return radio.assign(cell=names)
 
 
 def _places(positions: pd.DataFrame, time_s: Floats) -> tuple[Floats, Bools]:

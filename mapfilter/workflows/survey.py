@@ -108,6 +108,8 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         height_m=config.cells.height_m,
         eirp_dbm=config.cells.eirp_dbm,
         frequency_mhz=config.cells.frequency_mhz,
+        technologies=measurements.technologies,
+        codes=measurements.codes,
     )
     write_cell_plan(cells, plan_path)
     pictures: tuple[Path, ...] = ()

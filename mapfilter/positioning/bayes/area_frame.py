@@ -76,6 +76,12 @@ class AreaFrame(ABC):
         """
 
     @cached_property
+    def uncoded(self) -> frozenset[int]:
+        """Bands of the cells that no carrier with a code tells: any such neighbour may be one."""
+        coded = {band for (_, code), bands in self.carriers.items() if code >= 0 for band in bands}
+        return frozenset(range(len(self.cell_ids))) - coded
+
+    @cached_property
     def layer_of(self) -> Ints:
         """Number of each band's layer, (C,)."""
         layers = self.layers or (0,) * len(self.cell_ids)

@@ -276,7 +276,12 @@ class RadioSource(EvidenceSource):
         """Return the bands that rows of a report are of, or may be of, with and without levels."""
         if any(row.cell is None and row.arfcn is None for row in epoch.radio):
             return set(range(len(self.area.cell_ids)))
-        return {band for row in epoch.radio for band in self._bands_of(row)}
+        found: set[int] = set()
+        for row in epoch.radio:
+            bands = self._bands_of(row)
+            # A neighbour that the plan's carriers and codes do not tell may be a cell without them.
+            found.update(self.area.uncoded if row.cell is None and not bands else bands)
+        return found
 
     def _bands_of(self, row: ReportRow) -> tuple[int, ...]:
         """Return the bands that a row with a cell or a carrier is of, or may be of."""
