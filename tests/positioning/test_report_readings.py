@@ -299,6 +299,17 @@ def test_no_cell_of_a_report_is_absent_however_it_is_named():
         assert reading.levels.absent.tolist() == expected, rows
 
 
+def test_a_neighbour_that_no_code_tells_may_be_any_cell_without_one():
+    rows = serving("A", -70.0), named("B", -80.0), carrier(61, 9, -80.0)
+    assert absent(read(*rows)[1]) == ([C, D], FLOOR_DBM)
+    # The plan has no code of D; and of none, as a survey without a plan.
+    told = {key: tuple(b for b in bands if b != D) for key, bands in AREA.carriers.items()}
+    told = {key: bands for key, bands in told.items() if bands}
+    assert absent(read(*rows, area=replace(AREA, carriers=told))[1]) == ([C], FLOOR_DBM)
+    _, reading, _, _ = read(*rows, area=replace(AREA, carriers={}))
+    assert absent(reading)[0] == []
+
+
 def test_levels_and_what_they_are_compared_with():
     used, first, _, _ = read(serving("A", -70.0))
     moved = START.moved(MotionStep(10.0, 0.0))

@@ -10,7 +10,8 @@ from test_survey_fit import ANTENNA, CRS, LATTICE, law, measured, shadowed, some
 
 from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
-from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.cells import Cell, CellPlan, write_cell_plan
+from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import check_against_plan
@@ -220,6 +221,28 @@ def test_the_plan_of_a_survey_fits_its_rasters(tmp_path):
     mean_only = fit_survey(along_a_street(), SurveyOptions(trend="mean"))
     (cell,) = surveyed_plan(mean_only, ids, {}, None, **given).cells
     assert abs(cell.east_m - ANTENNA[0]) < 150
+
+
+@pytest.mark.parametrize(
+    ("family", "code", "expected"),
+    [
+        ("LTE", (6300, 101), ("LTE", 6300, 101)),
+        (None, (60, 9), (None, 60, 9)),
+        ("GSM", None, ("GSM", None, None)),
+        # A plan with these could not be read again.
+        ("GSM", (6300, 101), (None, None, None)),
+        ("CDMA", (6300, 101), (None, None, None)),
+    ],
+)
+def test_the_plan_of_a_survey_has_carriers_and_codes(tmp_path, family, code, expected):
+    survey = fit_survey(along_a_street(), SurveyOptions())
+    given = {"height_m": 30.0, "eirp_dbm": 50.0, "frequency_mhz": 1800.0}
+    told = {"technologies": {"A": family} if family else {}, "codes": {"A": code} if code else {}}
+    plan = surveyed_plan(survey, ("A",), {}, None, **given, **told)
+    (cell,) = plan.cells
+    assert (cell.technology, cell.arfcn, cell.bsic) == expected
+    write_cell_plan(plan, tmp_path / "cells.csv")
+    assert read_cell_plan(tmp_path / "cells.csv", CRS).cells[0].arfcn == expected[1]
 
 
 def test_a_predicted_raster_is_calibrated(tmp_path):

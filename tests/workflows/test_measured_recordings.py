@@ -184,3 +184,58 @@ def test_a_column_of_cells_of_another_name_is_named_as_the_mistake(tmp_path):
         read(path)
     columns = {"cell": "CellName", "lat": "Latitude", "lon": "Longitude", "level_dbm": "RSRP"}
     assert read_measurements([path], "EPSG:32635", columns=columns).cell_ids == ("A",)
+
+
+def coded(made, *neighbours):
+    """Return the rows of a drive that is served by 7 and 8, with neighbours of a place and code."""
+    served = [
+        *(f"{1777629600 + k},{60.17 + k * 1e-4},24.94,244,91,1,7,-80,1300,101" for k in range(5)),
+        *(f"{1777629605 + k},60.171,24.94,244,91,1,8,-82,1300,102" for k in range(5)),
+    ]
+    others = [f"{1777629610 + k},{at},,,,,-95,{code}" for k, (at, code) in enumerate(neighbours)]
+    header = "time,lat,lon,mcc,mnc,lac,eci,rsrp,earfcn,pci"
+    return recorded_rows(made("csv", "\n".join([header, *served, *others]) + "\n"))
+
+
+def test_neighbours_have_the_cell_that_their_carrier_and_code_have_elsewhere_in_the_file(made):
+    rows = coded(
+        made,
+        ("60.171,24.94", "1300,101"),
+        # Within 2 km of where 7 serves, 60.17 to 60.1704, and beyond; to the east, too.
+        ("60.1883,24.94", "1300,101"),
+        ("60.1885,24.94", "1300,101"),
+        ("60.1521,24.94", "1300,101"),
+        ("60.1519,24.94", "1300,101"),
+        ("60.171,24.976", "1300,101"),
+        ("60.171,24.977", "1300,101"),
+        # Of another carrier, or of no known code, or without a carrier.
+        ("60.171,24.94", "1301,101"),
+        ("60.171,24.94", "1300,103"),
+        ("60.171,24.94", ",101"),
+    )
+    ids = list(rows.cells)
+    named = [
+        ids[cell] for cell, serving in zip(rows.cell, rows.columns[6], strict=True) if not serving
+    ]
+    assert named == ["244-91-1-7"] * 4
+    assert rows.remarks == ["4 neighbours named by carrier and code"]
+    assert rows.aside["levels of cells without identity"] == 6
+    assert rows.codes == {"244-91-1-7": (1300, 101), "244-91-1-8": (1300, 102)}
+    assert rows.technologies == dict.fromkeys(ids, "LTE")
+
+
+def test_a_code_of_two_cells_names_none(made):
+    text = "time,lat,lon,mcc,mnc,lac,eci,rsrp,earfcn,pci\n" + "".join(
+        f"{1777629600 + k},60.17,24.94,244,91,1,{7 + k % 2},-80,1300,101\n" for k in range(6)
+    )
+    rows = recorded_rows(made("csv", text + "1777629610,60.17,24.94,,,,,-95,1300,101\n"))
+    assert rows.aside["levels of cells without identity"] == 1
+    assert rows.remarks == []
+
+
+def test_own_formats_state_carriers_and_codes(tmp_path):
+    path = tmp_path / "own.csv"
+    head = "time,lat,lon,mcc,mnc,lac,ci,level_dbm,earfcn,pci\n"
+    path.write_text(head + "1777629600,60.17,24.94,244,91,1,7,-80,1300,101\n"
+                    "1777629601,60.17,24.94,244,91,1,8,-80,1300,\n")  # fmt: skip
+    assert read(path).codes == {"244-91-1-7": (1300, 101)}
