@@ -38,8 +38,6 @@ class AreaFrame(ABC):
         Weaker levels are not in the database.
     sites : mapping of str to tuple of float
         East, north and height of all cells of the database.
-    interfering : frozenset of int
-        Bands of the cells whose neighbours send on the same carrier (:func:`interfering_of`).
     layers : tuple of int
         Number of each band's layer, from 0 (:mod:`mapfilter.radio.layers`); empty where all are of
         one.
@@ -51,7 +49,6 @@ class AreaFrame(ABC):
     carriers: dict[tuple[int, int], tuple[int, ...]]
     floor_dbm: float
     sites: Mapping[str, tuple[float, float, float]]
-    interfering: frozenset[int]
     layers: tuple[int, ...]
 
     @abstractmethod
@@ -180,17 +177,6 @@ def carriers_of(plan: CellPlan, cell_ids: Iterable[str]) -> dict[tuple[int, int]
         for key in keys:
             found[key] = (*found.get(key, ()), band)
     return found
-
-
-def interfering_of(plan: CellPlan, cell_ids: Iterable[str]) -> frozenset[int]:
-    """Return the bands of cells of UMTS, LTE and NR.
-
-    Their neighbours share a carrier, so a phone finds one only where the stronger ones do not drown
-    it: in LTE at -6 dB of signal to interference (3GPP TS 36.133). The beacons of GSM have
-    carriers of their own.
-    """
-    found = {cell.id for cell in plan.cells if cell.technology in ("UMTS", "LTE", "NR")}
-    return frozenset(band for band, cell in enumerate(cell_ids) if cell in found)
 
 
 def sites_of(plan: CellPlan) -> dict[str, tuple[float, float, float]]:
