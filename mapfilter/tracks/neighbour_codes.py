@@ -109,4 +109,4 @@ def _nearest(cells: Sequence[Cell], serving: Cell | None) -> str | None:
     )
     if not away or away[0][0] > _REACH_M:
         return None
-    return away[0][1] if len(away) == 1 or away[1][0] > _APART * away[0][0] else None
+    return away[0][1] if len(away) == 1 or away[1][0] >= _APART * away[0][0] else None

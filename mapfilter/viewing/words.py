@@ -19,7 +19,7 @@ REASONS: Mapping[Reason, str] = {
     Reason.NO_STEP: "the length of the step is unknown",
     Reason.NO_READING: "nothing was measured",
     Reason.MOTION_MISSING: "motion is missing for a while",
-    Reason.MOTION_STUCK: "no motion is counted, but levels change: a ride, or a sensor that stands still",
+    Reason.MOTION_STUCK: "no motion, but levels change: a ride, or a sensor that stands still",
     Reason.HEADING_STUCK: "the heading repeats itself while one walks",
     Reason.IMPOSSIBLE_STEP: "a step is longer than anything can go in that time",
     Reason.PHONE_TURNED: "the heading has jumped as that of a phone that is turned",

@@ -266,3 +266,47 @@ def test_a_plan_without_carriers_tells_neighbours_by_code_and_distance(
     assert [None if pd.isna(one) else one for one in log.radio["cell"]] == ["here", expected]
     taken = "radio: 1 neighbour named by code alone, as the plan lacks carriers"
     assert (taken in log.notes) == (expected is not None)
+
+
+def test_a_code_alone_without_a_known_serving_place():
+    """Only a code that one cell of the plan has is told then."""
+    rows = [
+        {"time_s": 0.0, "role": "serving", "cell": "new", "technology": "LTE", "arfcn": 6300},
+        {"time_s": 0.0, "role": "neighbour", "bsic": 2},
+        {"time_s": 0.0, "role": "neighbour", "bsic": 4},
+        {"time_s": 1.0, "role": "serving", "cell": "here"},
+        {"time_s": 1.0, "role": "neighbour", "bsic": 2},
+    ]
+    log = name_by_plan(make_log(CRS, radio=pd.DataFrame(rows)), UNCARRIED)
+    found = [None if pd.isna(one) else one for one in log.radio["cell"]]
+    # The serving cell of each report counts, not that of another one.
+    assert found == ["new", None, "away", "here", "near"]
+
+
+@pytest.mark.parametrize(
+    ("away_m", "next_m", "expected"),
+    [(35_000.0, 90_000.0, "one"), (35_001.0, 90_000.0, None), (1_000.0, 2_000.0, "one"),
+     (1_000.0, 1_999.0, None)],
+)  # fmt: skip
+def test_the_nearest_cell_of_a_code_is_clearly_nearest(away_m, next_m, expected):
+    cells = (
+        cell("here", technology="LTE", bsic=1),
+        replace(cell("one", technology="LTE", bsic=2), north_m=6_672_000.0 + away_m),
+        replace(cell("other", technology="LTE", bsic=2), north_m=6_672_000.0 - next_m),
+    )
+    rows = [{"role": "serving", "cell": "here"}, {"role": "neighbour", "bsic": 2}]
+    table = pd.DataFrame([{"time_s": 0.0, **row} for row in rows])
+    log = name_by_plan(make_log(CRS, radio=table), CellPlan(CRS, cells))
+    assert (None if pd.isna(log.radio["cell"].iloc[1]) else log.radio["cell"].iloc[1]) == expected
+
+
+def test_a_neighbour_with_an_id_or_an_identity_keeps_it():
+    rows = [
+        {"role": "serving", "cell": "here"},
+        {"role": "neighbour", "cell": "unknown", "bsic": 2},
+        {"role": "neighbour", "ci": 77, "bsic": 2},
+    ]
+    table = pd.DataFrame([{"time_s": 0.0, **row} for row in rows])
+    log = name_by_plan(make_log(CRS, radio=table), UNCARRIED)
+    assert log.radio["cell"].tolist() == ["here", "unknown", "77"]
+    assert log.radio["arfcn"].isna().all()

@@ -171,3 +171,18 @@ def test_a_zip_of_too_many_files_is_refused(packed):
     path = packed(**{f"{k}.csv": "" for k in range(1001)})
     with pytest.raises(InputError, match="at most 1000 files, found 1001 files"):
         read_recordings([path], OpenOptions())
+
+
+def test_files_and_folders_that_are_none_are_no_zip(packed, tmp_path):
+    assert not zipped.is_zip(tmp_path)
+    assert not zipped.is_zip(tmp_path / "nothing")
+    (tmp_path / "a.csv").write_text("time,lat")
+    assert not zipped.is_zip(tmp_path / "a.csv")
+    assert zipped.is_zip(packed(**{"a.csv": "x"}))
+
+
+def test_hidden_files_and_folders_are_left_out_and_a_thousand_files_are_not_too_many(packed):
+    path = packed(**{"_x/a.gpx": GPX, "b/.c/d.gpx": GPX, "b/track.gpx": GPX, "b/.hidden": GPX})
+    assert zipped.files_in_zip(path) == [path / "b" / "track.gpx"]
+    many = packed(**{f"{k}.csv": "" for k in range(1000)})
+    assert len(zipped.files_in_zip(many)) == 1000
