@@ -18,6 +18,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cell_rules import technology_faults
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.identities import LIMITS
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.undeclared import check_nodata_stated
@@ -116,6 +117,7 @@ def surveyed_plan(
     An antenna that could not be located is put amid the strongest quarter of its readings. What
     is known of a cell, its identity, technology, carrier and code, is in the plan.
     """
+    families = _families(identities, technologies or {}, codes or {})
     known = plan.to_crs(survey.crs) if plan is not None else None
     cells = []
     for cell_id in ids:
@@ -127,11 +129,29 @@ def surveyed_plan(
         cell = Cell(cell_id, cell_id, *place, height_m, None, eirp_dbm, frequency_mhz, "omni")
         cell = replace(cell, mcc=mcc, mnc=mnc, lac=lac, ci=ci)
         arfcn, bsic = (codes or {}).get(cell_id, (None, None))
-        told = replace(cell, arfcn=arfcn, bsic=bsic, technology=(technologies or {}).get(cell_id))
+        told = replace(cell, arfcn=arfcn, bsic=bsic, technology=families.get(cell_id))
         # What no plan may state would make this one unreadable.
         odd = technology_faults(told.technology, partial(getattr, told))
         cells.append(cell if odd else told)
     return CellPlan(survey.crs, tuple(cells))
+
+
+def _families(
+    identities: Mapping[str, Identity], technologies: Mapping[str, str], codes: Mapping[str, Code]
+) -> Mapping[str, str]:
+    """Return the technologies of cells: GSM where none is stated, and all have what GSM has.
+
+    A CI of 16 bits beside ARFCN and BSIC; in LTE identities are longer, and most codes larger.
+    """
+    unknown = [name for name in codes if name not in technologies and name in identities]
+    most = LIMITS["GSM"]
+    fits = all(
+        max(identities[name][2:]) <= most["ci"]
+        and codes[name][0] <= most["arfcn"]
+        and codes[name][1] <= most["bsic"]
+        for name in unknown
+    )
+    return {**technologies, **dict.fromkeys(unknown, "GSM")} if fits else technologies
 
 
 def predicted_levels(rasters: RxLevRasters, plan: CellPlan | None) -> dict[str, Covariate]:

@@ -49,6 +49,7 @@ OPTIONS = EvidenceOptions(
     ),
     spacing_m=6.0,
     first_m=20.0,
+    full_list=3,
     bound_weight=0.4,
     beside_db=5.0,
     beside_m=40.0,

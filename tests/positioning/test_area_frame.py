@@ -1,5 +1,7 @@
 """Extent, edges, cells and sites of an area in its local frame, however its levels are held."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_area import FLOOR_DBM, LEVEL_DBM, make_area
@@ -8,6 +10,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.area_frame import (
     AreaFrame,
     carriers_of,
+    interfering_of,
     sites_of,
 )
 from mapfilter.radio.cells import Cell, CellPlan
@@ -122,6 +125,13 @@ def test_carriers_have_the_bands_of_their_cells():
         (70, -1): (1, 2, 3, 0), (70, 3): (1, 0), (70, 4): (2,), (71, -1): (4,), (71, 3): (4,),
     }  # fmt: skip
     assert sites_of(CellPlan(CRS, (cell("a", east_m=7.0),))) == {"a": (7.0, 2.0, 30.0)}
+
+
+def test_not_all_neighbours_of_a_known_technology_are_found():
+    technologies = {"a": "LTE", "b": "GSM", "c": None, "d": "NR", "e": "UMTS", "away": "LTE"}
+    cells = [replace(cell(name), technology=one) for name, one in technologies.items()]
+    assert interfering_of(CellPlan(CRS, tuple(cells)), ("e", "c", "b", "a", "d")) == {0, 2, 3, 4}
+    assert interfering_of(CellPlan(CRS, ()), ("a",)) == frozenset()
 
 
 def test_levels_that_are_not_in_the_database_are_six_decibels_below_its_floor():

@@ -41,8 +41,8 @@ def test_the_usual_options():
     evidence = EvidenceOptions()
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)
     assert (evidence.serving, evidence.levels) == (ServingWeights(), LevelErrors())
-    weights = evidence.bound_weight, evidence.beside_db, evidence.beside_m
-    assert (*weights, evidence.serving_with_levels) == (0.5, 6.0, 50.0, 1.0)
+    weights = evidence.full_list, evidence.bound_weight, evidence.beside_db, evidence.beside_m
+    assert (*weights, evidence.serving_with_levels) == (6, 0.5, 6.0, 50.0, 1.0)
     bound = BayesFilter(bias_sd_deg=1.5).over_area(small_area.make_area())
     model = bound.model
     narrow = MotionErrors(bias_sd_rad=radians(1.5))

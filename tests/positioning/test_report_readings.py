@@ -21,7 +21,7 @@ from made_radio import (
     serving,
     unknown_cells,
 )
-from small_area import CARRIERS, OPTIONS
+from small_area import CARRIERS, FLOOR_DBM, OPTIONS
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.path import DeadReckoning
@@ -186,34 +186,31 @@ def test_a_serving_cell_may_count_less_beside_levels():
 
 
 def test_cells_are_absent_where_a_phone_reports_neighbours():
-    """One neighbour may be all that a phone measures; with two others would be listed, too."""
+    """One neighbour may be all that a phone measures; with two the list is taken for whole."""
     for neighbours in ((), (named("B", -80.0),)):
         _, reading, _, _ = read(serving("A", -70.0), *neighbours)
         assert reading.levels.absent.size == 0
     _, reading, _, _ = read(serving("A", -70.0), named("B", -80.0), named("X", -99.0))
-    assert absent(reading) == ([C, D], -99.0)
+    assert absent(reading) == ([C, D], FLOOR_DBM)
     assert reading.levels.absent.dtype == np.int32
     # A second serving cell is no neighbour.
     _, reading, _, _ = read(serving("A", -70.0), serving("B", -80.0), named("C", -90.0))
     assert reading.levels.absent.size == 0
 
 
-def test_cells_that_a_list_lacks_are_weaker_than_its_weakest():
-    """However long it is: phones list few cells, and find none that stronger ones drown."""
+def test_a_full_list_leaves_out_what_is_weaker_than_its_weakest():
     rows = serving("A", -98.0), named("B", -80.0), named("X", -92.5), named("E", -85.0)
     _, reading, _, _ = read(*rows)
     # A serving cell may be weaker than its neighbours.
     assert absent(reading) == ([C, D], -98.0)
     _, reading, _, _ = read(serving("A", -70.0), *rows[1:])
     assert absent(reading) == ([C, D], -92.5)
-    _, reading, _, _ = read(serving("A", -70.0), *rows[1:3])
+    # A row without a level fills the list, too.
+    _, reading, _, _ = read(serving("A", -70.0), *rows[1:3], named("X", nan))
     assert absent(reading) == ([C, D], -92.5)
-    # A row without a level counts as one.
-    _, reading, _, _ = read(serving("A", -70.0), rows[1], named("X", nan))
-    assert absent(reading) == ([C, D], -80.0)
-    # One neighbour may still be all that a phone measures.
-    _, reading, _, _ = read(*rows[:2])
-    assert reading.levels.absent.size == 0
+    longer = replace(OPTIONS, full_list=4)
+    _, reading, _, _ = read(*rows, options=longer)
+    assert absent(reading) == ([C, D], FLOOR_DBM)
 
 
 LAYERED = replace(AREA, layers=(0, 1, 0, 1))
@@ -224,23 +221,26 @@ def test_cells_of_layers_that_a_phone_does_not_measure_are_not_absent():
     """With two neighbours of a layer, each is; and they are weaker than the weakest of it."""
     rows = serving("A", -70.0), named("C", -95.5), named("C", -96.0)
     _, reading, _, _ = read(*rows, area=replace(LAYERED, layers=(0, 1, 0, 0)))
-    assert absent(reading) == ([D], -96.0)
+    assert absent(reading) == ([D], FLOOR_DBM)
     _, reading, _, _ = read(*rows, area=LAYERED)
     assert absent(reading) == ([], set())
     # One neighbour of another layer is not all that is there.
     _, reading, _, _ = read(*rows, named("B", -80.0), area=LAYERED)
     assert absent(reading) == ([], set())
-    shared = replace(LAYERED, layers=(0, 1, 0, 0))
+    shared = replace(LAYERED, layers=(0, 1, 0, 0), interfering=frozenset(range(4)))
     _, reading, _, _ = read(*rows, named("B", -99.0), area=shared)
     assert absent(reading) == ([D], -96.0)
-    three = replace(AREA, layers=(0, 1, 1, 1))
+    three = replace(AREA, layers=(0, 1, 1, 1), interfering=frozenset({A, B, C, D}))
     two = named("B", -80.25), named("B", -91.5)
     _, reading, _, _ = read(serving("A", -99.0), *two, area=three)
     assert absent(reading) == ([C, D], -91.5)
     both = replace(AREA, layers=(0, 1, 0, 1))
-    _, reading, _, _ = read(*two, *rows[1:], area=both)
+    _, reading, _, _ = read(*two, *rows[1:], area=both, options=replace(OPTIONS, full_list=6))
+    assert absent(reading) == ([A, D], FLOOR_DBM)
+    both = replace(both, interfering=frozenset({A, C}))
+    _, reading, _, _ = read(*two, *rows[1:], area=both, options=replace(OPTIONS, full_list=6))
     bands, limit_dbm = reading.levels.absent.tolist(), reading.levels.limit_dbm.tolist()
-    assert (bands, limit_dbm) == ([A, D], [-96.0, -91.5])
+    assert (bands, limit_dbm) == ([A, D], [-96.0, FLOOR_DBM])
 
 
 def test_a_neighbour_of_an_unknown_code_is_of_the_layer_of_its_carrier():
@@ -248,17 +248,28 @@ def test_a_neighbour_of_an_unknown_code_is_of_the_layer_of_its_carrier():
     arfcn, layers = CARRIERS["B"][0], replace(AREA, layers=(0, 1, 1, 1))
     rows = serving("A", -70.0), carrier(arfcn, 7, -88.0), carrier(arfcn, 8, -90.0)
     _, reading, _, _ = read(*rows, area=layers)
-    assert absent(reading) == ([B, C, D], -90.0)
+    assert absent(reading) == ([B, C, D], FLOOR_DBM)
     both = [replace(row, cell="X") for row in rows[1:]]
     _, reading, _, _ = read(rows[0], *both, area=layers)
-    assert absent(reading) == ([B, C, D], -90.0)
+    assert absent(reading) == ([B, C, D], FLOOR_DBM)
     _, reading, _, _ = read(rows[0], named("X", -88.0), named("Y", -90.0), area=layers)
     assert absent(reading) == ([], set())
 
 
+def test_cells_on_one_carrier_may_be_drowned_by_those_of_the_report():
+    """A phone finds them by what is left beside the stronger ones, and not down to the floor."""
+    rows = serving("A", -70.0), named("B", -80.0), named("X", -84.5)
+    for bands, limit_dbm in (({A, B, C, D}, -84.5), ((), FLOOR_DBM)):
+        _, reading, _, _ = read(*rows, area=replace(AREA, interfering=frozenset(bands)))
+        assert absent(reading) == ([C, D], limit_dbm)
+    # One neighbour may still be all that a phone measures.
+    _, reading, _, _ = read(*rows[:2], area=replace(AREA, interfering=frozenset({A})))
+    assert reading.levels.absent.size == 0
+
+
 def test_cells_may_be_drowned_by_those_of_which_no_one_cell_is_known():
     """Ambiguous codes, and codes that no cell of the plan has, are received all the same."""
-    both = replace(AREA, layers=(0, 1, 1, 1))
+    both = replace(AREA, layers=(0, 1, 1, 1), interfering=frozenset({A, B, C, D}))
     arfcn = CARRIERS["B"][0]
     rows = carrier(arfcn, 7, -88.0), carrier(arfcn, 8, -90.0)
     _, reading, _, _ = read(serving("A", -70.0), *rows, area=both)
@@ -290,11 +301,11 @@ def test_no_cell_of_a_report_is_absent_however_it_is_named():
 
 def test_a_neighbour_that_no_code_tells_may_be_any_cell_without_one():
     rows = serving("A", -70.0), named("B", -80.0), carrier(61, 9, -80.0)
-    assert absent(read(*rows)[1]) == ([C, D], -80.0)
+    assert absent(read(*rows)[1]) == ([C, D], FLOOR_DBM)
     # The plan has no code of D; and of none, as a survey without a plan.
     told = {key: tuple(b for b in bands if b != D) for key, bands in AREA.carriers.items()}
     told = {key: bands for key, bands in told.items() if bands}
-    assert absent(read(*rows, area=replace(AREA, carriers=told))[1]) == ([C], -80.0)
+    assert absent(read(*rows, area=replace(AREA, carriers=told))[1]) == ([C], FLOOR_DBM)
     _, reading, _, _ = read(*rows, area=replace(AREA, carriers={}))
     assert absent(reading)[0] == []
 
@@ -318,7 +329,7 @@ def test_the_usual_weights_of_reports():
     del usual["serving"], usual["levels"]
     assert usual == {
         "spacing_m": 5.0, "first_m": 25.0, "use_levels": True, "serving_with_levels": 1.0,
-        "bound_weight": 0.5, "beside_db": 6.0, "beside_m": 50.0,
+        "full_list": 6, "bound_weight": 0.5, "beside_db": 6.0, "beside_m": 50.0,
     }  # fmt: skip
 
 

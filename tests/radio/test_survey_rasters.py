@@ -288,3 +288,22 @@ def test_losses_are_calibrated_with_the_plans_eirp(tmp_path):
     write_rasters(path, LATTICE, [("A", loss)], ("A",), quantity="loss")
     levels = predicted_levels(open_rasters(path), plan)
     np.testing.assert_allclose(levels["A"](east_m, north_m), law(east_m, north_m), atol=2.0)
+
+
+@pytest.mark.parametrize(
+    ("ci", "code", "family"),
+    [(10_151, (26, 24), "GSM"), (13_063_179, (26, 24), None), (10_151, (1300, 24), None),
+     (10_151, (26, 64), None)],
+)  # fmt: skip
+def test_cells_are_of_gsm_where_all_have_what_gsm_has(ci, code, family):
+    survey = fit_survey(along_a_street(), SurveyOptions())
+    given = {"height_m": 30.0, "eirp_dbm": 50.0, "frequency_mhz": 900.0}
+    identities = {"A": (262, 2, 3100, 7), "B": (262, 2, 3100, ci)}
+    codes = {"A": (60, 9), "B": code, "C": (300_000, 500)}
+    plan = surveyed_plan(survey, ("A",), identities, None, **given, codes=codes)
+    assert plan.cells[0].technology == family
+    stated = {"A": "UMTS"}
+    plan = surveyed_plan(
+        survey, ("A",), identities, None, **given, codes=codes, technologies=stated
+    )
+    assert plan.cells[0].technology == "UMTS"

@@ -14,6 +14,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.way_map import all_inside, places_beyond, weight_inside
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.identities import LIMITS
 
 BELOW_FLOOR_DB = 6.0
 """How far below the floor a level is assumed to be that the database does not hold."""
@@ -38,6 +39,9 @@ class AreaFrame(ABC):
         Weaker levels are not in the database.
     sites : mapping of str to tuple of float
         East, north and height of all cells of the database.
+    interfering : frozenset of int
+        Bands of the cells that a phone may not find though they are above the floor
+        (:func:`interfering_of`).
     layers : tuple of int
         Number of each band's layer, from 0 (:mod:`mapfilter.radio.layers`); empty where all are of
         one.
@@ -49,6 +53,7 @@ class AreaFrame(ABC):
     carriers: dict[tuple[int, int], tuple[int, ...]]
     floor_dbm: float
     sites: Mapping[str, tuple[float, float, float]]
+    interfering: frozenset[int]
     layers: tuple[int, ...]
 
     @abstractmethod
@@ -177,6 +182,17 @@ def carriers_of(plan: CellPlan, cell_ids: Iterable[str]) -> dict[tuple[int, int]
         for key in keys:
             found[key] = (*found.get(key, ()), band)
     return found
+
+
+def interfering_of(plan: CellPlan, cell_ids: Iterable[str]) -> frozenset[int]:
+    """Return the bands of cells of GSM, UMTS, LTE and NR, but not of an unknown technology.
+
+    Neighbours share a carrier, so a phone finds one only where the stronger ones do not drown it:
+    in LTE at -6 dB of signal to interference (3GPP TS 36.133). In GSM it looks for the carriers
+    that the network names, and has to read the code beside other cells on that carrier.
+    """
+    found = {cell.id for cell in plan.cells if cell.technology in LIMITS}
+    return frozenset(band for band, cell in enumerate(cell_ids) if cell in found)
 
 
 def sites_of(plan: CellPlan) -> dict[str, tuple[float, float, float]]:

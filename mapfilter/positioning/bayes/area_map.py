@@ -18,6 +18,7 @@ from mapfilter.positioning.bayes.area_frame import (
     BELOW_FLOOR_DB,
     AreaFrame,
     carriers_of,
+    interfering_of,
     sites_of,
 )
 from mapfilter.radio.cells import CellPlan
@@ -42,7 +43,7 @@ class AreaMap(AreaFrame):
         Id of the way of the nearest point; 0 where that belongs to no way.
     on_way : ndarray of bool, shape (rows, cols)
         Whether the pixel is a point of the database.
-    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, layers
+    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, interfering, layers
         As of :class:`AreaFrame`.
     carriageway_m : ndarray of float32, shape (rows, cols), or None
         To the edge of the nearest carriageway; None in a database with cells.
@@ -59,6 +60,7 @@ class AreaMap(AreaFrame):
     floor_dbm: float
     sites: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     carriageway_m: Floats32 | None = None
+    interfering: frozenset[int] = frozenset()
     layers: tuple[int, ...] = ()
 
     @classmethod
@@ -104,6 +106,7 @@ class AreaMap(AreaFrame):
             floor_dbm,
             sites_of(plan),
             lane_m,
+            interfering_of(plan, field.cell_ids),
             layers,
         )
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import exp, isfinite, nan, sqrt
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from annotated_types import Ge
 
 from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import BoundReading, ServingWeights
@@ -53,6 +54,10 @@ class EvidenceOptions(Options):
     serving_with_levels : float
         Share of a serving cell's weight where levels are reported, too: given these, it depends on
         the position no more.
+    full_list : int
+        With so many neighbours or more a report may have left out others, weaker than these; with
+        fewer, all cells above the floor are in it, unless they share a carrier and the stronger
+        ones may drown them.
     bound_weight : float
         Exponent of the likelihood of bounds and of levels of one of several cells.
     beside_db, beside_m : float
@@ -65,6 +70,7 @@ class EvidenceOptions(Options):
     first_m: NotNegative = 25.0
     use_levels: bool = True
     serving_with_levels: Share = 1.0
+    full_list: Annotated[int, Ge(0)] = 6
     bound_weight: Share = 0.5
     beside_db: NotNegative = 6.0
     beside_m: Positive = 50.0
@@ -237,11 +243,10 @@ class RadioSource(EvidenceSource):
     def _absent(self, epoch: Epoch) -> dict[int, float]:
         """Return cells that would be in a report if they were stronger, and than which level.
 
-        They are of layers of which the phone measures neighbours, and weaker than the weakest of
-        these: phones list few cells, and find none that stronger ones drown, or that the network
-        does not tell them to look for.
+        They are of layers of which the phone measures neighbours.
         """
         area, present = self.area, self._present(epoch)
+        full = sum(row.role != SERVING for row in epoch.radio) >= self.options.full_list
         rows: dict[int, list[ReportRow]] = {}
         for row in epoch.radio:
             for layer in self._layers_of(row):
@@ -252,7 +257,8 @@ class RadioSource(EvidenceSource):
                 continue
             of_layer = np.flatnonzero(area.layer_of == layer).tolist()
             levels = [row.level_dbm for row in some if isfinite(row.level_dbm)]
-            limit_dbm = min(levels, default=area.floor_dbm)
+            listed = levels and (full or not area.interfering.isdisjoint(of_layer))
+            limit_dbm = min(levels) if listed else area.floor_dbm
             found.update(dict.fromkeys((b for b in of_layer if b not in present), limit_dbm))
         return dict(sorted(found.items()))
 

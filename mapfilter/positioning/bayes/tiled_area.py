@@ -25,6 +25,7 @@ from mapfilter.models.tile_kernels import (
 from mapfilter.positioning.bayes.area_frame import (
     AreaFrame,
     carriers_of,
+    interfering_of,
     sites_of,
 )
 from mapfilter.positioning.bayes.area_tiles import HELD_BYTES, TILE_PX, AreaTiles
@@ -46,7 +47,7 @@ class TiledArea(AreaFrame):
 
     Parameters
     ----------
-    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, layers
+    lattice, cell_ids, known_ids, carriers, floor_dbm, sites, interfering, layers
         As of :class:`~mapfilter.positioning.bayes.area_frame.AreaFrame`.
     tiles : AreaTiles
         Of the database.
@@ -62,6 +63,7 @@ class TiledArea(AreaFrame):
     sites: Mapping[str, tuple[float, float, float]]
     tiles: AreaTiles
     search_tiles: int = SEARCH_TILES
+    interfering: frozenset[int] = frozenset()
     layers: tuple[int, ...] = ()
 
     @classmethod
@@ -105,6 +107,7 @@ class TiledArea(AreaFrame):
             sites_of(plan),
             AreaTiles(database, cells, layers, side, largest_bytes),
             search_tiles,
+            interfering_of(plan, cells),
             layers,
         )
 
