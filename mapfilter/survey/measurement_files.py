@@ -38,6 +38,10 @@ _CODES = {
 }
 
 
+_FAMILY_OF = {"earfcn": "LTE", "eci": "LTE", "uarfcn": "UMTS", "nr_arfcn": "NR", "nci": "NR"}
+"""Technologies of columns that have a name of their own in each."""
+
+
 class Dialect(NamedTuple):
     """Names of the columns of one kind of file.
 
@@ -87,6 +91,7 @@ DIALECTS: Mapping[str, Dialect] = {
         neighbour="neighboring",
         arfcn="arfcn",
         bsic="psc",
+        technology="net_type",
     ),
 }
 """Columns named as the fields are; uploads to OpenCellID; exports of Tower Collector."""
@@ -102,6 +107,8 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
     if not header:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "no text file")
     places, signs = _places(path, header, dialect), _Signs()
+    families = {_FAMILY_OF[name] for name in header if name in _FAMILY_OF}
+    usual = families.pop() if len(families) == 1 else None
     for line, text in lines:
         if text is not None and not text.strip():
             continue
@@ -126,7 +133,7 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
         if not cell:
             continue
         family = found["technology"].upper()
-        if kind := technology(family):
+        if kind := technology(family) or (None if family else usual):
             rows.technologies.setdefault(cell, kind)
         signs.add(line, found["level_dbm"], family)
         dbm = _from_asu(found["level_dbm"], family)

@@ -238,4 +238,10 @@ def test_own_formats_state_carriers_and_codes(tmp_path):
     head = "time,lat,lon,mcc,mnc,lac,ci,level_dbm,earfcn,pci\n"
     path.write_text(head + "1777629600,60.17,24.94,244,91,1,7,-80,1300,101\n"
                     "1777629601,60.17,24.94,244,91,1,8,-80,1300,\n")  # fmt: skip
-    assert read(path).codes == {"244-91-1-7": (1300, 101)}
+    found = read(path)
+    assert found.codes == {"244-91-1-7": (1300, 101)}
+    assert found.technologies == dict.fromkeys(found.cell_ids, "LTE")
+    path.write_text(
+        head.replace("earfcn", "arfcn") + "1777629600,60.17,24.94,244,91,1,7,-80,60,9\n"
+    )
+    assert (read(path).codes, read(path).technologies) == ({"244-91-1-7": (60, 9)}, {})
