@@ -138,13 +138,15 @@ def _with_coded(rows: Rows, radio: pd.DataFrame, places: Floats, placed: Bools) 
     The file itself tells it where a cell is identified, within 2 km of all places at which it is;
     where several cells have that carrier and code, none is taken.
     """
-    columns = ["technology", "arfcn", "bsic"] if "technology" in radio else ["arfcn", "bsic"]
     coded = (radio[["arfcn", "bsic"]].notna().all(axis=1) & placed).to_numpy()
     named = coded & radio["cell"].notna().to_numpy()
     bare = coded & ~radio["cell"].notna().to_numpy() & (radio["role"] != SERVING).to_numpy()
     if not (named.any() and bare.any()):
         return radio
-    keys = radio[columns].astype(object).fillna("").astype(str).agg(" ".join, axis=1).to_numpy()
+    codes = radio["arfcn"].astype(str) + " " + radio["bsic"].astype(str)
+    if "technology" in radio:
+        codes = radio["technology"].astype(object).fillna("").astype(str) + " " + codes
+    keys = codes.to_numpy(dtype=object)
     known = pd.DataFrame({"key": keys, "cell": radio["cell"], "lat": places[0], "lon": places[1]})
     cells = (
         known[named]
