@@ -38,8 +38,8 @@ _CODES = {
 }
 
 
-_FAMILY_OF = {"earfcn": "LTE", "eci": "LTE", "uarfcn": "UMTS", "nr_arfcn": "NR", "nci": "NR"}
-"""Technologies of columns that have a name of their own in each."""
+_FAMILY_OF = {"earfcn": "LTE", "uarfcn": "UMTS", "nr_arfcn": "NR"}
+"""Technologies of columns of carriers, which have a name of their own in each."""
 
 
 class Dialect(NamedTuple):
@@ -60,7 +60,7 @@ class Dialect(NamedTuple):
 
 def mapped(columns: Mapping[str, str]) -> Dialect:
     """Return the dialect of a map from fields to columns; these columns are required."""
-    own = {name: (name,) for name in FIELDS} | _CODES
+    own = {name: (name,) for name in FIELDS} | _CODES | {"technology": ("technology",)}
     named = {name: (column,) for name, column in columns.items()}
     return Dialect({**own, **named}, tuple(dict.fromkeys((*REQUIRED, *columns))))
 
@@ -80,7 +80,6 @@ DIALECTS: Mapping[str, Dialect] = {
         accuracy_m="rating",
         technology="act",
         timing_advance="ta",
-        bsic="pci psc",
     ),
     "towercollector": _upload(
         lac="lac",
@@ -107,7 +106,9 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
     if not header:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "no text file")
     places, signs = _places(path, header, dialect), _Signs()
-    families = {_FAMILY_OF[name] for name in header if name in _FAMILY_OF}
+    is_dbm = all(header[at].endswith("dbm") for at in places["level_dbm"])
+    stating = [at for at, name in enumerate(header) if name in _FAMILY_OF]
+    families = {_FAMILY_OF[header[at]] for at in stating}
     usual = families.pop() if len(families) == 1 else None
     for line, text in lines:
         if text is not None and not text.strip():
@@ -133,10 +134,11 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
         if not cell:
             continue
         family = found["technology"].upper()
-        if kind := technology(family) or (None if family else usual):
+        states = any(fields[at].strip() for at in stating)
+        if kind := technology(family) or (usual if states and not family else None):
             rows.technologies.setdefault(cell, kind)
         signs.add(line, found["level_dbm"], family)
-        dbm = _from_asu(found["level_dbm"], family)
+        dbm = None if is_dbm else _from_asu(found["level_dbm"], family)
         if dbm is not None:
             rows.aside["levels given as ASU (turned into dBm)"] += 1
             found["level_dbm"] = repr(dbm)

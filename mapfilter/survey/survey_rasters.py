@@ -16,7 +16,7 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.lattice import Lattice
-from mapfilter.radio.cell_rules import technology_faults
+from mapfilter.radio.cell_rules import RANGES, technology_faults
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.identities import LIMITS
 from mapfilter.rasters.geotiff_writer import write_rasters
@@ -131,7 +131,10 @@ def surveyed_plan(
         arfcn, bsic = (codes or {}).get(cell_id, (None, None))
         told = replace(cell, arfcn=arfcn, bsic=bsic, technology=families.get(cell_id))
         # What no plan may state would make this one unreadable.
-        odd = technology_faults(told.technology, partial(getattr, told))
+        odd = technology_faults(told.technology, partial(getattr, told)) or not all(
+            value is None or RANGES[name].holds(value)
+            for name, value in (("arfcn", arfcn), ("bsic", bsic))
+        )
         cells.append(cell if odd else told)
     return CellPlan(survey.crs, tuple(cells))
 

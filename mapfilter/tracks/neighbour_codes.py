@@ -16,8 +16,8 @@ from mapfilter.tracks.schema import SERVING
 
 _REACH_M = 35_000.0
 """No neighbour is farther away from the serving cell."""
-_APART = 2.0
-"""How many times farther the next cell of the same code has to be."""
+_APART, _SITE_M = 2.0, 1.0
+"""How many times farther the next cell of the same code has to be, and at least how far in m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,9 @@ def neighbours_by_code(
         family = row.technology or (known.technology if known else None)
         carrier = known.arfcn if row.arfcn is None and known else row.arfcn
         if family in SHARED_CARRIER:
-            served.setdefault(row.time_s, {})[family, carrier] = known
+            of_it = served.setdefault(row.time_s, {})
+            # A second row of that carrier, without a name, hides none that has one.
+            of_it[family, carrier] = known or of_it.get((family, carrier))
     uncarried = _without_carrier(plan)
     chosen: dict[tuple[str | None, str, int], str | None] = {}
     found: list[tuple[int | None, str | None]] = []
@@ -109,4 +111,6 @@ def _nearest(cells: Sequence[Cell], serving: Cell | None) -> str | None:
     )
     if not away or away[0][0] > _REACH_M:
         return None
-    return away[0][1] if len(away) == 1 or away[1][0] >= _APART * away[0][0] else None
+    # Carriers of one sector share a code and a place.
+    apart = len(away) == 1 or away[1][0] >= max(_APART * away[0][0], _SITE_M)
+    return away[0][1] if apart else None

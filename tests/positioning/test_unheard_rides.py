@@ -64,6 +64,9 @@ def test_only_of_who_is_known_to_walk(pace):
         # The serving cell of one of them is a neighbour in the other.
         (190.0, 0.0, HERE, report([-90.0, -70.0], serving="B"), False),
         (190.0, 0.0, HERE[1:], (THERE[0], replace(HERE[1], role="serving")), False),
+        # No serving cell is named.
+        (190.0, 0.0, HERE[1:], HERE[1:], False),
+        (190.0, 0.0, HERE, THERE[:2], False),
         # Serving cells alone: another one may serve at the same place.
         (190.0, 0.0, HERE[:1], THERE, False),
         (190.0, 0.0, HERE, THERE[2:], False),

@@ -232,6 +232,7 @@ def test_the_plan_of_a_survey_fits_its_rasters(tmp_path):
         # A plan with these could not be read again.
         ("GSM", (6300, 101), (None, None, None)),
         ("CDMA", (6300, 101), (None, None, None)),
+        (None, (60, 65_535), (None, None, None)),
     ],
 )
 def test_the_plan_of_a_survey_has_carriers_and_codes(tmp_path, family, code, expected):

@@ -141,6 +141,8 @@ def test_network_survey_states_serving_cells_and_technologies_by_columns(tmp_pat
         ({"earfcn": 1300, "nci": 77}, None),
         ({"enodeb": 300, "cid": 7}, "LTE"),
         ({"earfcn": 1300, "tech": "3G"}, "UMTS"),
+        ({"earfcn": "", "cid": 7}, None),
+        ({"enodeb": "", "cid": 7}, None),
     ],
 )
 def test_a_technology_is_that_of_its_columns(tmp_path, columns, family):

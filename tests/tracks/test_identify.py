@@ -310,3 +310,23 @@ def test_a_neighbour_with_an_id_or_an_identity_keeps_it():
     log = name_by_plan(make_log(CRS, radio=table), UNCARRIED)
     assert log.radio["cell"].tolist() == ["here", "unknown", "77"]
     assert log.radio["arfcn"].isna().all()
+
+
+def test_two_cells_of_a_code_at_one_place_are_not_told_apart():
+    """Carriers of one sector often share it."""
+    cells = tuple(cell(name, technology="LTE", bsic=2 - (name == "S")) for name in "SMN")
+    rows = [{"role": "serving", "cell": "S"}, {"role": "neighbour", "bsic": 2}]
+    table = pd.DataFrame([{"time_s": 0.0, **row} for row in rows])
+    log = name_by_plan(make_log(CRS, radio=table), CellPlan(CRS, cells))
+    assert pd.isna(log.radio["cell"].iloc[1])
+
+
+def test_a_second_serving_row_without_a_name_hides_none_that_has_one():
+    rows = [
+        {"role": "serving", "cell": "here", "arfcn": 100},
+        {"role": "serving", "technology": "LTE", "arfcn": 100, "level_dbm": -99.0},
+        {"role": "neighbour", "bsic": 2, "arfcn": 100},
+    ]
+    table = pd.DataFrame([{"time_s": 0.0, "level_dbm": -80.0, **row} for row in rows])
+    log = name_by_plan(make_log(CRS, radio=table), UNCARRIED)
+    assert "near" in log.radio["cell"].tolist()

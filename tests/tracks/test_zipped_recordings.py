@@ -186,3 +186,16 @@ def test_hidden_files_and_folders_are_left_out_and_a_thousand_files_are_not_too_
     assert zipped.files_in_zip(path) == [path / "b" / "track.gpx"]
     many = packed(**{f"{k}.csv": "" for k in range(1000)})
     assert len(zipped.files_in_zip(many)) == 1000
+
+
+def test_names_are_those_of_paths_and_methods_but_deflate_are_refused(tmp_path):
+    """bzip2 and LZMA would unpack a whole block, however little is asked for."""
+    path = tmp_path / "walk.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("./track.gpx", GPX)
+    _, tables = notes_and_tables(path)
+    assert ("track.gpx", "positions") in tables
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2) as archive:
+        archive.writestr("track.gpx", GPX)
+    with pytest.raises(InputError, match="a file compressed by deflate, found method 12"):
+        read_recordings([path], OpenOptions())

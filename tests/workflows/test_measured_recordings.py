@@ -245,3 +245,16 @@ def test_own_formats_state_carriers_and_codes(tmp_path):
         head.replace("earfcn", "arfcn") + "1777629600,60.17,24.94,244,91,1,7,-80,60,9\n"
     )
     assert (read(path).codes, read(path).technologies) == ({"244-91-1-7": (60, 9)}, {})
+
+
+def test_what_a_column_states_of_a_row_counts_and_dbm_are_no_asu(tmp_path):
+    path = tmp_path / "own.csv"
+    path.write_text(
+        "time,lat,lon,mcc,mnc,lac,ci,technology,level_dbm,earfcn,pci\n"
+        "1777629600,60.17,24.94,244,91,1,7,GSM,-80,,\n"
+        "1777629601,60.17,24.94,244,91,1,8,,-80,,\n"
+        "1777629602,60.17,24.94,244,91,1,9,GSM,20,,\n"
+    )
+    found = read(path)
+    assert found.cell_ids == ("244-91-1-7", "244-91-1-8")
+    assert found.technologies == {"244-91-1-7": "GSM"}

@@ -59,7 +59,10 @@ def was_ride(
     if min(len(before), len(now)) < 2:
         # Another cell may serve where the phone stayed, and nothing else is told.
         return False
-    return not (_cells(before, SERVING) & _cells(now) or _cells(now, SERVING) & _cells(before))
+    served, serves = _cells(before, SERVING), _cells(now, SERVING)
+    if not (served and serves):
+        return False
+    return not (served & _cells(now) or serves & _cells(before))
 
 
 def _hardly_steps(pace: Pace, silent_s: float, stepped_m: float, step_unit_m: float) -> bool:

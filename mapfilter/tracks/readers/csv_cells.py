@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
 from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import only
 from mapfilter.tracks.readers.csv_fields import FIELDS
@@ -35,7 +35,7 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     if mapped.has("technology"):
         columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
     elif (family := _family(mapped)) is not None:
-        known = ~np.isnan(columns["arfcn"]) | ~np.isnan(identity["ci"])
+        known = _stated(mapped)
         columns["technology"] = np.array([None, family], dtype=object)[known.astype(np.int64)]
     if mapped.has("bars"):
         _add_bars(mapped, columns)
@@ -53,6 +53,14 @@ def _family(mapped: Mapped) -> str | None:
     columns = [mapped.rows.find(*mapped.names(field)) for field in ("arfcn", "ci", "enodeb")]
     found = {_FAMILY_OF[name] for name in columns if name in _FAMILY_OF}
     return found.pop() if len(found) == 1 else None
+
+
+def _stated(mapped: Mapped) -> Bools:
+    """Return the rows in which a column that states a technology holds something."""
+    columns = [mapped.rows.find(*mapped.names(field)) for field in ("arfcn", "ci", "enodeb")]
+    stating = [name for name in columns if name in _FAMILY_OF]
+    held: Bools = np.any([mapped.rows.texts(name) != "" for name in stating], axis=0)
+    return held
 
 
 def _add_bars(mapped: Mapped, columns: dict[str, np.ndarray]) -> None:

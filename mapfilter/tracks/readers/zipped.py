@@ -19,6 +19,7 @@ from mapfilter.errors import InputError, MapfilterError, fail
 _BEGIN = b"PK\x03\x04"
 _WORKBOOK = "[Content_Types].xml"
 _MOST_FILES = 1000
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _CHECKED_BYTES = 1 << 18
 _DAMAGE = (OSError, EOFError, NotImplementedError, ValueError, zipfile.BadZipFile, zlib.error)
 
@@ -50,7 +51,7 @@ def files_in_zip(path: Path) -> list[Path]:
         folders and no file beside them.
     """
     with _archive(path) as archive:
-        names = [PurePosixPath(one.filename) for one in archive.infolist() if not one.is_dir()]
+        names = [PurePosixPath(name) for name in _members(archive)]
     for name in names:
         if name.is_absolute() or ".." in name.parts or "\\" in str(name):
             got = repr(str(name)[:80])
@@ -79,7 +80,7 @@ def has_recording(path: Path) -> bool:
     if (found := zip_of(path)) is None:
         return path.is_file()
     with _archive(found) as archive:
-        return path.relative_to(found).as_posix() in archive.namelist()
+        return path.relative_to(found).as_posix() in _members(archive)
 
 
 def read_zipped(path: Path, within: Path, most_bytes: int, largest_bytes: int) -> bytes:
@@ -91,13 +92,17 @@ def read_zipped(path: Path, within: Path, most_bytes: int, largest_bytes: int) -
         There is no such file, it is damaged or needs a password, or it is larger than
         ``largest_bytes``, unpacked.
     """
-    name = path.relative_to(within).as_posix()
     with _archive(within) as archive:
-        if name not in archive.namelist():
+        entry = _members(archive).get(path.relative_to(within).as_posix())
+        if entry is None:
             hint = "a mistyped path"
             raise fail(InputError, str(path), "a file in the ZIP", "no such file", hint)
+        if entry.compress_type not in _METHODS:
+            # Others are unpacked block by block, however little is asked for, or not at all.
+            got = f"method {entry.compress_type}"
+            raise fail(InputError, str(path), "a file compressed by deflate", got, "unpack the ZIP")
         try:
-            with archive.open(name) as stream:
+            with archive.open(entry) as stream:
                 data = stream.read(largest_bytes + 1 if most_bytes < 0 else most_bytes)
         except RuntimeError as error:
             raise fail(InputError, str(path), "a file without a password", str(error)) from error
@@ -110,6 +115,12 @@ def read_zipped(path: Path, within: Path, most_bytes: int, largest_bytes: int) -
 def check_zipped(path: Path, within: Path) -> None:
     """Check that a file in a ZIP can be read, as far as its beginning; InputError as above."""
     read_zipped(path, within, _CHECKED_BYTES, _CHECKED_BYTES)
+
+
+def _members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """Return the files of a ZIP by their names as paths have them: ``./a//b`` is ``a/b``."""
+    files = (one for one in archive.infolist() if not one.is_dir())
+    return {str(PurePosixPath(one.filename)): one for one in files}
 
 
 @contextmanager
