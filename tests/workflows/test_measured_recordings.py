@@ -257,4 +257,5 @@ def test_what_a_column_states_of_a_row_counts_and_dbm_are_no_asu(tmp_path):
     )
     found = read(path)
     assert found.cell_ids == ("244-91-1-7", "244-91-1-8")
-    assert found.technologies == {"244-91-1-7": "GSM"}
+    assert found.technologies["244-91-1-7"] == "GSM"
+    assert "244-91-1-8" not in found.technologies
