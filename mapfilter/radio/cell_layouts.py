@@ -96,14 +96,20 @@ OPENCELLID_HEADER = (
 ALIASES: Columns = {
     "lac": ("tac",),
     "ci": ("eci", "nci"),
-    "arfcn": ("uarfcn", "earfcn", "nr_arfcn", "nrarfcn"),
+    "arfcn": ("uarfcn", "earfcn", "nr_arfcn", "nrarfcn", "narfcn"),
     "bsic": ("psc", "pci"),
     "cgi": ("cgi", "ecgi", "ncgi"),
 }
 """Names by technology; a plan may have several of a field, each filled in some rows. A ``cgi`` is
 mcc, mnc, lac and ci in one text."""
-IMPLIED = {"uarfcn": "UMTS", "psc": "UMTS", "earfcn": "LTE", "nr_arfcn": "NR", "nrarfcn": "NR"}
-"""Technologies that values in columns of these names imply."""
+OF_CARRIERS = {
+    "uarfcn": "UMTS",
+    "earfcn": "LTE",
+    **dict.fromkeys(("nr_arfcn", "nrarfcn", "narfcn"), "NR"),
+}
+IMPLIED = {**OF_CARRIERS, "psc": "UMTS"}
+"""Technologies that values in columns of these names imply: of carriers in any table, as phones
+write a PCI as ``psc``, too; and in a plan."""
 _OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs", *OFFSETS)} | {
     name: (*((name,) if name in COLUMNS else ()), *more) for name, more in ALIASES.items()
 }

@@ -24,7 +24,7 @@ from mapfilter.serving.documents import (
 )
 from mapfilter.serving.places import in_metres
 from mapfilter.tracks.identify import PlanNames, ReportedCell
-from mapfilter.tracks.neighbour_codes import CodedRow, neighbours_by_code
+from mapfilter.tracks.neighbour_codes import CODED, CodedRow, neighbours_by_code
 from mapfilter.tracks.schema import (
     LEAST_PLACE_M,
     MISSING_SIGNS,
@@ -50,7 +50,6 @@ _PACED_ROWS, _SELDOM_S, _SOMEWHERE_M, _SLOW_MPS = 5, 50.0, 25.0, 0.04
 the speed: what gets somewhere is faster."""
 _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
-_CODED = ("role", "cell", "technology", "ci", "arfcn", "bsic")
 _COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
 
 
@@ -157,7 +156,7 @@ def _rows(
             values["heading_rad"] = float(wrap_rad(values["heading_rad"]))
         found.append(values)
     if table == "radio":
-        rows = [CodedRow(0.0, *(values[name] for name in _CODED)) for values in found]
+        rows = [CodedRow(0.0, *(values[name] for name in CODED)) for values in found]
         told = neighbours_by_code(rows, names.plan)
         for values, (carrier, cell) in zip(found, told, strict=True):
             values.update(arfcn=carrier, cell=cell)

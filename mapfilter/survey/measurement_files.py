@@ -20,6 +20,7 @@ import numpy as np
 from mapfilter._header_units import header_unit
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs, is_above_asu
+from mapfilter.radio.cell_layouts import ALIASES, OF_CARRIERS
 from mapfilter.radio.identities import IDENTITY, technology
 from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
 from mapfilter.radio.tables import number
@@ -30,16 +31,7 @@ _UNAVAILABLE = 1e9
 _FIRST_LINES = 100
 _FEWEST_NUMBERS = 3
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
-
-
-_CODES = {
-    "arfcn": ("arfcn", "earfcn", "uarfcn", "nr_arfcn"),
-    "bsic": ("bsic", "pci", "psc"),
-}
-
-
-_FAMILY_OF = {"earfcn": "LTE", "uarfcn": "UMTS", "nr_arfcn": "NR"}
-"""Technologies of columns of carriers, which have a name of their own in each."""
+_CODES = {name: (name, *ALIASES[name]) for name in ("arfcn", "bsic")}
 
 
 class Dialect(NamedTuple):
@@ -107,8 +99,8 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "no text file")
     places, signs = _places(path, header, dialect), _Signs()
     is_dbm = all(header[at].endswith("dbm") for at in places["level_dbm"])
-    stating = [at for at, name in enumerate(header) if name in _FAMILY_OF]
-    families = {_FAMILY_OF[header[at]] for at in stating}
+    stating = [at for at, name in enumerate(header) if name in OF_CARRIERS]
+    families = {OF_CARRIERS[header[at]] for at in stating}
     usual = families.pop() if len(families) == 1 else None
     for line, text in lines:
         if text is not None and not text.strip():

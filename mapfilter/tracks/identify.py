@@ -15,6 +15,7 @@ from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.identities import IDENTITY, UNIQUE_IN_NETWORK, parse_cgi
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.neighbour_codes import (
+    CODED,
     CodedRow,
     has_codes_without_carrier,
     neighbours_by_code,
@@ -22,7 +23,6 @@ from mapfilter.tracks.neighbour_codes import (
 from mapfilter.tracks.schema import SERVING
 
 _KEYS = ("technology", *IDENTITY, "arfcn", "bsic")
-_CODED = ("role", "cell", "technology", "ci", "arfcn", "bsic")
 _SHORT_CI = 1 << 16
 
 
@@ -88,7 +88,7 @@ def _by_codes(log: TrackLog, plan: CellPlan) -> TrackLog:
     bare = radio["arfcn"].isna() & radio["bsic"].notna() & (radio["role"] != SERVING)
     if not bare.any() and not has_codes_without_carrier(plan):
         return log
-    columns = [_values(radio, name) for name in _CODED]
+    columns = [_values(radio, name) for name in CODED]
     rows = [CodedRow(*values) for values in zip(radio["time_s"], *columns, strict=True)]
     found = neighbours_by_code(rows, plan)
     changes = list(zip(rows, found, strict=True))

@@ -20,6 +20,10 @@ _APART, _SITE_M = 2.0, 1.0
 """How many times farther the next cell of the same code has to be, and at least how far in m."""
 
 
+CODED = ("role", "cell", "technology", "ci", "arfcn", "bsic")
+"""Columns of a report's row, after its time, that a :class:`CodedRow` has."""
+
+
 @dataclass(frozen=True, slots=True)
 class CodedRow:
     """A row of a report: rows of equal time are one report; ``ci`` is CI, ECI or NCI."""

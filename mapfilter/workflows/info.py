@@ -64,7 +64,7 @@ def run_info(path: Path) -> dict[str, Any]:
         return {"kind": "logs", "logs": len(logs), "first": logs[0].name, "last": logs[-1].name}
     if (found := result_info(path)) is not None:
         return found
-    if found := _recordings_info(_recordings_in(path)):
+    if found := _recordings_info(_recordings_in(path), _USE_OF_FOLDERS):
         return found
     inner = sorted(p.name for p in path.iterdir() if not p.name.startswith("."))
     hint = f"name one of {', '.join(inner)[:200]}" if inner else "an empty folder"
@@ -128,7 +128,7 @@ def _file_info(path: Path) -> dict[str, Any]:
         return _recording_info(path)
     if is_zip(path):
         formats = [known.name for one in files_in_zip(path) if (known := format_of(one))]
-        if found := _recordings_info(formats):
+        if found := _recordings_info(formats, _USE_OF_RECORDINGS):
             return found
     if suffix in _TABLES and _INDEX_COLUMN not in _first_line(path):
         return _table_info(path)
@@ -161,13 +161,13 @@ def _recordings_in(folder: Path) -> list[str]:
     return [known.name for known in found if known is not None]
 
 
-def _recordings_info(formats: Sequence[str]) -> dict[str, Any]:
-    """Describe several recordings by their formats; empty without any."""
+def _recordings_info(formats: Sequence[str], use: str) -> dict[str, Any]:
+    """Describe several recordings by their formats, with their use; empty without any."""
     if not formats:
         return {}
     counts = {name: formats.count(name) for name in sorted(set(formats))}
     held = {"kind": "recordings", "files": len(formats), "formats": counts}
-    return {**held, "use": _USE_OF_FOLDERS}
+    return {**held, "use": use}
 
 
 def _table_info(path: Path) -> dict[str, Any]:

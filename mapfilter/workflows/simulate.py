@@ -10,6 +10,7 @@ from mapfilter._parallel import Progress
 from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import OutputError, fail, listed
+from mapfilter.radio.layers import SHARED_CARRIER
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.journeys import JourneyPlan
@@ -63,11 +64,14 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
             if progress is not None:
                 progress(done, total)
     notes = [*rasters.notes, *raster_cover(config.area, world.lattice)]
-    nameless = sum(cell.arfcn is None or cell.bsic is None for cell in plan.cells)
+    nameless = sum(
+        cell.arfcn is None and (cell.bsic is None or cell.technology not in SHARED_CARRIER)
+        for cell in plan.cells
+    )
     if nameless and settings.reports.max_neighbours:
         cells = number_of(nameless, "cell has", "cells have")
         notes.append(
-            f"{cells} no carrier and code (arfcn, bsic) in the plan: neighbours of them are "
+            f"{cells} no carrier and code (arfcn, bsic) in the plan: as neighbours they are "
             "reported without a name, and filters cannot use them"
         )
     if silent:

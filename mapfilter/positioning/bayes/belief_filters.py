@@ -284,7 +284,7 @@ class BeliefFilters:
         return gnss.compared_at_s < since_s < inf
 
     def is_unheard(self, state: BayesState) -> bool:
-        """Return whether a walker who stands may have left, as nothing is heard any more."""
+        """Return whether a walker who hardly steps may have left, as nothing is heard any more."""
         if not (self.holds.watched and state.watch.is_unheard(state.hold.step_unit_m)):
             return False
         gnss: GnssState = state.sources[GnssSource.name]

@@ -10,9 +10,7 @@ import numpy as np
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.grid import GridBelief
-from mapfilter.positioning.bayes.alternative import (
-    MapBelief,
-)
+from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.contradicted import misreads

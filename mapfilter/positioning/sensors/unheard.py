@@ -11,8 +11,8 @@ from mapfilter.positioning.sensors.pauses import RowTimes
 from mapfilter.tracks.schema import SERVING
 
 _DOUBT_S, _RIDE_S, _INTERVALS = 60.0, 90.0, 5.0
-"""Silence after which a place at rest is in doubt, and that of a ride; usual intervals of reports
-that either lasts at least."""
+"""Silence in s after which a place is in doubt, and that of a ride; usual intervals of reports that
+either lasts at least."""
 _STEPPED = 0.5
 """Share of the usual way in that time that the steps of a station are."""
 
@@ -26,6 +26,8 @@ def is_in_doubt(pace: Pace, times: RowTimes, stepped_m: float, step_unit_m: floa
         With the epoch.
     stepped_m : float
         Length of all steps since the last report, in the log's unit.
+    step_unit_m : float
+        That unit.
     """
     silent_s = _silent_s(times, times.epoch_s)
     return silent_s >= _DOUBT_S and _hardly_steps(pace, silent_s, stepped_m, step_unit_m)
@@ -50,7 +52,9 @@ def was_ride(
     stepped_m : float
         Length of all steps in between, in the log's unit.
     reports : pair of tuple of ReportRow
-        One of several cells each; no cell of either serves in the other.
+        The report before, and that of now. Only those of two cells or more are compared.
+    step_unit_m : float
+        That unit.
     """
     silent_s = _silent_s(times, time_s)
     if silent_s < _RIDE_S or not _hardly_steps(pace, silent_s, stepped_m, step_unit_m):

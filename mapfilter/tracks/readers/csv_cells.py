@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Floats
+from mapfilter.radio.cell_layouts import OF_CARRIERS
 from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import only
 from mapfilter.tracks.readers.csv_fields import FIELDS
@@ -13,11 +14,7 @@ from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.readers.identities import add_radio
 from mapfilter.tracks.readers.reading import Reading
 
-_FAMILY_OF = {
-    **dict.fromkeys(("earfcn", "eci", *FIELDS["enodeb"]), "LTE"),
-    **dict.fromkeys(("nrarfcn", "nr_arfcn", "narfcn", "nci"), "NR"),
-    "uarfcn": "UMTS",
-}
+_IMPLIED = {**OF_CARRIERS, **dict.fromkeys(("eci", *FIELDS["enodeb"]), "LTE"), "nci": "NR"}
 """Technologies of columns: the carrier, or the identity, has a name of its own in each."""
 
 
@@ -34,9 +31,8 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     }
     if mapped.has("technology"):
         columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
-    elif (family := _family(mapped)) is not None:
-        known = _stated(mapped)
-        columns["technology"] = np.array([None, family], dtype=object)[known.astype(np.int64)]
+    elif (implied := _implied(mapped)) is not None:
+        columns["technology"] = implied
     if mapped.has("bars"):
         _add_bars(mapped, columns)
     cell = mapped.texts("cell")
@@ -48,19 +44,18 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     add_radio(reading, *only(columns, mapped.rows.line, there))
 
 
-def _family(mapped: Mapped) -> str | None:
-    """Return the technology that the names of columns state, if they state one."""
-    columns = [mapped.rows.find(*mapped.names(field)) for field in ("arfcn", "ci", "enodeb")]
-    found = {_FAMILY_OF[name] for name in columns if name in _FAMILY_OF}
-    return found.pop() if len(found) == 1 else None
+def _implied(mapped: Mapped) -> np.ndarray | None:
+    """Return the technology of each row by its columns' names; None if they state none, or several.
 
-
-def _stated(mapped: Mapped) -> Bools:
-    """Return the rows in which a column that states a technology holds something."""
+    That of a row in which such a column holds something; None for the others.
+    """
     columns = [mapped.rows.find(*mapped.names(field)) for field in ("arfcn", "ci", "enodeb")]
-    stating = [name for name in columns if name in _FAMILY_OF]
-    held: Bools = np.any([mapped.rows.texts(name) != "" for name in stating], axis=0)
-    return held
+    stating = [name for name in columns if name in _IMPLIED]
+    if len({_IMPLIED[name] for name in stating}) != 1:
+        return None
+    held = np.any([mapped.rows.texts(name) != "" for name in stating], axis=0)
+    families = np.array([None, _IMPLIED[stating[0]]], dtype=object)
+    return np.asarray(families[held.astype(np.int64)])
 
 
 def _add_bars(mapped: Mapped, columns: dict[str, np.ndarray]) -> None:
