@@ -11,7 +11,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.radio import EvidenceOptions
+from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
 from mapfilter.radio.cells import Cell, CellPlan
 
 ROWS, COLS, PIXEL_M = 7, 9, 10.0

@@ -21,8 +21,8 @@ from mapfilter.positioning.bayes.alternative import (
     NullHypothesis,
 )
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.bayes.transitions import (

@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.held import HeldOtherwise, is_ahead
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules, RivalRules
 from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.rides import rides_unheard, rode
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
@@ -262,33 +263,12 @@ class BeliefFilters:
         return state.reckoning.travelled_m > gnss.used_at_m
 
     def may_be_anywhere(self, state: BayesState, watch: SensorWatch, time_s: float) -> bool:
-        """Return whether what is known so far tells nothing of the place at an epoch.
-
-        A walker took a bus or a train underground, and no position was measured then.
-
-        Parameters
-        ----------
-        state : BayesState
-            After the epoch before.
-        watch : SensorWatch
-            After this epoch's readings.
-        """
-        if not self.holds.watched:
-            return False
-        since_s, rest = inf, state.watch.rest
-        if rest is not None and watch.rest is None and rest.was_ride(time_s):
-            since_s = rest.since_s
-        if watch.rode_unheard:
-            since_s = min(since_s, state.watch.times.report_s)
-        gnss: GnssState = state.sources[GnssSource.name]
-        return gnss.compared_at_s < since_s < inf
+        """Return whether a walker rode before an epoch; ``watch`` is that of after it."""
+        return self.holds.watched and rode(state, watch, time_s)
 
     def is_unheard(self, state: BayesState) -> bool:
-        """Return whether a walker who hardly steps may have left, as nothing is heard any more."""
-        if not (self.holds.watched and state.watch.is_unheard(state.hold.step_unit_m)):
-            return False
-        gnss: GnssState = state.sources[GnssSource.name]
-        return gnss.compared_at_s < state.watch.times.report_s
+        """Return whether a walker may ride unheard."""
+        return self.holds.watched and rides_unheard(state)
 
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""

@@ -32,7 +32,7 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.beyond_edge import beyond_edge
 from mapfilter.positioning.bayes.evidence import SERVING_UNDER_NULL, RadioReading
-from mapfilter.positioning.bayes.radio import EvidenceOptions
+from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
 from mapfilter.positioning.bayes.sampled_cells import (
     expected_absent,
     mean_rough_db2,

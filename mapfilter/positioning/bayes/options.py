@@ -22,6 +22,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.carriageways import carriageway_filters
+from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.model import BayesModel
@@ -32,7 +33,6 @@ from mapfilter.positioning.bayes.over_survey import (
     filled_field,
     over_survey,
 )
-from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 _SLOW, _FAST, _WHITE = 7.0, 4.0, 3.3
