@@ -33,6 +33,7 @@ from mapfilter.evaluation.first_fix_kernels import Judgement, Levels, try_all
 from mapfilter.evaluation.radio_map import (
     ErrorModel,
     RadioMap,
+    best_of_layers_dbm,
 )
 from mapfilter.options import Options, Positive
 
@@ -124,10 +125,16 @@ def first_fix(
     start = starts(radio, options.spacing_m)
     shape = (start.size, options.journeys)
     first, point = radio.points_by_cell()
-    best_dbm = radio.level_dbm.max(axis=2)
+    best_dbm = best_of_layers_dbm(radio.level_dbm, radio.layer)
     found = np.full((*shape, 7), np.nan)
     levels = Levels(
-        radio.near_way, radio.level_dbm, best_dbm, radio.site, radio.floor_dbm, radio.margin_db
+        radio.near_way,
+        radio.level_dbm,
+        best_dbm,
+        radio.site,
+        radio.layer,
+        radio.floor_dbm,
+        radio.margin_db,
     )
     resolution_m = radio.lattice.resolution_m
     judgement = Judgement(

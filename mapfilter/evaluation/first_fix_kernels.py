@@ -79,12 +79,13 @@ def _serves(level_dbm, best_dbm, floor_dbm, margin_db):  # type: ignore[no-untyp
 
 
 class Levels(NamedTuple):
-    """Levels of all pixels and cells, and where hypotheses may be, for the kernels."""
+    """Levels of all pixels, cells and, at best, layers, and where hypotheses may be."""
 
     near_way: Bools
     level_dbm: Floats32
     best_dbm: Floats32
     site: Ints
+    layer: Ints
     floor_dbm: float
     margin_db: float
 
@@ -104,7 +105,7 @@ class Judgement(NamedTuple):
 @njit(cache=True)
 def judged_by_cells(rows, cols, gone_m, row, col, levels, near_px, path_m):  # type: ignore[no-untyped-def]
     """Return metres until all hypotheses are near the truth, and bits after ``path_m``."""
-    near_way, level_dbm, best_dbm, _, floor_dbm, margin_db = levels
+    near_way, level_dbm, best_dbm, _, layer, floor_dbm, margin_db = levels
     clear_m, bits = np.inf, -1.0
     from_row, from_col = row.copy(), col.copy()
     left = from_row.size
@@ -118,7 +119,8 @@ def judged_by_cells(rows, cols, gone_m, row, col, levels, near_px, path_m):  # t
                 continue
             if not near_way[r, c]:
                 continue
-            if not _serves(level_dbm[r, c, server], best_dbm[r, c], floor_dbm, margin_db):
+            best = best_dbm[r, c, layer[server]]
+            if not _serves(level_dbm[r, c, server], best, floor_dbm, margin_db):
                 continue
             from_row[kept], from_col[kept] = from_row[h], from_col[h]
             off_r, off_c = from_row[h] - rows[0], from_col[h] - cols[0]
@@ -139,7 +141,7 @@ def judged_by_levels(  # type: ignore[no-untyped-def]
     rng, rows, cols, gone_m, row, col, point, levels, judgement
 ):
     """Return metres until levels decide, whether rightly, bits, twin, and the twin's error."""
-    near_way, level_dbm, _, site, floor_dbm, _ = levels
+    near_way, level_dbm, _, site, layer, floor_dbm, _ = levels
     deviation_db, correlation_m, share, near_px, path_m, apart_px, mass = judgement
     clear_m, right, bits, twin, twin_error = np.inf, 0.0, -1.0, -1.0, 0.0
     cell_count = level_dbm.shape[2]
@@ -162,7 +164,8 @@ def judged_by_levels(  # type: ignore[no-untyped-def]
                 own_db[i] = kept * own_db[i] + new * rng.standard_normal()
             for i in range(site_db.size):
                 site_db[i] = kept * site_db[i] + new * rng.standard_normal()
-        received = received_cells(level_dbm[rows[k], cols[k]], floor_dbm, site, share, cells, part)
+        here_dbm = level_dbm[rows[k], cols[k]]
+        received = received_cells(here_dbm, floor_dbm, site, layer, share, cells, part)
         for i in range(received):
             error = np.sqrt(share) * site_db[site[cells[i]]] + np.sqrt(1 - share) * own_db[cells[i]]
             truth[i] = level_dbm[rows[k], cols[k], cells[i]]

@@ -85,6 +85,7 @@ def distinctness(radio: RadioMap, errors: ErrorModel) -> Distinctness:
         from_,
         levels[compared],
         radio.site,
+        radio.layer,
         radio.floor_dbm,
         errors.deviation_db**2,
         errors.site_share,
@@ -95,14 +96,14 @@ def distinctness(radio: RadioMap, errors: ErrorModel) -> Distinctness:
 
 @njit(cache=True)
 def _mean_overlap(  # type: ignore[no-untyped-def]
-    levels, server, first, others, site, floor_dbm, variance, share
+    levels, server, first, others, site, layer, floor_dbm, variance, share
 ):
     mean = np.zeros(server.size)
     cells = np.empty(MOST_RECEIVED, dtype=np.int64)
     off_db, part = np.empty(MOST_RECEIVED), np.empty(MOST_RECEIVED)
     scale = -1.0 / (8.0 * variance * (1.0 - share))
     for i in range(server.size):
-        received = received_cells(levels[i], floor_dbm, site, share, cells, part)
+        received = received_cells(levels[i], floor_dbm, site, layer, share, cells, part)
         begin, end = first[server[i]], first[server[i] + 1]
         total = 0.0
         for other in range(begin, end):

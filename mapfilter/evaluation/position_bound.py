@@ -52,6 +52,7 @@ def position_bound(radio: RadioMap, errors: ErrorModel) -> PositionBound:
         way,
         radio.level_dbm,
         radio.site,
+        radio.layer,
         radio.floor_dbm,
         max(errors.correlation_m / resolution_m, 1.0),
         max(round(_STREET_M / resolution_m), 1),
@@ -63,7 +64,7 @@ def position_bound(radio: RadioMap, errors: ErrorModel) -> PositionBound:
 
 @njit(cache=True)
 def _bounds(  # type: ignore[no-untyped-def]
-    rows, cols, on_way, way, level_dbm, site, floor_dbm, reach_px, street_px, variance, share
+    rows, cols, on_way, way, level_dbm, site, layer, floor_dbm, reach_px, street_px, variance, share
 ):
     """Return the bounds in pixels."""
     count = rows.size
@@ -76,7 +77,7 @@ def _bounds(  # type: ignore[no-untyped-def]
     weight = np.empty(most)
     for i in range(count):
         row, col = rows[i], cols[i]
-        received = received_cells(level_dbm[row, col], floor_dbm, site, share, cells, part)
+        received = received_cells(level_dbm[row, col], floor_dbm, site, layer, share, cells, part)
         found = 0
         mean_r, mean_c, total = 0.0, 0.0, 0.0
         axis_rr, axis_rc, axis_cc = 0.0, 0.0, 0.0

@@ -13,6 +13,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.options import Below1, Options, Positive
+from mapfilter.radio.layers import layers_of
 
 MOST_RECEIVED = 7
 """Cells in a report: the serving one and six neighbours."""
@@ -66,8 +67,9 @@ class RadioMap:
     ----------
     cell_ids : tuple of str
         Those that are received, C of them.
-    site : numpy.ndarray of int64, shape (C,)
-        Number of the site of each cell.
+    site, layer : numpy.ndarray of int64, shape (C,)
+        Number of the site of each cell, and of its layer (:func:`mapfilter.radio.layers.layers_of`)
+        from 0.
     level_dbm : numpy.ndarray of float32, shape (rows, cols, C)
         Off the points, those of the nearest; ``floor_dbm`` where a cell is not received.
     floor_dbm, margin_db : float
@@ -81,12 +83,13 @@ class RadioMap:
     way_id : numpy.ndarray of int64, shape (N,)
         0 for points of no way.
     server : numpy.ndarray of int64, shape (N,)
-        The strongest cell of each point.
+        The strongest cell of each point, of all layers.
     """
 
     lattice: Lattice
     cell_ids: tuple[str, ...]
     site: Ints
+    layer: Ints
     level_dbm: Floats32
     floor_dbm: float
     margin_db: float
@@ -103,7 +106,8 @@ class RadioMap:
     def points_by_cell(self) -> tuple[Ints, Ints]:
         """Return the points at which each cell can serve.
 
-        A point belongs to its strongest cell and to those at most the margin weaker.
+        A point belongs to the strongest cell of each layer and to its cells at most the margin
+        weaker.
 
         Returns
         -------
@@ -113,11 +117,17 @@ class RadioMap:
             Indices of points, cell by cell.
         """
         level = self.level_dbm[self.row, self.col]
-        best = level.max(axis=1, keepdims=True)
+        best = best_of_layers_dbm(level, self.layer)[:, self.layer]
         received = (level >= best - np.float32(self.margin_db)) & (level > self.floor_dbm)
         cell, point = np.nonzero(received.T)
         first = np.searchsorted(cell, np.arange(len(self.cell_ids) + 1))
         return first.astype(np.int64), point.astype(np.int64)
+
+
+def best_of_layers_dbm(level_dbm: Floats32, layer: Ints) -> Floats32:
+    """Return the strongest level of each layer, shape (…, layers), of levels (…, cells)."""
+    count = int(layer.max(initial=-1)) + 1
+    return np.stack([level_dbm[..., layer == k].max(axis=-1) for k in range(count)], axis=-1)
 
 
 def radio_map(database: RadioRouteDatabase) -> RadioMap:
@@ -143,6 +153,7 @@ def radio_map(database: RadioRouteDatabase) -> RadioMap:
         lattice,
         field.cell_ids,
         np.unique(sites, return_inverse=True)[1].astype(np.int64),
+        np.array(layers_of(database.plan, field.cell_ids), dtype=np.int64),
         level,
         database.floor_dbm,
         database.margin_db,
@@ -156,16 +167,17 @@ def radio_map(database: RadioRouteDatabase) -> RadioMap:
 
 
 @njit(cache=True)
-def received_cells(level_dbm, floor_dbm, site, share, found, part):  # type: ignore[no-untyped-def]
+def received_cells(level_dbm, floor_dbm, site, layer, share, found, part):  # type: ignore[no-untyped-def]
     """Write the strongest cells above the floor into ``found``, those of a site side by side.
 
-    ``part`` gets, at the last cell of each site, what :func:`distance_squared` needs, and 0 at the
-    others. Returns how many cells are received.
+    They are of the layer of the strongest cell, as a phone measures few cells of others. ``part``
+    gets, at the last cell of each site, what :func:`distance_squared` needs, and 0 at the others.
+    Returns how many cells are received.
     """
-    count = 0
+    count, serving = 0, layer[np.argmax(level_dbm)]
     for cell in range(level_dbm.size):
         level = level_dbm[cell]
-        if level <= floor_dbm:
+        if level <= floor_dbm or layer[cell] != serving:
             continue
         place = count
         while place > 0 and level_dbm[found[place - 1]] < level:

@@ -40,8 +40,8 @@ NOTES = (
     "that looks alike",
 )
 LAYERS_NOTE = (
-    "the network has several layers: the strongest of all cells serves here, and all are reported; "
-    "a phone on one carrier has fewer. Build a database of its cells alone for a bound of that"
+    "the network has several layers: phones are on that of the strongest cell of each place, and "
+    "report its cells alone; a database of the cells of one carrier bounds phones that stay on it"
 )
 _DECIMALS = 3
 _FILES = ("bound.tif", "bound.gpkg", "ways.parquet", "twins.parquet")

@@ -32,7 +32,10 @@ class World:
         # Somewhere no cell but one is above the floor.
         self.level_dbm[3, :, 1:] = FLOOR_DBM - 1
         self.level_dbm[..., 0] = np.maximum(self.level_dbm[..., 0], np.float32(-99.0))
-        self.best_dbm = self.level_dbm.max(axis=2)
+        # Every second world has two layers.
+        self.layer = np.array([0, 0, 1, 1]) * (seed % 2)
+        layers = range(self.layer.max() + 1)
+        best = [self.level_dbm[..., self.layer == k].max(axis=2) for k in layers]
         self.near_way = rng.random(SHAPE) < 0.9
         steps = rng.integers(1, 3, 8)
         self.cols = 4 + np.concatenate([[0], np.cumsum(steps)])
@@ -42,12 +45,18 @@ class World:
         self.gone_m = np.concatenate([[0.0], np.cumsum(leg_m)])
         row, col = np.nonzero(self.near_way)
         server = self.level_dbm[self.rows[0], self.cols[0]].argmax()
-        own = _serving(self.level_dbm[row, col], server, 6.0)
+        own = self.serving(self.level_dbm[row, col], server)
         self.row, self.col = row[own], col[own]
         self.site = np.array([1, 0, 1, 0])
         self.levels = Levels(
-            self.near_way, self.level_dbm, self.best_dbm, self.site, FLOOR_DBM, 6.0
-        )
+            self.near_way, self.level_dbm, np.stack(best, axis=2), self.site, self.layer,
+            FLOOR_DBM, 6.0,
+        )  # fmt: skip
+
+    def serving(self, level_dbm, server):
+        """Return where a cell is strong enough, among those of its layer."""
+        own, rivals = level_dbm[..., server], level_dbm[..., self.layer == self.layer[server]]
+        return (own > FLOOR_DBM) & (own >= rivals.max(axis=-1) - np.float32(6.0))
 
     def moved(self, k):
         """Return where each start would be now, and whether one can be there."""
@@ -62,11 +71,6 @@ class World:
         return (self.row - self.rows[0]) ** 2 + (self.col - self.cols[0]) ** 2
 
 
-def _serving(level_dbm, server, margin_db):
-    own = level_dbm[..., server]
-    return (own > FLOOR_DBM) & (own >= level_dbm.max(axis=-1) - np.float32(margin_db))
-
-
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize(("near_px", "path_m"), [(10.0, 40.0), (4.0, 1e4), (2.0, 0.0)])
 def test_cells_alone_against_the_definition(seed, near_px, path_m):
@@ -76,7 +80,7 @@ def test_cells_alone_against_the_definition(seed, near_px, path_m):
     for k, gone_m in enumerate(world.gone_m):
         r, c, possible = world.moved(k)
         server = world.level_dbm[world.rows[k], world.cols[k]].argmax()
-        alive &= possible & _serving(world.level_dbm[r, c], server, 6.0)
+        alive &= possible & world.serving(world.level_dbm[r, c], server)
         if clear_m == np.inf and (world.off_px2[alive] <= near_px**2).all():
             clear_m = gone_m
         if bits is None and gone_m >= path_m:
@@ -117,7 +121,8 @@ def levels_by_definition(world, errors, deviation_db, correlation_m, share, opti
     for k, gone_m in enumerate(world.gone_m):
         looks = 1.0 if k == 0 else (gone_m - world.gone_m[k - 1]) / (2 * correlation_m)
         truth = world.level_dbm[world.rows[k], world.cols[k]].astype(float)
-        heard = np.flatnonzero(truth > FLOOR_DBM)
+        of_layer = world.layer == world.layer[truth.argmax()]
+        heard = np.flatnonzero((truth > FLOOR_DBM) & of_layer)
         same_site = world.site[heard][:, None] == world.site[heard][None, :]
         covariance = deviation_db**2 * ((1 - share) * np.eye(heard.size) + share * same_site)
         inverse = np.linalg.inv(covariance)

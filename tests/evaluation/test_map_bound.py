@@ -2,37 +2,13 @@
 
 import numpy as np
 import pytest
+from radio_maps import FLOOR_DBM, made_map
 
 from mapfilter.errors import ConfigError
 from mapfilter.evaluation.first_fix import FirstFixOptions, first_fix, starts
 from mapfilter.evaluation.map_bound import BANDS, distinctness, map_bound
 from mapfilter.evaluation.position_bound import position_bound
-from mapfilter.evaluation.radio_map import ErrorModel, RadioMap, distance_squared, received_cells
-from mapfilter.lattice import Lattice
-
-FLOOR_DBM = -110.0
-
-
-def made_map(level_dbm, on_way, site=None, margin_db=6.0, way_id=None):
-    """A map of levels, shape (rows, cols, cells), heard at some pixels."""
-    row, col = np.nonzero(on_way)
-    level = np.asarray(level_dbm, dtype=np.float32)
-    rows, cols, cells = level.shape
-    ids = np.ones(row.size, dtype=np.int64) if way_id is None else way_id[row, col]
-    return RadioMap(
-        Lattice("EPSG:32631", 500_000.0, rows * 5.0, 5.0, rows, cols),
-        tuple(f"C{i}" for i in range(cells)),
-        np.arange(cells) if site is None else np.asarray(site),
-        level,
-        FLOOR_DBM,
-        margin_db,
-        on_way,
-        on_way,
-        row.astype(np.int64),
-        col.astype(np.int64),
-        ids,
-        np.argmax(level[row, col], axis=1).astype(np.int64),
-    )
+from mapfilter.evaluation.radio_map import ErrorModel, distance_squared, received_cells
 
 
 def slopes(rows, cols, *per_m):
@@ -76,7 +52,9 @@ def test_distances_are_those_of_the_inverse_matrix():
     for _ in range(20):
         level = rng.uniform(-120, -60, site.size).astype(np.float32)
         cells, part = np.empty(7, dtype=np.int64), np.empty(7)
-        count = received_cells(level, FLOOR_DBM, site, 0.4, cells, part)
+        count = received_cells(
+            level, FLOOR_DBM, site, np.zeros(9, dtype=np.int64), 0.4, cells, part
+        )
         heard = np.flatnonzero(level > FLOOR_DBM)
         strongest = heard[np.argsort(-level[heard], kind="stable")][:7]
         assert sorted(cells[:count]) == sorted(strongest)
@@ -209,3 +187,47 @@ def test_impossible_settings_are_all_told_at_once():
     with pytest.raises(ConfigError) as told:
         FirstFixOptions(spacing_m=0.0, journeys=0, most_m=1e9, mass=0.2)
     assert len(told.value.faults) == 4
+
+
+def test_a_report_holds_the_cells_of_the_strongest_one_s_layer():
+    layer, site = np.array([1, 0, 1, 0, 1]), np.array([0, 0, 1, 1, 2])
+    level = np.array([-90.0, -60.0, -70.0, -80.0, FLOOR_DBM], dtype=np.float32)
+    cells, part = np.empty(7, dtype=np.int64), np.empty(7)
+    count = received_cells(level, FLOOR_DBM, site, layer, 0.4, cells, part)
+    assert cells[:count].tolist() == [1, 3]
+    level[0] = -50.0
+    count = received_cells(level, FLOOR_DBM, site, layer, 0.4, cells, part)
+    assert cells[:count].tolist() == [0, 2]
+
+
+def test_copies_of_all_cells_on_a_second_carrier_bound_nothing_better():
+    on_way = plain_grid()
+    level = slopes(*on_way.shape, (0.1, 0.0), (0.0, 0.05), (-0.05, 0.05))
+    both = np.concatenate([level, level - 4.0], axis=-1)
+    options = FirstFixOptions(spacing_m=200.0, most_m=300.0)
+    one, two, taken_for_one = (
+        map_bound(
+            made_map(levels, on_way, layer=layers), ErrorModel(), options, np.random.default_rng(4)
+        )
+        for levels, layers in ((level, [0] * 3), (both, [0] * 3 + [1] * 3), (both, [0] * 6))
+    )
+    assert np.array_equal(two.position.plane_m, one.position.plane_m)
+    assert np.array_equal(two.distinct.cell_bits, one.distinct.cell_bits)
+    assert np.array_equal(two.distinct.level_bits, one.distinct.level_bits)
+    assert np.array_equal(two.fix.cells_m, one.fix.cells_m)
+    better = np.median(taken_for_one.position.plane_m) / np.median(one.position.plane_m)
+    assert better == pytest.approx(np.sqrt(0.5))
+    assert taken_for_one.distinct.level_bits.mean() > one.distinct.level_bits.mean()
+
+
+def test_a_cell_serves_where_it_is_strong_within_its_layer():
+    # The second carrier is 20 dB weaker all over, and has a border of its own.
+    level = np.full((4, 40, 3), -60.0)
+    level[..., 1:] = FLOOR_DBM
+    level[:, :10, 1] = level[:, 10:, 2] = -80.0
+    on_way = np.ones((4, 40), dtype=bool)
+    first, point = made_map(level, on_way, layer=[0, 1, 1]).points_by_cell()
+    assert np.diff(first).tolist() == [160, 40, 120]
+    assert set(point[first[1] : first[2]] % 40) == set(range(10))
+    first, _ = made_map(level, on_way).points_by_cell()
+    assert np.diff(first).tolist() == [160, 0, 0]

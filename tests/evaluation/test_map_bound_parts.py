@@ -13,6 +13,7 @@ from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix,
 from mapfilter.evaluation.map_bound import BANDS, MapBound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel, radio_map
 from mapfilter.lattice import Lattice
+from mapfilter.radio.cells import Cell, CellPlan
 
 
 def fake_database():
@@ -23,7 +24,14 @@ def fake_database():
     field = SimpleNamespace(
         level_dbm=level, on_way=on_way, cell_ids=("A", "B"), way_id=np.arange(8).reshape(2, 4)
     )
-    plan = {"A": SimpleNamespace(site="north"), "B": SimpleNamespace(site="east")}
+    cells = {"A": "north", "B": "east"}
+    plan = CellPlan(
+        "EPSG:32631",
+        tuple(
+            Cell(name, site, 0.0, 0.0, 30.0, None, 30.0, 900.0, "omni")
+            for name, site in cells.items()
+        ),
+    )
     return SimpleNamespace(
         lattice=Lattice("EPSG:32631", 500_000.0, 10.0, 5.0, 2, 4), cell_ids=("A", "B"),
         field=lambda: field, plan=plan, floor_dbm=FLOOR_DBM, margin_db=6.0, path="db",
@@ -37,6 +45,7 @@ def test_a_database_in_memory():
     assert radio.server.tolist() == [0, 1, 1]
     # Sites are numbered by name; what is not heard is at the floor.
     assert radio.site.tolist() == [1, 0]
+    assert radio.layer.tolist() == [0, 0]
     assert radio.level_dbm[0, 0].tolist() == [-80.0, FLOOR_DBM]
     # Beside a point means by one pixel, not across a corner.
     assert radio.near_way.tolist() == [[True, True, True, True], [True, False, True, True]]
