@@ -19,6 +19,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rxlev import quantise_level_dbm
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.simulation.journeys import ticks_s
+from mapfilter.simulation.layer_choice import layers_by_priority, layers_served
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 Levels = Callable[[Floats, Floats], NDArray[np.floating]]
@@ -38,8 +39,8 @@ class ReportModel(Options):
     report_period_s : float
         Between two reports: 0.48 s in GSM, 1 s in many logs.
     radio : {"ground_truth", "as_predicted"}
-        With "as_predicted" the serving cell is the strongest at each place: no noise, no
-        averaging, no hysteresis. The levels must then be the predicted ones.
+        With "as_predicted" the serving cell is the strongest of its layer at each place: no noise,
+        no averaging, no hysteresis. The levels must then be the predicted ones.
     hysteresis_db : float
         Another cell takes over when its mean is more than this above the serving cell's.
     averaging_s : float
@@ -48,7 +49,10 @@ class ReportModel(Options):
     fading_db : float
         Standard deviation of the measurement noise, drawn for each cell and report.
     max_neighbours : int
-        Strongest other cells that are reported.
+        Strongest other cells that are reported; of a network's layers those of the serving one.
+    layer_reserve_db : float
+        In a network of several layers, a phone stays on the newest technology and the highest
+        frequency while the best cell there is at least this much above the sensitivity.
     sensitivity_dbm : float
         Weaker cells are not received.
     phone_offset_sd_db : float
@@ -70,6 +74,7 @@ class ReportModel(Options):
     fading_db: NotNegative = 1.0
     max_neighbours: Annotated[int, Ge(0), Le(32)] = 6
     sensitivity_dbm: Annotated[float, Ge(-150), Le(0)] = -104.0
+    layer_reserve_db: NotNegative = 10.0
     phone_offset_sd_db: NotNegative = 0.0
     quantise: bool = True
 
@@ -104,8 +109,9 @@ def reports(
     -------
     radio : pandas.DataFrame
         The columns of a log's radio table; for each report the serving cell, then the neighbours
-        from the strongest down, whose ``cell`` is None. Of cells that share carrier and BSIC only
-        the strongest is received, or the serving one. An empty report has no rows.
+        from the strongest down, whose ``cell`` is None, all of one layer. Of cells that share
+        carrier and BSIC only the strongest is received, or the serving one. An empty report has no
+        rows.
 
     Raises
     ------
@@ -134,10 +140,16 @@ def reports(
     if model.radio == "ground_truth":
         level = level + noise_db
     received = np.where(level >= model.sensitivity_dbm, level, -np.inf)
+    averaged, hysteresis_db = 1, 0.0
     if model.radio == "ground_truth":
         averaged = max(1, round(model.averaging_s / model.report_period_s))
-        mean = running_mean_db(np.where(np.isnan(level), _SILENT_DBM, level), averaged)
-        serving = serving_cells(mean, np.isfinite(received), model.hysteresis_db)
+        hysteresis_db = model.hysteresis_db
+    mean = running_mean_db(np.where(np.isnan(level), _SILENT_DBM, level), averaged)
+    layer, enough_dbm = layers_by_priority(plan), model.sensitivity_dbm + model.layer_reserve_db
+    on = layers_served(mean, np.isfinite(received), layer, enough_dbm, hysteresis_db)
+    received = np.where(layer == on[:, np.newaxis], received, -np.inf)
+    if model.radio == "ground_truth":
+        serving = serving_cells(mean, np.isfinite(received), hysteresis_db)
     else:
         serving = np.where(np.isfinite(received).any(axis=1), np.argmax(received, axis=1), -1)
     rank = _ranked(received, serving, plan, model.max_neighbours)

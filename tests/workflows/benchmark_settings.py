@@ -83,6 +83,7 @@ OF_JOURNEYS = {
     "journeys.fading_db": (5.0, "reports.fading_db"),
     "journeys.quantise": (False, "reports.quantise"),
     "journeys.max_neighbours": (4, "reports.max_neighbours"),
+    "journeys.layer_reserve_db": (6.0, "reports.layer_reserve_db"),
     "journeys.sensitivity_dbm": (-99.0, "reports.sensitivity_dbm"),
     "journeys.phone_offset_sd_db": (6.0, "reports.phone_offset_sd_db"),
     "journeys.beside": (7.0, "journey.walker.beside"),
