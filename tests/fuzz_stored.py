@@ -38,11 +38,11 @@ from mapfilter.positioning.fingerprints.locating import fit_locator
 from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.plan_names import PlanNames
 from mapfilter.serving.documents import RequestError, read_object
 from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.geolocate import geolocator
 from mapfilter.serving.state_file import encode, read_session
-from mapfilter.tracks.identify import PlanNames
 from mapfilter.tracks.store import write_log
 from mapfilter.viewing.page import read_page
 

@@ -17,7 +17,9 @@ from mapfilter.positioning.fingerprints.locating import locate_by, locator_for
 from mapfilter.positioning.fingerprints.options import AUTO, Method
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
+from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.range_units import with_range_notes
 
 
 def locate_reports(
@@ -77,5 +79,8 @@ def locate_reports(
         check_arguments("locate_reports", *each)
         known = reports_of_logs(logs)
     if not isinstance(log, Reports):
-        log = reports_of_logs([read(log, known.crs)], plan)
+        track = read(log, known.crs)
+        if plan is not None:
+            track = with_range_notes(name_by_plan(track, plan), plan)
+        log = reports_of_logs([track], plan)
     return locate_by(locator_for(log, known, method, rng), log)

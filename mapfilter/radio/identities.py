@@ -30,6 +30,9 @@ LIMITS: dict[str, dict[str, int]] = {
 PSC, PCI), areas ``lac`` (LAC, TAC), identities ``ci`` (CI, ECI, NCI) and timing advances.
 """
 
+SERVING, NEIGHBOUR = "serving", "neighbour"
+"""Roles of reported cells."""
+
 IDENTITY = ("mcc", "mnc", "lac", "ci")
 """Parts of a global cell identity."""
 UNIQUE_IN_NETWORK = ("LTE", "NR")

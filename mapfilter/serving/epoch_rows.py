@@ -13,6 +13,7 @@ from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.merging import epoch_columns, make_epoch
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.radio.identities import IDENTITY, LIMITS, TIMING_STEP_M
+from mapfilter.radio.plan_names import PlanNames, ReportedCell
 from mapfilter.serving.documents import (
     RequestError,
     check_keys,
@@ -23,7 +24,6 @@ from mapfilter.serving.documents import (
     whole,
 )
 from mapfilter.serving.places import in_metres
-from mapfilter.tracks.identify import PlanNames, ReportedCell
 from mapfilter.tracks.neighbour_codes import CODED, CodedRow, neighbours_by_code
 from mapfilter.tracks.schema import (
     LEAST_PLACE_M,

@@ -20,8 +20,8 @@ from mapfilter.positioning.fingerprints.locating import ReportLocator, locate_by
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.identities import LIMITS, technology
+from mapfilter.radio.plan_names import PlanNames, ReportedCell
 from mapfilter.serving.documents import RequestError, check_keys, number, rows_of, text, whole
-from mapfilter.tracks.identify import PlanNames, ReportedCell
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 _MOST = 100

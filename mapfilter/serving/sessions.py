@@ -18,6 +18,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from mapfilter.errors import Faults
+from mapfilter.radio.plan_names import PlanNames
 from mapfilter.serving.documents import RequestError
 from mapfilter.serving.filters import (
     SessionFilter,
@@ -29,7 +30,6 @@ from mapfilter.serving.limits import ServiceLimits
 from mapfilter.serving.session import Progress, Session
 from mapfilter.serving.steps import SEED_BITS, Stepped, first, shown_or, stepped, wanted
 from mapfilter.serving.store import SessionStore
-from mapfilter.tracks.identify import PlanNames
 
 ResultT = TypeVar("ResultT")
 

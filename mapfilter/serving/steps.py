@@ -18,6 +18,7 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.log_options import LogStatement
 from mapfilter.positioning.step_output import StepOutput
+from mapfilter.radio.plan_names import PlanNames
 from mapfilter.serving.documents import RequestError, check_keys, text, whole
 from mapfilter.serving.epoch_rows import check_pace, read_epochs
 from mapfilter.serving.events import fix_document, json_bytes
@@ -25,7 +26,6 @@ from mapfilter.serving.filters import LOG, SessionFilter, statement_of
 from mapfilter.serving.places import check_fixes, start_of
 from mapfilter.serving.session import Progress
 from mapfilter.serving.watching import Watcher
-from mapfilter.tracks.identify import PlanNames
 
 SEED_BITS = 63
 

@@ -10,6 +10,8 @@ import numpy as np
 from mapfilter._types import Bools, Floats, Ints32
 from mapfilter._words import number_of
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.identities import SERVING
+from mapfilter.radio.plan_names import PlanNames, ReportedCell
 from mapfilter.survey.measurement_rows import Code, Identity
 
 
@@ -94,14 +96,19 @@ class Measurements:
 
 
 def named_after(measurements: Measurements, plan: CellPlan) -> Measurements:
-    """Return the measurements with the plan's ids for the cells whose identity the plan has."""
-    ids = {(cell.mcc, cell.mnc, cell.lac, cell.ci): cell.id for cell in plan.cells}
-    new = [
-        cell_id
-        if cell_id in plan or cell_id not in measurements.identities
-        else ids.get(measurements.identities[cell_id], cell_id)
-        for cell_id in measurements.cell_ids
-    ]
+    """Return the measurements with the plan's ids for the cells whose identity the plan has.
+
+    Identities are compared as those of logs are (:class:`mapfilter.radio.plan_names.PlanNames`).
+    """
+    table = PlanNames(plan)
+
+    def named(cell_id: str) -> str:
+        if cell_id not in measurements.identities:
+            return cell_id
+        kind, identity = measurements.technologies.get(cell_id), measurements.identities[cell_id]
+        return table.name(ReportedCell(SERVING, cell_id, kind, *identity, None, None)) or cell_id
+
+    new = [named(cell_id) for cell_id in measurements.cell_ids]
     names, places = np.unique(np.array(new), return_inverse=True)
     known = list(zip(measurements.cell_ids, new, strict=True))
     identities = {

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from mapfilter.errors import listed
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.identities import parse_cgi
-from mapfilter.tracks.identify import PlanNames, ReportedCell
+from mapfilter.radio.plan_names import PlanNames, ReportedCell
 from mapfilter.tracks.schema import SERVING
 
 

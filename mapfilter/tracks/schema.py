@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 from math import inf, nextafter, pi
 from typing import Literal
 
+from mapfilter.radio.identities import NEIGHBOUR as NEIGHBOUR
+from mapfilter.radio.identities import SERVING as SERVING
+
 Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
 """Kinds of measurements that a log may hold, each in one table of :data:`TABLES`."""
 Without = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
@@ -23,9 +26,6 @@ PLACE = ("x_m", "y_m", "z_m")
 """Position of a satellite, earth-centred."""
 LEAST_PLACE_M, MOST_PLACE_M = 2.0e7, 5.5e7
 """Distances of a satellite from the earth's centre that are possible."""
-
-SERVING = "serving"
-NEIGHBOUR = "neighbour"
 
 MISSING_SIGNS = (-9999.0, -99999.0, -999999.0)
 """Numbers by which other programs mean that a value is missing; here its field is empty."""

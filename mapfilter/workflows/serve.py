@@ -22,6 +22,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.fingerprints.locating import fit_locator
 from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.positioning.fingerprints.sources import reports_of_database
+from mapfilter.radio.plan_names import PlanNames
 from mapfilter.serving.app import Service
 from mapfilter.serving.filters import SessionFilters
 from mapfilter.serving.geolocate import Geolocator, geolocator
@@ -30,7 +31,6 @@ from mapfilter.serving.live_page import LivePage
 from mapfilter.serving.server import listen, run
 from mapfilter.serving.sessions import Sessions
 from mapfilter.serving.store import SessionStore
-from mapfilter.tracks.identify import PlanNames
 from mapfilter.viewing.bundle import database_bundle
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.terminal import print_message

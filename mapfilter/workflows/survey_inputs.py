@@ -85,10 +85,16 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
 
 
 def _unplanned(measurements: Measurements, plan: CellPlan, where: str) -> str:
-    """Return a note where none of the cells received is in the plan; "" where one is."""
+    """Return a note on the cells received that are not in the plan; "" where all are."""
     ids = measurements.cell_ids
-    if any(cell_id in plan for cell_id in ids):
+    missing = [cell_id for cell_id in ids if cell_id not in plan]
+    if not missing:
         return ""
+    if len(missing) < len(ids):
+        return (
+            f"{len(missing)} of {number_of(len(ids), 'cell')} received are not in {where} "
+            f"({listed(missing)}): antennas are located from their levels"
+        )
     known = measurements.identities
     names = ["-".join(map(str, known[one])) if one in known else one for one in ids]
     why = foreign_cells(names, plan, "plan")

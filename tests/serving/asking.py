@@ -9,12 +9,12 @@ from positioning.cross_world import walk_log
 
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.merging import epochs
+from mapfilter.radio.plan_names import PlanNames
 from mapfilter.serving.app import Service
 from mapfilter.serving.filters import SessionFilters
 from mapfilter.serving.limits import ServiceLimits
 from mapfilter.serving.sessions import Sessions
 from mapfilter.serving.store import SessionStore
-from mapfilter.tracks.identify import PlanNames
 
 JSON = {"content-type": "application/json", "host": "localhost"}
 SMALL = BayesFilter(max_particles=1500, min_search_particles=800, min_particles=300)

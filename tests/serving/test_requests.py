@@ -18,12 +18,13 @@ from mapfilter.positioning.fingerprints.locating import locate_by
 from mapfilter.positioning.fingerprints.log_reports import reports_of_log
 from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.plan_names import PlanNames
 from mapfilter.serving import door as door_module
 from mapfilter.serving.documents import RequestError
 from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.geolocate import geolocator
 from mapfilter.serving.limits import RateLimit
-from mapfilter.tracks.identify import PlanNames, name_by_plan
+from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import make_log
 
 TOKEN = "0123456789abcdef"
