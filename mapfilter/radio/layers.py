@@ -58,9 +58,12 @@ def layer_numbers(cells: Sequence[Cell]) -> Ints:
 
 
 def _network(cell: Cell, known: set[_Network]) -> _Network:
-    """Return a cell's network, or else the only one that is known."""
-    stated = cell.mcc is not None and cell.mnc is not None
-    return next(iter(known)) if not stated and len(known) == 1 else (cell.mcc, cell.mnc)
+    """Return a cell's network, or the only one that is known where what it states agrees."""
+    if len(known) == 1:
+        ((mcc, mnc),) = known
+        if cell.mcc in (None, mcc) and cell.mnc in (None, mnc):
+            return mcc, mnc
+    return cell.mcc, cell.mnc
 
 
 def _key(

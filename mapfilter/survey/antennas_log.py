@@ -59,7 +59,7 @@ def _add_logged(
         rows.aside["levels given only as bounds (>)"] += 1
     elif name and level is not None:
         neighbour = cell["neighbour"]
-        rows.technologies[name] = "GSM"
+        rows.technologies[name, "GSM"] += 1
         rows.add(line, name, {**found, "level_dbm": level[2], "neighbour": neighbour})
 
 

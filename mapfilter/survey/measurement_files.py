@@ -128,7 +128,7 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
         family = found["technology"].upper()
         states = any(fields[at].strip() for at in stating)
         if kind := technology(family) or (usual if states and not family else None):
-            rows.technologies.setdefault(cell, kind)
+            rows.technologies[cell, kind] += 1
         signs.add(line, found["level_dbm"], family)
         dbm = None if is_dbm else _from_asu(found["level_dbm"], family)
         if dbm is not None:

@@ -6,10 +6,11 @@ import math
 import re
 from array import array
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,7 +32,6 @@ _MOST_STEPS = 3846.0
 """Timing advances: of NR 0 to 3846, fewer of older technologies."""
 _YES = ("1", "true", "yes", "neighbour", "neighbor")
 _NO = ("0", "false", "no", "serving")
-"""Fields that name a cell together."""
 REQUIRED = ("lat", "lon", "level_dbm")
 """Fields without which a row is of no use."""
 FIELDS = (
@@ -41,6 +41,7 @@ FIELDS = (
 """Fields that a column map may name."""
 
 NO_TIME = "times not understood (levels kept)"
+NO_CODE = "carriers or codes that are not possible (levels kept)"
 _TIMES = "expected ISO 8601 (2026-05-01T10:00:00+02:00), 31.12.2026 10:00:00 or Unix s, ms or µs"
 _DOTTED = re.compile(r"(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)[ T]+(\d\d?):(.*)", re.ASCII)
 """Day, month and year with dots, which no one writes in another order, and a time."""
@@ -49,6 +50,8 @@ _DOTTED = re.compile(r"(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)[ T]+(\d\d?):(.*)", re.A
 class NotMeasurementsError(InputError):
     """A file is no drive test: a text, or a recording without cells."""
 
+
+T = TypeVar("T", str, tuple[int, int])
 
 Identity = tuple[int, int, int, int]
 """mcc, mnc, lac (tac in LTE) and ci."""
@@ -60,10 +63,10 @@ Code = tuple[int, int]
 class Rows:
     """Good rows as columns, the faults of bad ones, and counts of what is set aside.
 
-    ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``technologies`` has
-    GSM, UMTS, LTE or NR of cells where that is known, ``codes`` their carriers and codes;
-    ``identified`` is the cell of identities that were looked at before, ``odd_time`` the first
-    time not understood; ``remarks`` are on the file as a whole.
+    ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``technologies`` and
+    ``codes`` count how often cells have been GSM, UMTS, LTE or NR, and had a carrier and code
+    (:func:`most_frequent`); ``identified`` is the cell of identities that were looked at before,
+    ``odd_time`` the first time not understood; ``remarks`` are on the file as a whole.
     """
 
     path: Path
@@ -74,8 +77,8 @@ class Rows:
     session: array[int] = field(default_factory=lambda: array("i"))
     values: array[float] = field(default_factory=lambda: array("d"))
     identities: dict[str, Identity] = field(default_factory=dict)
-    technologies: dict[str, str] = field(default_factory=dict)
-    codes: dict[str, Code] = field(default_factory=dict)
+    technologies: Counter[tuple[str, str]] = field(default_factory=Counter)
+    codes: Counter[tuple[str, Code]] = field(default_factory=Counter)
     identified: dict[tuple[str, ...], str] = field(default_factory=dict)
     refused: int = 0
     faults: list[Fault] = field(default_factory=list)
@@ -168,7 +171,10 @@ class Rows:
             steps = math.nan
         arfcn, bsic = _whole(given["arfcn"]), _whole(given["bsic"])
         if arfcn is not None and bsic is not None:
-            self.codes.setdefault(cell, (arfcn, bsic))
+            if RANGES["arfcn"].holds(arfcn) and RANGES["bsic"].holds(bsic):
+                self.codes[cell, (arfcn, bsic)] += 1
+            else:
+                self.aside[NO_CODE] += 1
         said = given["neighbour"].lower()
         serving = 0.0 if said in _YES else 1.0 if said in _NO else math.nan
         self.values.extend((time_s, lat_deg, lon_deg, level_dbm, accuracy_m, steps, serving))
@@ -188,6 +194,21 @@ class Rows:
 
     def _example(self, what: str) -> str:
         return f", such as {self.odd_time}; {_TIMES}" if what == NO_TIME and self.odd_time else ""
+
+
+def most_frequent(counts: Iterable[Counter[tuple[str, T]]]) -> dict[str, T]:
+    """Return what most rows of each cell state; of equals the larger one, whatever their order.
+
+    Examples
+    --------
+    >>> most_frequent([Counter({("A", 7): 2, ("B", 5): 1}), Counter({("A", 9): 3, ("B", 4): 1})])
+    {'B': 5, 'A': 9}
+    """
+    total: Counter[tuple[str, T]] = Counter()
+    for one in counts:
+        total.update(one)
+    ordered = sorted((count, said) for said, count in total.items())
+    return {cell: value for _, (cell, value) in ordered}
 
 
 def unix_seconds(text: str) -> float:

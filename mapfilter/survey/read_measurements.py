@@ -22,7 +22,7 @@ from mapfilter.survey.measurement_files import (
     may_hold_measurements,
     read_csv,
 )
-from mapfilter.survey.measurement_rows import NotMeasurementsError, Rows
+from mapfilter.survey.measurement_rows import NotMeasurementsError, Rows, most_frequent
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SESSION_GAP_S
 
@@ -166,15 +166,25 @@ def _expanded(
 
     for path in map(Path, files):
         if path.is_dir() and not is_read(path):
-            inside = sorted(filter(is_read, path.iterdir()))
+            held = sorted(path.iterdir())
+            inside = list(filter(is_read, held))
             if not inside:
-                raise fail(InputError, str(path), f"files {', '.join(suffixes)}", "none")
+                zipped = any(map(_is_zipped, held))
+                hint = "ZIP files, which are not looked into: unpack them" if zipped else ""
+                raise fail(InputError, str(path), f"files {', '.join(suffixes)}", "none", hint)
             found += inside
+        elif _is_zipped(path):
+            hint = "unpack it, and name its folder"
+            raise fail(InputError, str(path), "a drive test, or a folder of them", "a ZIP", hint)
         else:
             found.append(path)
     if not found:
         raise fail(InputError, "measurements", "at least one file", "none")
     return found
+
+
+def _is_zipped(path: Path) -> bool:
+    return path.suffix.lower() == ".zip"
 
 
 def _is_log(folder: Path) -> bool:
@@ -212,8 +222,8 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         _notes(tables),
         np.where(np.isnan(role), _alone(of_session, time_s), role > 0).astype(np.bool_),
         timing_advance,
-        {cell: name for table in tables for cell, name in table.technologies.items()},
-        {cell: code for table in tables for cell, code in table.codes.items()},
+        most_frequent(table.technologies for table in tables),
+        most_frequent(table.codes for table in tables),
     )
     placed = np.isfinite(east_m) & np.isfinite(north_m)
     if not placed.all():

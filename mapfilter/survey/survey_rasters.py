@@ -131,11 +131,15 @@ def surveyed_plan(
         arfcn, bsic = (codes or {}).get(cell_id, (None, None))
         told = replace(cell, arfcn=arfcn, bsic=bsic, technology=families.get(cell_id))
         # What no plan may state would make this one unreadable.
-        odd = technology_faults(told.technology, partial(getattr, told)) or not all(
-            value is None or RANGES[name].holds(value)
+        odd = {name for name, *_ in technology_faults(told.technology, partial(getattr, told))}
+        odd |= {
+            name
             for name, value in (("arfcn", arfcn), ("bsic", bsic))
-        )
-        cells.append(cell if odd else told)
+            if value is not None and not RANGES[name].holds(value)
+        }
+        if odd & {"arfcn", "bsic"}:
+            told = replace(told, arfcn=None, bsic=None)
+        cells.append(replace(told, technology=None) if odd - {"arfcn", "bsic"} else told)
     return CellPlan(survey.crs, tuple(cells))
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -13,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._io import program_version, sha256_file
 from mapfilter._parallel import Progress, local_executor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.config.sections import Config
@@ -43,6 +41,7 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
 from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.learn_key import study_key
 from mapfilter.workflows.learn_lacks import log_notes, unused_notes
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_lacks import check_log
@@ -124,7 +123,7 @@ def study_logs(
     paths = journeys_of(config)
     opened = _opened(config, paths, database)
     names, logs = [one.name for one in opened], [one.log for one in opened]
-    key = _key(database, (*paths, *config.track.recordings), choice, seed, use_truth)
+    key = study_key(database, names, logs, choice, seed, use_truth)
     with (
         FinishedParts(out, lambda: key, keep=resume, name="journey") as finished,
         tempfile.TemporaryDirectory() as scratch,
@@ -264,27 +263,6 @@ def _smoothing(choice: FilterOptions) -> FilterOptions:
         hint = "learning needs smoothed tracks"
         raise fail(ConfigError, "filter.name", "bayes", choice.name, hint)
     return replace(choice, smooth=True)
-
-
-def _key(
-    database: RadioRouteDatabase,
-    paths: Sequence[Path],
-    choice: FilterOptions,
-    seed: int,
-    use_truth: bool,
-) -> str:
-    """Return a checksum of everything that the tracks depend on."""
-    parts = [program_version(), database.generation, repr(choice), seed, use_truth]
-    digest = hashlib.sha256(repr(parts).encode())
-    for file in _files(paths):
-        digest.update(f"{file.parent.name}/{file.name} {sha256_file(file)}".encode())
-    return digest.hexdigest()
-
-
-def _files(paths: Sequence[Path]) -> Iterator[Path]:
-    for path in paths:
-        inner = sorted(path.iterdir()) if path.is_dir() else [path]
-        yield from (file for file in inner if file.is_file())
 
 
 def _opened(config: Config, paths: Sequence[Path], database: RadioRouteDatabase) -> list[OpenedLog]:

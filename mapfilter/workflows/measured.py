@@ -119,7 +119,7 @@ def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: 
     coded = (kept & radio["arfcn"].notna() & radio["bsic"].notna()).to_numpy()
     codes = radio[["arfcn", "bsic"]].to_numpy(dtype=object)[coded]
     for cell, (arfcn, bsic) in zip(radio["cell"].to_numpy(dtype=object)[coded], codes, strict=True):
-        rows.codes.setdefault(cell, (int(arfcn), int(bsic)))
+        rows.codes[cell, (int(arfcn), int(bsic))] += 1
     parts = radio[list(IDENTITY)].fillna(_UNKNOWN).to_numpy(dtype=np.int64)[kept]
     whole = (parts >= 0).all(axis=1)
     for cell, identity in zip(cells[whole], parts[whole].tolist(), strict=True):
@@ -129,7 +129,7 @@ def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: 
         technology = radio["technology"].astype(object)
         kinds = technology.where(technology.notna(), "").to_numpy()[kept]
         pairs = zip(cells, kinds, strict=True)
-        rows.technologies.update({cell: kind for cell, kind in pairs if kind})
+        rows.technologies.update((cell, kind) for cell, kind in pairs if kind)
 
 
 def _with_coded(rows: Rows, radio: pd.DataFrame, places: Floats, placed: Bools) -> pd.DataFrame:
@@ -182,5 +182,9 @@ def _places(positions: pd.DataFrame, time_s: Floats) -> tuple[Floats, Bools]:
     before = np.where(at[after] == time_s, after, np.maximum(after - 1, 0))
     placed = (at[before] <= time_s) & (time_s <= at[after])
     placed &= at[after] - at[before] <= _LONGEST_S
-    places = np.stack([np.interp(time_s, at, column) for column in columns[:2]])
-    return np.vstack([places, np.fmax(columns[2, before], columns[2, after])]), placed
+    lat_deg = np.interp(time_s, at, columns[0])
+    # The short way round, also across 180 degrees.
+    lon_deg = np.interp(time_s, at, np.unwrap(columns[1], period=360.0))
+    accuracy_m = np.fmax(columns[2, before], columns[2, after])
+    lon_deg -= 360.0 * np.round(lon_deg / 360.0)
+    return np.stack([lat_deg, lon_deg, accuracy_m]), placed

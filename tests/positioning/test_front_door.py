@@ -11,13 +11,16 @@ import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import make_database, walk_log
+from cross_world import LATTICE, levels_dbm, make_database, make_plan, make_routes, walk_log
 from matplotlib.figure import Figure
 
 import mapfilter as mf
+from mapfilter.database.build import build
 from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.locators import as_filter
+from mapfilter.rasters.geotiff_writer import write_rasters
+from mapfilter.rasters.opening import open_rasters
 
 
 @pytest.fixture(scope="module")
@@ -433,3 +436,24 @@ def test_a_sweep_takes_the_class_of_options(database, rasters, streets):
     by_class = mf.sweep(database, rasters, streets, {"c": mf.CandidateFilter}, **given).runs
     by_name = mf.sweep(database, rasters, streets, {"c": "candidate"}, **given).runs
     pd.testing.assert_frame_equal(by_class, by_name)
+
+
+def test_single_reports_are_named_by_the_plan_as_replays_are(tmp_path):
+    plan = make_plan()
+    numbered = [
+        replace(cell, mcc=262, mnc=1, lac=7, ci=100 + k) for k, cell in enumerate(plan.cells)
+    ]
+    plan = replace(plan, cells=tuple(numbered))
+    items = ((cell.id, levels_dbm(cell)) for cell in plan.cells)
+    write_rasters(tmp_path / "rxlev.tif", LATTICE, items, plan.ids)
+    known = build(open_rasters(tmp_path / "rxlev.tif"), plan, make_routes(), tmp_path / "database")
+    walk = walk_log()
+    number = {cell.id: cell.ci for cell in plan.cells}
+    radio = walk.radio.assign(
+        mcc=262, mnc=1, lac=7, ci=walk.radio["cell"].map(number).astype("Int64"), cell=None
+    )
+    nameless = mf.make_log(walk.crs, motion=walk.motion, radio=radio, truth=walk.truth)
+    found = mf.locate_reports(nameless, known, "knn").to_dataframe()
+    named = mf.locate_reports(walk, known, "knn").to_dataframe()
+    assert len(named) > 50
+    pd.testing.assert_frame_equal(found, named)

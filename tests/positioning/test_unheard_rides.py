@@ -85,6 +85,39 @@ def test_neighbours_without_a_name_are_compared_by_carrier_and_code():
     assert was_ride(PACE, TIMES, 190.0, 0.0, (tuple(nameless), other), 1.0)
 
 
+CODED = tuple(replace(row, arfcn=60, bsic=k) for k, row in enumerate(HERE))
+BARE = replace(THERE[1], cell=None)
+
+
+@pytest.mark.parametrize(
+    ("before", "now"),
+    [
+        # A neighbour without a name may be the cell that served, and is none that is known.
+        (HERE, (THERE[0], BARE)),
+        (HERE, (*THERE, BARE)),
+        ((HERE[0], replace(HERE[1], cell=None)), THERE),
+        # One cell, given twice.
+        (HERE, (THERE[0], THERE[0])),
+        ((HERE[0], replace(HERE[0], level_dbm=-75.0)), THERE),
+        # Names cannot be compared with carriers and codes.
+        (HERE, tuple(replace(row, cell=None, arfcn=60, bsic=k) for k, row in enumerate(THERE))),
+        (HERE, (THERE[0], replace(THERE[1], cell=None, arfcn=60, bsic=0))),
+    ],
+)
+def test_reports_that_cannot_be_compared_tell_no_ride(before, now):
+    assert not was_ride(PACE, TIMES, 190.0, 0.0, (before, now), 1.0)
+
+
+def test_a_row_by_code_is_compared_with_one_that_has_name_and_code():
+    coded = tuple(replace(row, cell=None, arfcn=60, bsic=7 + k) for k, row in enumerate(THERE))
+    assert was_ride(PACE, TIMES, 190.0, 0.0, (CODED, coded), 1.0)
+    same = replace(coded[1], bsic=0)
+    assert not was_ride(PACE, TIMES, 190.0, 0.0, (CODED, (coded[0], same)), 1.0)
+    # One code in another place is another cell only where names tell it; in doubt it is the same.
+    again = tuple(replace(row, arfcn=60, bsic=k) for k, row in enumerate(THERE))
+    assert not was_ride(PACE, TIMES, 190.0, 0.0, (CODED, again), 1.0)
+
+
 def test_the_watch_follows_the_silence_and_the_steps_in_it():
     watch, _ = told(walk())
     assert not watch.is_unheard(1.0)

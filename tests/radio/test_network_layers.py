@@ -90,3 +90,9 @@ def test_what_a_cell_lacks_is_looked_up_in_the_whole_plan():
     )
     assert layers_of(CellPlan("EPSG:32632", cells), ("c", "a")) == (0, 0)
     assert layers_of(CellPlan("EPSG:32632", cells), ("c", "b")) == (0, 0)
+
+
+def test_a_cell_that_states_a_part_of_another_network_is_not_filled_in():
+    cells = [(806.0, 6300, OWN), (806.0, None, (None, 2)), (806.0, None, (None, 1)),
+             (806.0, None, (310, None))]  # fmt: skip
+    assert numbers("LTE", *cells) == [0, 1, 0, 2]

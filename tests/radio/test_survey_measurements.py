@@ -1,6 +1,7 @@
 """Reading measurements: every dialect, and bad rows that lose nothing but themselves."""
 
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -333,6 +334,28 @@ def test_identity_gives_cells_the_names_of_the_plan(tmp_path):
         for i in found.cell
     ]
     assert named.identities["West 1"] == (302, 720, 29100, 8302920)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"lac": 7, "technology": "LTE"},
+        {"lac": None},
+        {"mcc": None, "mnc": None},
+        {"id": "302-720-29100-8302920", "mcc": None, "mnc": None, "lac": None, "ci": None},
+    ],
+)
+def test_measured_cells_are_named_as_those_of_logs_are(tmp_path, parts):
+    found = read_measurements([write(tmp_path, OPENCELLID)])
+    found = replace(found, technologies=dict.fromkeys(found.cell_ids, "LTE"))
+    cell = Cell("West 1", "W", 444_800.0, 5_029_000.0, 30.0, None, 50.0, 1800.0, "omni")
+    whole = {"mcc": 302, "mnc": 720, "lac": 29100, "ci": 8302920}
+    cell = replace(cell, **{**whole, **parts})
+    assert cell.id in named_after(found, CellPlan(found.crs, (cell,))).cell_ids
+    # A cell of another network is another one.
+    other = replace(cell, id="West 2", **{**whole, "mnc": 610})
+    named = named_after(found, CellPlan(found.crs, (other,)))
+    assert named.cell_ids == found.cell_ids
 
 
 @pytest.mark.parametrize(

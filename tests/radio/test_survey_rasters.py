@@ -230,8 +230,8 @@ def test_the_plan_of_a_survey_fits_its_rasters(tmp_path):
         (None, (60, 9), (None, 60, 9)),
         ("GSM", None, ("GSM", None, None)),
         # A plan with these could not be read again.
-        ("GSM", (6300, 101), (None, None, None)),
-        ("CDMA", (6300, 101), (None, None, None)),
+        ("GSM", (6300, 101), ("GSM", None, None)),
+        ("CDMA", (6300, 101), (None, 6300, 101)),
         (None, (60, 65_535), (None, None, None)),
     ],
 )

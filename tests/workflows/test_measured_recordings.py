@@ -1,5 +1,7 @@
 """Recordings of other programs as measurements of a survey."""
 
+import zipfile
+
 import numpy as np
 import pytest
 from command_line import assert_done, assert_refused, mapfilter
@@ -7,6 +9,7 @@ from made_recordings import COUNT, LEVEL_DBM, MADE
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project
+from mapfilter.survey.measurement_rows import most_frequent
 from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.workflows.convert import run_convert
@@ -220,8 +223,9 @@ def test_neighbours_have_the_cell_that_their_carrier_and_code_have_elsewhere_in_
     assert named == ["244-91-1-7"] * 4
     assert rows.remarks == ["4 neighbours named by carrier and code"]
     assert rows.aside["levels of cells without identity"] == 6
-    assert rows.codes == {"244-91-1-7": (1300, 101), "244-91-1-8": (1300, 102)}
-    assert rows.technologies == dict.fromkeys(ids, "LTE")
+    codes = {"244-91-1-7": (1300, 101), "244-91-1-8": (1300, 102)}
+    assert most_frequent([rows.codes]) == codes
+    assert most_frequent([rows.technologies]) == dict.fromkeys(ids, "LTE")
 
 
 def test_a_code_of_two_cells_names_none(made):
@@ -259,3 +263,38 @@ def test_what_a_column_states_of_a_row_counts_and_dbm_are_no_asu(tmp_path):
     assert found.cell_ids == ("244-91-1-7", "244-91-1-8")
     assert found.technologies["244-91-1-7"] == "GSM"
     assert "244-91-1-8" not in found.technologies
+
+
+def test_what_most_rows_state_counts_in_whatever_order_files_come(tmp_path):
+    head = "time,lat,lon,mcc,mnc,lac,ci,technology,level_dbm,arfcn,pci\n"
+    row = "1777629600,60.17,24.94,244,91,1,7,{},-80,{},{}\n"
+    old, new = tmp_path / "old.csv", tmp_path / "new.csv"
+    old.write_text(head + row.format("LTE", 1300, 101) * 2)
+    new.write_text(head + row.format("NR", 504_990, 700) + row.format("LTE", 6300, 102) * 3)
+    either = [read_measurements(files, "EPSG:32635") for files in ((old, new), (new, old))]
+    for found in either:
+        assert found.technologies == {"244-91-1-7": "LTE"}
+        assert found.codes == {"244-91-1-7": (6300, 102)}
+
+
+def test_a_code_that_is_not_possible_hides_no_others(tmp_path):
+    path = tmp_path / "own.csv"
+    row = "17776296{:02d},60.17,24.94,244,91,1,7,LTE,-80,1300,{}\n"
+    path.write_text(
+        "time,lat,lon,mcc,mnc,lac,ci,technology,level_dbm,earfcn,pci\n"
+        + "".join(row.format(k, 65535 if k < 3 else 101) for k in range(5))
+    )
+    found = read(path)
+    assert len(found) == 5
+    assert found.codes == {"244-91-1-7": (1300, 101)}
+    assert any("3 carriers or codes that are not possible" in note for note in found.notes)
+
+
+def test_a_zip_of_drive_tests_is_refused_with_what_to_do(tmp_path):
+    path = tmp_path / "drive.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("drive.csv", "lat,lon,level_dbm,cell\n60,24,-80,A\n")
+    for named in (path, tmp_path):
+        with pytest.raises(InputError, match="unpack") as caught:
+            read(named)
+        assert len(caught.value.faults) == 1

@@ -81,7 +81,6 @@ def test_a_benchmark(world, here):
     told = mapfilter("evaluate", "global-positioning", "-c", file, *given, "--out", out, "--json")
     (case,) = told.json["cases"]
     assert (case["name"], case["filter"], case["runs"]) == ("cell-6", MINE, 1)
-    assert case["error_mean_m"] is None or case["error_mean_m"] < 200
 
 
 @pytest.mark.parametrize("command", ["replay", "sweep", "evaluate"])
@@ -138,7 +137,7 @@ def test_a_sweep_of_a_filter_without_a_map_takes_the_sites_of_the_database(own_w
 
 def test_a_benchmark_of_a_filter_without_a_map(own_world, tmp_path):
     given = [*settings(area__resolution_m=10), "--filter", "ekf", "--runs", 1, "--workers", 1]
-    given += ["--world", "easy", "--case", "levels-6", "--out", tmp_path, "--json"]
+    given += ["--world", "easy", "--case", "cell-6", "--out", tmp_path, "--json"]
     told = mapfilter("evaluate", "global-positioning", "-c", own_world.benchmark_toml, *given)
     (case,) = assert_done(told).json["cases"]
     assert case["filter"] == "ekf"

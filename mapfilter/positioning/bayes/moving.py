@@ -169,13 +169,10 @@ def moved(
                 )
                 held = still_open(rules, (*held, *more), belief, reckoning.travelled_m)
             if held:
-                held = tuple(
-                    replace(one, belief=predict(one.belief, one.hold.read(measured), own.moving)[0])
-                    for one in held
-                )
+                held = tuple(_moved_as_read(one, predict, measured, own.moving) for one in held)
             if unaided:
                 unaided = tuple(
-                    _moved_alone(one, predict, measured, own.unaided) for one in unaided
+                    _moved_as_read(one, predict, measured, own.unaided) for one in unaided
                 )
             belief, why = predict(belief, _assumed(step, belief), rng)
             belief = remounted(belief, beliefs.model.motion, abs(step.step_m), rng)
@@ -223,10 +220,10 @@ def moved(
     ), unused
 
 
-def _moved_alone(
+def _moved_as_read(
     one: HeldOtherwise, predict: Callable[..., Any], measured: MotionStep, rng: np.random.Generator
 ) -> HeldOtherwise:
-    """Return a belief without positions, moved by a step as it reads it."""
+    """Return a belief beside the main one, moved by a step as it reads it."""
     as_read = one.hold.read(measured)
     return replace(one, belief=predict(one.belief, _assumed(as_read, one.belief), rng)[0])
 

@@ -47,7 +47,10 @@ _MOST_NATS, _LEAST_NATS = 3.0, -12.0
 _STROLL_SHARE = 0.5
 """Share of that variance which a way as measured explains, where it is compared with being
 elsewhere: with all of it, the two could hardly be told apart after 30 m."""
-_LEFT_M, _SHOWABLE_NATS = 45.0, -2.5
+_LEFT_M = 45.0
+"""Way from which on a position is in doubt."""
+_SHOWABLE_NATS = -2.5
+"""Sum of levels that do not change at all above which levels could not show a rest."""
 _RIDE_S = 60.0
 """After so long a bus is half a kilometre away."""
 _DRIFT_MPS = 1.5
@@ -57,8 +60,7 @@ _BRAKES_MPS2 = 5.0
 _CORNER_RAD, _CORNER_S = radians(45.0), 10.0
 """Turn within some seconds that no bias of a gyroscope adds up to."""
 _SHOWN_NATS, _SHOWN_AGAIN_NATS = -1.0, -5.0
-"""Way from which on a position is in doubt, and sum of levels that do not change at all above which
-levels could not show a rest; the sum at or below which they do, and do again after a doubt."""
+"""Sum at or below which levels show a rest, and do so again after a doubt."""
 
 
 @dataclass(frozen=True, slots=True)

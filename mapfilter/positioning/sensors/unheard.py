@@ -5,6 +5,8 @@ Which of the two, the next report tells: by then a train is where other cells ar
 
 from __future__ import annotations
 
+from itertools import product
+
 from mapfilter.positioning.epochs import ReportRow
 from mapfilter.positioning.sensors.pace import WALKERS_MPS, Pace
 from mapfilter.positioning.sensors.pauses import RowTimes
@@ -52,21 +54,23 @@ def was_ride(
     stepped_m : float
         Length of all steps in between, in the log's unit.
     reports : pair of tuple of ReportRow
-        The report before, and that of now. Only those of two cells or more are compared.
+        The report before, and that of now. Only those of two cells or more are compared, all of
+        which have names, or carriers and codes.
     step_unit_m : float
         That unit.
     """
     silent_s = _silent_s(times, time_s)
     if silent_s < _RIDE_S or not _hardly_steps(pace, silent_s, stepped_m, step_unit_m):
         return False
-    before, now = reports
-    if min(len(before), len(now)) < 2:
+    if min(len({_name(row) for row in rows}) for rows in reports) < 2:
         # Another cell may serve where the phone stayed, and nothing else is told.
         return False
-    served, serves = _cells(before, SERVING), _cells(now, SERVING)
+    before, now = reports
+    served, serves = ([row for row in rows if row.role == SERVING] for rows in reports)
     if not (served and serves):
         return False
-    return not (served & _cells(now) or serves & _cells(before))
+    pairs = [*product(served, now), *product(serves, before)]
+    return all(_differ(one, other) for one, other in pairs)
 
 
 def _hardly_steps(pace: Pace, silent_s: float, stepped_m: float, step_unit_m: float) -> bool:
@@ -81,8 +85,16 @@ def _silent_s(times: RowTimes, time_s: float) -> float:
     return silent_s if silent_s >= _INTERVALS * times.interval_s else 0.0
 
 
-def _cells(rows: tuple[ReportRow, ...], role: str = "") -> set[object]:
-    """Return the names of cells, and their carriers with codes, by which others tell them."""
-    some = [row for row in rows if role in ("", row.role)]
-    names: set[object] = {row.cell for row in some if row.cell is not None}
-    return names | {(row.arfcn, row.bsic) for row in some if None not in (row.arfcn, row.bsic)}
+def _name(row: ReportRow) -> object:
+    return row.cell if row.cell is not None else _code(row)
+
+
+def _code(row: ReportRow) -> tuple[int, int] | None:
+    return None if row.arfcn is None or row.bsic is None else (row.arfcn, row.bsic)
+
+
+def _differ(one: ReportRow, other: ReportRow) -> bool:
+    """Return whether two rows are certainly of two cells, by their names or by their codes."""
+    pairs = [(one.cell, other.cell), (_code(one), _code(other))]
+    told = [left != right for left, right in pairs if left is not None and right is not None]
+    return bool(told) and all(told)

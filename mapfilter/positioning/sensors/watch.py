@@ -233,8 +233,9 @@ def _followed(
     if why is Reason.USED and rest.is_carried:
         why = Reason.MOTION_STUCK if steps else Reason.MOTION_MISSING
     if why is Reason.USED:
-        if rest.measured_m >= _STRETCH_M and not rest.is_doubtful:
-            strolled_mps = rest.measured_m / step_unit_m / (time_s - rest.since_s)
+        rested_s = time_s - rest.since_s
+        if rest.measured_m >= _STRETCH_M and not rest.is_doubtful and rested_s > 0:
+            strolled_mps = rest.measured_m / step_unit_m / rested_s
             slower = watch._replace(pace=pace.slowed(strolled_mps))
             return slower._moving(time_s), epoch, why
         known_s = time_s if going.measured else watch.known_s

@@ -104,6 +104,9 @@ def read_zipped(path: Path, within: Path, most_bytes: int, largest_bytes: int) -
         try:
             with archive.open(entry) as stream:
                 data = stream.read(largest_bytes + 1 if most_bytes < 0 else most_bytes)
+        except NotImplementedError as error:
+            expected = "a file compressed by deflate"
+            raise fail(InputError, str(path), expected, str(error), "unpack the ZIP") from error
         except RuntimeError as error:
             raise fail(InputError, str(path), "a file without a password", str(error)) from error
     if len(data) > largest_bytes:
