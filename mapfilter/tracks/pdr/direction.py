@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import wrap_rad
@@ -23,8 +24,8 @@ _AGREE_RAD = np.radians(40.0)
 UPRIGHT = 0.7
 
 
-def direction_by_acceleration(level_mps2: Floats, yaw_rad: Floats, walking: Bools) -> float:
-    """Return the direction of walking at yaw 0 by the accelerations of the steps, in radians.
+def forward_accelerations(level_mps2: Floats, yaw_rad: Floats) -> npt.NDArray[np.complex128]:
+    """Return the horizontal acceleration that a step has forward, by the phase of its rise.
 
     Within a step the body speeds up about an eighth of a period before it rises; the horizontal
     acceleration of that phase points forward. This holds in any posture of the device.
@@ -34,6 +35,33 @@ def direction_by_acceleration(level_mps2: Floats, yaw_rad: Floats, walking: Bool
     level_mps2 : (N, 3) array
         Specific force in the level frame.
     yaw_rad : (N,) array
+
+    Returns
+    -------
+    (N,) array of complex
+        Its parts along the x and the y axis of the level frame at yaw 0; of no meaning where nobody
+        walks.
+    """
+    # Slow to import (it imports scipy.stats), and few commands need it.
+    from scipy.signal import butter, hilbert, sosfiltfilt
+
+    cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+    x = level_mps2[:, 0] * cosine + level_mps2[:, 1] * sine
+    y = level_mps2[:, 1] * cosine - level_mps2[:, 0] * sine
+    sos = butter(2, _BAND_HZ, btype="band", fs=RATE_HZ, output="sos")
+    along, across, up = (hilbert(sosfiltfilt(sos, part)) for part in (x, y, level_mps2[:, 2]))
+    turned = np.exp(-1j * _PHASE_RAD) * up.conj()
+    found: npt.NDArray[np.complex128] = (along * turned).real + 1j * (across * turned).real
+    return found
+
+
+def direction_by_acceleration(forward: npt.NDArray[np.complex128], walking: Bools) -> float:
+    """Return the direction of walking at yaw 0 by the accelerations of the steps, in radians.
+
+    Parameters
+    ----------
+    forward : (N,) array of complex
+        From :func:`forward_accelerations`.
     walking : (N,) array of bool
         Samples that are of a walk.
 
@@ -42,19 +70,9 @@ def direction_by_acceleration(level_mps2: Floats, yaw_rad: Floats, walking: Bool
     float
         Counter-clockwise from the x axis of the level frame; NaN with less than 5 s of walk.
     """
-    # Slow to import (it imports scipy.stats), and few commands need it.
-    from scipy.signal import butter, hilbert, sosfiltfilt
-
     if walking.sum() < _LEAST_S * RATE_HZ:
         return float("nan")
-    cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
-    x = level_mps2[:, 0] * cosine + level_mps2[:, 1] * sine
-    y = level_mps2[:, 1] * cosine - level_mps2[:, 0] * sine
-    sos = butter(2, _BAND_HZ, btype="band", fs=RATE_HZ, output="sos")
-    along, across, up = (hilbert(sosfiltfilt(sos, part)) for part in (x, y, level_mps2[:, 2]))
-    turned = np.exp(-1j * _PHASE_RAD) * up.conj()
-    forward = [(part * turned)[walking].real.sum() for part in (along, across)]
-    return float(np.arctan2(forward[1], forward[0]))
+    return float(np.angle(forward[walking].sum()))
 
 
 def direction_by_device(reference: Rotation) -> float:

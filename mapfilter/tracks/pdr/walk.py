@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -12,15 +12,25 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.attitude import Attitude, attitude
+from mapfilter.tracks.pdr.carried_bias import bias_while_carried
 from mapfilter.tracks.pdr.direction import (
+    ACCELERATION_SD_RAD,
     direction_by_acceleration,
     direction_by_device,
+    forward_accelerations,
     walking_direction,
 )
 from mapfilter.tracks.pdr.gyroscope import Gyroscope, gyroscope_at_rest
 from mapfilter.tracks.pdr.heading import YawOffset, compass_samples, yaw_offset
 from mapfilter.tracks.pdr.height import Climb, climbs
 from mapfilter.tracks.pdr.options import Pose, WalkOptions
+from mapfilter.tracks.pdr.remounts import (
+    HELD_SWING_RAD,
+    Forward,
+    drifts,
+    parted_where_remounted,
+    swings_rad,
+)
 from mapfilter.tracks.pdr.rows import climbed_rows, course_over_strides, row_events
 from mapfilter.tracks.pdr.signals import RATE_HZ, Signals, inertial_signals
 from mapfilter.tracks.pdr.steps import find_steps, step_lengths, still
@@ -97,6 +107,8 @@ def reckon_walk(
     speed = sensors.get("velocity")
     rests = [still(signals.force_mps2) for signals in stretches]
     gyroscope = gyroscope_at_rest(sensors, stretches, rests)
+    carried = bias_while_carried(gyroscope.without_bias(part) for part in stretches)
+    gyroscope = replace(gyroscope, bias_radps=gyroscope.bias_radps + carried)
     parts = [
         _reckon(gyroscope.without_bias(signals), gyroscope, quiet, options, speed)
         for signals, quiet in zip(stretches, rests, strict=True)
@@ -155,10 +167,14 @@ def _reckon(
         walked = _speed_at(signals.time_s[index], speed) < _DRIVING_MPS
         index, swing = index[walked], swing[walked]
     offset = _offset(signals, gyroscope, turned, quiet, options)
-    directions, sds = _directions(turned, level, index, options.pose)
+    walking = _walking(len(level), index)
+    forward = forward_accelerations(level, turned.yaw_rad)
+    turned = parted_where_remounted(turned, forward, walking)
+    directions, sds = _directions(turned, forward, walking, options.pose)
     compass = offset.sd_rad[0] < np.pi
     yaw = turned.yaw_rad + np.interp(signals.time_s, offset.time_s, offset.offset_rad)
-    heading = yaw + directions[turned.section]
+    drifting = np.where(sds == ACCELERATION_SD_RAD, 1.0, 0.0)[turned.section]
+    heading = yaw + directions[turned.section] + drifting * drifts(turned, forward, walking)
     # Without a compass the walker is taken to go on as before when the phone changes its place.
     course = heading if compass else yaw
     time_s, step_m, at = row_events(signals.time_s, index, step_lengths(swing, options.step_factor))
@@ -220,18 +236,28 @@ def _offset(
     return yaw_offset(compass, rates, sds, walk_rad_per_sqrt_s=gyroscope.walk_rad_per_sqrt_s)
 
 
-def _directions(turned: Attitude, level: Floats, index: Ints, pose: Pose) -> tuple[Floats, Floats]:
+def _walking(count: int, index: Ints) -> Bools:
+    """Return which of some samples are near a step."""
+    if not index.size:
+        return np.zeros(count, dtype=np.bool_)
+    away = _to_nearest(np.arange(count, dtype=np.float64), index.astype(np.float64))
+    near: Bools = away < _AROUND_S * RATE_HZ
+    return near
+
+
+def _directions(
+    turned: Attitude, forward: Forward, walking: Bools, pose: Pose
+) -> tuple[Floats, Floats]:
     """Return the direction of walking at yaw 0 in each posture, and its standard deviation."""
-    number = np.arange(len(level))
-    walking = np.zeros(len(level), dtype=bool)
-    if index.size:
-        away = _to_nearest(number.astype(np.float64), index.astype(np.float64))
-        walking = away < _AROUND_S * RATE_HZ
     found, sds = [], []
+    swings = swings_rad(turned, walking)
     for k in range(len(turned.reference)):
         inside = walking & (turned.section == k)
-        by_acceleration = direction_by_acceleration(level, turned.yaw_rad, inside)
+        by_acceleration = direction_by_acceleration(forward, inside)
         by_device = direction_by_device(turned.reference[k])
+        if pose == "auto" and swings[k] > HELD_SWING_RAD:
+            # Nobody looks at it, so it may point anywhere.
+            by_device = np.nan
         one, sd = walking_direction(by_device, by_acceleration, pose)
         found.append(one)
         sds.append(sd)
