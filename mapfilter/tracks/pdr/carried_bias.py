@@ -8,6 +8,7 @@ all but that about itself, so that a phone that lies in several ways shows all t
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,16 +22,42 @@ _ROUNDS, _WEIGHINGS = 4, 10
 _DEGREES_OF_FREEDOM = 3.0
 _MEDIAN_OF_THREE = 2.37
 """Median of the sum of squares of three normal numbers."""
-_SHOWN = 3.0
+_SHOWN, _LEAST_RAD = 3.0, float(np.radians(0.5))
+"""Deviations that are no chance, and the least error of a direction."""
 _WIDTH = int(RATE_HZ)
 
 
-def bias_while_carried(stretches: Iterable[Signals]) -> Floats:
-    """Return the bias in the axes of the device, in rad/s; 0 where it may be that of a usual one.
+@dataclass(frozen=True, eq=False)
+class CarriedBias:
+    """A bias in the axes of the device.
 
-    Directions 15 s apart are compared by robust least squares (Student's t weights), with an error
-    of 0.5 deg/s an axis expected before. A usual gyroscope's bias, 0.1 deg/s, is left to the
-    smoother of the yaw.
+    Parameters
+    ----------
+    bias_radps : (3,) array
+    covariance : (3, 3) array
+        In (rad/s)².
+    """
+
+    bias_radps: Floats
+    covariance: Floats
+
+    @property
+    def shown_radps(self) -> Floats:
+        """The bias; 0 where it may be that of a usual gyroscope, 0.1 deg/s."""
+        sd = np.sqrt(np.diag(self.covariance) + RATE_SD_RADPS**2)
+        unusual = (np.abs(self.bias_radps) > _SHOWN * sd).any()
+        return self.bias_radps if unusual else np.zeros(3)
+
+    def sd_about_radps(self, axes: Floats) -> float:
+        """Return the root mean square of the deviations about some axes, unit vectors (N, 3)."""
+        return float(np.sqrt(np.einsum("ni,ij,nj->n", axes, self.covariance, axes).mean()))
+
+
+def bias_while_carried(stretches: Iterable[Signals]) -> CarriedBias:
+    """Return the bias of a gyroscope by directions 15 s apart.
+
+    They are compared by robust least squares (Student's t weights), with an error of 0.5 deg/s an
+    axis expected before.
 
     Parameters
     ----------
@@ -47,8 +74,8 @@ def bias_while_carried(stretches: Iterable[Signals]) -> Floats:
         information = before + sum((one for one, _ in found), np.zeros((3, 3)))
         pulls = sum((pull for _, pull in found), np.zeros(3)) - before @ bias
         bias = bias + np.linalg.solve(information, pulls)
-    sd = np.sqrt(np.diag(np.linalg.inv(information)) + RATE_SD_RADPS**2)
-    return bias if (np.abs(bias) > _SHOWN * sd).any() else np.zeros(3)
+    covariance: Floats = np.linalg.inv(information).astype(np.float64)
+    return CarriedBias(bias, covariance)
 
 
 def _compared(signals: Signals, rate_radps: Floats) -> list[tuple[Floats, Floats]]:
@@ -91,7 +118,7 @@ def _shown(pairs: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     information, pull = np.zeros((3, 3)), np.zeros(3)
     for _ in range(_WEIGHINGS):
         squared = ((turned - effect @ more) ** 2).sum(axis=1)
-        variance = max(float(np.median(squared)) / _MEDIAN_OF_THREE, 1e-8)
+        variance = max(float(np.median(squared)) / _MEDIAN_OF_THREE, _LEAST_RAD**2)
         freedom = _DEGREES_OF_FREEDOM
         weight = (freedom + 3) / (freedom + squared / variance)
         # Pairs that begin within the lag of each other tell the same.

@@ -199,7 +199,7 @@ def error_notes(
     if walk_rad_per_sqrt_s >= _LARGE_WALK_RAD_PER_SQRT_S:
         drift_deg = float(np.degrees(walk_rad_per_sqrt_s))
         found.append(f"noise by which headings drift {drift_deg:.2g} deg/sqrt(s)")
-    return (f"{of}: unusually large errors at rest: {', and '.join(found)}",) if found else ()
+    return (f"{of}: unusually large errors: {', and '.join(found)}",) if found else ()
 
 
 def _rests(rate_radps: Floats, quiet: Bools, noise: float) -> tuple[Ints, Floats, Floats]:

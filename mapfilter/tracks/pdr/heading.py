@@ -119,6 +119,7 @@ def yaw_offset(
     use_compass: bool = True,
     walk_rad_per_sqrt_s: float = WALK_RAD_PER_SQRT_S,
     usual_radps: float = 0.0,
+    alone_sd_radps: float = UNSEEN_SD_RADPS,
 ) -> YawOffset:
     """Smooth the offset between yaw and magnetic headings.
 
@@ -134,6 +135,8 @@ def yaw_offset(
         Random walk of the gyroscope's yaw.
     usual_radps : float
         Its rate error, beside which that of a time is small.
+    alone_sd_radps : float
+        Deviation of the rate error without a compass, before rests are looked at.
 
     Returns
     -------
@@ -145,8 +148,8 @@ def yaw_offset(
     # Where the field is disturbed nearly everywhere, a disturbed compass is better than none.
     if use_compass and good.sum() < 0.2 * len(good):
         good = np.isfinite(compass.north_rad) & (compass.size_ut > 0)
-    first_sd_radps = RATE_SD_RADPS
-    if not np.isfinite(rates).any():
+    first_sd_radps = RATE_SD_RADPS if good.any() else alone_sd_radps
+    if good.any() and not np.isfinite(rates).any():
         usual_radps, first_sd_radps = _rate_by_compass(compass, good)
     # What is left beside it is smoothed.
     rates = rates - usual_radps
@@ -173,7 +176,7 @@ def yaw_offset(
     spread = float(np.sqrt(np.mean(residual**2))) if residual.size else float(np.pi)
     if not good.any():
         sd = np.full(len(sd), np.pi)
-        rate_sd = rate_sd if np.isfinite(rates).any() else UNSEEN_SD_RADPS
+        rate_sd = rate_sd if np.isfinite(rates).any() else alone_sd_radps
     rate += usual_radps
     return YawOffset(compass.time_s, offset - turned, sd, rate, rate_sd, ~used, spread)
 

@@ -12,7 +12,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.attitude import Attitude, attitude
-from mapfilter.tracks.pdr.carried_bias import bias_while_carried
+from mapfilter.tracks.pdr.carried_bias import CarriedBias, bias_while_carried
 from mapfilter.tracks.pdr.direction import (
     ACCELERATION_SD_RAD,
     direction_by_acceleration,
@@ -20,7 +20,7 @@ from mapfilter.tracks.pdr.direction import (
     forward_accelerations,
     walking_direction,
 )
-from mapfilter.tracks.pdr.gyroscope import Gyroscope, gyroscope_at_rest
+from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS, Gyroscope, gyroscope_at_rest
 from mapfilter.tracks.pdr.heading import YawOffset, compass_samples, yaw_offset
 from mapfilter.tracks.pdr.height import Climb, climbs
 from mapfilter.tracks.pdr.options import Pose, WalkOptions
@@ -108,9 +108,12 @@ def reckon_walk(
     rests = [still(signals.force_mps2) for signals in stretches]
     gyroscope = gyroscope_at_rest(sensors, stretches, rests)
     carried = bias_while_carried(gyroscope.without_bias(part) for part in stretches)
-    gyroscope = replace(gyroscope, bias_radps=gyroscope.bias_radps + carried)
+    # With a compass the smoother finds what is small.
+    alone = all(part.field_ut is None for part in stretches)
+    more = carried.bias_radps if alone else carried.shown_radps
+    gyroscope = replace(gyroscope, bias_radps=gyroscope.bias_radps + more)
     parts = [
-        _reckon(gyroscope.without_bias(signals), gyroscope, quiet, options, speed)
+        _reckon(gyroscope.without_bias(signals), gyroscope, carried, quiet, options, speed)
         for signals, quiet in zip(stretches, rests, strict=True)
     ]
     counts = [int((part.rows["step_m"] > 0).sum()) for part in parts]
@@ -155,6 +158,7 @@ def _begun(rows: pd.DataFrame, number: int) -> pd.DataFrame:
 def _reckon(
     signals: Signals,
     gyroscope: Gyroscope,
+    carried: CarriedBias,
     quiet: Bools,
     options: WalkOptions,
     speed: pd.DataFrame | None,
@@ -166,7 +170,7 @@ def _reckon(
     if speed is not None and len(speed):
         walked = _speed_at(signals.time_s[index], speed) < _DRIVING_MPS
         index, swing = index[walked], swing[walked]
-    offset = _offset(signals, gyroscope, turned, quiet, options)
+    offset = _offset(signals, gyroscope, carried, turned, quiet, options)
     walking = _walking(len(level), index)
     forward = forward_accelerations(level, turned.yaw_rad)
     turned = parted_where_remounted(turned, forward, walking)
@@ -176,7 +180,7 @@ def _reckon(
     drifting = np.where(sds == ACCELERATION_SD_RAD, 1.0, 0.0)[turned.section]
     heading = yaw + directions[turned.section] + drifting * drifts(turned, forward, walking)
     # Without a compass the walker is taken to go on as before when the phone changes its place.
-    course = heading if compass else yaw
+    course = heading
     time_s, step_m, at = row_events(signals.time_s, index, step_lengths(swing, options.step_factor))
     course_at, sway = course_over_strides(course, at, step_m > 0)
     nearest = np.clip(np.searchsorted(offset.time_s, time_s), 0, len(offset.time_s) - 1)
@@ -219,7 +223,12 @@ def _to_nearest(values: Floats, known: Floats) -> Floats:
 
 
 def _offset(
-    signals: Signals, gyroscope: Gyroscope, turned: Attitude, quiet: Bools, options: WalkOptions
+    signals: Signals,
+    gyroscope: Gyroscope,
+    carried: CarriedBias,
+    turned: Attitude,
+    quiet: Bools,
+    options: WalkOptions,
 ) -> YawOffset:
     """Return what the compass and the times of standing still say of the gyroscope's yaw."""
     field = signals.field_ut
@@ -233,7 +242,14 @@ def _offset(
     if signals.rate_radps is not None:
         up = turned.to_level.apply(signals.rate_radps)[:, 2]
         rates, sds = gyroscope.rates_at_rest(signals.rate_radps, up, quiet, count)
-    return yaw_offset(compass, rates, sds, walk_rad_per_sqrt_s=gyroscope.walk_rad_per_sqrt_s)
+    up = turned.to_level.inv().apply([0.0, 0.0, 1.0])
+    return yaw_offset(
+        compass,
+        rates,
+        sds,
+        walk_rad_per_sqrt_s=gyroscope.walk_rad_per_sqrt_s,
+        alone_sd_radps=float(np.hypot(carried.sd_about_radps(up), RATE_SD_RADPS)),
+    )
 
 
 def _walking(count: int, index: Ints) -> Bools:
