@@ -111,6 +111,8 @@ def judged_by_cells(rows, cols, gone_m, row, col, levels, near_px, path_m):  # t
     left = from_row.size
     for k in range(rows.size):
         server = np.argmax(level_dbm[rows[k], cols[k]])
+        # Where no cell is received none tells anything, and hypotheses are only moved.
+        told = level_dbm[rows[k], cols[k], server] > floor_dbm
         moved_r, moved_c = rows[k] - rows[0], cols[k] - cols[0]
         kept, farthest = 0, 0.0
         for h in range(left):
@@ -120,7 +122,7 @@ def judged_by_cells(rows, cols, gone_m, row, col, levels, near_px, path_m):  # t
             if not near_way[r, c]:
                 continue
             best = best_dbm[r, c, layer[server]]
-            if not _serves(level_dbm[r, c, server], best, floor_dbm, margin_db):
+            if told and not _serves(level_dbm[r, c, server], best, floor_dbm, margin_db):
                 continue
             from_row[kept], from_col[kept] = from_row[h], from_col[h]
             off_r, off_c = from_row[h] - rows[0], from_col[h] - cols[0]

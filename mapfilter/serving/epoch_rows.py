@@ -48,6 +48,8 @@ _MOST_ROWS = 200
 _PACED_ROWS, _SELDOM_S, _SOMEWHERE_M, _SLOW_MPS = 5, 50.0, 25.0, 0.04
 """Rows of motion after which times that are milliseconds show, the time between these, the way, and
 the speed: what gets somewhere is faster."""
+_FAST_MPS = 100.0
+"""No vehicle on the ground goes so fast in the mean."""
 _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
 _COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
@@ -113,13 +115,18 @@ def read_epochs(
 
 
 def check_pace(pace: Pace, travelled_m: float) -> None:
-    """Check that times are no milliseconds, once rows of motion have come for some way.
+    """Check units of times and steps, once rows of motion have come for some way.
 
     Raises
     ------
     RequestError
-        Rows seldom come, and none of them was faster than anything that gets somewhere (400).
+        Rows seldom come, and none of them was faster than anything that gets somewhere; or their
+        mean speed is none on the ground (400).
     """
+    if pace.rows >= _PACED_ROWS and pace.speed_mps > _FAST_MPS:
+        hint = "centimetres, or the way since the start; begin a new session"
+        got = f"{pace.speed_mps:.3g} m/s in the mean"
+        raise one_fault("motion, step_m", "metres since the row before", got, hint)
     if pace.rows < _PACED_ROWS or pace.interval_s < _SELDOM_S or travelled_m < _SOMEWHERE_M:
         return
     if 0 < pace.fastest_mps < _SLOW_MPS:

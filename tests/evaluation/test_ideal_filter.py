@@ -273,3 +273,22 @@ def test_straight_on_is_likeliest_in_the_open_and_lengths_are_those_of_the_steps
     legs_m = np.hypot(np.diff(rows), np.diff(cols)) * RESOLUTION_M
     assert np.diff(gone_m) == pytest.approx(legs_m)
     assert gone_m[-2] < 150 <= gone_m[-1]
+
+
+def test_where_no_cell_is_received_hypotheses_are_only_moved():
+    """Levels below the floor on a part of the way: nothing is told there."""
+    world = World(0)
+    silent = world.rows[3], world.cols[3]
+    world.level_dbm[silent] = FLOOR_DBM - 1
+    world.levels.best_dbm[silent] = FLOOR_DBM - 1
+    given = world.rows, world.cols, world.gone_m, world.row, world.col, world.levels
+    _, bits = judged_by_cells(*given, 0.0, 1e4)
+    assert 0 < bits < np.inf
+    alive = np.ones(world.row.size, dtype=bool)
+    for k in range(len(world.gone_m)):
+        r, c, possible = world.moved(k)
+        server = world.level_dbm[world.rows[k], world.cols[k]].argmax()
+        alive &= possible
+        if k != 3:
+            alive &= world.serving(world.level_dbm[r, c], server)
+    assert bits == pytest.approx(np.log2(alive.size / alive.sum()))

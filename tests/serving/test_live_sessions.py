@@ -1,6 +1,7 @@
 """Sessions give what a replay gives, also after a restart, a crash, or a while on disk."""
 
 import asyncio
+import copy
 import json
 import time
 from contextlib import closing
@@ -188,6 +189,25 @@ def test_times_in_milliseconds_are_refused(positioner, cross, at_once):
     assert answers[-1].code == 400
     assert "milliseconds for s" in answers[-1].json["error"]["message"]
     assert taken < (30 if at_once == 1 else 1)
+
+
+@pytest.mark.parametrize("cumulative", [True, False])
+def test_steps_in_centimetres_or_since_the_start_are_refused(positioner, cross, cumulative):
+    sent, gone_m = copy.deepcopy(documents(COUNT)[0]), 0.0
+    for one in sent:
+        for row in one.get("motion", []):
+            gone_m += 20 * row["step_m"]
+            row["step_m"] = gone_m if cumulative else 100 * row["step_m"]
+
+    async def run(app):
+        session = await begin(app)
+        return await ask(app, "POST", f"/sessions/{session}/epochs", {"epochs": sent})
+
+    with service(positioner, cross.plan) as made:
+        answer = asyncio.run(run(made.app()))
+    assert answer.code == 400
+    assert "metres since the row before" in answer.json["error"]["message"]
+    assert "centimetres" in answer.json["error"]["message"]
 
 
 def test_a_known_start_is_tracked_from_there(positioner, cross, whole):
