@@ -75,7 +75,7 @@ DeclinationOption = Annotated[
 ]
 StepLengthOption = Annotated[
     float | None,
-    typer.Option("--step-length", metavar="M", help="Length of a step that is only counted."),
+    typer.Option("--step-length", metavar="M", help="Mean length of a step."),
 ]
 ColumnOption = Annotated[
     list[str] | None,

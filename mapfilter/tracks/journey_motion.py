@@ -188,9 +188,8 @@ def _walked(
         notes += walked.notes
         with_compass, why = _compass_of(walked.motion)
         why = f"steps and their lengths are those of the accelerometer, {why}"
-        used = {"step_factor"} | (
-            {"pose", "declination_deg", "field_ut"} if with_compass else set()
-        )
+        used = {"step_factor"} if walk.step_m is None else {"step_m"}
+        used |= {"pose", "declination_deg", "field_ut"} if with_compass else set()
         notes += without_effect(walk, used, why)
         return Moved(walked.motion, walked.imu, walked.reckoning, compass=with_compass)
     counted, noise, reasons = reckon_counted(sensors, walk, frame.convergence_rad)

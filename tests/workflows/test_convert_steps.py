@@ -150,10 +150,19 @@ def test_options_without_effect_are_noted(columns, without, tmp_path):
     assert told(plain.json["notes"]) == []
 
 
-def test_a_length_of_steps_has_no_effect_on_raw_sensors(recording, tmp_path):
+def test_a_length_of_steps_is_the_mean_of_those_by_the_accelerometer(recording, tmp_path):
     done = mapfilter("convert", recording, *PLACE, *OPTIONS, "--out", tmp_path / "log", "--json")
-    assert told(done.json["notes"]) == ["--step-length"]
-    assert any("lengths are those of the accelerometer" in note for note in done.json["notes"])
+    assert told(done.json["notes"]) == []
+    step_m = mf.read_log(tmp_path / "log").motion["step_m"]
+    given_m = float(OPTIONS[OPTIONS.index("--step-length") + 1])
+    assert step_m[step_m > 0].mean() == pytest.approx(given_m)
+    assert step_m[step_m > 0].std() > 0
+    plain = mapfilter("convert", recording, *PLACE, "--out", tmp_path / "plain", "--json")
+    assert plain.code == 0
+    own_m = mf.read_log(tmp_path / "plain").motion["step_m"]
+    assert own_m[own_m > 0].mean() != pytest.approx(given_m, rel=0.01)
+    ratio = step_m[step_m > 0] / own_m[own_m > 0]
+    assert ratio.to_numpy() == pytest.approx(ratio.iloc[0])
 
 
 def test_motion_that_a_file_holds_takes_no_options(tmp_path):

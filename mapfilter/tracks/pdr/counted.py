@@ -121,13 +121,13 @@ def reckon_counted(
     motion = pd.DataFrame(
         {
             "time_s": time_s,
-            "step_m": options.step_m * counted * course.chord,
+            "step_m": options.counted_m * counted * course.chord,
             "heading_rad": course.heading_rad,
             "turn_rad": course.turn_rad,
         }
     )
     source = course.source if compass is None else "with the phone's orientation as a compass"
-    notes = [f"motion: {np.nansum(counted):.0f} steps of {options.step_m:g} m {how}, {source}"]
+    notes = [f"motion: {np.nansum(counted):.0f} steps of {options.counted_m:g} m {how}, {source}"]
     if unknown:
         some = number_of(unknown, "row")
         notes.append(f"motion unknown in {some}: the counter jumped, or paused for 30 s")
@@ -181,7 +181,7 @@ def _by_compass(
         return None, "compass and step counter have no time in common: no motion"
     notes = []
     stepped = counted > 0
-    if fault := compass_fault(magnetic_deg[stepped], options.step_m * float(np.nansum(counted))):
+    if fault := compass_fault(magnetic_deg[stepped], options.counted_m * float(np.nansum(counted))):
         notes.append(fault)
     if options.declination_deg is None:
         notes.append("no magnetic declination given: magnetic north taken for true north")
@@ -255,7 +255,7 @@ def _errors(motion: pd.DataFrame, options: WalkOptions, walk_rad: float) -> ImuN
     stepped = motion[motion["step_m"] > 0]
     between_s = np.diff(stepped["time_s"])
     # A step is counted in the row in which it ends, or in the next one.
-    late_m = _COUNTED_LATE * options.step_m
+    late_m = _COUNTED_LATE * options.counted_m
     steps = ImuNoise(
         period_s=float(np.median(between_s)) if between_s.size else 1.0,
         sigma_trans_m=float(np.hypot(STEP_SHARE * float(stepped["step_m"].median()), late_m)),

@@ -21,6 +21,9 @@ _OF_COMMANDS = {
 STEP_FACTOR = 0.405
 """Weinberg's factor: metres by the fourth root of m/s²; of the walks in ``docs/howto/raw-imu``."""
 
+COUNTED_M = 0.7
+"""Usual length of a step."""
+
 
 @dataclass(frozen=True, slots=True)
 class WalkOptions(Options):
@@ -39,15 +42,21 @@ class WalkOptions(Options):
         Size of the magnetic field of the place; 0 for the median of the recording.
     step_factor : float
         Length of a step by the fourth root of its vertical acceleration's range in m/s².
-    step_m : float
-        Length of a step where a phone only counts them.
+    step_m : float or None
+        Mean length of a step. Lengths by the accelerometer are scaled to it; steps that a phone
+        only counts are 0.7 m where it is not given.
     """
 
     pose: Pose = "auto"
     declination_deg: Annotated[float, Ge(-180), Le(180)] | None = None
     field_ut: Annotated[float, Ge(0), Le(100)] = 0.0
     step_factor: Positive = STEP_FACTOR
-    step_m: Annotated[float, Gt(0), Lt(3)] = 0.7
+    step_m: Annotated[float, Gt(0), Lt(3)] | None = None
+
+    @property
+    def counted_m(self) -> float:
+        """Length of a step that a phone only counts."""
+        return COUNTED_M if self.step_m is None else self.step_m
 
 
 def without_effect(options: WalkOptions, used: Collection[str], why: str) -> tuple[str, ...]:

@@ -123,6 +123,8 @@ def reckon_walk(
     compass = any(np.isfinite(part.rows["heading_rad"]).any() for part in parts)
     rows = pd.concat([_begun(part.rows, k) for k, part in enumerate(parts)], ignore_index=True)
     rows["heading_rad"] = wrap_rad(rows["heading_rad"].to_numpy() + north_rad)
+    if options.step_m is not None:
+        rows["step_m"] *= options.step_m / rows.loc[rows["step_m"] > 0, "step_m"].mean()
     found: tuple[Climb, ...] = ()
     if (barometer := sensors.get("barometer")) is not None:
         steps_s = rows.loc[rows["step_m"] > 0, "time_s"].to_numpy()
