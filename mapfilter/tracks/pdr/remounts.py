@@ -27,7 +27,7 @@ _ALIKE = 0.6
 """Walk beside a jump, the angle that is one, and the share of forward accelerations on either side
 that have one direction. Of a phone in one hand, one of 200 such angles is so large."""
 _DRIFT_S, _SWING_S = 30.0, 3.0
-_EVERY = int(RATE_HZ / 2)
+_WIDTH, _EVERY = int(RATE_HZ), int(RATE_HZ / 2)
 HELD_SWING_RAD = float(np.radians(5.0))
 """Swing beyond which no hand holds a phone to look at it."""
 
@@ -83,11 +83,16 @@ def drifts(turned: Attitude, forward: Forward, walking: Bools) -> Floats:
         walked = np.flatnonzero(inside & walking)
         if not walked.size:
             continue
-        mean = forward[walked].sum()
-        own = np.where(walking[inside], forward[inside], 0.0) / (mean / abs(mean))
-        width = _DRIFT_S * RATE_HZ
-        near = [gaussian_filter1d(part, width, mode="constant") for part in (own.real, own.imag)]
-        found[inside] = np.where(np.hypot(*near) > 0, np.arctan2(near[1], near[0]), 0.0)
+        own = np.where(walking[inside], forward[inside], 0.0) * forward[walked].sum().conj()
+        # Second by second, as a recording may last for hours.
+        second = np.arange(len(own)) // _WIDTH
+        near = [
+            gaussian_filter1d(np.bincount(second, part), _DRIFT_S, mode="constant")
+            for part in (own.real, own.imag)
+        ]
+        turned_rad = np.unwrap(np.arctan2(near[1], near[0]))
+        middle = np.arange(len(turned_rad)) * _WIDTH + _WIDTH / 2
+        found[inside] = np.interp(np.arange(len(own)), middle, turned_rad)
     return found
 
 
