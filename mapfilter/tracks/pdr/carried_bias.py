@@ -18,7 +18,9 @@ from mapfilter.tracks.pdr.signals import RATE_HZ, Signals
 
 _LAG_S, _MEAN_S = 15, 3
 """Time over which directions are compared, and that over which they are means: of some strides."""
-_ROUNDS, _WEIGHINGS = 4, 10
+_LEAST_S = 60.0
+"""Shorter recordings show a bias no better than is known before."""
+_ROUNDS, _WEIGHINGS, _SETTLED_RADPS = 4, 10, float(np.radians(0.02))
 _DEGREES_OF_FREEDOM = 3.0
 _MEDIAN_OF_THREE = 2.37
 """Median of the sum of squares of three normal numbers."""
@@ -57,7 +59,7 @@ def bias_while_carried(stretches: Iterable[Signals]) -> CarriedBias:
     """Return the bias of a gyroscope by directions 15 s apart.
 
     They are compared by robust least squares (Student's t weights), with an error of 0.5 deg/s an
-    axis expected before.
+    axis expected before. A recording of less than a minute shows none.
 
     Parameters
     ----------
@@ -67,13 +69,17 @@ def bias_while_carried(stretches: Iterable[Signals]) -> CarriedBias:
     turning = [(part, part.rate_radps) for part in stretches if part.rate_radps is not None]
     before = np.eye(3) / UNSEEN_SD_RADPS**2
     bias, information = np.zeros(3), before
-    for _ in range(_ROUNDS):
+    lasts_s = sum(len(rate) for _, rate in turning) / RATE_HZ
+    for _ in range(_ROUNDS if lasts_s >= _LEAST_S else 0):
         # Each round turns back by what is known, as a sum of small turns is one that is not small.
         parts = [_compared(part, rate - bias) for part, rate in turning]
         found = [_shown(pairs) for part in parts for pairs in part if len(pairs[0])]
         information = before + sum((one for one, _ in found), np.zeros((3, 3)))
         pulls = sum((pull for _, pull in found), np.zeros(3)) - before @ bias
-        bias = bias + np.linalg.solve(information, pulls)
+        more = np.linalg.solve(information, pulls)
+        bias = bias + more
+        if np.abs(more).max() < _SETTLED_RADPS:
+            break
     covariance: Floats = np.linalg.inv(information).astype(np.float64)
     return CarriedBias(bias, covariance)
 
