@@ -23,9 +23,8 @@ def layers_by_priority(plan: CellPlan) -> Ints:
     Examples
     --------
     >>> from mapfilter.radio.cells import Cell
-    >>> where = {"east_m": 0.0, "north_m": 0.0, "height_m": 30.0, "azimuth_deg": None}
     >>> cells = [
-    ...     Cell(id=kind, site="S", eirp_dbm=30.0, frequency_mhz=mhz, technology=kind, **where)
+    ...     Cell(kind, "S", 0.0, 0.0, 30.0, None, 30.0, mhz, "omni", technology=kind)
     ...     for kind, mhz in (("GSM", 950.0), ("LTE", 1850.0))
     ... ]
     >>> layers_by_priority(CellPlan("EPSG:32631", tuple(cells))).tolist()

@@ -76,8 +76,8 @@ def test_long_runs_of_one_character_take_no_time(place):
         for size in (SIZE // 32, SIZE):
             text = character * size
             given = text if isinstance(pattern.pattern, str) else text.encode()
-            # What takes 0.1 s is not known to the millisecond on a machine that others use.
-            longest_s = LONGEST_S if size < SIZE else 10 * LONGEST_S
+            # The whole may take as much longer as it is longer: machines differ, and are shared.
+            longest_s = LONGEST_S if size < SIZE else 32 * LONGEST_S
             assert slowest_s(pattern, given) < longest_s, (place, character, size)
 
 
