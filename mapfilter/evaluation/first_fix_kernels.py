@@ -79,7 +79,7 @@ def _serves(level_dbm, best_dbm, floor_dbm, margin_db):  # type: ignore[no-untyp
 
 
 class Levels(NamedTuple):
-    """Levels of all pixels, cells and, at best, layers, and where hypotheses may be."""
+    """Levels of all pixels and cells, the best of each layer, and where hypotheses may be."""
 
     near_way: Bools
     level_dbm: Floats32

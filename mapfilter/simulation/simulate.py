@@ -15,7 +15,8 @@ from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey, ticks_s
-from mapfilter.simulation.reports import Levels, ReportModel, level_sampler, reports
+from mapfilter.simulation.level_samplers import Levels, level_sampler
+from mapfilter.simulation.reports import ReportModel, reports
 from mapfilter.simulation.routes import route
 from mapfilter.simulation.walking import Inside
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -88,7 +89,7 @@ def simulate_journeys(
     ----------
     levels : RxLevRasters or callable
         The true levels: rasters, or a function from positions to levels in the plan's order, as
-        :func:`mapfilter.simulation.reports.level_sampler` returns it.
+        :func:`mapfilter.simulation.level_samplers.level_sampler` returns it.
     plan : CellPlan
         In the network's CRS.
     settings : SimulationSettings, optional

@@ -51,12 +51,12 @@ class NotMeasurementsError(InputError):
     """A file is no drive test: a text, or a recording without cells."""
 
 
-T = TypeVar("T", str, tuple[int, int])
-
 Identity = tuple[int, int, int, int]
 """mcc, mnc, lac (tac in LTE) and ci."""
 Code = tuple[int, int]
 """Carrier and code (BSIC, PSC or PCI), by which reports name neighbours."""
+
+_ToldT = TypeVar("_ToldT", str, Code)
 
 
 @dataclass(slots=True)
@@ -196,7 +196,7 @@ class Rows:
         return f", such as {self.odd_time}; {_TIMES}" if what == NO_TIME and self.odd_time else ""
 
 
-def most_frequent(counts: Iterable[Counter[tuple[str, T]]]) -> dict[str, T]:
+def most_frequent(counts: Iterable[Counter[tuple[str, _ToldT]]]) -> dict[str, _ToldT]:
     """Return what most rows of each cell state; of equals the larger one, whatever their order.
 
     Examples
@@ -204,7 +204,7 @@ def most_frequent(counts: Iterable[Counter[tuple[str, T]]]) -> dict[str, T]:
     >>> most_frequent([Counter({("A", 7): 2, ("B", 5): 1}), Counter({("A", 9): 3, ("B", 4): 1})])
     {'B': 5, 'A': 9}
     """
-    total: Counter[tuple[str, T]] = Counter()
+    total: Counter[tuple[str, _ToldT]] = Counter()
     for one in counts:
         total.update(one)
     ordered = sorted((count, said) for said, count in total.items())

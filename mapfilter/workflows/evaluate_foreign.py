@@ -39,7 +39,7 @@ from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.roads.route_points import inside_areas
-from mapfilter.simulation.reports import array_sampler
+from mapfilter.simulation.level_samplers import array_sampler
 from mapfilter.simulation.worlds.faults import GivenInputs, given_inputs
 from mapfilter.simulation.worlds.open_ground import OpenGround
 from mapfilter.simulation.worlds.radio import planners_offsets_db

@@ -31,7 +31,8 @@ def study_key(
     parts = [program_version(), database.generation, repr(choice), seed, use_truth, list(names)]
     digest = hashlib.sha256(repr(parts).encode())
     for log in logs:
-        for field in fields(log):
+        # Notes name files, and change no track.
+        for field in (one for one in fields(log) if one.name != "notes"):
             value = getattr(log, field.name)
             digest.update(field.name.encode())
             digest.update(_of_table(value) if isinstance(value, pd.DataFrame) else _of(value))

@@ -14,7 +14,8 @@ from mapfilter.radio.layers import SHARED_CARRIER
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.journeys import JourneyPlan
-from mapfilter.simulation.reports import ReportModel, level_sampler
+from mapfilter.simulation.level_samplers import level_sampler
+from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.imu_noise import ImuNoise

@@ -28,6 +28,7 @@ def key(logs=None, names=("a",), choice=None, seed=1, use_truth=True, database=D
 
 def test_it_is_the_same_for_logs_that_were_opened_again():
     assert key() == key([log()])
+    assert key() == key([replace(log(), notes=("read from another folder",))])
 
 
 @pytest.mark.parametrize(

@@ -12,14 +12,8 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.rxlev import resolve_neighbours
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.simulation.reports import (
-    ReportModel,
-    array_sampler,
-    level_sampler,
-    reports,
-    running_mean_db,
-    serving_cells,
-)
+from mapfilter.simulation.level_samplers import array_sampler, level_sampler
+from mapfilter.simulation.reports import ReportModel, reports, running_mean_db, serving_cells
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32629"

@@ -19,7 +19,8 @@ from mapfilter.gnss.skyline import Skyline
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
-from mapfilter.simulation.reports import Levels, reports
+from mapfilter.simulation.level_samplers import Levels
+from mapfilter.simulation.reports import reports
 from mapfilter.simulation.routes import route
 from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 from mapfilter.simulation.simulate import SimulationSettings, at_ticks

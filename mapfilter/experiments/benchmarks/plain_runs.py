@@ -18,7 +18,7 @@ from mapfilter.experiments.benchmarks.world import BenchmarkWorld
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.simulation.reports import Levels
+from mapfilter.simulation.level_samplers import Levels
 from mapfilter.tracks.log import TrackLog
 
 

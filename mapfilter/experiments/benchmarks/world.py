@@ -27,7 +27,7 @@ from mapfilter.propagation.predict import simulate_ground_truth
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings, Ways
-from mapfilter.simulation.reports import Levels, array_sampler
+from mapfilter.simulation.level_samplers import Levels, array_sampler
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.simulation.simulate import SimulationSettings
 

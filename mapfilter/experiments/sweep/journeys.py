@@ -18,7 +18,8 @@ from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import journey
-from mapfilter.simulation.reports import array_sampler, reports
+from mapfilter.simulation.level_samplers import array_sampler
+from mapfilter.simulation.reports import reports
 from mapfilter.simulation.routes import route
 from mapfilter.simulation.simulate import at_ticks
 from mapfilter.tracks.log import TrackLog, make_log

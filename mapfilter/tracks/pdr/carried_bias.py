@@ -73,7 +73,7 @@ def bias_while_carried(stretches: Iterable[Signals]) -> CarriedBias:
     for _ in range(_ROUNDS if lasts_s >= _LEAST_S else 0):
         # Each round turns back by what is known, as a sum of small turns is one that is not small.
         parts = [_compared(part, rate - bias) for part, rate in turning]
-        found = [_shown(pairs) for part in parts for pairs in part if len(pairs[0])]
+        found = [_information(pairs) for part in parts for pairs in part if len(pairs[0])]
         information = before + sum((one for one, _ in found), np.zeros((3, 3)))
         pulls = sum((pull for _, pull in found), np.zeros(3)) - before @ bias
         more = np.linalg.solve(information, pulls)
@@ -116,7 +116,7 @@ def _compared(signals: Signals, rate_radps: Floats) -> list[tuple[Floats, Floats
     return found
 
 
-def _shown(pairs: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+def _information(pairs: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Return the information on a bias that pairs of directions hold, and where it pulls."""
     turned, effect = pairs
     more = np.zeros(3)

@@ -15,6 +15,8 @@ from mapfilter.tracks.pdr.signals import RATE_HZ
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
+Forward = npt.NDArray[np.complex128]
+
 DEVICE_SD_RAD = float(np.radians(8.0))
 ACCELERATION_SD_RAD = float(np.radians(20.0))
 _PHASE_RAD = np.radians(45.0)
@@ -24,7 +26,7 @@ _AGREE_RAD = np.radians(40.0)
 UPRIGHT = 0.7
 
 
-def forward_accelerations(level_mps2: Floats, yaw_rad: Floats) -> npt.NDArray[np.complex128]:
+def forward_accelerations(level_mps2: Floats, yaw_rad: Floats) -> Forward:
     """Return the horizontal acceleration that a step has forward, by the phase of its rise.
 
     Within a step the body speeds up about an eighth of a period before it rises; the horizontal
@@ -51,11 +53,11 @@ def forward_accelerations(level_mps2: Floats, yaw_rad: Floats) -> npt.NDArray[np
     sos = butter(2, _BAND_HZ, btype="band", fs=RATE_HZ, output="sos")
     along, across, up = (hilbert(sosfiltfilt(sos, part)) for part in (x, y, level_mps2[:, 2]))
     turned = np.exp(-1j * _PHASE_RAD) * up.conj()
-    found: npt.NDArray[np.complex128] = (along * turned).real + 1j * (across * turned).real
+    found: Forward = (along * turned).real + 1j * (across * turned).real
     return found
 
 
-def direction_by_acceleration(forward: npt.NDArray[np.complex128], walking: Bools) -> float:
+def direction_by_acceleration(forward: Forward, walking: Bools) -> float:
     """Return the direction of walking at yaw 0 by the accelerations of the steps, in radians.
 
     Parameters

@@ -10,16 +10,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.pdr.attitude import Attitude
+from mapfilter.tracks.pdr.direction import Forward
 from mapfilter.tracks.pdr.signals import RATE_HZ
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
-
-Forward = npt.NDArray[np.complex128]
 
 _BESIDE = int(10 * RATE_HZ)
 _JUMP_RAD = np.radians(60.0)
@@ -42,6 +40,9 @@ def parted_where_remounted(turned: Attitude, forward: Forward, walking: Bools) -
         From :func:`mapfilter.tracks.pdr.direction.forward_accelerations`.
     walking : (N,) array of bool
     """
+    # Slow to import, and few commands need it.
+    from scipy.spatial.transform import Rotation
+
     cuts: list[int] = []
     for k in range(len(turned.reference)):
         index = np.flatnonzero(walking & (turned.section == k))
@@ -61,7 +62,7 @@ def parted_where_remounted(turned: Attitude, forward: Forward, walking: Bools) -
         else turned.reference[int(turned.section[begin])]
         for begin, end in zip(first, ends, strict=True)
     ]
-    return replace(turned, section=section, reference=_together(references))
+    return replace(turned, section=section, reference=Rotation.concatenate(references))
 
 
 def drifts(turned: Attitude, forward: Forward, walking: Bools) -> Floats:
@@ -147,9 +148,3 @@ def _mean_reference(turned: Attitude, begin: int, end: int) -> Rotation:
     some = np.arange(begin, end, _EVERY)
     back = np.column_stack([np.zeros((len(some), 2)), -turned.yaw_rad[some]])
     return (Rotation.from_rotvec(back) * turned.to_level[some]).mean()
-
-
-def _together(rotations: list[Rotation]) -> Rotation:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.concatenate(rotations)

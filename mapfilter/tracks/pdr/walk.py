@@ -14,7 +14,8 @@ from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.attitude import Attitude, attitude
 from mapfilter.tracks.pdr.carried_bias import CarriedBias, bias_while_carried
 from mapfilter.tracks.pdr.direction import (
-    ACCELERATION_SD_RAD,
+    DEVICE_SD_RAD,
+    Forward,
     direction_by_acceleration,
     direction_by_device,
     forward_accelerations,
@@ -26,7 +27,6 @@ from mapfilter.tracks.pdr.height import Climb, climbs
 from mapfilter.tracks.pdr.options import Pose, WalkOptions
 from mapfilter.tracks.pdr.remounts import (
     HELD_SWING_RAD,
-    Forward,
     drifts,
     parted_where_remounted,
     swings_rad,
@@ -179,12 +179,12 @@ def _reckon(
     directions, sds = _directions(turned, forward, walking, options.pose)
     compass = offset.sd_rad[0] < np.pi
     yaw = turned.yaw_rad + np.interp(signals.time_s, offset.time_s, offset.offset_rad)
-    drifting = np.where(sds == ACCELERATION_SD_RAD, 1.0, 0.0)[turned.section]
-    heading = yaw + directions[turned.section] + drifting * drifts(turned, forward, walking)
-    # Without a compass the walker is taken to go on as before when the phone changes its place.
-    course = heading
+    # One that a hand points forward does not drift.
+    by_acceleration = (sds > DEVICE_SD_RAD)[turned.section]
+    drift = np.where(by_acceleration, drifts(turned, forward, walking), 0.0)
+    heading = yaw + directions[turned.section] + drift
     time_s, step_m, at = row_events(signals.time_s, index, step_lengths(swing, options.step_factor))
-    course_at, sway = course_over_strides(course, at, step_m > 0)
+    course_at, sway = course_over_strides(heading, at, step_m > 0)
     nearest = np.clip(np.searchsorted(offset.time_s, time_s), 0, len(offset.time_s) - 1)
     spread = np.hypot(offset.sd_rad[nearest], sds[turned.section[at]])
     rows = pd.DataFrame(
@@ -242,8 +242,8 @@ def _offset(
     count = len(compass.time_s)
     rates, sds = np.full(count, np.nan), np.full(count, np.nan)
     if signals.rate_radps is not None:
-        up = turned.to_level.apply(signals.rate_radps)[:, 2]
-        rates, sds = gyroscope.rates_at_rest(signals.rate_radps, up, quiet, count)
+        up_radps = turned.to_level.apply(signals.rate_radps)[:, 2]
+        rates, sds = gyroscope.rates_at_rest(signals.rate_radps, up_radps, quiet, count)
     up = turned.to_level.inv().apply([0.0, 0.0, 1.0])
     return yaw_offset(
         compass,
