@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import fields
@@ -45,6 +46,7 @@ from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.options import Options, Positive
 from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning.custom_filter import GivenFilter
 from mapfilter.positioning.locators import filter_options
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -86,9 +88,11 @@ def sweep(
         The levels that the phone receives, with the handovers and fading of ``reports``.
     roads : path, GeoDataFrame or Ways
         As for :func:`simulate`.
-    filters : mapping of str to options, their class, or the name of a filter
+    filters : mapping of str to options, a class, or the name of a filter
         Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``. A custom
-        filter goes by its name, ``"my_module:MyFilter"``, by which workers import it.
+        filter is its class, or a function that makes it of a database, or the name of one,
+        ``"my_module:MyFilter"``. The workers of an executor have to import it: one that is defined
+        in a notebook runs in this process alone.
     noises : sequence of ImuNoise, or one, optional
         See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations. Errors of a
         gyro may differ only where a custom filter uses turns (``turns="gyro"``).
@@ -140,9 +144,10 @@ def sweep(
     reports = reports or ReportModel()
     radio = Radio() if reports.radio == AS_PREDICTED else Radio("ground truth", nan)
     journey = JourneyPlan(length_m=length_m, profile=profile, walker=walker or WalkerModel())
+    readings = _readings(filters, here=executor is None)
     plans = [
         SweepPlan(
-            _readings(filters),
+            readings,
             noises=(noise,),
             radios=(radio,),
             report_periods_s=(reports.report_period_s,),
@@ -171,7 +176,8 @@ def sweep(
     return Sweep(runs)
 
 
-def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
+def _readings(filters: Mapping[str, Any], *, here: bool) -> tuple[Reading, ...]:
+    """Return the filters of a sweep; ``here`` is whether this process alone runs them."""
     faults = Faults()
     found = []
     if not filters:
@@ -181,26 +187,36 @@ def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
         if isinstance(given, type) and issubclass(given, Options):
             options = given()
         if isinstance(options, type) or not hasattr(options, "over"):
-            expected = "options, or the name of a filter"
-            faults.add(f"filters, {name}", expected, *_unnamed(options))
-        else:
-            own_m = options.update_length_m if isinstance(options, CandidateFilter) else nan
-            found.append(Reading(name, options, float(own_m)))
+            wrong = _not_a_filter(options, here=here)
+            if wrong is not None:
+                faults.add(f"filters, {name}", *wrong)
+                continue
+            options = GivenFilter(options)
+        own_m = options.update_length_m if isinstance(options, CandidateFilter) else nan
+        found.append(Reading(name, options, float(own_m)))
     faults.raise_if_any(ConfigError)
     return tuple(found)
 
 
-def _unnamed(given: Any) -> tuple[str, str]:
-    """Return what was given for a filter, and the likely mistake."""
+def _not_a_filter(given: Any, *, here: bool) -> tuple[str, str, str] | None:
+    """Return what was expected and given, and the likely mistake, of what makes no filter."""
     if not callable(given):
         own = type(given)
-        is_filter = callable(getattr(given, "locate", getattr(given, "step", None)))
-        return own.__name__, f'"{own.__module__}:{own.__name__}"' if is_filter else ""
+        made = callable(getattr(given, "locate", getattr(given, "step", None)))
+        hint = f"its class, {own.__name__}, which is called with the database" if made else ""
+        return "options, a class, or the name of a filter", own.__name__, hint
+    if here:
+        return None
+    module, kind = getattr(given, "__module__", "__main__"), getattr(given, "__qualname__", "")
+    found = None if module == "__main__" else sys.modules.get(module)
+    for part in kind.split("."):
+        found = getattr(found, part, None)
+    if found is given:
+        return None
     kind = getattr(given, "__name__", type(given).__name__)
-    module = getattr(given, "__module__", "__main__")
-    if module in ("__main__", "functools") or kind == "<lambda>":
-        return kind, 'a custom filter goes by its name, "my_module:MyFilter", in a file of its own'
-    return kind, f'a custom filter goes by its name, "{module}:{kind}"'
+    expected = "a filter that the workers of an executor can import"
+    hint = "put it into a file of its own, or leave the executor out"
+    return expected, f"{kind} of this notebook or program", hint
 
 
 def _distinguished(

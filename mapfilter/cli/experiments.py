@@ -59,7 +59,14 @@ def sweep(
     as_json: JsonOption = False,
 ) -> None:
     """Run filters over a grid of noises and options; exit code 3 if it was stopped on the way."""
-    from mapfilter.workflows.sweep import brief, forecast_sweep, load_sweep, run_sweep, vary_axes
+    from mapfilter.workflows.sweep import (
+        brief,
+        brief_pairs,
+        forecast_sweep,
+        load_sweep,
+        run_sweep,
+        vary_axes,
+    )
 
     loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
     check_custom_filter(loaded)
@@ -77,7 +84,8 @@ def sweep(
     except (KeyboardInterrupt, Stopped) as error:
         print_message(stopped_text(error))
         raise typer.Exit(PARTIAL) from None
-    shown = asdict(result) | ({} if as_json else {"cells": brief(result.cells)})
+    pairs = [pair.row for pair in result.pairs] if as_json else brief_pairs(result.pairs)
+    shown = asdict(result) | {"pairs": pairs} | ({} if as_json else {"cells": brief(result.cells)})
     print_result(shown, as_json)
 
 

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Accuracy, mean_of
 
-_Z_95 = 1.959963984540054
+Z_95 = 1.959963984540054
+"""Half the width of a 95 % interval, in standard deviations."""
 
 
-def wilson_interval(successes: int, runs: int, z: float = _Z_95) -> tuple[float, float]:
+def wilson_interval(successes: int, runs: int, z: float = Z_95) -> tuple[float, float]:
     """Return the Wilson score interval of a share (Wilson 1927); (0, 1) without any run.
 
     Examples
@@ -30,7 +31,7 @@ def wilson_interval(successes: int, runs: int, z: float = _Z_95) -> tuple[float,
 
 
 def wilson_interval_of_routes(
-    successes: ArrayLike, runs: ArrayLike, z: float = _Z_95
+    successes: ArrayLike, runs: ArrayLike, z: float = Z_95
 ) -> tuple[float, float]:
     """Return the Wilson interval of a share over all routes, from that of some routes.
 
@@ -58,17 +59,38 @@ def wilson_interval_of_routes(
     [0.352, 0.648]
     """
     good, of = np.asarray(successes, dtype=np.float64), np.asarray(runs, dtype=np.float64)
-    routes, total = good.size, float(of.sum())
-    if routes < 2:
+    if good.size < 2:
         return float("nan"), float("nan")
-    if np.all(of == 1):
-        return _wilson(float(good.mean()), routes, z)
-    share = float(good.sum()) / total
-    if share in (0.0, 1.0):
-        return _wilson(share, routes, z)
-    variance = routes / (routes - 1) * float(np.sum((good - share * of) ** 2)) / total**2
-    independent = share * (1 - share) / variance if variance > 0 else total
-    return _wilson(share, min(max(independent, 1.0), total), z)
+    share = float(good.sum()) / float(of.sum())
+    return _wilson(share, independent_runs(good, of, share * (1 - share)), z)
+
+
+def independent_runs(sums: ArrayLike, runs: ArrayLike, variance: float) -> float:
+    """Return how many independent runs tell as much of a mean as the runs of some routes do.
+
+    The effective sample size of Korn and Graubard (1998), by the scatter of the routes (the ratio
+    estimator of cluster sampling), between one and all runs. Where runs do not differ at all, each
+    route counts as one; where each route has one run, that is all of them.
+
+    Parameters
+    ----------
+    sums, runs : array_like, shape (routes,)
+        Sum of what is averaged over the runs of each route, and their number.
+    variance : float
+        Variance of a single run.
+
+    Examples
+    --------
+    >>> round(independent_runs([10, 0, 10, 0], [10, 10, 10, 10], 0.25), 6)
+    3.0
+    """
+    total_of, of = np.asarray(sums, dtype=np.float64), np.asarray(runs, dtype=np.float64)
+    routes, total = of.size, float(of.sum())
+    if variance == 0 or np.all(of == 1):
+        return float(routes)
+    mean = float(total_of.sum()) / total
+    between = routes / (routes - 1) * float(np.sum((total_of - mean * of) ** 2)) / total**2
+    return min(max(variance / between, 1.0), total) if between > 0 else total
 
 
 def _wilson(share: float, runs: float, z: float) -> tuple[float, float]:

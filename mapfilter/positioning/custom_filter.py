@@ -13,7 +13,7 @@ import hashlib
 import inspect
 import sys
 import traceback
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -64,6 +64,33 @@ class CustomFilter:
         """
         with wrap_user_errors(self.name):
             made = _imported(self.name)(database)
+        return adapted(made, database, self.name, ways=ways)
+
+
+@dataclass(frozen=True)
+class GivenFilter:
+    """A filter by the class, or the function of a database, that makes it.
+
+    Processes get it by its name: it has to be one that they can import.
+    """
+
+    make: Callable[[RadioRouteDatabase], Any]
+
+    @property
+    def name(self) -> str:
+        """Name of the class or function."""
+        return str(getattr(self.make, "__name__", type(self.make).__name__))
+
+    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:
+        """Make the filter over a database.
+
+        Raises
+        ------
+        ConfigError
+            It lacks a function, or does not take a database.
+        """
+        with wrap_user_errors(self.name, self.make):
+            made = self.make(database)
         return adapted(made, database, self.name, ways=ways)
 
 

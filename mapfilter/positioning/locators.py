@@ -12,7 +12,7 @@ from mapfilter.errors import ConfigError, fail
 from mapfilter.options import Options
 from mapfilter.positioning import BUILT_IN as BUILT_IN
 from mapfilter.positioning import DEFAULT as DEFAULT
-from mapfilter.positioning.custom_filter import adapted, custom_filter, wrap_user_errors
+from mapfilter.positioning.custom_filter import GivenFilter, adapted, custom_filter
 from mapfilter.positioning.filter import Filter, FilterOptions
 
 
@@ -78,10 +78,8 @@ def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) ->
     if hasattr(given, "over") and not isinstance(given, type):
         found: Filter[Any] = given.over(database, ways=ways)
         return found
-    name = getattr(given, "__name__", type(given).__name__)
     if callable(given):
         if isinstance(given, type) and issubclass(given, Options):
             return as_filter(given(), database, ways=ways)
-        with wrap_user_errors(name, given):
-            given = given(database)
-    return adapted(given, database, name, ways=ways)
+        return GivenFilter(given).over(database, ways=ways)
+    return adapted(given, database, type(given).__name__, ways=ways)

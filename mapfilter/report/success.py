@@ -8,30 +8,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from mapfilter._types import Floats
-from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.success_cells import HEADING, READING, SuccessCell, axes_of
 from mapfilter.report.canvas import (
     BLACK,
-    GREY,
-    VERMILLION,
     Look,
-    bottom_legend,
     distinct_colours,
-    draw_shares,
     figure_of,
     legend,
-    new_figure,
     single_axes,
     styled,
     tidy,
 )
 
 _SIZE_IN = (8.4, 5.2)
-_RUNS_SIZE_IN = (11.0, 4.6)
-_FARTHEST_M = 200.0
 _MOST_TICKS = 8
 _LABELS = {
     HEADING: "standard deviation of the heading / °",
@@ -221,37 +212,3 @@ def plot_success_map(cells: Sequence[SuccessCell], ax: Axes | None = None, *, ti
     axes.set_ylabel("standard deviation of a step / m")
     figure_of(axes).colorbar(image, ax=axes, label="success / %")
     return axes
-
-
-@styled
-def plot_run_distributions(groups: Sequence[tuple[str, pd.DataFrame]], *, title: str) -> Figure:
-    """Draw three cumulative distributions for each group of runs.
-
-    The error at the switch and the distance to the switch are shares of *all* runs: a curve that
-    ends below 100 % shows how many never switched; what lies beyond 50 m switched wrongly. The
-    mean error after the switch is that of the successful runs. A group is a name and the rows of a
-    sweep's table.
-    """
-    figure = new_figure(*_RUNS_SIZE_IN)
-    at_switch, after, distance = figure.subplots(1, 3)
-    for (name, rows), colour in zip(groups, distinct_colours(len(groups)), strict=True):
-        right = rows[rows["success"]]
-        look = Look(color=colour, linewidth=1.3)
-        draw_shares(at_switch, rows["error_at_switch_m"], label=name, **look)
-        draw_shares(after, right["error_mean_m"], **look)
-        draw_shares(distance, rows["switch_distance_m"], **look)
-    at_switch.axvline(SUCCESS_RADIUS_M, color=VERMILLION, linestyle=(0, (5, 3)), linewidth=1.1)
-    radius = f"{SUCCESS_RADIUS_M:.0f} m"
-    at_switch.text(SUCCESS_RADIUS_M + 3, 2, radius, color=GREY, fontsize=8.5)
-    for axes, label, of in (
-        (at_switch, "error at the switch / m", "all"),
-        (after, "mean error after the switch / m", "successful"),
-        (distance, "distance travelled to the switch / m", "all"),
-    ):
-        axes.set(xlabel=label, ylabel=f"share of {of} runs / %", ylim=(0, 101))
-        axes.set_xlim(left=0)
-        tidy(axes)
-    at_switch.set_xlim(0, _FARTHEST_M)
-    figure.suptitle(title, fontsize=11)
-    bottom_legend(figure, 4)
-    return figure

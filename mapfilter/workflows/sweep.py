@@ -21,9 +21,11 @@ from mapfilter.config.axes import parse_axis
 from mapfilter.config.load import load_config, load_keys
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults
+from mapfilter.evaluation.paired import PairedCell, paired_cells
 from mapfilter.evaluation.success_cells import (
     COORDINATES,
     HEADING,
+    READING,
     SuccessCell,
     axes_of,
     success_cells,
@@ -34,10 +36,10 @@ from mapfilter.experiments.sweep.run import run_batch, seconds_per_run, sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.report.canvas import Drawn
 from mapfilter.report.claimed_radii import have_radii, plot_claimed_radii
+from mapfilter.report.run_distributions import plot_run_distributions
 from mapfilter.report.saving import save
 from mapfilter.report.success import (
     place_words,
-    plot_run_distributions,
     plot_success_curves,
     plot_success_map,
 )
@@ -46,7 +48,9 @@ from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plans, sweep_w
 
 _WHITE = {f"{section}{name}" for section in ("", "imu.") for name in NOISE_AXES[:2]}
 _MOST_CURVES, _MOST_GROUPS = 8, 16
-_OWN = re.compile(r"table\.(csv|tex)|(success|success-map|radii|distributions)(-[0-9]+)?\.png")
+_OWN = re.compile(
+    r"table\.(csv|tex)|pairs\.csv|(success|success-map|radii|distributions)(-[0-9]+)?\.png"
+)
 _PLACES = ("sweep.databases", "database.path", "output.dir")
 
 
@@ -54,6 +58,8 @@ _SUCCESS = ("runs", "success", "low", "high", "wrong", "error_mean_m", "switch_d
 _COVERAGE = ("coverage_95", "coverage_95_low", "coverage_95_high")
 _FOUND = (*_SUCCESS, "claimed", *_COVERAGE, "radius_95_median_m")
 _BRIEF = (*_SUCCESS, "coverage_95", "radius_95_median_m")
+_GAINED = ("success", "success_routes_low", "success_routes_high", "wrong")
+_PAIR_BRIEF = (READING, "baseline", "runs", *_GAINED, "error_m", "distance_m")
 
 
 def draw_sweep(runs: pd.DataFrame, out: Path) -> tuple[Path, ...]:
@@ -103,11 +109,14 @@ def groups_of(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 class SweepResult:
     """Results of a sweep.
 
-    ``table`` has one row for each run, ``tables`` (CSV, LaTeX) one for each cell of the grid.
+    ``table`` has one row for each run, ``tables`` (CSV, LaTeX) one for each cell of the grid, and
+    ``pairs.csv`` among them one for each cell and each filter beside the first one, if there are
+    several.
     """
 
     runs: int
     cells: tuple[SuccessCell, ...]
+    pairs: tuple[PairedCell, ...]
     table: Path
     tables: tuple[Path, ...]
     pictures: tuple[Path, ...]
@@ -229,14 +238,17 @@ def run_sweep(
         )
     runs = read_runs(table)
     cells = success_cells(runs)
-    shown = cell_table(cells)
+    shown, pairs = cell_table(cells), paired_cells(runs, str(runs[READING].iloc[0]))
     # Pictures of an older sweep do not stay beside the table of this one.
     with replaced_files(out, partial(_older, out)) as new:
         tables = [write_table(shown, new / f"table{suffix}") for suffix in (".csv", ".tex")]
+        if pairs:
+            tables.append(write_table(pair_table(pairs), new / "pairs.csv"))
         pictures = () if config.output.pictures == "none" else draw_sweep(runs, new)
     return SweepResult(
         len(runs),
         cells,
+        pairs,
         table,
         tuple(out / file.name for file in tables),
         tuple(out / file.name for file in pictures),
@@ -259,6 +271,21 @@ def cell_table(cells: Sequence[SuccessCell]) -> pd.DataFrame:
     """Return one row for each cell: coordinates in which the cells differ, and main figures."""
     names = [*axes_of(cells), *_FOUND]
     return pd.DataFrame([asdict(cell) | cell.place for cell in cells])[names]
+
+
+def pair_table(pairs: Sequence[PairedCell]) -> pd.DataFrame:
+    """Return one row for each pair: coordinates in which the pairs differ, and all figures."""
+    rows = pd.DataFrame([pair.row for pair in pairs])
+    alike = [name for name in pairs[0].place if len({repr(value) for value in rows[name]}) == 1]
+    return rows.drop(columns=alike)
+
+
+def brief_pairs(pairs: Sequence[PairedCell]) -> list[dict[str, Any]]:
+    """Return a row for each pair: coordinates in which the pairs differ, and main figures."""
+    if not pairs:
+        return []
+    names = [name for name in pair_table(pairs) if name in (*pairs[0].place, *_PAIR_BRIEF)]
+    return [{name: pair.row[name] for name in names} for pair in pairs]
 
 
 def brief(cells: Sequence[SuccessCell]) -> list[dict[str, Any]]:

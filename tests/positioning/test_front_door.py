@@ -277,6 +277,31 @@ class Recording(mf.Filter):
         return state + 1, mf.StepOutput(fix)
 
 
+class Centre:
+    """Somewhere about the middle of the points of the serving cell, by chance."""
+
+    def __init__(self, database):
+        self.database = database
+
+    def begin(self, kinds=()):
+        return mf.Status.SEARCHING
+
+    def step(self, state, epoch, rng):
+        searching = state is mf.Status.SEARCHING
+        cells = [row.cell for row in epoch.radio if row.role == "serving"]
+        if not cells:
+            status = mf.Status.TRACKING if not searching else state
+            fix = mf.Fix.nowhere(epoch.time_s, status, Reason.NO_SERVING_CELL)
+            return status, mf.StepOutput(fix)
+        row, col, _ = self.database.cell_points(cells[0])
+        east_m, north_m = self.database.lattice.east_north(row, col)
+        at = east_m.mean() + rng.normal(0, 30), north_m.mean() + rng.normal(0, 30)
+        status = mf.Status.CONVERGED if searching else mf.Status.TRACKING
+        unknown = np.full((2, 2), np.nan), np.full(3, np.nan)
+        fix = mf.Fix(epoch.time_s, *at, *unknown, status, 1, np.nan, 0, np.nan, Reason.USED)
+        return status, mf.StepOutput(fix)
+
+
 @pytest.mark.parametrize("given", [Recording, f"{__name__}:Recording"], ids=["class", "name"])
 def test_a_custom_filter_is_the_same_by_class_and_by_name(given, database):
     with pytest.raises(mf.MapfilterError, match=r"test_front_door.py line \d+, in step.*no idea"):
@@ -422,13 +447,55 @@ def test_what_cannot_be_swept_is_refused(database, rasters, streets):
     gyro = mf.ImuNoise(turns="gyro"), mf.ImuNoise(turns="gyro", gyro_bias_deg_per_s=1.0)
     with pytest.raises(mf.MapfilterError, match=r"gyro_bias_deg_per_s: .*one without effect"):
         swept(database, rasters, streets, noises=gyro)
-    named = f'a custom filter goes by its name, "{Recording.__module__}:Recording"'
-    with pytest.raises(mf.MapfilterError, match=f"filters, mine: expected options, .+{named}"):
-        mf.sweep(database, rasters, streets, {"mine": Recording})
-    for nameless in (lambda area: Recording(area), partial(Recording), 3.0):
-        hint = "in a file of its own" if callable(nameless) else "found float$"
-        with pytest.raises(mf.MapfilterError, match=hint):
-            mf.sweep(database, rasters, streets, {"mine": nameless})
+    made = "the name of a filter, found Recording .likely: its class, Recording"
+    for wrong, told in ((3.0, "found float$"), (Recording(database), made)):
+        with pytest.raises(mf.MapfilterError, match=told):
+            mf.sweep(database, rasters, streets, {"mine": wrong})
+
+
+def test_a_sweep_takes_the_class_of_a_filter(database, rasters, streets):
+    """As mf.locate does, of a notebook, too; workers have to import it."""
+    given = {"routes": 2, "length_m": 200.0}
+    named = f"{Centre.__module__}:Centre"
+    by_name = mf.sweep(database, rasters, streets, {"mine": named}, **given).runs
+
+    class Local(Centre):
+        pass
+
+    for made in (Centre, Local, lambda area: Centre(area), partial(Centre)):
+        found = mf.sweep(database, rasters, streets, {"mine": made}, **given).runs
+        pd.testing.assert_frame_equal(found.drop(columns="filter"), by_name.drop(columns="filter"))
+        known = mf.locate(walk_log(), database, made).estimate
+        assert known.filter == found["filter"].iloc[0]
+    with ThreadPoolExecutor(1) as executor:
+        found = mf.sweep(database, rasters, streets, {"mine": Centre}, executor=executor, **given)
+        pd.testing.assert_frame_equal(
+            found.runs.drop(columns="filter"), by_name.drop(columns="filter")
+        )
+        for nameless in (Local, lambda area: Centre(area), partial(Centre)):
+            with pytest.raises(mf.MapfilterError, match=r"can import, .*in?to a file of its own"):
+                mf.sweep(database, rasters, streets, {"mine": nameless}, executor=executor)
+
+
+def test_filters_of_a_sweep_are_compared_run_by_run(database, rasters, streets):
+    filters = {"c": mf.CandidateFilter(), "mine": Centre, "b": mf.BayesFilter()}
+    noises = (mf.ImuNoise(), mf.ImuNoise(sigma_orient_deg=9.0))
+    given = {"noises": noises, "routes": 2, "length_m": 200.0}
+    found = mf.sweep(database, rasters, streets, filters, **given)
+    pairs = found.compare("c")
+    assert pairs["reading"].tolist() == ["mine", "b"] * 2
+    assert set(pairs["baseline"]) == {"c"}
+    assert (pairs["runs"] == 2).all()
+    rates = found.to_dataframe().set_index(["sigma_orient_deg", "reading"])["success"]
+    for one in pairs.itertuples():
+        at = one.sigma_orient_deg
+        assert one.success == rates[at, one.reading] - rates[at, "c"]
+    for figure in ("error_at_switch_m", "error_mean_m", "switch_distance_m"):
+        assert found.plot(figure=figure).get_legend_handles_labels()[1] == list(filters)
+    with pytest.raises(mf.MapfilterError, match="compare, baseline: expected one of 'c', 'mine'"):
+        found.compare("d")
+    with pytest.raises(mf.MapfilterError, match="beside another filter"):
+        mf.Sweep(found.runs[found.runs["reading"] == "c"]).compare("c")
 
 
 def test_a_sweep_takes_the_class_of_options(database, rasters, streets):

@@ -13,10 +13,10 @@ from mapfilter.report.claimed_radii import (
     plot_coverage_curves,
     plot_radius_curves,
 )
+from mapfilter.report.run_distributions import plot_run_distributions
 from mapfilter.report.saving import save
 from mapfilter.report.success import (
     curve_axis,
-    plot_run_distributions,
     plot_success_curves,
     plot_success_map,
     success_curves,

@@ -18,7 +18,7 @@ from mapfilter.experiments.sweep import run
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.workflows.simulate import run_simulate
-from mapfilter.workflows.sweep import load_sweep, run_sweep
+from mapfilter.workflows.sweep import brief_pairs, load_sweep, run_sweep
 from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
 
 GRID = settings(
@@ -55,6 +55,7 @@ def test_the_command_and_what_it_tells(world, whole, tmp_path):
     found = assert_done(mapfilter("sweep", "-c", toml, *GRID, "--json")).json
     assert found["runs"] == RUNS
     assert len(found["cells"]) == 8
+    assert found["pairs"] == []
     cell = found["cells"][0]
     assert (cell["runs"], cell["routes"], cell["filter"]) == (12, 3, "candidate")
     assert cell["low"] <= cell["success"] <= cell["high"]
@@ -377,6 +378,15 @@ update_length_m = 5.0
     assert set(runs["prediction_error_db"]) == {0.0, 7.0}
     lengths = dict(zip(runs["reading"], runs["update_length_m"], strict=True))
     assert lengths == {"printed": 10.0, "list": 5.0}
+    assert {(one.reading, one.baseline, one.runs) for one in found.pairs} == {
+        ("list", "printed", 2)
+    }
+    pairs = pd.read_csv(found.tables[-1])
+    assert found.tables[-1].name == "pairs.csv"
+    assert len(pairs) == len(found.pairs) == 2 * 2 * 2
+    assert {"prediction_error_db", "report_period_s", "sigma_orient_deg"} <= set(pairs)
+    assert "bias_sd_deg" not in pairs
+    assert len(brief_pairs(found.pairs)) == 8
     assert len(found.pictures) == 3 * 2 * 2 * 2
     assert all(picture.stat().st_size > 10_000 for picture in found.pictures)
 

@@ -19,8 +19,8 @@ from mapfilter.evaluation.success_cells import SuccessCell, success_cells
 from mapfilter.experiments.papers.paper import Paper, PaperSettings, Picture
 from mapfilter.experiments.sweep.plan import Radio, Reading, SweepPlan, noise_grid
 from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.report.run_distributions import plot_run_distributions
 from mapfilter.report.success import (
-    plot_run_distributions,
     plot_success_curves,
     plot_success_map,
 )

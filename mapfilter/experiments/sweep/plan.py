@@ -277,4 +277,6 @@ def _plain(value: object) -> object:
         return value
     if isinstance(value, float):
         return repr(value)
+    if callable(value):
+        return f"{value.__module__}:{getattr(value, '__qualname__', type(value).__qualname__)}"
     return {str(key): _plain(item) for key, item in dict(value).items()}  # type: ignore[call-overload]
