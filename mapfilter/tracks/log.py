@@ -26,6 +26,7 @@ from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.tracks.clock_steps import with_clocks_gone_on
+from mapfilter.tracks.geographic import in_metres
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import (
     check_clocks,
@@ -42,6 +43,8 @@ from mapfilter.tracks.moved import UNDIRECTED
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import PLACE, TABLES
 from mapfilter.tracks.tables import tidy_table
+
+_PLACED = ("gnss", "truth")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -160,8 +163,10 @@ def make_log(
     motion, radio, gnss, truth, pseudoranges, tdoa : pandas.DataFrame, optional
         Tables with the columns of :class:`TrackLog`. Required are only ``time_s``, ``role``
         (radio), ``east_m`` and ``north_m`` (gnss, truth), ``satellite`` (pseudoranges), ``cell``
-        and ``reference`` (tdoa). Instead of ``time_s`` in seconds there may be timestamps with a
-        time zone, in a column ``time_s`` or ``time``: then the first of all is second 0.
+        and ``reference`` (tdoa). Instead of metres positions may have ``lat_deg`` and ``lon_deg``,
+        and those of gnss ``accuracy_m``, the radius that holds 68 % as phones state it. Instead of
+        ``time_s`` in seconds there may be timestamps with a time zone, in a column ``time_s`` or
+        ``time``: then the first of all is second 0.
     almanac : Almanac, optional
         Gives the places of satellites where their rows have none; requires a known start.
     start_utc_s : float
@@ -224,12 +229,15 @@ def make_log(
         crs = projected_crs(crs, f"{whole}, crs")
     except InputError as error:
         faults.found.extend(error.faults)
+    known = not faults.found
     present = {table: rows for table in TABLES if (rows := arguments[table]) is not None}
     given, start_utc_s = seconds_of_tables(present, float(start_utc_s), called, faults)
     given, of_clocks = with_clocks_gone_on(given, called)
     tables, every_note = dict[str, pd.DataFrame](), (*notes, *of_clocks)
     for table in TABLES:
         name, number = called.get(table, table), numbers.get(table)
+        if table in _PLACED and table in given and known:
+            given[table] = in_metres(given[table], name, str(crs), faults, number)
         tables[table], more = tidy_table(table, given.get(table), name, faults, number)
         every_note += more
     check_start(start_utc_s, tables, faults, whole)

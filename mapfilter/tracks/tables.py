@@ -99,9 +99,13 @@ def _check_columns(table: str, given: pd.DataFrame, found: TableFaults) -> tuple
             found.add(f", column {name}", f"columns {', '.join(names)}", name, near[0])
         else:
             notes.append(f"{found.where}: column {name} is not used")
-    for column in SCHEMA[table]:
-        if column.required and column.name not in given.columns:
-            found.add("", f"a column {column.name}", "none")
+    lacking = [c.name for c in SCHEMA[table] if c.required and c.name not in given.columns]
+    placed = ["east_m", "north_m"]
+    if table in ("gnss", "truth") and set(placed) <= set(lacking):
+        found.add("", "columns east_m and north_m, or lat_deg and lon_deg", "neither")
+        lacking = [name for name in lacking if name not in placed]
+    for name in lacking:
+        found.add("", f"a column {name}", "none")
     return tuple(notes)
 
 

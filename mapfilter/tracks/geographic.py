@@ -1,0 +1,71 @@
+"""Positions given in degrees, as phones and pandas users have them, in a log's CRS."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from mapfilter.errors import Faults
+from mapfilter.geodesy import project
+from mapfilter.tracks.column_values import TableFaults, column_values
+from mapfilter.tracks.position_units import RADIUS_68
+from mapfilter.tracks.schema import Column
+
+_SWAPPED = "longitude and latitude swapped, or metres given for degrees"
+_LAT = Column("lat_deg", -90, 90, "degrees in -90..90", _SWAPPED, required=True)
+_LON = Column("lon_deg", -180, 180, "degrees in -180..180", _SWAPPED, required=True)
+_ACCURACY = Column("accuracy_m", 0, 1e5, "metres in 0..100000")
+_VARIANCES = ("var_east_m2", "var_north_m2", "cov_east_north_m2")
+_METRES = ("east_m", "north_m", *_VARIANCES)
+
+
+def in_metres(
+    given: pd.DataFrame, where: str, crs: str, faults: Faults, row_numbers: ArrayLike | None = None
+) -> pd.DataFrame:
+    """Return a table of positions with columns in metres in place of those in degrees.
+
+    Parameters
+    ----------
+    given : pandas.DataFrame
+        With ``lat_deg`` and ``lon_deg`` (WGS 84) and, if known, ``accuracy_m``, the radius that
+        holds 68 % as phones state it. Without these columns, or with some in metres, too, it is
+        returned as it is.
+    where : str
+        Name of the table in messages.
+    crs : str
+        The log's CRS.
+    row_numbers : (N,) array_like of int, optional
+        Number of each row in messages; 1 to N by default.
+    """
+    degrees = ("lat_deg", "lon_deg")
+    if not set(degrees) <= set(given.columns) or set(_METRES) & set(given.columns):
+        return given
+    numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
+    found, before = TableFaults(where, numbers, faults), len(faults.found)
+    given = given.reset_index(drop=True)
+    lat_deg, lon_deg = (column_values(one, given, found) for one in (_LAT, _LON))
+    accuracy_m = None
+    if "accuracy_m" in given.columns:
+        accuracy_m = column_values(_ACCURACY, given, found)
+    rest = given.drop(columns=[*degrees, *(() if accuracy_m is None else ("accuracy_m",))])
+    if len(faults.found) > before:
+        return rest.assign(east_m=0.0, north_m=0.0)
+    east_m, north_m = project(crs, lon_deg, lat_deg)
+    beyond = ~(np.isfinite(east_m) & np.isfinite(north_m))
+    found.add_rows(
+        beyond,
+        "lat_deg",
+        f"a place that {crs} covers",
+        lambda row: f"{lat_deg[row]:g}, {lon_deg[row]:g}",
+        lambda _: "",
+    )
+    table = rest.assign(east_m=np.where(beyond, 0, east_m), north_m=np.where(beyond, 0, north_m))
+    if accuracy_m is None:
+        return table
+    variance_m2 = np.where(accuracy_m > 0, (accuracy_m / RADIUS_68) ** 2, np.nan)
+    return table.assign(
+        var_east_m2=variance_m2,
+        var_north_m2=variance_m2,
+        cov_east_north_m2=np.where(np.isnan(variance_m2), np.nan, 0.0),
+    )

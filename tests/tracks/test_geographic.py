@@ -1,0 +1,84 @@
+"""Positions in degrees in the tables of a log."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from pyproj import Transformer
+
+import mapfilter as mf
+from mapfilter.tracks.log import make_log
+from mapfilter.tracks.store import read_log
+
+CRS = "EPSG:32633"
+LAT, LON = np.array([50.08, 50.081, 50.082]), np.array([14.42, 14.421, 14.42])
+
+
+def positions(**more):
+    return pd.DataFrame({"time_s": [0.0, 1.0, 2.0], "lat_deg": LAT, "lon_deg": LON, **more})
+
+
+def test_positions_in_degrees_are_those_of_the_crs():
+    log = make_log(CRS, gnss=positions(accuracy_m=[3.03, np.nan, 0.0]), truth=positions())
+    east_m, north_m = Transformer.from_crs("EPSG:4326", CRS, always_xy=True).transform(LON, LAT)
+    for table in (log.gnss, log.truth):
+        assert table["east_m"].to_numpy() == pytest.approx(east_m, abs=1e-6)
+        assert table["north_m"].to_numpy() == pytest.approx(north_m, abs=1e-6)
+    # A radius of 68 % of two equal deviations is 1.51 of one: √(-2 ln 0.32).
+    sd_m = np.sqrt(log.gnss["var_east_m2"].to_numpy())
+    assert sd_m[0] == pytest.approx(3.03 / np.sqrt(-2 * np.log(0.32)), rel=5e-3)
+    assert np.isnan(sd_m[1:]).all()
+    assert log.gnss["cov_east_north_m2"].iloc[0] == 0
+    assert "degrees" not in " ".join(log.notes)
+    assert "not used" not in " ".join(log.notes)
+
+
+def test_their_own_index_and_timestamps_are_kept():
+    stamps = pd.to_datetime(
+        ["2026-05-01 12:00:00Z", "2026-05-01 12:00:01Z", "2026-05-01 12:00:02Z"]
+    )
+    given = positions().drop(columns="time_s").set_index(stamps)
+    log = make_log(CRS, gnss=given, truth=given.iloc[::-1])
+    assert log.gnss["time_s"].tolist() == [0.0, 1.0, 2.0]
+    assert log.gnss["east_m"].tolist() == log.truth["east_m"].tolist()
+
+
+def test_a_folder_may_hold_them(tmp_path):
+    folder = tmp_path / "walk"
+    folder.mkdir()
+    (folder / "log.json").write_text('{"crs": "EPSG:32633"}')
+    positions(accuracy_m=5.0).to_csv(folder / "gnss.csv", index=False)
+    read = read_log(folder)
+    assert read.gnss.equals(make_log(CRS, gnss=positions(accuracy_m=5.0)).gnss)
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "value", "told"),
+    [
+        ("lat_deg", 1, 100.0, "gnss row 2, lat_deg: expected degrees in -90..90, found 100.0"),
+        ("lon_deg", 0, 5_548_000.0, "lon_deg: expected degrees in -180..180, found 5548000.0"),
+        ("lat_deg", 2, np.nan, "gnss row 3, lat_deg: expected degrees in -90..90, found nan"),
+        ("lat_deg", 2, "north", "gnss row 3, lat_deg: expected degrees in -90..90, found north"),
+        ("accuracy_m", 0, -4.0, "gnss row 1, accuracy_m: expected metres in 0..100000, found -4.0"),
+        ("lon_deg", 0, 105.0, "gnss row 1, lat_deg: expected a place that EPSG:32633 covers"),
+    ],
+)
+def test_what_is_no_position_is_told_with_its_row(column, row, value, told):
+    given = positions(accuracy_m=5.0).astype({column: object})
+    given.loc[row, column] = value
+    if "covers" in told:
+        given["lat_deg"] = 0.0
+    with pytest.raises(mf.MapfilterError) as refused:
+        make_log(CRS, gnss=given)
+    assert told in str(refused.value)
+
+
+def test_degrees_beside_metres_are_not_used():
+    given = positions(east_m=458_000.0, north_m=5_548_000.0)
+    log = make_log(CRS, gnss=given)
+    assert set(log.gnss["east_m"]) == {458_000.0}
+    assert "gnss: column lat_deg is not used" in log.notes
+
+
+def test_neither_metres_nor_degrees():
+    with pytest.raises(mf.MapfilterError, match="or lat_deg and lon_deg, found neither"):
+        make_log(CRS, truth=positions().rename(columns={"lat_deg": "y", "lon_deg": "x"}))
