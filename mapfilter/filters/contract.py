@@ -108,6 +108,13 @@ class MotionStep:
     turned_sd_rad: float = 0.0
 
     @property
+    def is_undirected(self) -> bool:
+        """Whether nothing is known of its direction, nor how far it leads to all sides."""
+        return not (
+            isfinite(self.heading_rad) or isfinite(self.turn_rad) or isfinite(self.spread_m)
+        )
+
+    @property
     def all_sides_m(self) -> float:
         """Root mean square of the displacement where there is no heading."""
         return self.spread_m if isfinite(self.spread_m) else abs(self.step_m)

@@ -73,6 +73,13 @@ class MotionErrors(Options):
         Random walk of that logarithm.
     stretch_sd, stretch_m : float
         Standard deviation of the deviation of that logarithm, and its correlation length.
+    corners_per_m : float
+        How often one that keeps to ways would turn aside where ways lead to all sides; 0 where
+        steps without any direction do so (:mod:`mapfilter.models.way_course`).
+    rounds_per_m : float
+        How often it turns round.
+    bend_rad_per_sqrt_m : float
+        Random walk of its course between corners.
     """
 
     step_sd_m: NotNegative = 0.3
@@ -91,6 +98,9 @@ class MotionErrors(Options):
     scale_drift_per_sqrt_m: NotNegative = 0.0
     stretch_sd: NotNegative = 0.08
     stretch_m: Positive = 25.0
+    corners_per_m: NotNegative = 0.0
+    rounds_per_m: NotNegative = 5e-5
+    bend_rad_per_sqrt_m: NotNegative = 0.03
 
     @property
     def turn_sd_rad(self) -> float:

@@ -37,6 +37,8 @@ _FOLLOWED, _SOUGHT = (Status.TRACKING,), (Status.SEARCHING, Status.LOST, Status.
 _LED_LOG_ODDS, _PROVEN_LOG_ODDS = -3.0, -6.0
 """Log odds of a belief that is wrong to fixes that are, where these lie apart from those before: of
 one that was found by positions, and of one that was found without them, too."""
+_ABANDONED_BY_WAYS_M = 3000.0
+"""Distance after which an undecided alternative is abandoned without directions."""
 _POSITIONED_M = 200.0
 """Distance from the last position that was measured after which the map is the evidence again."""
 
@@ -112,9 +114,23 @@ class BeliefFilters:
             return self._by_carriageways
         return self.by_compass[compass]
 
+    @property
+    def by_ways(self) -> bool:
+        """Whether steps without any direction follow the ways."""
+        return self.model.motion.corners_per_m > 0 and not self.grid
+
+    def goes_by_ways(self, state: BayesState) -> bool:
+        """Return whether there were steps, and none of them had a direction."""
+        way = state.watch.undirected
+        return self.by_ways and way.is_blind and not way.directed
+
     def rules_of(self, state: BayesState) -> AlternativeRules:
         """Return the rules for the evidence that there is."""
-        return self._settings_of(state)[1]
+        rules = self._settings_of(state)[1]
+        if self.goes_by_ways(state):
+            # It takes longer until a place is found.
+            return replace(rules, abandon_after_m=_ABANDONED_BY_WAYS_M)
+        return rules
 
     def options_of(self, state: BayesState) -> ParticleOptions:
         """Return the numbers of particles and the switch rule for the evidence that there is."""

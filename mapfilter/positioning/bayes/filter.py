@@ -170,7 +170,7 @@ class BayesPositioner(Filter[BayesState]):
         spacing_m, hold = state.particle_spacing_m, state.hold
         state = _tracked(state)
         before, weighing = state.status, self._weighing
-        usable = usable_epoch(state, epoch)
+        usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
         epoch, motion, radio = usable.epoch, usable.motion, usable.radio
         state, unused = moved(self.beliefs, state, usable.watch, epoch, rng)
         if motion is not Reason.USED:
@@ -232,7 +232,7 @@ class BayesPositioner(Filter[BayesState]):
         generator as before the step these are its own.
         """
         spacing_m, state = state.particle_spacing_m, _tracked(state)
-        usable = usable_epoch(state, epoch)
+        usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
         state, _ = moved(self.beliefs, state, usable.watch, usable.epoch, rng)
         return *self._weighing.collected(state, usable.epoch, spacing_m), usable.is_measured
 

@@ -21,13 +21,24 @@ from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, NORTH, OFF, MotionErrors, move, moving
-from mapfilter.models.way_map import MapWeights, WayMap, weigh_by_ways, weighed_at_places
+from mapfilter.models.way_course import with_courses
+from mapfilter.models.way_map import (
+    MapWeights,
+    WayMap,
+    interpolate,
+    places_beyond,
+    weigh_by_ways,
+    weighed_at_places,
+)
 from mapfilter.positioning.bayes.beyond_edge import BEYOND_COST_PER_M
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.evidence_model import EvidenceModel
 from mapfilter.positioning.bayes.first_hypotheses import BEYOND_M, Start, first_hypotheses
 from mapfilter.positioning.bayes.likely_points import KEPT_REPORTS, KnownReading, likelihoods
 from mapfilter.positioning.bayes.tiled_area import TiledArea
+
+_BESIDE = 1.0
+"""Negative log-likelihood of the map that the middle of a way may have without a cost."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +84,8 @@ class BayesModel(EvidenceModel):
         """Move by one step and weigh by the map, by the metre."""
         length_m, count = abs(motion.step_m), log_weight.size
         calls: list[Call] = []
+        if self.motion.corners_per_m > 0 and motion.is_undirected:
+            return self._along_ways(state, log_weight, motion, key)
         if isfinite(motion.heading_rad):
             call, moved = moving(
                 state,
@@ -109,6 +122,29 @@ class BayesModel(EvidenceModel):
             calls.append((weigh_by_ways, moved, self._ways, factors, beyond, log_weight, weighed))
             self.threads.over(count, *calls)
         return moved, weighed
+
+    def _along_ways(
+        self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
+    ) -> tuple[Floats32, Floats]:
+        """Move by a step without any direction, each hypothesis on along the ways."""
+        length_m = abs(motion.step_m)
+        state = with_courses(state, length_m, self.motion, self._log_map_at, key)
+        moved = move(state, motion.step_m, 0.0, self.motion, key, motion.sampling_sd_m)
+        # Along narrow ways a raster is a few metres beside them: such cost no more than others.
+        fit = np.minimum(self._log_map_at(moved[: NORTH + 1]) + _BESIDE, 0.0)
+        cost = BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
+        beyond = places_beyond(moved[0], moved[1], *self.area.size_m)
+        per_m = np.where(beyond, -cost, self.weights.weight_per_m * fit)
+        return moved, log_weight + length_m * per_m
+
+    def _log_map_at(self, places_m: Floats32) -> Floats32:
+        """Return the map's log-likelihood at places (2, N), in metres."""
+        if isinstance(self.area, TiledArea):
+            return self.area.log_map_at(places_m, self.weights.sd_m)
+        rows, pixel_m = self.log_map.shape[0], self.area.lattice.resolution_m
+        upper_m = (rows - 0.5) * pixel_m
+        east_m, north_m = places_m
+        return interpolate(east_m, north_m, self.log_map, pixel_m / 2, upper_m, 1 / pixel_m)
 
     def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
         """Return whether the leading hypothesis is on the map, and nothing else is as probable."""

@@ -52,6 +52,7 @@ _VEHICLE_MOTION: Mapping[str, float] = {
     "remounts_per_m": 0.0,
     "rate_rad_per_m": radians(0.01),
     "stretch_sd": 0.02,
+    "corners_per_m": 1 / 20,
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
 

@@ -42,7 +42,7 @@ class UsableEpoch(NamedTuple):
         return self.motion not in UNMEASURED
 
 
-def usable_epoch(state: BayesState, given: Epoch) -> UsableEpoch:
+def usable_epoch(state: BayesState, given: Epoch, *, by_ways: bool = False) -> UsableEpoch:
     """Return what is usable of an epoch, and the sensors after it."""
     fix, is_repeated = given.fix, False
     epoch = given
@@ -51,7 +51,8 @@ def usable_epoch(state: BayesState, given: Epoch) -> UsableEpoch:
         if is_repeated or not (isfinite(fix.east_m) and isfinite(fix.north_m)):
             epoch = replace(given, fix=None)
     watch, epoch, (motion, radio) = watched(state.watch, epoch, state.hold.step_unit_m)
-    way, epoch, left_out = watch.undirected.spread(epoch, is_measured=motion not in UNMEASURED)
+    measured = motion not in UNMEASURED
+    way, epoch, left_out = watch.undirected.spread(epoch, is_measured=measured, by_ways=by_ways)
     watch = watch if way is watch.undirected else watch._replace(undirected=way)
     time_s, unused = given.time_s, []
     if radio is not Reason.USED:

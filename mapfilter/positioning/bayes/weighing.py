@@ -155,6 +155,8 @@ class Weighing:
         contradiction = next((one.contradiction for one in updates if one.contradiction), None)
         disputed = disputed or asks_for_unit(state, now.belief, other_m)
         disputed = disputed or now.null.log_odds >= rules.start_log_odds or gone
+        # Who is lost on ways without directions comes to no other place.
+        disputed = disputed or beliefs.goes_by_ways(state)
         # A turned phone may be ahead only because the belief is in a wrong place.
         if (
             (state.alternative is None or misreads(alternative, state, contradiction))

@@ -23,6 +23,8 @@ APART_SD, APART_M = 2.5, 25.0
 """Way between positions that are used, in deviations of these, at most: fixes nearer to each other
 are all ahead of a belief that spreads to all sides from each of them, and contradict it in the
 end."""
+LEG_M = 8.0
+"""Least length of a leg along the ways."""
 _NEAR_M = 30.0
 """Nearer positions are used if the next one seems to come after a longer way than this."""
 
@@ -51,6 +53,8 @@ class UndirectedWay(NamedTuple):
         Of the last row with a direction; NaN where that was a turn.
     is_unmeasured : bool
         Whether some of the way since the last position that was used was not measured.
+    waiting_m : float
+        Way that waits until it makes a leg along the ways.
     """
 
     rows: bool = False
@@ -60,6 +64,7 @@ class UndirectedWay(NamedTuple):
     gone_m: float = 0.0
     heading_rad: float = nan
     is_unmeasured: bool = False
+    waiting_m: float = 0.0
 
     @property
     def is_blind(self) -> bool:
@@ -67,7 +72,7 @@ class UndirectedWay(NamedTuple):
         return self.gone_m > (_FEW_M if self.directed else 0.0)
 
     def spread(
-        self, epoch: Epoch, *, is_measured: bool = True
+        self, epoch: Epoch, *, is_measured: bool = True, by_ways: bool = False
     ) -> tuple[UndirectedWay, Epoch, list[UnusedReading]]:
         """Return it after an epoch, and the epoch with steps that are parts of one way.
 
@@ -78,17 +83,20 @@ class UndirectedWay(NamedTuple):
         epoch : Epoch
         is_measured : bool
             Whether its motion was: without, a position may be far from the last one.
+        by_ways : bool
+            Whether the belief follows the ways without directions, so that no step is spread and no
+            position left out: steps become legs of some metres.
         """
         after, steps, given = self, [], epoch.motion
         if not is_measured and not self.is_unmeasured:
             after = self._replace(is_unmeasured=True)
         for step in given:
-            after, one = after._after(step)
+            after, one = after._after(step, by_ways=by_ways)
             steps.append(one)
         if any(one is not step for one, step in zip(steps, given, strict=True)):
             epoch = replace(epoch, motion=tuple(steps))
         ranged = any(isfinite(one.range_m) for one in epoch.ranges)
-        if not after.is_blind or (epoch.fix is None and not ranged):
+        if by_ways or not after.is_blind or (epoch.fix is None and not ranged):
             return after, epoch, []
         # Who comes as far again until the next one had better take this one.
         next_m, after = after.since_m + after.seen_m, after._replace(seen_m=0.0)
@@ -106,13 +114,20 @@ class UndirectedWay(NamedTuple):
             return self
         return self._replace(since_m=0.0, is_unmeasured=False)
 
-    def _after(self, step: MotionStep) -> tuple[UndirectedWay, MotionStep]:
+    def _after(self, step: MotionStep, *, by_ways: bool) -> tuple[UndirectedWay, MotionStep]:
         """Return it after a step, and the step as a part of the way."""
         turns = isfinite(step.turn_rad)
         # The first row turns by nothing.
         if isfinite(step.heading_rad) or (turns and self.rows):
             return _DIRECTED._replace(heading_rad=step.heading_rad), step
         way_m = abs(step.step_m)
+        if by_ways and not (self.directed or turns or isfinite(step.spread_m)) and way_m > 0:
+            waiting_m = self.waiting_m + step.step_m
+            is_leg = abs(waiting_m) >= LEG_M
+            after = self._replace(
+                rows=True, gone_m=self.gone_m + way_m, waiting_m=0.0 if is_leg else waiting_m
+            )
+            return after, replace(step, step_m=waiting_m if is_leg else 0.0)
         if turns or not (isfinite(self.since_m) and way_m > 0):
             return self if self.rows else self._replace(rows=True), step
         if self.directed and self.gone_m + way_m <= _FEW_M and not isfinite(step.spread_m):
