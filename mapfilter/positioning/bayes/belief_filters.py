@@ -120,9 +120,9 @@ class BeliefFilters:
         return self.model.motion.corners_per_m > 0 and not self.grid
 
     def goes_by_ways(self, state: BayesState) -> bool:
-        """Return whether there were steps, and none of them had a direction."""
-        way = state.watch.undirected
-        return self.by_ways and way.is_blind and not way.directed
+        """Return whether there were steps, none of them with a direction, and no positions."""
+        way, gnss = state.watch.undirected, state.sources[GnssSource.name]
+        return self.by_ways and way.is_blind and not way.directed and not gnss.met
 
     def rules_of(self, state: BayesState) -> AlternativeRules:
         """Return the rules for the evidence that there is."""

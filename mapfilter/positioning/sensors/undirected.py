@@ -11,7 +11,7 @@ replay, as only the past is asked.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite, nan, sqrt
+from math import inf, isfinite, nan, sqrt
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
@@ -90,12 +90,13 @@ class UndirectedWay(NamedTuple):
         after, steps, given = self, [], epoch.motion
         if not is_measured and not self.is_unmeasured:
             after = self._replace(is_unmeasured=True)
+        ranged = any(isfinite(one.range_m) for one in epoch.ranges)
+        leg_m = inf if not by_ways else (0.0 if epoch.fix is not None or ranged else LEG_M)
         for step in given:
-            after, one = after._after(step, by_ways=by_ways)
+            after, one = after._after(step, leg_m)
             steps.append(one)
         if any(one is not step for one, step in zip(steps, given, strict=True)):
             epoch = replace(epoch, motion=tuple(steps))
-        ranged = any(isfinite(one.range_m) for one in epoch.ranges)
         if by_ways or not after.is_blind or (epoch.fix is None and not ranged):
             return after, epoch, []
         # Who comes as far again until the next one had better take this one.
@@ -114,16 +115,20 @@ class UndirectedWay(NamedTuple):
             return self
         return self._replace(since_m=0.0, is_unmeasured=False)
 
-    def _after(self, step: MotionStep, *, by_ways: bool) -> tuple[UndirectedWay, MotionStep]:
-        """Return it after a step, and the step as a part of the way."""
+    def _after(self, step: MotionStep, leg_m: float) -> tuple[UndirectedWay, MotionStep]:
+        """Return it after a step, and the step as a part of the way.
+
+        ``leg_m`` is the least length of a leg along the ways; infinite where it is spread.
+        """
         turns = isfinite(step.turn_rad)
         # The first row turns by nothing.
         if isfinite(step.heading_rad) or (turns and self.rows):
             return _DIRECTED._replace(heading_rad=step.heading_rad), step
         way_m = abs(step.step_m)
-        if by_ways and not (self.directed or turns or isfinite(step.spread_m)) and way_m > 0:
+        known = self.directed or turns or isfinite(step.spread_m)
+        if isfinite(leg_m) and not known and way_m > 0:
             waiting_m = self.waiting_m + step.step_m
-            is_leg = abs(waiting_m) >= LEG_M
+            is_leg = abs(waiting_m) >= leg_m
             after = self._replace(
                 rows=True, gone_m=self.gone_m + way_m, waiting_m=0.0 if is_leg else waiting_m
             )
