@@ -15,6 +15,7 @@ from mapfilter._parallel import Progress
 from mapfilter.check.extent_checks import check_extents
 from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.identity_checks import check_identities
+from mapfilter.check.level_law import check_bands, check_factor
 from mapfilter.check.raster_checks import (
     check_ids,
     is_surveyed,
@@ -229,6 +230,10 @@ class _Checks:
             # Measured along some ways only: without lobes, and without the plan's EIRP.
             return
         in_place = check_against_sites(samples, plan, outside, str(rasters.path), findings)
+        if as_declared:
+            where, quantity = str(rasters.path), rasters.quantity
+            check_factor(in_place, plan, rasters.factor, quantity, where, findings)
+            check_bands(in_place, plan, quantity, where, findings)
         levels = in_place if rasters.quantity == "level" and as_declared else []
         check_power(levels, plan, self.plan_name, findings)
 
