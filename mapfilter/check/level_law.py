@@ -4,7 +4,7 @@ In the main lobe, from 300 m on, macrocells lose 20 dB (free space) to about 60 
 distance: 35 by Okumura and Hata (30 m), 36 to 60 as measured in 95 suburban cells, more the lower
 the mast and the hillier the land (Erceg et al., IEEE JSAC 17(7), 1999); ridges add some. Nothing
 is received much above free space (ITU-R P.525), and where the lobe is strongest hardly 45 dB below
-it, or 80 where the EIRP is a carrier's and levels are those of a subcarrier.
+it, or 75 where the EIRP is a carrier's and levels are those of a subcarrier.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ _UNITS = (1.0, 1 / 2, 1 / 4, 1 / 8, 1 / 10, 1 / 16, 1 / 32, 1 / 64, 1 / 100, 1 /
 _USUAL_UNITS = (1 / 16, 1 / 10, 1.0, *_UNITS)
 _ROUNDED = 0.01
 _LIKELY_TIMES = 1.8
-_USUAL_SLOPE_DB, _USUAL_BELOW_DB = (20.0, 60.0), (-5.0, 45.0)
+_USUAL_SLOPE_DB, _USUAL_BELOW_DB = (20.0, 60.0), (-5.0, 75.0)
 _STEEPEST_DB, _STEEP_BELOW_DB = 65.0, 50.0
 _STEEP_DB, _FAR_BELOW_DB = 50.0, 60.0
 _ABOVE_DB = -8.0
