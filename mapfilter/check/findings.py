@@ -141,6 +141,7 @@ _BY_HINT = {
     "a cell of another place, or another CRS": "crs-mixed",
     "two systems mixed up": "crs-mixed",
     "another zone": "crs-mixed",
+    "the CRS of the rasters, or of the area, is of another zone": "crs-mixed",
     "raster of another zone": "crs-mixed",
     "a CRS of another region": "crs-mixed",
     "a CRS of another region, or Web Mercator": "crs-mixed",
