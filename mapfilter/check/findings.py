@@ -31,6 +31,8 @@ REMEDIES = {
     "azimuth-off-lobe": "Correct the azimuth, or take the raster that belongs to the cell.",
     "azimuth-gons": "Turn the azimuths into degrees: 0.9 times as many.",
     "azimuth-radians": "Turn the azimuths into degrees.",
+    "band-labels-swapped": "Exchange the labels of the rasters of the two bands, or correct "
+    "frequency or EIRP in the plan.",
     "cell-without-raster": "Add the rasters, or take the cells out of the plan.",
     "code-reused-nearby": "Correct carrier (arfcn) or code (bsic) of one of them, or take out "
     "the cell that is no more; filters weigh a neighbour less that may be either.",
@@ -100,6 +102,8 @@ REMEDIES = {
     "raster-empty": "Export the raster anew, or take the cell out.",
     "raster-upside-down": "Write row 0 in the north and column 0 in the west.",
     "plan-columns": "Name the columns that are of use in [cells.columns].",
+    "raster-factor": "Set rasters.factor to the dB per stored unit, as the planning tool's export "
+    "states it; if it is right, check the EIRP in the plan.",
     "raster-without-cell": "Add the cells to the plan, or take the rasters out.",
     "rasters-invalid": "Correct or export the raster anew.",
     "rasters-missing": "Run `mapfilter predict`, or correct rasters.path.",
@@ -137,6 +141,7 @@ _BY_HINT = {
     "a cell of another place, or another CRS": "crs-mixed",
     "two systems mixed up": "crs-mixed",
     "another zone": "crs-mixed",
+    "the CRS of the rasters, or of the area, is of another zone": "crs-mixed",
     "raster of another zone": "crs-mixed",
     "a CRS of another region": "crs-mixed",
     "a CRS of another region, or Web Mercator": "crs-mixed",

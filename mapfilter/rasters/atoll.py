@@ -164,8 +164,13 @@ def _rows(
         path = _within(table.path.parent, given["FILE_NAME"], names)
         if path is None:
             expected = f"the name of a file in {table.path.parent}"
+            got = repr(given["FILE_NAME"][:80])
             hint = "rasters moved elsewhere, or exported to another folder"
-            faults.add(f"{where}, FILE_NAME", expected, repr(given["FILE_NAME"][:80]), hint)
+            if _leads_out(table.path.parent, given["FILE_NAME"], names):
+                got += ", a link out of the folder"
+                hint = "rasters linked instead of copied; links out of the folder are not followed"
+                hint += ", so that inputs reach no other files: copy them, or link the whole folder"
+            faults.add(f"{where}, FILE_NAME", expected, got, hint)
             continue
         values: dict[str, float | None] = {}
         for name in _NUMBERS:
@@ -188,15 +193,33 @@ def _rows(
 
 def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:
     """Return a file of the folder or below it; None for none, and for names that lead out of it."""
+    path = _named(folder, name, names)
+    try:
+        # A name may be longer than the file system allows.
+        held = path is not None and path.is_file() and _is_below(folder, path)
+    except (OSError, ValueError):
+        return None
+    return path if held else None
+
+
+def _leads_out(folder: Path, name: str, names: dict[str, str]) -> bool:
+    """Return whether a name of the folder is a link to what lies elsewhere."""
+    path = _named(folder, name, names)
+    try:
+        return path is not None and path.is_symlink() and not _is_below(folder, path)
+    except (OSError, ValueError):
+        return False
+
+
+def _is_below(folder: Path, path: Path) -> bool:
+    return path.resolve().is_relative_to(folder.resolve())
+
+
+def _named(folder: Path, name: str, names: dict[str, str]) -> Path | None:
+    """Return what a name of an index means in its folder, be it there or not."""
     place = PurePosixPath(name.replace("\\", "/"))
     if not place.parts or place.is_absolute() or ".." in place.parts or ":" in name or "\0" in name:
         return None
     # Names from Windows ignore the case.
     own = place.name
-    path = folder / (names.get(own.lower(), own) if len(place.parts) == 1 else place)
-    try:
-        # A name may be longer than the file system allows.
-        held = path.is_file() and path.resolve().is_relative_to(folder.resolve())
-    except (OSError, ValueError):
-        return None
-    return path if held else None
+    return folder / (names.get(own.lower(), own) if len(place.parts) == 1 else place)

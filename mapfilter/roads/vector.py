@@ -28,7 +28,7 @@ from mapfilter._ogr import PARQUET, VectorSource, sealed_gdal, vector_source
 from mapfilter._types import Ints
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.geodesy import known_crs
+from mapfilter.geodesy import known_crs, same_crs, utm_zone, utm_zone_crs
 from mapfilter.roads.maps import box_deg, boxes_overlap
 from mapfilter.roads.ways import Bounds, Geometries, on_earth
 
@@ -220,6 +220,7 @@ def _nothing_there(
 ) -> MapfilterError:
     """Return the error for a layer with nothing in the area, with the likely mistake."""
     where, hint = f"{name}, area {_numbers(bounds_m)} in {crs}", "the area lies outside the layer"
+    got = "none"
     if covered is None or not np.isfinite(covered).all():
         return fail(InputError, where, "features in the area", "none", hint)
     if pyproj.CRS.from_user_input(source_crs).is_geographic:
@@ -229,7 +230,31 @@ def _nothing_there(
         elif boxes_overlap((south, west, north, east), covered):
             hint = "longitude and latitude swapped"
     expected = f"features in the area; the layer covers {_numbers(covered)}"
-    return fail(InputError, where, expected, "none", hint)
+    if hint == "the area lies outside the layer":
+        zone, away_m = _fitting_zone(crs, bounds_m, source_crs, covered)
+        if zone:
+            got = f"none: the area is {away_m / 1000:.0f} km away, and would be there as numbers "
+            got += f"of {zone} instead of {crs}"
+            hint = "the CRS of the rasters, or of the area, is of another zone"
+    return fail(InputError, where, expected, got, hint)
+
+
+def _fitting_zone(crs: str, bounds_m: Bounds, source_crs: Any, covered: Any) -> tuple[str, float]:
+    """Return the UTM zone in whose numbers an area meets a layer, or "", and how far off it is."""
+    source = pyproj.CRS.from_user_input(source_crs)
+    box = tuple(covered) if source.is_geographic else box_deg(source.to_wkt(), tuple(covered))
+    if not np.isfinite(box).all() or "UTM zone" not in pyproj.CRS.from_user_input(crs).name:
+        return "", np.nan
+    lon, lat = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+    west, south, east, north = box_deg(crs, bounds_m)
+    middle = (west + east) / 2, (south + north) / 2
+    away_m = float(pyproj.Geod(ellps="WGS84").inv(*middle, lon, lat)[2])
+    zone = utm_zone(lon, lat)
+    for apart in (0, -1, 1):
+        other = utm_zone_crs((zone + apart - 1) % 60 + 1, lat)
+        if not same_crs(other, crs) and boxes_overlap(box_deg(other, bounds_m), box):
+            return other, away_m
+    return "", away_m
 
 
 def _numbers(values: Sequence[float]) -> str:

@@ -13,8 +13,10 @@ from rasterio.errors import RasterioError
 from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
 from mapfilter.check.extent_checks import check_extents
+from mapfilter.check.fills import check_fills
 from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.identity_checks import check_identities
+from mapfilter.check.level_law import check_bands, check_factor
 from mapfilter.check.raster_checks import (
     check_ids,
     is_surveyed,
@@ -23,6 +25,7 @@ from mapfilter.check.raster_checks import (
 )
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
+from mapfilter.database.floor import floor_of
 from mapfilter.errors import InputError, MapfilterError, listed
 from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
@@ -222,13 +225,24 @@ class _Checks:
             # Antennas were located from the same levels, and may well stand outside.
             return
         strongest_dbm = strongest(samples, plan, rasters.quantity) if as_declared else {}
+        where, quantity = str(rasters.path), rasters.quantity
+        if as_declared and not is_surveyed(rasters):
+            floor_dbm = floor_of(plan, config.database.floor_dbm)
+            factor, given = rasters.factor, len(findings.found)
+            samples = check_fills(samples, plan, factor, quantity, floor_dbm, where, findings)
+            if any(one.severity == "error" for one in findings.found[given:]):
+                # Of levels that may mean no data, sites are not judged.
+                samples = []
         outside = check_sites(plan, rasters.lattice, self.plan_name, findings, strongest_dbm)
         # Where a raster lies elsewhere, it tells nothing of its site.
         outside |= check_extents(rasters, plan, findings)
         if is_surveyed(rasters):
             # Measured along some ways only: without lobes, and without the plan's EIRP.
             return
-        in_place = check_against_sites(samples, plan, outside, str(rasters.path), findings)
+        in_place = check_against_sites(samples, plan, outside, where, findings)
+        if as_declared:
+            check_factor(in_place, plan, rasters.factor, quantity, where, findings)
+            check_bands(in_place, plan, quantity, where, findings)
         levels = in_place if rasters.quantity == "level" and as_declared else []
         check_power(levels, plan, self.plan_name, findings)
 

@@ -125,7 +125,17 @@ def test_links_do_not_lead_out_of_the_folder(tmp_path: Path) -> None:
     path = write_bil(outside / "a.bil", LATTICE, LOSS)
     (inside / "a.bil").symlink_to(path)
     (inside / "index.txt").write_text(INDEX_HEADER + index_row("A", path, LATTICE))
-    assert "FILE_NAME: expected the name of a file" in _complaint(inside)
+    told = _complaint(inside)
+    assert "FILE_NAME: expected the name of a file" in told
+    assert "found 'a.bil', a link out of the folder (likely: rasters linked" in told
+    assert "moved elsewhere" not in told
+    (inside / "a.bil").unlink()
+    (inside / "a.bil").symlink_to(inside / "none.bil")
+    assert "moved elsewhere" in _complaint(inside)
+    linked = tmp_path / "linked"
+    linked.symlink_to(outside)
+    (outside / "index.txt").write_text(INDEX_HEADER + index_row("A", path, LATTICE))
+    assert _open(linked).cell_ids == ("A",)
 
 
 def test_capitals_decimal_commas_and_a_folder_below(tmp_path: Path) -> None:

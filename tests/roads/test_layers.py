@@ -271,3 +271,14 @@ def test_empty_layers(tmp_path, name):
     path = write(ROADS[:0], tmp_path / name)
     with pytest.raises(InputError, match=name):
         read_layer_roads(path, *AREA)
+
+
+@pytest.mark.parametrize("crs", [CRS, "EPSG:4326"])
+def test_an_area_in_another_zone_is_told_with_the_zone_that_fits(crs, tmp_path):
+    path = write(ROADS[:1].to_crs(crs), tmp_path / "a.gpkg")
+    for zone in ("EPSG:32628", "EPSG:32630"):
+        told = rf"none: the area is 50\d km away, and would be there as numbers of {CRS} instead "
+        with pytest.raises(InputError, match=f"{told}of {zone} .*is of another zone"):
+            read_layer_roads(path, zone, AREA[1])
+    with pytest.raises(InputError, match=r"found none \(likely: the area lies outside"):
+        read_layer_roads(path, "EPSG:3035", AREA[1])
