@@ -1,4 +1,4 @@
-"""Notes on fixes: what is assumed of those that state no error, and which are left out."""
+"""Notes on fixes without errors, and on motion without directions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter._words import number_of
-from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.epochs import FIX_SD_M
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.sensors.undirected import APART_M, APART_SD
@@ -43,7 +43,7 @@ def assumed_note(log: TrackLog, options: Any, uses: Collection[str]) -> tuple[st
 
 
 def undirected_notes(log: TrackLog, options: Any) -> tuple[str, ...]:
-    """Return a note where a filter leaves out positions as no row of a log has a direction.
+    """Return a note on what follows where no row of a log has a direction.
 
     Parameters
     ----------
@@ -56,10 +56,15 @@ def undirected_notes(log: TrackLog, options: Any) -> tuple[str, ...]:
     # The first row turns by nothing.
     turned = motion["turn_rad"].iloc[1:].notna().any() or motion["heading_rad"].notna().any()
     placed = len(log.gnss) or len(log.pseudoranges)
-    if not isinstance(options, BayesFilter) or turned or not (moves and placed):
+    if not isinstance(options, BayesFilter) or turned or not moves:
+        return ()
+    lacking = "motion: no headings and no turns at all (a yaw rate, turns or a compass)"
+    if options.vehicle and not isinstance(options, GridFilter):
+        return (f"{lacking}: hypotheses follow the ways, and are soon on many of them",)
+    if not placed:
         return ()
     return (
-        "motion: no headings and no turns at all (a yaw rate, turns or a compass): of positions "
+        f"{lacking}: of positions "
         f"less than {APART_SD:g} of their deviations, or {APART_M:g} m, of way apart only the "
         "first is used: without directions the others would be taken for errors that last",
     )
