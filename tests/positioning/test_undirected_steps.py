@@ -77,6 +77,23 @@ def test_a_drive_without_turns_is_followed_by_its_fixes(town):
     assert error_m.max() < 40
 
 
+def test_a_drive_without_turns_is_smoothed_by_its_fixes(town):
+    """As if it stood between positions, smoothed places were twice as far off, in half the radii."""
+    log, away_m = driven(fixes_s=1e9), {}
+    truth = log.truth
+    for smooth in (False, True):
+        options = BayesFilter(vehicle=True, smooth=smooth, **FEW)
+        found = mf.locate(log, town, filter=options).to_dataframe()
+        east_m, north_m = (
+            np.interp(found["time_s"], truth["time_s"], truth[name])
+            for name in ("east_m", "north_m")
+        )
+        away_m[smooth] = np.hypot(found["east_m"] - east_m, found["north_m"] - north_m)
+        assert np.mean(away_m[smooth] <= found["radius_95_m"]) > 0.88
+    assert away_m[True].median() < away_m[False].median() < 4.0
+    assert away_m[True].max() < 25
+
+
 def step(length_m=STEP_M, heading_rad=np.nan, turn_rad=np.nan):
     return MotionStep(length_m, heading_rad, turn_rad)
 
@@ -136,6 +153,14 @@ def test_along_ways_steps_become_legs_and_no_position_is_left_out():
     way, epoch, _ = way.spread(Epoch(20.0, (step(5.0), step(-5.0))), by_ways=True)
     assert [one.step_m for one in epoch.motion] == [0.0, 0.0]
     assert way.waiting_m == 0
+    # For some way after a position nothing waits.
+    way = way.positioned()
+    way, epoch, _ = way.spread(Epoch(21.0, (step(1.0), step(198.5))), by_ways=True)
+    assert [one.step_m for one in epoch.motion] == [1.0, 198.5]
+    way, epoch, _ = way.spread(Epoch(22.0, (step(1.0),)), by_ways=True)
+    assert epoch.motion[0].step_m == 1.0
+    way, epoch, _ = way.spread(Epoch(23.0, (step(1.0),)), by_ways=True)
+    assert epoch.motion[0].step_m == 0.0
     directed, _, _ = UndirectedWay().spread(Epoch(0.0, (step(heading_rad=0.1),)), by_ways=True)
     _, epoch, _ = directed.spread(Epoch(1.0, (step(30.0),)), by_ways=True)
     assert np.isfinite(epoch.motion[0].spread_m)

@@ -20,13 +20,16 @@ _LEAST_TURNED_RAD = 1.5 * pi
 """A leg that bends by less is straight; so much turning, as of three right angles, makes a path
 distinctive."""
 
+_AWAY_M = 10.0
+"""Way for which steps without a heading lead to one side."""
+
 
 @dataclass(frozen=True, slots=True)
 class DeadReckoning:
     """Distance and displacement since the start, in the frame of the headings.
 
-    ``sampling_m2`` is the sum of the variances that steps have by their sampling, ``gaps`` how
-    often the direction or the length of a way was not measured.
+    ``sampling_m2`` is the sum of the variances that steps have by their sampling, or as they lead
+    to all sides, ``gaps`` how often the direction or the length of a way was not measured.
     """
 
     travelled_m: float = 0.0
@@ -42,8 +45,13 @@ class DeadReckoning:
         if not isfinite(step.step_m):
             return replace(self, gaps=self.gaps + 1)
         if not isfinite(step.heading_rad):
-            travelled_m = self.travelled_m + abs(step.step_m)
-            return replace(self, travelled_m=travelled_m, gaps=self.gaps + 1)
+            return replace(
+                self,
+                travelled_m=self.travelled_m + abs(step.step_m),
+                sampling_m2=self.sampling_m2
+                + step.all_sides_m * max(step.all_sides_m, _AWAY_M) / 2,
+                gaps=self.gaps + 1,
+            )
         heading, sampling_m2 = step.heading_rad, self.sampling_m2 + step.sampling_sd_m**2
         return DeadReckoning(
             self.travelled_m + abs(step.step_m),

@@ -23,8 +23,8 @@ APART_SD, APART_M = 2.5, 25.0
 """Way between positions that are used, in deviations of these, at most: fixes nearer to each other
 are all ahead of a belief that spreads to all sides from each of them, and contradict it in the
 end."""
-LEG_M = 8.0
-"""Least length of a leg along the ways."""
+LEG_M, _NEAR_POSITION_M = 8.0, 200.0
+"""Least length of a leg along the ways; way since a position up to which each step is a leg."""
 _NEAR_M = 30.0
 """Nearer positions are used if the next one seems to come after a longer way than this."""
 
@@ -91,7 +91,11 @@ class UndirectedWay(NamedTuple):
         if not is_measured and not self.is_unmeasured:
             after = self._replace(is_unmeasured=True)
         ranged = any(isfinite(one.range_m) for one in epoch.ranges)
-        leg_m = inf if not by_ways else (0.0 if epoch.fix is not None or ranged else LEG_M)
+        leg_m = inf
+        if by_ways:
+            # Near positions what waits would be an error of the position.
+            near = epoch.fix is not None or ranged or self.since_m < _NEAR_POSITION_M
+            leg_m = 0.0 if near else LEG_M
         for step in given:
             after, one = after._after(step, leg_m)
             steps.append(one)
@@ -130,7 +134,10 @@ class UndirectedWay(NamedTuple):
             waiting_m = self.waiting_m + step.step_m
             is_leg = abs(waiting_m) >= leg_m
             after = self._replace(
-                rows=True, gone_m=self.gone_m + way_m, waiting_m=0.0 if is_leg else waiting_m
+                rows=True,
+                since_m=self.since_m + way_m,
+                gone_m=self.gone_m + way_m,
+                waiting_m=0.0 if is_leg else waiting_m,
             )
             return after, replace(step, step_m=waiting_m if is_leg else 0.0)
         if turns or not (isfinite(self.since_m) and way_m > 0):
