@@ -78,7 +78,7 @@ def test_a_drive_without_turns_is_followed_by_its_fixes(town):
 
 
 def test_a_drive_without_turns_is_smoothed_by_its_fixes(town):
-    """As if it stood between positions, smoothed places were twice as far off, in half the radii."""
+    """As if it stood between positions, smoothed places were off, in half the radii."""
     log, away_m = driven(fixes_s=1e9), {}
     truth = log.truth
     for smooth in (False, True):
