@@ -95,7 +95,7 @@ class TestFactor:
         assert factor_found(carriers, samples, 1 / 16) == []
 
     def test_losses_need_no_power(self):
-        plan, samples = samples_of(LOW)
+        _, samples = samples_of(LOW)
         lost = [replace(s, values=s.values - np.float32(30)) for s in samples]
         unknown = CellPlan(CRS, tuple(replace(c, eirp_dbm=50, assumed="eirp_dbm") for c in LOW))
         assert factor_found(unknown, lost, 1 / 16, "loss") == []
