@@ -83,9 +83,10 @@ def unknown_neighbours_note(radio: DataFrame, plan: CellPlan) -> tuple[str, ...]
     found = Counter(int(one) for one in elsewhere)
     uplink = sum(one + sign * _UPLINK_APART in held for one in found for sign in (-1, 1))
     likely = " (likely: carriers of the uplink in one of them)" if uplink else ""
+    neighbours = number_of(len(arfcn), "neighbour")
     return (
-        f"{len(elsewhere)} of {number_of(len(arfcn), 'neighbour')} can be no cell of the plan: they are on carriers (arfcn, EARFCN) {_most(found)}, and its cells on "
-        f"{_most(held)}{likely}",
+        f"{len(elsewhere)} of {neighbours} can be no cell of the plan: they are on carriers "
+        f"(arfcn, EARFCN) {_most(found)}, and its cells on {_most(held)}{likely}",
     )
 
 
