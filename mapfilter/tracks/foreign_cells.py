@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 
+from pandas import DataFrame
+
+from mapfilter._words import number_of
 from mapfilter.errors import listed
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.identities import parse_cgi
 from mapfilter.radio.plan_names import PlanNames, ReportedCell
-from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.schema import NEIGHBOUR, SERVING
+
+_UPLINK_APART = 18_000
+"""EARFCN of an uplink less that of its downlink, of paired bands of LTE (3GPP TS 36.101, 5.7.3)."""
+_NAMED = 4
 
 
 def foreign_cells(names: Collection[str], plan: CellPlan, of: str = "database") -> str:
@@ -50,6 +58,40 @@ def foreign_cells(names: Collection[str], plan: CellPlan, of: str = "database") 
     if not networks or not own or networks & own:
         return ""
     return f"they are of {_named(networks)}, the {of} holds {_named(own, '')}"
+
+
+def unknown_neighbours_note(radio: DataFrame, plan: CellPlan) -> tuple[str, ...]:
+    """Return a note where no cell of a plan can be most of the neighbours that a log names by code.
+
+    Parameters
+    ----------
+    radio : pandas.DataFrame
+        Of a track log whose cells are named by the plan: role, cell, arfcn and bsic.
+    """
+    by_code = (radio["role"] == NEIGHBOUR) & radio["cell"].isna() & radio["bsic"].notna()
+    arfcn = radio["arfcn"][by_code]
+    if arfcn.empty or not len(plan):
+        return ()
+    if all(cell.bsic is None for cell in plan.cells):
+        rows = number_of(len(arfcn), "neighbour")
+        return (f"{rows} can be no cell of the plan, as it states no codes (bsic)",)
+    held = Counter(cell.arfcn for cell in plan.cells if cell.arfcn is not None)
+    # Cells without a carrier may be on any.
+    elsewhere = arfcn[arfcn.notna() & ~arfcn.isin(list(held))]
+    if sum(held.values()) < len(plan) or 2 * len(elsewhere) <= len(arfcn):
+        return ()
+    found = Counter(int(one) for one in elsewhere)
+    uplink = sum(one + sign * _UPLINK_APART in held for one in found for sign in (-1, 1))
+    likely = " (likely: carriers of the uplink in one of them)" if uplink else ""
+    neighbours = number_of(len(arfcn), "neighbour")
+    return (
+        f"{len(elsewhere)} of {neighbours} can be no cell of the plan: they are on carriers "
+        f"(arfcn, EARFCN) {_most(found)}, and its cells on {_most(held)}{likely}",
+    )
+
+
+def _most(carriers: Counter[int]) -> str:
+    return listed([str(carrier) for carrier, _ in carriers.most_common()], _NAMED)
 
 
 def _named(networks: Collection[tuple[int, int]], what: str = "network ") -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ from mapfilter.workflows.world import (
 )
 
 _NAMED = 6
+_FEW_POINTS = 0.1
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,7 @@ def run_build(
             *layer_notes(plan),
             *_cells_notes(database),
             *floor,
+            *_few_points_note(counts),
             *cover,
             *world.streets.notes,
         ),
@@ -143,6 +146,18 @@ def _cells_notes(database: RadioRouteDatabase) -> list[str]:
     errors = [one for one in found.found if one.severity == "error"]
     repeated = [one.evidence for one in errors if one.code == "identity-repeated"]
     return [*notes, *(evidence.removesuffix(".") for evidence in repeated)]
+
+
+def _few_points_note(counts: Mapping[str, int]) -> list[str]:
+    """Return a note where less than a tenth of the points of the roads have a level."""
+    points, roads = counts["points"], sum(counts.values())
+    if points >= _FEW_POINTS * roads:
+        return []
+    return [
+        f"{points} of {roads} points of the roads have a level above the floor (likely: levels "
+        "that are too weak, as by another rasters.factor or floor, or rasters of another place): "
+        "mapfilter check -c FILE compares levels with the plan's EIRP"
+    ]
 
 
 def _build_roads(config: Config, progress: Progress | None) -> BuildResult:

@@ -35,7 +35,7 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
 from mapfilter.report.ground import BaseMap
-from mapfilter.tracks.foreign_cells import foreign_cells
+from mapfilter.tracks.foreign_cells import foreign_cells, unknown_neighbours_note
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.log import TrackLog
@@ -154,6 +154,8 @@ def run_replay(
         notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))
         if database is not None and by_streets_alone(fitted, log, database):
             notes = (*notes, STREETS_ALONE)
+        if has_sites:
+            notes = (*notes, *unknown_neighbours_note(log.radio, sites(crs)))
         notes = (*notes, *undirected_notes(log, fitted))
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
         notes = (*notes, *assumed_note(log, fitted, filter_.uses))
