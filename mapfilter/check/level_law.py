@@ -1,7 +1,7 @@
 """How levels fall with the distance, against what propagation allows.
 
 In the main lobe, from 300 m on, macrocells lose 20 dB (free space) to about 60 dB per tenfold
-distance: 35 by Okumura and Hata (30 m), 36 to 60 as measured in 95 suburban cells, more the lower
+distance: 35 by Okumura and Hata (30 m), 35 to 58 as measured in 95 suburban cells, more the lower
 the mast and the hillier the land (Erceg et al., IEEE JSAC 17(7), 1999); ridges add some. Nothing
 is received much above free space (ITU-R P.525), and where the lobe is strongest hardly 45 dB below
 it, or 75 where the EIRP is a carrier's and levels are those of a subcarrier.
