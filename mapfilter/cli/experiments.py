@@ -59,14 +59,8 @@ def sweep(
     as_json: JsonOption = False,
 ) -> None:
     """Run filters over a grid of noises and options; exit code 3 if it was stopped on the way."""
-    from mapfilter.workflows.sweep import (
-        brief,
-        brief_pairs,
-        forecast_sweep,
-        load_sweep,
-        run_sweep,
-        vary_axes,
-    )
+    from mapfilter.workflows.sweep import forecast_sweep, load_sweep, run_sweep, vary_axes
+    from mapfilter.workflows.sweep_tables import brief, brief_pairs
 
     loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
     check_custom_filter(loaded)

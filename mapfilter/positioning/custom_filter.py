@@ -82,13 +82,7 @@ class GivenFilter:
         return str(getattr(self.make, "__name__", type(self.make).__name__))
 
     def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:
-        """Make the filter over a database.
-
-        Raises
-        ------
-        ConfigError
-            It lacks a function, or does not take a database.
-        """
+        """Make the filter over a database; ConfigError where it lacks a function."""
         with wrap_user_errors(self.name, self.make):
             made = self.make(database)
         return adapted(made, database, self.name, ways=ways)

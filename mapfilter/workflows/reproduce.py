@@ -25,8 +25,9 @@ from mapfilter.report.saving import save
 from mapfilter.report.table import write_table
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
-from mapfilter.workflows.sweep import brief, sweep_executor
+from mapfilter.workflows.sweep import sweep_executor
 from mapfilter.workflows.sweep_plan import sweep_world
+from mapfilter.workflows.sweep_tables import brief
 
 CITY = "synthetic"
 """The map where none is given."""

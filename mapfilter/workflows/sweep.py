@@ -7,10 +7,9 @@ import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -27,7 +26,6 @@ from mapfilter.evaluation.success_cells import (
     HEADING,
     READING,
     SuccessCell,
-    axes_of,
     success_cells,
     varied_keys,
 )
@@ -45,6 +43,7 @@ from mapfilter.report.success import (
 )
 from mapfilter.report.table import write_table
 from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plans, sweep_world
+from mapfilter.workflows.sweep_tables import cell_table, pair_table
 
 _WHITE = {f"{section}{name}" for section in ("", "imu.") for name in NOISE_AXES[:2]}
 _MOST_CURVES, _MOST_GROUPS = 8, 16
@@ -52,14 +51,6 @@ _OWN = re.compile(
     r"table\.(csv|tex)|pairs\.csv|(success|success-map|radii|distributions)(-[0-9]+)?\.png"
 )
 _PLACES = ("sweep.databases", "database.path", "output.dir")
-
-
-_SUCCESS = ("runs", "success", "low", "high", "wrong", "error_mean_m", "switch_distance_m")
-_COVERAGE = ("coverage_95", "coverage_95_low", "coverage_95_high")
-_FOUND = (*_SUCCESS, "claimed", *_COVERAGE, "radius_95_median_m")
-_BRIEF = (*_SUCCESS, "coverage_95", "radius_95_median_m")
-_GAINED = ("success", "success_routes_low", "success_routes_high", "wrong")
-_PAIR_BRIEF = (READING, "baseline", "runs", *_GAINED, "error_m", "distance_m")
 
 
 def draw_sweep(runs: pd.DataFrame, out: Path) -> tuple[Path, ...]:
@@ -265,55 +256,3 @@ def sweep_executor(workers: int, cluster: str | None) -> Iterator[tuple[Executor
     """Give an executor, and how many batches keep all of its workers busy."""
     with executor_of(workers, cluster) as (executor, at_once):
         yield executor, (2 if cluster is None else 3) * at_once
-
-
-def cell_table(cells: Sequence[SuccessCell]) -> pd.DataFrame:
-    """Return one row for each cell: coordinates in which the cells differ, and main figures."""
-    names = [*axes_of(cells), *_FOUND]
-    return pd.DataFrame([asdict(cell) | cell.place for cell in cells])[names]
-
-
-def pair_table(pairs: Sequence[PairedCell]) -> pd.DataFrame:
-    """Return one row for each pair: coordinates in which the pairs differ, and all figures."""
-    rows = pd.DataFrame([pair.row for pair in pairs])
-    alike = [name for name in pairs[0].place if len({repr(value) for value in rows[name]}) == 1]
-    return rows.drop(columns=alike)
-
-
-def brief_pairs(pairs: Sequence[PairedCell]) -> list[dict[str, Any]]:
-    """Return a row for each pair: coordinates in which the pairs differ, and main figures."""
-    if not pairs:
-        return []
-    names = [name for name in pair_table(pairs) if name in (*pairs[0].place, *_PAIR_BRIEF)]
-    return [{name: pair.row[name] for name in names} for pair in pairs]
-
-
-def brief(cells: Sequence[SuccessCell]) -> list[dict[str, Any]]:
-    """Return a row for each cell, or with several heading noises for all that differ in it alone.
-
-    Rows hold those coordinates in which the cells differ. With one heading noise they hold the
-    main figures, with several the success at each.
-
-    Examples
-    --------
-    >>> from dataclasses import replace
-    >>> place = dict.fromkeys(SuccessCell.__dataclass_fields__, 0.0)
-    >>> cell = SuccessCell(**{**place, "runs": 4, "success": 0.75, "varied": {}})
-    >>> brief([cell, replace(cell, sigma_orient_deg=3.0, success=0.5)])
-    [{'runs': 4, 'success at 0°': 0.75, '3°': 0.5}]
-    >>> list(brief([cell, replace(cell, sigma_trans_m=0.4)])[0])[:3]
-    ['sigma_trans_m', 'runs', 'success']
-    """
-    axes = axes_of(cells, by_reading=True)
-    if HEADING not in axes:
-        names = [*axes, *_BRIEF]
-        return [{name: (asdict(cell) | cell.place)[name] for name in names} for cell in cells]
-    axes = [name for name in axes if name not in (HEADING, f"imu.{HEADING}")]
-    degrees = sorted({cell.sigma_orient_deg for cell in cells})
-    names = [f"{'' if number else 'success at '}{deg:g}°" for number, deg in enumerate(degrees)]
-    rows: dict[str, dict[str, Any]] = {}
-    for cell in cells:
-        at = {name: cell.place[name] for name in axes}
-        row = rows.setdefault(repr(at), {**at, "runs": cell.runs, **dict.fromkeys(names)})
-        row[names[degrees.index(cell.sigma_orient_deg)]] = round(cell.success, 3)
-    return list(rows.values())

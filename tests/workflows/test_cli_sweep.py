@@ -18,8 +18,9 @@ from mapfilter.experiments.sweep import run
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.workflows.simulate import run_simulate
-from mapfilter.workflows.sweep import brief_pairs, load_sweep, run_sweep
+from mapfilter.workflows.sweep import load_sweep, run_sweep
 from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
+from mapfilter.workflows.sweep_tables import brief_pairs
 
 GRID = settings(
     sweep__sigma_orient_deg="0,6",

@@ -2,7 +2,7 @@
 
 from mapfilter.evaluation.success_cells import SuccessCell
 from mapfilter.workflows.result_text import text_lines
-from mapfilter.workflows.sweep import brief
+from mapfilter.workflows.sweep_tables import brief
 
 
 def cell(**place):

@@ -37,10 +37,9 @@ _FOLLOWED, _SOUGHT = (Status.TRACKING,), (Status.SEARCHING, Status.LOST, Status.
 _LED_LOG_ODDS, _PROVEN_LOG_ODDS = -3.0, -6.0
 """Log odds of a belief that is wrong to fixes that are, where these lie apart from those before: of
 one that was found by positions, and of one that was found without them, too."""
-_ABANDONED_BY_WAYS_M = 3000.0
-"""Distance after which an undecided alternative is abandoned without directions."""
-_POSITIONED_M = 200.0
-"""Distance from the last position that was measured after which the map is the evidence again."""
+_ABANDONED_BY_WAYS_M, _POSITIONED_M = 3000.0, 200.0
+"""Distance after which an undecided alternative is abandoned without directions; that from the last
+position that was measured after which the map is the evidence again."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +126,9 @@ class BeliefFilters:
     def rules_of(self, state: BayesState) -> AlternativeRules:
         """Return the rules for the evidence that there is."""
         rules = self._settings_of(state)[1]
-        if self.goes_by_ways(state):
-            # It takes longer until a place is found.
-            return replace(rules, abandon_after_m=_ABANDONED_BY_WAYS_M)
-        return rules
+        # By ways alone it takes longer until a place is found.
+        by_ways = self.goes_by_ways(state)
+        return replace(rules, abandon_after_m=_ABANDONED_BY_WAYS_M) if by_ways else rules
 
     def options_of(self, state: BayesState) -> ParticleOptions:
         """Return the numbers of particles and the switch rule for the evidence that there is."""
