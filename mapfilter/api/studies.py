@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import fields
+from functools import partial
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -207,6 +208,8 @@ def _not_a_filter(given: Any, *, here: bool) -> tuple[str, str, str] | None:
         return "options, a class, or the name of a filter", own.__name__, hint
     if here:
         return None
+    while isinstance(given, partial):
+        given = given.func
     module, kind = getattr(given, "__module__", "__main__"), getattr(given, "__qualname__", "")
     found = None if module == "__main__" else sys.modules.get(module)
     for part in kind.split("."):

@@ -90,7 +90,7 @@ def check_fills(
     elif weakest and level_dbm <= _WEAK_DBM:
         severity = "warning"
     sign = -1.0 if quantity == "loss" else 1.0
-    stored = sign * number / factor
+    stored = _as_stored(sign * number / factor)
     unit = "dB" if quantity == "loss" else "dBm"
     evidence = (
         f"{sign * number:g} {unit} fills up to {share:.0%} of the pixels of {len(having)} of "
@@ -102,6 +102,18 @@ def check_fills(
     ids = listed([s.cell_id for s in having])
     findings.add("nodata-as-level", f"{where}, cells {ids}", evidence, severity, remedy)
     return [_without(s, number) for s in samples]
+
+
+def _as_stored(number: float) -> float:
+    """Return what a file holds for a number that single precision has rounded.
+
+    Examples
+    --------
+    >>> _as_stored(-601.0000229), _as_stored(-60.5)
+    (-601.0, -60.5)
+    """
+    whole = float(round(number))
+    return whole if abs(number - whole) < 1e-4 * max(1.0, abs(number)) else float(f"{number:.7g}")
 
 
 _MEANING: dict[Severity, str] = {

@@ -11,7 +11,7 @@ step where the vehicle came from: after a kilometre without a corner it is still
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import exp, pi, radians
+from math import copysign, exp, pi, radians
 
 import numpy as np
 from numba import njit
@@ -48,7 +48,7 @@ def with_courses(
     state : ndarray of float32, shape (8 or more, N)
         The lasting error of headings is the course: it counts from a heading of 0.
     length_m : float
-        Of the leg.
+        Of the leg; backwards below 0.
     errors : MotionErrors
         ``bend_rad_per_sqrt_m``, ``corners_per_m`` and ``rounds_per_m``.
     log_map_at : callable
@@ -58,12 +58,13 @@ def with_courses(
     """
     count, key = state.shape[1], key ^ _SALT
     aside, around = (
-        1 - exp(-rate * length_m) for rate in (errors.corners_per_m, errors.rounds_per_m)
+        1 - exp(-rate * abs(length_m)) for rate in (errors.corners_per_m, errors.rounds_per_m)
     )
-    bend_rad = errors.bend_rad_per_sqrt_m * length_m**0.5
+    bend_rad = errors.bend_rad_per_sqrt_m * abs(length_m) ** 0.5
+    ahead_m = copysign(max(abs(length_m), _AHEAD_M), length_m)
     course = np.empty((count, _COURSES), dtype=np.float32)
     ahead = np.empty((2, 2 * course.size), dtype=np.float32)
-    _draw(state[: NORTH + 1], state[BIAS], bend_rad, max(length_m, _AHEAD_M), key, course, ahead)
+    _draw(state[: NORTH + 1], state[BIAS], bend_rad, ahead_m, key, course, ahead)
     headed = state.copy()
     _choose(course, log_map_at(ahead), aside, around, key, headed[BIAS])
     headed[[TURN, RATE]] = 0.0

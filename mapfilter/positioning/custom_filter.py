@@ -67,11 +67,12 @@ class CustomFilter:
         return adapted(made, database, self.name, ways=ways)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GivenFilter:
     """A filter by the class, or the function of a database, that makes it.
 
-    Processes get it by its name: it has to be one that they can import.
+    Processes get it by its name: it has to be one that they can import. Two of the same class are
+    two filters, as the class may have been changed in between.
     """
 
     make: Callable[[RadioRouteDatabase], Any]

@@ -17,11 +17,14 @@ _LAT = Column("lat_deg", -90, 90, "degrees in -90..90", _SWAPPED, required=True)
 _LON = Column("lon_deg", -180, 180, "degrees in -180..180", _SWAPPED, required=True)
 _ACCURACY = Column("accuracy_m", 0, 1e5, "metres in 0..100000")
 _VARIANCES = ("var_east_m2", "var_north_m2", "cov_east_north_m2")
-_METRES = ("east_m", "north_m", *_VARIANCES)
 
 
 def in_metres(
-    given: pd.DataFrame, where: str, crs: str, faults: Faults, row_numbers: ArrayLike | None = None
+    given: pd.DataFrame,
+    where: str,
+    crs: str | None,
+    faults: Faults,
+    row_numbers: ArrayLike | None = None,
 ) -> pd.DataFrame:
     """Return a table of positions with columns in metres in place of those in degrees.
 
@@ -29,17 +32,17 @@ def in_metres(
     ----------
     given : pandas.DataFrame
         With ``lat_deg`` and ``lon_deg`` (WGS 84) and, if known, ``accuracy_m``, the radius that
-        holds 68 % as phones state it. Without these columns, or with some in metres, too, it is
-        returned as it is.
+        holds 68 % as phones state it. Without the former, or with places in metres, too, it is
+        returned as it is; variances that are given count, and an accuracy does not then.
     where : str
         Name of the table in messages.
     crs : str
-        The log's CRS.
+        The log's CRS; None where it is at fault.
     row_numbers : (N,) array_like of int, optional
         Number of each row in messages; 1 to N by default.
     """
     degrees = ("lat_deg", "lon_deg")
-    if not set(degrees) <= set(given.columns) or set(_METRES) & set(given.columns):
+    if not set(degrees) <= set(given.columns) or {"east_m", "north_m"} & set(given.columns):
         return given
     numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
     found, before = TableFaults(where, numbers, faults), len(faults.found)
@@ -49,7 +52,7 @@ def in_metres(
     if "accuracy_m" in given.columns:
         accuracy_m = column_values(_ACCURACY, given, found)
     rest = given.drop(columns=[*degrees, *(() if accuracy_m is None else ("accuracy_m",))])
-    if len(faults.found) > before:
+    if crs is None or len(faults.found) > before:
         return rest.assign(east_m=0.0, north_m=0.0)
     east_m, north_m = project(crs, lon_deg, lat_deg)
     beyond = ~(np.isfinite(east_m) & np.isfinite(north_m))
@@ -61,7 +64,7 @@ def in_metres(
         lambda _: "",
     )
     table = rest.assign(east_m=np.where(beyond, 0, east_m), north_m=np.where(beyond, 0, north_m))
-    if accuracy_m is None:
+    if accuracy_m is None or set(_VARIANCES) & set(given.columns):
         return table
     variance_m2 = np.where(accuracy_m > 0, (accuracy_m / RADIUS_68) ** 2, np.nan)
     return table.assign(

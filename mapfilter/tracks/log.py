@@ -236,8 +236,11 @@ def make_log(
     tables, every_note = dict[str, pd.DataFrame](), (*notes, *of_clocks)
     for table in TABLES:
         name, number = called.get(table, table), numbers.get(table)
-        if table in _PLACED and table in given and known:
-            given[table] = in_metres(given[table], name, str(crs), faults, number)
+        if table in _PLACED and table in given:
+            used = str(crs) if known else None
+            rows = given[table].drop(columns="accuracy_m", errors="ignore")
+            rows = given[table] if table == "gnss" else rows
+            given[table] = in_metres(rows, name, used, faults, number)
         tables[table], more = tidy_table(table, given.get(table), name, faults, number)
         every_note += more
     check_start(start_utc_s, tables, faults, whole)

@@ -83,9 +83,18 @@ def test_at_a_crossing_each_way_is_taken_by_many():
 
 
 def test_at_a_dead_end_it_comes_back():
-    """Three quarters and more are on the road again, back, half a kilometre later."""
+    """Most are on the road again, back, half a kilometre later."""
     found = driven(at(-200, 0, 0.0), 600, on_ways(((-900, 0), (0, 0))))
     assert np.mean((found[EAST] < -250) & (np.abs(found[NORTH]) < 12)) > 0.5
+
+
+def test_backwards_it_stays_on_the_road():
+    """Which of its ends a vehicle reverses to is behind it."""
+    state, road = at(0, 0, 0.0), on_ways(((-900, 0), (2, 0)))
+    for number in range(10):
+        key = np.uint64(31 * number + 5)
+        state = move(with_courses(state, -LEG_M, ERRORS, road, key), -LEG_M, 0.0, ERRORS, key)
+    assert np.mean((state[EAST] < -100) & (np.abs(state[NORTH]) < 12)) > 0.9
 
 
 def test_draws_follow_the_key_and_inputs_stay():

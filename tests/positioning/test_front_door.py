@@ -472,7 +472,7 @@ def test_a_sweep_takes_the_class_of_a_filter(database, rasters, streets):
         pd.testing.assert_frame_equal(
             found.runs.drop(columns="filter"), by_name.drop(columns="filter")
         )
-        for nameless in (Local, lambda area: Centre(area), partial(Centre)):
+        for nameless in (Local, lambda area: Centre(area), partial(Local)):
             with pytest.raises(mf.MapfilterError, match=r"can import, .*in?to a file of its own"):
                 mf.sweep(database, rasters, streets, {"mine": nameless}, executor=executor)
 

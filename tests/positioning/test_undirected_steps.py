@@ -161,9 +161,56 @@ def test_along_ways_steps_become_legs_and_no_position_is_left_out():
     assert epoch.motion[0].step_m == 1.0
     way, epoch, _ = way.spread(Epoch(23.0, (step(1.0),)), by_ways=True)
     assert epoch.motion[0].step_m == 0.0
+    # Where directions end, it is as for walkers: near positions are left out.
     directed, _, _ = UndirectedWay().spread(Epoch(0.0, (step(heading_rad=0.1),)), by_ways=True)
-    _, epoch, _ = directed.spread(Epoch(1.0, (step(30.0),)), by_ways=True)
+    way, epoch, _ = directed.spread(Epoch(1.0, (step(20.0),)), by_ways=True)
     assert np.isfinite(epoch.motion[0].spread_m)
+    way = way.positioned()
+    _, epoch, unused = way.spread(Epoch(2.0, (step(1.0),), fix=fix_at(21.0)), by_ways=True)
+    assert (epoch.fix, len(unused)) == (None, 1)
+
+
+@pytest.mark.parametrize("rest", [(), (step(0.0),)])
+def test_what_waits_goes_before_a_position_at_rest(rest):
+    way, lengths_m = UndirectedWay(), []
+    for number in range(3):
+        way, epoch, _ = way.spread(Epoch(float(number), (step(2.5),)), by_ways=True)
+        lengths_m += [one.step_m for one in epoch.motion]
+    way, epoch, _ = way.spread(Epoch(3.0, rest, fix=fix_at(7.5)), by_ways=True)
+    assert sum(lengths_m) + sum(one.step_m for one in epoch.motion) == 7.5
+    assert way.waiting_m == 0
+    assert all(one.is_undirected for one in epoch.motion)
+
+
+def test_what_waits_is_a_part_of_the_first_step_with_a_direction():
+    way, _, _ = UndirectedWay().spread(Epoch(0.0, (step(3.0),)), by_ways=True)
+    way, epoch, _ = way.spread(Epoch(1.0, (step(2.0, heading_rad=0.5),)), by_ways=True)
+    assert epoch.motion[0].step_m == 5.0
+    assert (way.waiting_m, way.is_blind) == (0.0, False)
+
+
+def test_courses_become_errors_of_the_first_heading(town):
+    """Who went along the streets, by courses from 0, goes the same way with a compass."""
+    log = driven(fixes_s=40.0)
+    bayes = BayesFilter(vehicle=True, **FEW).over(mf.open_database(town.path))
+    state, rng = bayes.begin(), np.random.default_rng(3)
+    for epoch in epochs(log)[:150]:
+        state, _ = bayes.step(state, epoch, rng)
+    courses = state.belief.state[2]
+    usual = np.arctan2(
+        np.average(np.sin(courses), weights=state.belief.weight),
+        np.average(np.cos(courses), weights=state.belief.weight),
+    )
+    before = state.belief.summary.mean[:2]
+    heading = float(usual)
+    for number in range(10):
+        step_on = MotionStep(2.0, heading)
+        epoch = Epoch(epochs(log)[150].time_s + number, (step_on,))
+        state, _ = bayes.step(state, epoch, rng)
+    weight = state.belief.weight
+    gone = np.array([np.dot(weight, state.belief.state[row]) for row in (0, 1)]) - before
+    along = gone @ [np.cos(heading), np.sin(heading)]
+    assert along > 12
 
 
 @pytest.mark.parametrize(("heading_rad", "turn_rad"), [(0.5, np.nan), (np.nan, 0.5)])

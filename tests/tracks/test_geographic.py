@@ -82,3 +82,18 @@ def test_degrees_beside_metres_are_not_used():
 def test_neither_metres_nor_degrees():
     with pytest.raises(mf.MapfilterError, match="or lat_deg and lon_deg, found neither"):
         make_log(CRS, truth=positions().rename(columns={"lat_deg": "y", "lon_deg": "x"}))
+
+
+def test_a_wrong_crs_is_the_only_fault_of_degrees():
+    with pytest.raises(mf.MapfilterError) as refused:
+        make_log("EPSG:4326", gnss=positions(accuracy_m=5.0))
+    assert "neither" not in str(refused.value)
+    assert "crs" in str(refused.value)
+
+
+def test_given_variances_count_and_a_truth_has_no_accuracy():
+    given = positions(accuracy_m=5.0, var_east_m2=4.0, var_north_m2=4.0, cov_east_north_m2=0.0)
+    log = make_log(CRS, gnss=given, truth=positions(accuracy_m=5.0))
+    assert set(log.gnss["var_east_m2"]) == {4.0}
+    assert "var_east_m2" not in log.truth
+    assert "not used" not in " ".join(log.notes).replace("column accuracy_m is not used", "")

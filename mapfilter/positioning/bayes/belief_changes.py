@@ -61,6 +61,15 @@ def turned_at_jump(
     return replace(belief, state=state)
 
 
+def counted_from(belief: MapBelief, heading_rad: float) -> MapBelief:
+    """Return a belief whose courses are errors of a heading, the first one that is measured."""
+    if not isinstance(belief, ParticleBelief):
+        return belief
+    state = belief.state.copy()
+    state[BIAS] = wrap_rad(state[BIAS] - np.float32(heading_rad))
+    return replace(belief, state=state)
+
+
 def remounted(
     belief: MapBelief, motion: MotionErrors, length_m: float, rng: np.random.Generator
 ) -> MapBelief:

@@ -120,8 +120,13 @@ class BeliefFilters:
 
     def goes_by_ways(self, state: BayesState) -> bool:
         """Return whether there were steps, none of them with a direction, and no positions."""
-        way, gnss = state.watch.undirected, state.sources[GnssSource.name]
-        return self.by_ways and way.is_blind and not way.directed and not gnss.met
+        gnss: GnssState = state.sources[GnssSource.name]
+        return self.followed_ways(state) and not gnss.met
+
+    def followed_ways(self, state: BayesState) -> bool:
+        """Return whether hypotheses have followed the ways, as no step had a direction."""
+        way = state.watch.undirected
+        return self.by_ways and way.is_blind and not way.directed
 
     def rules_of(self, state: BayesState) -> AlternativeRules:
         """Return the rules for the evidence that there is."""

@@ -26,7 +26,6 @@ from mapfilter.models.way_map import (
     MapWeights,
     WayMap,
     interpolate,
-    places_beyond,
     weigh_by_ways,
     weighed_at_places,
 )
@@ -37,6 +36,7 @@ from mapfilter.positioning.bayes.first_hypotheses import BEYOND_M, Start, first_
 from mapfilter.positioning.bayes.likely_points import KEPT_REPORTS, KnownReading, likelihoods
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 
+_F = np.float32
 _BESIDE = 1.0
 """Negative log-likelihood of the map that the middle of a way may have without a cost."""
 
@@ -105,10 +105,7 @@ class BayesModel(EvidenceModel):
             if motion.turned_sd_rad > 0:
                 turned = draws.standard_normal(count, dtype=np.float32)
                 moved[BIAS] = wrap_rad(moved[BIAS] + np.float32(motion.turned_sd_rad) * turned)
-        # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
-        cost = BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
-        per_m = self.weights.weight_per_m
-        beyond = -cost / per_m if per_m > 0 else nan
+        beyond = self._beyond_per_m
         factors = self.weights.over(length_m)
         weighed: Floats
         if isinstance(self.area, TiledArea):
@@ -127,15 +124,22 @@ class BayesModel(EvidenceModel):
         self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
     ) -> tuple[Floats32, Floats]:
         """Move by a step without any direction, each hypothesis on along the ways."""
-        length_m = abs(motion.step_m)
-        state = with_courses(state, length_m, self.motion, self._log_map_at, key)
+        state = with_courses(state, motion.step_m, self.motion, self._log_map_at, key)
         moved = move(state, motion.step_m, 0.0, self.motion, key, motion.sampling_sd_m)
         # Along narrow ways a raster is a few metres beside them: such cost no more than others.
-        fit = np.minimum(self._log_map_at(moved[: NORTH + 1]) + _BESIDE, 0.0)
+        fit = np.minimum(self._log_map_at(moved[: NORTH + 1]) + _F(_BESIDE), _F(0.0))
+        factors = self.weights.over(abs(motion.step_m))
+        size_m, beyond = self.area.size_m, self._beyond_per_m
+        return moved, weighed_at_places(moved, fit, size_m, factors, beyond, log_weight)
+
+    @property
+    def _beyond_per_m(self) -> float:
+        """The map's log-likelihood beyond the area, where nobody knows the ways; NaN for none.
+
+        If these hypotheses are all there is, the belief is off the map.
+        """
         cost = BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
-        beyond = places_beyond(moved[0], moved[1], *self.area.size_m)
-        per_m = np.where(beyond, -cost, self.weights.weight_per_m * fit)
-        return moved, log_weight + length_m * per_m
+        return -cost / self.weights.weight_per_m if self.weights.weight_per_m > 0 else nan
 
     def _log_map_at(self, places_m: Floats32) -> Floats32:
         """Return the map's log-likelihood at places (2, N), in metres."""

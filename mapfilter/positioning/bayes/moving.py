@@ -13,7 +13,12 @@ import numpy as np
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import MapBelief
-from mapfilter.positioning.bayes.belief_changes import carried_on, remounted, turned_at_jump
+from mapfilter.positioning.bayes.belief_changes import (
+    carried_on,
+    counted_from,
+    remounted,
+    turned_at_jump,
+)
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
@@ -128,7 +133,15 @@ def moved(
     if belief is not None and rested is not None and beliefs.may_have_left(state):
         gone_s = epoch.time_s - rested.since_s
         belief = carried_on(belief, rested, gone_s, own_rng(epoch.time_s, _AWAY))
+    # Courses along the ways count from a heading of 0, those of a compass from its headings.
+    by_course = belief is not None and beliefs.followed_ways(state)
     for raw in epoch.motion:
+        if by_course and isfinite(raw.heading_rad):
+            by_course, held, unaided = False, (), ()
+            belief = counted_from(belief, raw.heading_rad)
+            if alternative is not None:
+                other = counted_from(alternative.belief, raw.heading_rad)
+                alternative = replace(alternative, belief=other)
         step, heading_rad = headed(raw, heading_rad)
         if compass and step.turned_sd_rad > 0:
             # A compass tells where the phone points afterwards.

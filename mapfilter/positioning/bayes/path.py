@@ -24,6 +24,12 @@ _AWAY_M = 10.0
 """Way for which steps without a heading lead to one side."""
 
 
+def _spread_m2(step: MotionStep) -> float:
+    """Return the mean square by which a step without a heading adds to those before."""
+    length_m = abs(step.step_m)
+    return step.spread_m**2 if isfinite(step.spread_m) else length_m * max(length_m, _AWAY_M)
+
+
 @dataclass(frozen=True, slots=True)
 class DeadReckoning:
     """Distance and displacement since the start, in the frame of the headings.
@@ -48,8 +54,7 @@ class DeadReckoning:
             return replace(
                 self,
                 travelled_m=self.travelled_m + abs(step.step_m),
-                sampling_m2=self.sampling_m2
-                + step.all_sides_m * max(step.all_sides_m, _AWAY_M) / 2,
+                sampling_m2=self.sampling_m2 + _spread_m2(step) / 2,
                 gaps=self.gaps + 1,
             )
         heading, sampling_m2 = step.heading_rad, self.sampling_m2 + step.sampling_sd_m**2

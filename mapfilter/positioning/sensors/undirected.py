@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf, isfinite, nan, sqrt
+from operator import is_not
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep, Reason
@@ -99,9 +100,16 @@ class UndirectedWay(NamedTuple):
         for step in given:
             after, one = after._after(step, leg_m)
             steps.append(one)
-        if any(one is not step for one, step in zip(steps, given, strict=True)):
+        if leg_m == 0 and after.waiting_m != 0:
+            steps.append(MotionStep(after.waiting_m, nan))
+            after = after._replace(waiting_m=0.0)
+        if len(steps) > len(given) or any(map(is_not, steps, given)):
             epoch = replace(epoch, motion=tuple(steps))
-        if by_ways or not after.is_blind or (epoch.fix is None and not ranged):
+        if (
+            (by_ways and not after.directed)
+            or not after.is_blind
+            or (epoch.fix is None and not ranged)
+        ):
             return after, epoch, []
         # Who comes as far again until the next one had better take this one.
         next_m, after = after.since_m + after.seen_m, after._replace(seen_m=0.0)
@@ -127,6 +135,8 @@ class UndirectedWay(NamedTuple):
         turns = isfinite(step.turn_rad)
         # The first row turns by nothing.
         if isfinite(step.heading_rad) or (turns and self.rows):
+            if self.waiting_m != 0:
+                step = replace(step, step_m=step.step_m + self.waiting_m)
             return _DIRECTED._replace(heading_rad=step.heading_rad), step
         way_m = abs(step.step_m)
         known = self.directed or turns or isfinite(step.spread_m)
