@@ -116,6 +116,9 @@ class Beliefs:
     def other_unit_m(self, _):
         return self.unit_m
 
+    def goes_by_ways(self, _):
+        return False
+
     def is_contested(self, _):
         return self.contested
 

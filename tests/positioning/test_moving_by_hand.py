@@ -75,6 +75,9 @@ class Beliefs:
     def may_have_left(self, state):
         return self.left
 
+    def followed_ways(self, state):
+        return False
+
     def may_be_anywhere(self, state, watch, time_s):
         return self.anywhere and watch.rest is None
 
