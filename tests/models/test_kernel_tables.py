@@ -80,6 +80,9 @@ def test_the_usual_options():
         "scale_drift_per_sqrt_m": 0.0,
         "stretch_sd": 0.08,
         "stretch_m": 25.0,
+        "corners_per_m": 0.0,
+        "rounds_per_m": 5e-5,
+        "bend_rad_per_sqrt_m": 0.03,
     }
     assert asdict(MapWeights()) == {
         "sd_m": 3.0,

@@ -30,7 +30,12 @@ def test_steps_add_up():
     assert here.moved(MotionStep(nan, 1.0)) == replace(here, gaps=1)
     blind = here.moved(MotionStep(-2.0, nan, sampling_sd_m=9.0))
     assert (blind.travelled_m, blind.east_m, blind.north_m) == (10.0, here.east_m, here.north_m)
-    assert (blind.sampling_m2, blind.gaps) == (here.sampling_m2, 1)
+    # Ten metres to one side, or as far as it is spread.
+    assert (blind.sampling_m2, blind.gaps) == (here.sampling_m2 + 2.0 * 10.0 / 2, 1)
+    long = here.moved(MotionStep(30.0, nan))
+    assert long.sampling_m2 == here.sampling_m2 + 30.0**2 / 2
+    spread = here.moved(MotionStep(2.0, nan, spread_m=3.0))
+    assert spread.sampling_m2 == here.sampling_m2 + 3.0**2 / 2
 
 
 def test_points_lie_a_leg_apart_and_the_last_eleven_are_kept():
