@@ -125,8 +125,10 @@ class BeliefFilters:
 
     def followed_ways(self, state: BayesState) -> bool:
         """Return whether hypotheses have followed the ways, as no step had a direction."""
+        if not self.by_ways:
+            return False
         way = state.watch.undirected
-        return self.by_ways and way.is_blind and not way.directed
+        return way.is_blind and not way.directed
 
     def rules_of(self, state: BayesState) -> AlternativeRules:
         """Return the rules for the evidence that there is."""

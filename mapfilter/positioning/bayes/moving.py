@@ -134,9 +134,9 @@ def moved(
         gone_s = epoch.time_s - rested.since_s
         belief = carried_on(belief, rested, gone_s, own_rng(epoch.time_s, _AWAY))
     # Courses along the ways count from a heading of 0, those of a compass from its headings.
-    by_course = belief is not None and beliefs.followed_ways(state)
+    by_course = beliefs.followed_ways(state)
     for raw in epoch.motion:
-        if by_course and isfinite(raw.heading_rad):
+        if by_course and belief is not None and isfinite(raw.heading_rad):
             by_course, held, unaided = False, (), ()
             belief = counted_from(belief, raw.heading_rad)
             if alternative is not None:
