@@ -20,6 +20,7 @@ _VARIANCES = ("var_east_m2", "var_north_m2", "cov_east_north_m2")
 
 
 def in_metres(
+    table: str,
     given: pd.DataFrame,
     where: str,
     crs: str | None,
@@ -30,6 +31,8 @@ def in_metres(
 
     Parameters
     ----------
+    table : str
+        "gnss" or "truth"; errors are those of the former alone.
     given : pandas.DataFrame
         With ``lat_deg`` and ``lon_deg`` (WGS 84) and, if known, ``accuracy_m``, the radius that
         holds 68 % as phones state it. Without the former, or with places in metres, too, it is
@@ -49,7 +52,8 @@ def in_metres(
     given = given.reset_index(drop=True)
     lat_deg, lon_deg = (column_values(one, given, found) for one in (_LAT, _LON))
     accuracy_m = None
-    if "accuracy_m" in given.columns:
+    stated = bool(set(_VARIANCES) & set(given.columns))
+    if table == "gnss" and "accuracy_m" in given.columns and not stated:
         accuracy_m = column_values(_ACCURACY, given, found)
     rest = given.drop(columns=[*degrees, *(() if accuracy_m is None else ("accuracy_m",))])
     if crs is None or len(faults.found) > before:
@@ -63,11 +67,11 @@ def in_metres(
         lambda row: f"{lat_deg[row]:g}, {lon_deg[row]:g}",
         lambda _: "",
     )
-    table = rest.assign(east_m=np.where(beyond, 0, east_m), north_m=np.where(beyond, 0, north_m))
-    if accuracy_m is None or set(_VARIANCES) & set(given.columns):
-        return table
+    placed = rest.assign(east_m=np.where(beyond, 0, east_m), north_m=np.where(beyond, 0, north_m))
+    if accuracy_m is None:
+        return placed
     variance_m2 = np.where(accuracy_m > 0, (accuracy_m / RADIUS_68) ** 2, np.nan)
-    return table.assign(
+    return placed.assign(
         var_east_m2=variance_m2,
         var_north_m2=variance_m2,
         cov_east_north_m2=np.where(np.isnan(variance_m2), np.nan, 0.0),

@@ -238,9 +238,7 @@ def make_log(
         name, number = called.get(table, table), numbers.get(table)
         if table in _PLACED and table in given:
             used = str(crs) if known else None
-            rows = given[table].drop(columns="accuracy_m", errors="ignore")
-            rows = given[table] if table == "gnss" else rows
-            given[table] = in_metres(rows, name, used, faults, number)
+            given[table] = in_metres(table, given[table], name, used, faults, number)
         tables[table], more = tidy_table(table, given.get(table), name, faults, number)
         every_note += more
     check_start(start_utc_s, tables, faults, whole)

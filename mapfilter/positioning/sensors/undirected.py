@@ -4,8 +4,9 @@ The map filters spread a step without a heading to all sides, each on its own. O
 of many, which go the same way mostly, the sum would be a rest with a small radius, and positions
 that are all ahead of it would contradict it in the end. So a direction holds for some metres; from
 there on, or after a position where there was none, steps are parts of one way, which goes on and
-on, and positions that are too near to the last one are left out. It is the same live and in a
-replay, as only the past is asked.
+on, and positions that are too near to the last one are left out. A vehicle without any direction
+follows the ways of the map instead, leg by leg. It is the same live and in a replay, as only the
+past is asked.
 """
 
 from __future__ import annotations
