@@ -17,7 +17,7 @@ _STANDING_MPS = 0.3
 """Least time and usual intervals without rows that are a gap, if it moved at an end of it."""
 LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG = 0.05, 1.0, 90.0
 _COURSE_BIAS_DEG = 1.0
-UNDIRECTED = "directions are unknown, so that uncertainty grows to all sides by the way gone"
+UNDIRECTED = "directions are unknown, so that uncertainty grows by the way gone"
 """What follows for steps without headings and turns."""
 MOVING_SD = 2.0
 

@@ -107,7 +107,7 @@ def test_speeds_without_yaw_rates_say_what_follows(drive, replay):
     assert "odometry: no yaw rates (a column such as Yaw rate [deg/s] or yaw_rate_radps): " in (
         done.err
     )
-    assert "directions are unknown, so that uncertainty grows to all sides" in done.err
+    assert "directions are unknown, so that uncertainty grows by the way gone" in done.err
     assert done.json["seconds_by_status"]["UNCERTAIN"] > 0
 
 
