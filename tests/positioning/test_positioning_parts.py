@@ -116,13 +116,15 @@ def test_dead_reckoning_adds_up():
     assert start.moved(MotionStep(0.0, nan)) is start
     # Whose length, direction or both are not known: from there on the displacement is another.
     assert start.moved(MotionStep(nan, 0.0)) == replace(start, gaps=1)
-    assert start.moved(MotionStep(0.0, nan, spread_m=3.0)) == replace(start, gaps=1)
+    spread = replace(start, sampling_m2=3.0**2 / 2, gaps=1)
+    assert start.moved(MotionStep(0.0, nan, spread_m=3.0)) == spread
     moved = start.moved(MotionStep(-2.0, pi / 2))
     assert moved.travelled_m == 12.0
     assert (moved.east_m, moved.north_m) == pytest.approx((1.0, 0.0))
-    # Without a heading it is not known where to: the displacement stays.
-    assert start.moved(MotionStep(2.0, nan)) == DeadReckoning(12.0, 1.0, 2.0, gaps=1)
-    assert start.moved(MotionStep(-2.0, nan)) == DeadReckoning(12.0, 1.0, 2.0, gaps=1)
+    # Without a heading it is not known where to: the displacement stays, with an error to each side.
+    unknown = DeadReckoning(12.0, 1.0, 2.0, sampling_m2=2.0 * 10.0 / 2, gaps=1)
+    assert start.moved(MotionStep(2.0, nan)) == unknown
+    assert start.moved(MotionStep(-2.0, nan)) == unknown
 
 
 def test_the_way_that_holds_the_largest_share():
