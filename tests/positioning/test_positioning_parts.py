@@ -121,7 +121,7 @@ def test_dead_reckoning_adds_up():
     moved = start.moved(MotionStep(-2.0, pi / 2))
     assert moved.travelled_m == 12.0
     assert (moved.east_m, moved.north_m) == pytest.approx((1.0, 0.0))
-    # Without a heading it is not known where to: the displacement stays, with an error to each side.
+    # Without a heading the displacement stays, with an error to each side.
     unknown = DeadReckoning(12.0, 1.0, 2.0, sampling_m2=2.0 * 10.0 / 2, gaps=1)
     assert start.moved(MotionStep(2.0, nan)) == unknown
     assert start.moved(MotionStep(-2.0, nan)) == unknown
