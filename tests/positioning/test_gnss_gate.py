@@ -61,7 +61,7 @@ def sum_of(terms, belief):
 @pytest.mark.parametrize(("gone_m", "times"), [(inf, 1.0), (40.0, 1.0), (5.0, 4.0), (0.0, 200.0)])
 def test_a_fix_that_agrees_weighs_hypotheses_and_leaves_the_belief(gone_m, times):
     """Fixes in a row count as one over the distance for which their errors last."""
-    belief, fix = belief_at(), fix_at(4.0, -3.0)
+    belief, fix = belief_at(sd_m=4.0), fix_at(4.0, -3.0)
     state = GnssState(fix_used_at_m=100.0 - gone_m, rejected_since_s=3.0)
     found = compared(belief, state, fix=fix)
     own = FixTerm(widened(fix, times), ORIGIN_M).log_likelihood(belief.state)
@@ -79,6 +79,17 @@ def test_a_fix_that_agrees_weighs_hypotheses_and_leaves_the_belief(gone_m, times
     assert after.was_used(10.0)
     assert not after.was_used(11.0)
     assert found.belief is belief
+
+
+def test_a_repeated_fix_makes_a_wide_belief_as_precise_as_it_is():
+    belief, fix = belief_at(count=20_000), fix_at(4.0, -3.0)
+    found = compared(belief, GnssState(fix_used_at_m=99.9), fix=fix)
+    weight = np.exp(belief.log_weight + sum_of(found.terms, belief))
+    weight /= weight.sum()
+    for axis in (EAST, NORTH):
+        place_m = belief.state[axis].astype(float)
+        variance_m2 = weight @ (place_m - weight @ place_m) ** 2
+        assert variance_m2 == pytest.approx(fix.var_east_m2, rel=0.05)
 
 
 def off_by(nats, sd_m=6.0):

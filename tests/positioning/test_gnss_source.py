@@ -165,7 +165,8 @@ def alternative(**more):
 def state_of(belief="main", beside=None, travelled_m=95.0, own=OWN):
     return SimpleNamespace(
         sources={"gnss": own}, reckoning=DeadReckoning(travelled_m),
-        belief=belief, alternative=beside, proven=False, watch=SimpleNamespace(rest=None),
+        belief=belief, alternative=beside, proven=False,
+        watch=SimpleNamespace(rest=None, is_unmeasured=False),
     )  # fmt: skip
 
 

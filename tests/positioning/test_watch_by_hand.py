@@ -11,7 +11,7 @@ from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
-from mapfilter.positioning.sensors.unmeasured import spread_m2
+from mapfilter.positioning.sensors.unmeasured import spread_m2, unmeasured_step
 from mapfilter.positioning.sensors.watch import SensorWatch, watched
 
 
@@ -294,9 +294,16 @@ def test_nothing_is_known_before_the_first_row():
     assert (watch.unmeasured_s, watch.moved_m, watch.repeated_nats) == (0.0, 0.0, 0.0)
     assert (watch.rest, watch.report) == (None, ())
     before, seen, why = watched(watch, epoch(3.0))
-    assert before._replace(times=watch.times) == watch
-    assert before.times.epoch_s == 3.0
+    # From there on levels and positions tell whether it rests.
+    assert (before.moving_s, before.known_s, before.rest.since_s) == (3.0, 3.0, 3.0)
+    assert (before.unmeasured_s, before.moved_m, before.times.epoch_s) == (0.0, 0.0, 3.0)
     assert (seen, why) == (epoch(3.0), (Reason.USED, Reason.USED))
+    unmeasured, seen, why = watched(SensorWatch(has_motion=False), epoch(3.0))
+    assert why == (Reason.MOTION_MISSING, Reason.USED)
+    later, seen, why = watched(unmeasured, epoch(5.0))
+    assert why == (Reason.MOTION_MISSING, Reason.USED)
+    assert seen.motion == (unmeasured_step(1.4, 0.0, 2.0),)
+    assert later.unmeasured_s == 2.0
     # The first row may be one of a rest.
     rests = after(epoch(3.0, 0.0), watch=watch)
     assert (rests.moving_s, rests.known_s, rests.rest.since_s) == (3.0, 3.0, 3.0)

@@ -255,6 +255,11 @@ class BeliefFilters:
         gnss: GnssState = state.sources[GnssSource.name]
         return isfinite(gnss.used_at_m)
 
+    def is_positioned(self, state: BayesState) -> bool:
+        """Return whether a position or satellites were used some way ago, or later."""
+        gnss: GnssState = state.sources[GnssSource.name]
+        return state.reckoning.travelled_m - gnss.used_at_m <= _POSITIONED_M
+
     def _is_led(self, state: BayesState) -> bool:
         # Without directions a belief without positions would soon be anywhere.
         if not self.pulls.watched or state.belief is None or state.watch.undirected.is_blind:

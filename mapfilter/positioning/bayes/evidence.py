@@ -197,7 +197,9 @@ class EvidenceUpdate(NamedTuple):
     alternative. ``radio`` and ``reason`` (whether the serving cell is used) come from the radio
     reports only. Beliefs in which the phone was turned are weighed by ``rival_terms``, too.
     ``path`` is the way that a belief starts with, where the map alone is the
-    evidence. ``contradiction`` is a way by fixes that the belief rejects.
+    evidence. ``contradiction`` is a way by fixes that the belief rejects. ``refuted`` is whether a
+    position is where none of the hypotheses of a search is that spread without any motion: it
+    begins anew.
     """
 
     state: Any
@@ -214,6 +216,7 @@ class EvidenceUpdate(NamedTuple):
     alternative_under_null: float | None = None
     rival_terms: tuple[Term, ...] = ()
     contradiction: Contradiction | None = None
+    refuted: bool = False
 
 
 class EvidenceSource(ABC):

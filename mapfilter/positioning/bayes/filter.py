@@ -127,10 +127,14 @@ class BayesPositioner(Filter[BayesState]):
     def _weighing(self) -> Weighing:
         return Weighing(self.beliefs, self._radio, self.sources)
 
-    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> BayesState:  # noqa: ARG002
-        """Return the state before the first epoch."""
+    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> BayesState:
+        """Return the state before the first epoch.
+
+        Without ``motion`` among the kinds one may go anywhere between two epochs.
+        """
         sources = {source.name: source.begin() for source in self.sources}
-        return BayesState(sources=sources, area=self.area.checksum)
+        watch = SensorWatch(has_motion="motion" in kinds or _POSITIONS.isdisjoint(kinds))
+        return BayesState(sources=sources, area=self.area.checksum, watch=watch)
 
     def begin_at(
         self, east_m: float, north_m: float, sd_m: float, rng: np.random.Generator
@@ -265,6 +269,9 @@ class BayesPositioner(Filter[BayesState]):
             belief.state[1].astype(np.float64) + south,
             belief.weight.astype(np.float64),
         )
+
+
+_POSITIONS = frozenset[Kind]({"gnss", "pseudorange"})
 
 
 def _tracked(state: BayesState) -> BayesState:

@@ -68,7 +68,11 @@ class Weighing:
     def collected(
         self, state: BayesState, epoch: Epoch, particle_spacing_m: float
     ) -> tuple[BayesState, list[EvidenceUpdate]]:
-        """Ask all sources for their evidence; return the state with theirs, and the evidence."""
+        """Ask all sources for their evidence; return the state with theirs, and the evidence.
+
+        The state has no belief where a position has refuted it.
+        """
+        given = state
         history = state.sources[self.radio.name]
         due = bool(epoch.radio) and self.radio.due(history, state.reckoning.travelled_m)
         context, updates, states = Context(particle_spacing_m, due), [], {}
@@ -86,6 +90,8 @@ class Weighing:
                     belief=update.belief or state.belief,
                     alternative=update.alternative or state.alternative,
                 )
+        if any(update.refuted for update in updates):
+            return self.collected(given.begun_anew(), epoch, particle_spacing_m)
         if states:
             state = replace(state, sources={**state.sources, **states})
         return state, updates
@@ -118,6 +124,8 @@ class Weighing:
         doubt = plain or doubted(rules, before, state.null, state.alternative)
         other_m = beliefs.other_unit_m(state)
         doubt = doubt or is_unit_open(state, before, other_m)
+        # Hypotheses that spread to all sides agree on a place by chance.
+        doubt = doubt or not (measured or beliefs.is_positioned(state))
         tracked = measured and before.status is Status.TRACKING
         reading = evidence.weighing(before, tracked=tracked, doubted=doubt)
         belief, info = update(before, reading, rng)

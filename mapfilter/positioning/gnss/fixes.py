@@ -116,6 +116,23 @@ def squared_distance(belief: MapBelief, fix: GnssFix, origin_m: tuple[float, flo
     return float(apart_m @ np.linalg.solve(covariance_m2, apart_m))
 
 
+def repeated(belief: MapBelief, fix: GnssFix) -> float:
+    """Return by how much a variance grows of a fix that makes a belief as precise as it is itself.
+
+    A fix whose error is that of the one before adds nothing to a belief that is more precise, for
+    which this is infinite; of one that has grown wider since, it restores the place.
+
+    Parameters
+    ----------
+    belief : ParticleBelief or GridBelief
+    fix : GnssFix
+        With its variances.
+    """
+    own_m2 = (fix.var_east_m2 + fix.var_north_m2) / 2
+    wide_m2 = float(np.trace(belief.summary.covariance_m2)) / 2
+    return wide_m2 / (wide_m2 - own_m2) if wide_m2 > own_m2 else inf
+
+
 def widened(fix: GnssFix, times: float) -> GnssFix:
     """Return a fix with its variance multiplied; 10 m are assumed where it has none, or 0."""
     known = 0 < fix.var_east_m2 < inf and 0 < fix.var_north_m2 < inf

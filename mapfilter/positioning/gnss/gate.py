@@ -27,6 +27,7 @@ from mapfilter.positioning.gnss.fixes import (
     RejectedFixTerm,
     agrees_with,
     refutation,
+    repeated,
     squared_distance,
     widened,
 )
@@ -168,6 +169,7 @@ class GnssGate:
                 return found.without("gnss", [""], why, state=state, compared=True)
         gone_m = travelled_m - state.fix_used_at_m
         times = max(options.fix_memory_m / max(gone_m, _MIN_MOVED_M), 1.0)
+        times = min(times, repeated(belief, widened(fix, 1.0)))
         # What it adds is little where its error is that of the one before, and less where fixes are
         # less precise than they state. Neither makes one that is far away agree.
         wide = widened(fix, times * state.understated)

@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from mapfilter._types import Floats, Floats32
+from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
@@ -149,6 +150,9 @@ class GnssSource(EvidenceSource):
             return EvidenceUpdate(own)
         travelled_m, belief = state.reckoning.travelled_m, state.belief
         due = context.report_due or own.due(self.options, epoch.time_s, travelled_m)
+        # Nothing else tells where an unmeasured way leads.
+        unmeasured = state.watch.is_unmeasured
+        due = due or unmeasured
         if belief is None or not due:
             return EvidenceUpdate(own)
         spacing_m = context.particle_spacing_m
@@ -170,6 +174,7 @@ class GnssSource(EvidenceSource):
                 alternative = self._supported(alternative, step, epoch.time_s, contradiction)
         rejected_s = epoch.time_s - main.state.rejected_since_s
         disputed = main.state.contradicting and rejected_s >= self.options.dispute_s
+        astray = unmeasured and main.unexplained
         return EvidenceUpdate(
             main.state,
             main.terms,
@@ -180,8 +185,9 @@ class GnssSource(EvidenceSource):
             belief=main.belief,
             alternative=alternative,
             rival_terms=main.rival_terms,
-            disputed=disputed or contradiction is not None,
+            disputed=disputed or astray or contradiction is not None,
             contradiction=contradiction,
+            refuted=astray and belief.status is Status.SEARCHING,
         )
 
     def _weighted(self, found: Contradiction | None, *, proven: bool) -> Contradiction | None:

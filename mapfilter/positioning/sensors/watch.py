@@ -44,7 +44,7 @@ class SensorWatch(NamedTuple):
         How often motion rows come, and how fast one moves.
     moving_s : float
         Time of the last step at the usual pace, or of what has shown since that slow ones are
-        right; since then the way is unmeasured, or at rest. NaN before the first row.
+        right; since then the way is unmeasured, or at rest. NaN before the first epoch.
     known_s : float
         Time until which the way is measured, or in the belief as an unmeasured one.
     rest : Rest or None
@@ -70,6 +70,8 @@ class SensorWatch(NamedTuple):
         Length of all steps since the last report, in their unit.
     rode_unheard : bool
         Whether this epoch's report is the first one after a ride without reception.
+    has_motion : bool
+        Whether there may be motion rows; False for a log that is known to have none.
     """
 
     pace: Pace = Pace()
@@ -86,6 +88,12 @@ class SensorWatch(NamedTuple):
     undirected: UndirectedWay = UndirectedWay()
     stepped_m: float = 0.0
     rode_unheard: bool = False
+    has_motion: bool = True
+
+    @property
+    def is_unmeasured(self) -> bool:
+        """Whether some of the way since the last position that was used was not measured."""
+        return self.undirected.is_unmeasured
 
     def is_unheard(self, step_unit_m: float) -> bool:
         """Return whether a walker may have left though hardly a step is counted."""
@@ -197,8 +205,6 @@ def _followed(
         watch = watch._replace(places=Places()) if watch.places.rows else watch
         return watch._moving(time_s), epoch, Reason.USED
     if not isfinite(watch.moving_s):
-        if not steps:
-            return watch, epoch, Reason.USED
         watch = watch._moving(time_s)
     places = watch.places.after(time_s, epoch.fix, step_unit_m * going.gone_m)
     found = places.carried if places is not watch.places else None
@@ -227,6 +233,8 @@ def _followed(
     why = Reason.USED
     if steps and not going.measured:
         why = Reason.NO_STEP
+    elif not watch.has_motion:
+        why = Reason.MOTION_MISSING
     elif not steps and pace.reports_always:
         missing = time_s - pace.motion_s > longest_s(pace)
         why = Reason.MOTION_MISSING if missing else Reason.USED
