@@ -76,6 +76,19 @@ def test_positions_too_near_in_time_held_or_old_do_not_count():
     assert nowhere == Places((), 2.0)
 
 
+@pytest.mark.parametrize(
+    ("far_m", "variance_m2", "left"),
+    [(28.0, 25.0, False), (28.5, 25.0, True), (63.2, 225.0, False), (63.3, 225.0, True)],
+)
+def test_positions_are_left_beyond_the_errors_of_both(far_m, variance_m2, left):
+    """Four deviations of the distance of one of 5 m and one of 5 or 15 m: 28.3 and 63.2 m."""
+    found = places([0.0, 1.0])
+    fix = GnssFix(0.0, far_m, variance_m2, variance_m2, 0.0)
+    assert Places().after(0.0, GnssFix(0.0, 0.0, 25.0, 25.0, 0.0), 0.0).are_left_by(fix) == left
+    assert not found.are_left_by(None)
+    assert not Places().are_left_by(fix)
+
+
 def reasons(places_m, *, walk_mps=1.4, every_s=1.0, sd_m=5.0, watch=None, carried_s=None):
     """Return, by the second, what motion is of a phone that stops after 20 s.
 

@@ -15,7 +15,7 @@ from made_town import CRS, Town, slowed, walk_log
 
 from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
-from mapfilter.filters.contract import Status
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.fixes import repeated
@@ -27,6 +27,7 @@ from mapfilter.tracks.log import make_log
 TOWN, BLOCKS = Town.of(1), make_blocks(5)
 AREA = BayesFilter().over_area(TOWN.area())
 CLAIMED = (Status.CONVERGED, Status.TRACKING)
+PLACE = ("east_m", "north_m")
 
 
 def fixes_of(truth, sd_m, seed):
@@ -54,9 +55,7 @@ def located(log, filter_=AREA, seed=0):
     """Return errors, radii of 95 % and whether positions are claimed, of those that there are."""
     estimate = locate(log, filter_, np.random.default_rng(seed)).estimate
     truth, at_s = log.truth, estimate.time_s
-    east_m, north_m = (
-        np.interp(at_s, truth["time_s"], truth[axis]) for axis in ("east_m", "north_m")
-    )
+    east_m, north_m = (np.interp(at_s, truth["time_s"], truth[axis]) for axis in PLACE)
     error_m = np.hypot(estimate.east_m - east_m, estimate.north_m - north_m)
     claimed = np.isin(estimate.status, CLAIMED)
     return at_s, error_m, estimate.radii_m[:, 2], claimed
@@ -89,6 +88,36 @@ def test_a_drive_is_followed_by_its_positions(tmp_path, vehicle):
     assert np.mean(error_m <= radius_m) > 0.85
     assert claimed.mean() > 0.8
     assert not (claimed & (error_m > 50)).any()
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_a_session_follows_positions_while_no_motion_comes(every):
+    """Nobody states there that none will: positions that leave the first one show it."""
+    errors_m, radii_m = [], []
+    for seed in (2, 3):
+        log, state, rng = (
+            walked(seed, every=every, radio=True),
+            AREA.begin(),
+            np.random.default_rng(0),
+        )
+        for epoch in epochs(log):
+            state, output = AREA.step(state, epoch, rng)
+            place = [np.interp(epoch.time_s, log.truth["time_s"], log.truth[k]) for k in PLACE]
+            errors_m.append(np.hypot(output.fix.east_m - place[0], output.fix.north_m - place[1]))
+            radii_m.append(output.fix.radii_m[2])
+    assert np.median(errors_m) < (6 if every == 1 else 15)
+    assert np.mean(np.array(errors_m) <= radii_m) > 0.85
+
+
+def test_motion_that_comes_late_is_used():
+    log, rng, state = slowed(walk_log(TOWN, 2)), np.random.default_rng(0), AREA.begin()
+    seen = log.truth[log.truth["time_s"] < 200]
+    rows = log.motion[log.motion["time_s"] >= 200]
+    for epoch in epochs(make_log(CRS, motion=rows, gnss=fixes_of(seen, 3.0, 0), truth=log.truth)):
+        state, output = AREA.step(state, epoch, rng)
+        missing = any(one.reason is Reason.MOTION_MISSING for one in output.unused)
+        if not 0 < epoch.time_s < 60:
+            assert missing == (60 <= epoch.time_s < 200)
 
 
 def test_nothing_is_claimed_after_the_last_position():

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import hypot, inf, isfinite, sqrt
+from math import hypot, inf, isfinite, nan, sqrt
 from typing import NamedTuple
 
 from mapfilter.positioning.epochs import FIX_SD_M, GnssFix
@@ -69,10 +69,14 @@ class Places:
             if held or time_s - last.time_s < _APART_S:
                 return self if gone_m == 0 else Places(rows, way_m)
             rows = tuple(row for row in rows if time_s - row.time_s <= _LASTS_S)
-        variance_m2 = (fix.var_east_m2 + fix.var_north_m2) / 2
-        sd_m = sqrt(variance_m2) if 0 < variance_m2 < inf else FIX_SD_M
-        place = Place(time_s, way_m, fix.east_m, fix.north_m, max(sd_m, _LEAST_SD_M))
-        return Places((*rows, place), way_m)
+        return Places((*rows, _place(time_s, way_m, fix)), way_m)
+
+    def are_left_by(self, fix: GnssFix | None) -> bool:
+        """Return whether a position lies farther from one of them than their errors."""
+        if fix is None or not self.rows:
+            return False
+        place = _place(nan, self.way_m, fix)
+        return any(_apart_m(row, place) >= _error_m(row, place) for row in self.rows)
 
     @property
     def standing(self) -> Places | None:
@@ -101,6 +105,12 @@ class Places:
             if missed_m >= _error_m(start, end) and _goes_on(some, gone_m):
                 return Carried(start.time_s, gone_m / lasted_s)
         return None
+
+
+def _place(time_s: float, way_m: float, fix: GnssFix) -> Place:
+    variance_m2 = (fix.var_east_m2 + fix.var_north_m2) / 2
+    sd_m = sqrt(variance_m2) if 0 < variance_m2 < inf else FIX_SD_M
+    return Place(time_s, way_m, fix.east_m, fix.north_m, max(sd_m, _LEAST_SD_M))
 
 
 def _apart_m(one: Place, other: Place) -> float:

@@ -71,7 +71,8 @@ class SensorWatch(NamedTuple):
     rode_unheard : bool
         Whether this epoch's report is the first one after a ride without reception.
     has_motion : bool
-        Whether there may be motion rows; False for a log that is known to have none.
+        Whether motion is measured, as far as is known; False for a log without any, and as long
+        as there was none though positions have moved.
     """
 
     pace: Pace = Pace()
@@ -193,6 +194,7 @@ def _followed(
     watch = watch._replace(
         pace=pace,
         moved_m=before_m + going.gone_m,
+        has_motion=watch.has_motion or bool(steps),
         stepped_m=watch.stepped_m + going.gone_m,
         times=times.read(time_s, has_report=bool(epoch.radio)),
     )
@@ -206,6 +208,8 @@ def _followed(
         return watch._moving(time_s), epoch, Reason.USED
     if not isfinite(watch.moving_s):
         watch = watch._moving(time_s)
+    if not pace.rows and watch.places.are_left_by(epoch.fix):
+        watch = watch._replace(has_motion=False)
     places = watch.places.after(time_s, epoch.fix, step_unit_m * going.gone_m)
     found = places.carried if places is not watch.places else None
     if watch.rest is not None and watch.rest.is_carried and (standing := places.standing):
