@@ -22,7 +22,7 @@ from mapfilter._inputs import json_value, read_input
 from mapfilter._io import atomic_file
 from mapfilter._json_files import check_version
 from mapfilter.errors import StoreError, fail
-from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_errors import LevelErrors
@@ -47,11 +47,12 @@ from mapfilter.positioning.sensors.pauses import RowTimes
 from mapfilter.positioning.sensors.places import Place, Places
 from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.short_steps import ShortSteps
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 
-FORMAT, VERSION = "mapfilter session", 16
+FORMAT, VERSION = "mapfilter session", 17
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -77,6 +78,7 @@ _CLASSES: dict[str, type] = {
         LevelMemory,
         MirroredTwin,
         MotionRepeats,
+        MotionStep,
         NullHypothesis,
         ParticleBelief,
         Receiver,
@@ -95,6 +97,7 @@ _CLASSES: dict[str, type] = {
         StepOutput,
         TimingState,
         TrailFix,
+        ShortSteps,
         UndirectedWay,
         UnusedReading,
         WanderFix,

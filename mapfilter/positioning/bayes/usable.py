@@ -54,6 +54,8 @@ def usable_epoch(state: BayesState, given: Epoch, *, by_ways: bool = False) -> U
     measured = motion not in UNMEASURED
     way, epoch, left_out = watch.undirected.spread(epoch, is_measured=measured, by_ways=by_ways)
     watch = watch if way is watch.undirected else watch._replace(undirected=way)
+    short, epoch = watch.short.gathered(epoch)
+    watch = watch if short is watch.short else watch._replace(short=short)
     time_s, unused = given.time_s, []
     if radio is not Reason.USED:
         unused = [UnusedReading(time_s, row.role, row.name, radio) for row in given.radio]

@@ -27,6 +27,7 @@ from mapfilter.positioning.sensors.pauses import RowTimes, longest_s, unrecorded
 from mapfilter.positioning.sensors.places import Places
 from mapfilter.positioning.sensors.repeats import MotionRepeats, without_repeats
 from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.short_steps import ShortSteps
 from mapfilter.positioning.sensors.stale_radio import STALE_NATS, repeated_nats
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.unmeasured import unmeasured_step
@@ -90,6 +91,7 @@ class SensorWatch(NamedTuple):
     stepped_m: float = 0.0
     rode_unheard: bool = False
     has_motion: bool = True
+    short: ShortSteps = ShortSteps()
 
     @property
     def is_unmeasured(self) -> bool:

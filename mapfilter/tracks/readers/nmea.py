@@ -23,7 +23,7 @@ from mapfilter.tracks.readers.separated_values import line_columns
 from mapfilter.tracks.readers.text import Text
 
 _STAMP = rb"[^$!,;\t]{0,48}(?:[,;\t][^$!,;\t]{0,48}){0,2}"
-_SENTENCE = re.compile(_STAMP + rb"[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")
+_SENTENCE = re.compile(rb"\A" + _STAMP + rb"[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")
 """Apps for Android write ``NMEA,$GNGGA,…*hh,TIME``, loggers a time stamp before each sentence."""
 _MODE = ("magnetic", "side", "mode")
 """Fields that old receivers do not have."""
