@@ -32,6 +32,7 @@ from mapfilter.tracks.log_checks import (
     check_clocks,
     check_start,
     check_steps,
+    check_turns,
     early_ends,
     truth_far_off,
     undirected_note,
@@ -245,6 +246,7 @@ def make_log(
     if not any(fault.where.endswith("time_s") for fault in faults.found):
         check_clocks(tables, called, faults)
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
+        check_turns(tables["motion"], called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
         if not faults.found and not any(FAR_APART in note for note in every_note):
             every_note += truth_far_off(str(crs), tables)
