@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from mapfilter.api.journeys import simulate as simulate
     from mapfilter.api.located import Track as Track
     from mapfilter.api.located import locate as locate
+    from mapfilter.api.logs import make_log as make_log
     from mapfilter.api.logs import read_log as read_log
     from mapfilter.api.pictures import save_picture as save_picture
     from mapfilter.api.reports import locate_reports as locate_reports
@@ -64,7 +65,6 @@ if TYPE_CHECKING:
     from mapfilter.simulation.walking import WalkerModel as WalkerModel
     from mapfilter.tracks.imu_noise import ImuNoise as ImuNoise
     from mapfilter.tracks.log import TrackLog as TrackLog
-    from mapfilter.tracks.log import make_log as make_log
     from mapfilter.tracks.pdr.options import WalkOptions as WalkOptions
     from mapfilter.tracks.store import write_log as write_log
 
@@ -72,7 +72,7 @@ _NAMES = {
     "api.bounds": "Bound bound",
     "api.journeys": "simulate",
     "api.located": "Track locate",
-    "api.logs": "read_log",
+    "api.logs": "make_log read_log",
     "api.pictures": "save_picture",
     "api.reports": "locate_reports",
     "api.scored": "Score score",
@@ -104,7 +104,7 @@ _NAMES = {
     "simulation.reports": "ReportModel",
     "simulation.walking": "WalkerModel",
     "tracks.imu_noise": "ImuNoise",
-    "tracks.log": "TrackLog make_log",
+    "tracks.log": "TrackLog",
     "tracks.pdr.options": "WalkOptions",
     "tracks.store": "write_log",
 }

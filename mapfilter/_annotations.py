@@ -6,7 +6,7 @@ import operator
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, is_dataclass
-from math import isfinite
+from math import isfinite, tau
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -22,6 +22,7 @@ _LIMITS: dict[type, tuple[str, str, Callable[[Any, Any], Any]]] = {
 }
 _TYPES = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 _TYPES |= {Path: "a path", NoneType: "nothing", tuple: "a list", dict: "a section"}
+_WHOLE_TURN_DEG = 360.0
 _CONTAINERS = (Literal, tuple, dict)
 
 
@@ -79,7 +80,10 @@ def likely(annotation: Any, value: Any) -> str:
     """Return the probable mistake behind a value beyond its limits, or an empty text."""
     _, limits = _split(without_none(annotation))
     share = any(getattr(limit, "le", getattr(limit, "lt", None)) == 1 for limit in limits)
+    whole_turn = any(getattr(limit, "le", None) == tau for limit in limits)
     number = isinstance(value, int | float) and not isinstance(value, bool)
+    if whole_turn and number and tau < value <= _WHOLE_TURN_DEG:
+        return "degrees given for radians"
     return "per cent given for a fraction" if share and number and 1 < value <= 100 else ""
 
 

@@ -19,6 +19,7 @@ from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from inspect import cleandoc
+from math import tau
 from types import NoneType
 from typing import Annotated, Any, ClassVar, Literal, cast, get_origin, get_type_hints
 
@@ -32,6 +33,7 @@ NotNegative = Annotated[float, Ge(0)]
 Share = Annotated[float, Ge(0), Le(1)]
 Below1 = Annotated[float, Ge(0), Lt(1)]
 Probability = Annotated[float, Gt(0), Lt(1)]
+Radians = Annotated[float, Ge(0), Le(tau)]
 Degrees = Annotated[float, Ge(0), Le(360)]
 Seed = Annotated[int, Ge(0), Lt(2**63)]
 

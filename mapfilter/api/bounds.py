@@ -11,6 +11,7 @@ import pandas as pd
 
 from mapfilter._arguments import Argument, Setting, WholeNumber, check_arguments
 from mapfilter.api.given import database_argument, opened
+from mapfilter.api.python_words import python_words
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import MapBound, on_lattice
@@ -67,6 +68,7 @@ class Bound:
         )
 
 
+@python_words()
 def bound(
     database: RadioRouteDatabase | Path | str,
     *,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mapfilter._arguments import PATH, Argument, Count, Setting, WholeNumber, check_arguments
+from mapfilter.api.python_words import python_words
 from mapfilter.options import Positive
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
@@ -20,6 +21,7 @@ from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import TrackLog
 
 
+@python_words()
 def simulate(
     rasters: RxLevRasters,
     cells: CellPlan,

@@ -17,6 +17,7 @@ from mapfilter._words import number_of
 from mapfilter.api.given import log_argument, opened, optional_database
 from mapfilter.api.mapless import over_sites, own_sites, without_sites
 from mapfilter.api.motion import with_right_motion
+from mapfilter.api.python_words import python_words
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.truth import Truth
@@ -130,6 +131,7 @@ class Track:
         return plot_track(self.estimate, truth, base, ax=ax, fixes_m=fixes_m)
 
 
+@python_words()
 def locate(
     log: TrackLog | Path | str,
     database: RadioRouteDatabase | Path | str | None = None,

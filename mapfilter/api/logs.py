@@ -8,7 +8,9 @@ from numbers import Real
 from pathlib import Path
 
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments, shown
+from mapfilter.api.python_words import python_log
 from mapfilter.errors import ConfigError, Faults, fail
+from mapfilter.tracks import log as tables
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import check_factors
 from mapfilter.tracks.open_log import open_log
@@ -18,7 +20,10 @@ from mapfilter.tracks.pdr.options import WalkOptions
 _FILES = "a path, or several"
 _WALK = WalkOptions()
 
+make_log = python_log(tables.make_log)
 
+
+@python_log
 def read_log(
     paths: str | Path | Iterable[str | Path],
     *,

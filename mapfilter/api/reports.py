@@ -10,6 +10,7 @@ import numpy as np
 
 from mapfilter._arguments import PATH, Argument, Setting, check_arguments, generator
 from mapfilter.api.given import opened, read
+from mapfilter.api.python_words import python_words
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.options import Positive
 from mapfilter.positioning.fingerprints.located import LocatedReports
@@ -22,6 +23,7 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.range_units import with_range_notes
 
 
+@python_words()
 def locate_reports(
     log: TrackLog | Reports | Path | str,
     database: RadioRouteDatabase | Path | str | Reports | TrackLog | Iterable[TrackLog],

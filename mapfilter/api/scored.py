@@ -18,7 +18,8 @@ from mapfilter.evaluation.accuracy import (
     mean_of,
     position_errors_m,
 )
-from mapfilter.evaluation.truth import Truth, truth_notes
+from mapfilter.evaluation.truth import Truth
+from mapfilter.evaluation.truth_notes import truth_notes
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.tables import tidy_table
@@ -46,7 +47,8 @@ class Score(Accuracy):
     error_m : (N,) array
         NaN where the track has no position, or the ground truth none.
     notes : tuple of str
-        Epochs that the ground truth does not cover.
+        Epochs that the ground truth does not cover, and times of it that fit far better when they
+        are moved, as those of another clock or time zone.
     """
 
     within_95: float = nan

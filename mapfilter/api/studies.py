@@ -31,6 +31,7 @@ from mapfilter.api.journeys import (
     reports_argument,
     roads_argument,
 )
+from mapfilter.api.python_words import python_words
 from mapfilter.api.swept import Sweep
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
@@ -62,6 +63,7 @@ from mapfilter.tracks.imu_noise import ImuNoise
 _FILTERS = 'names and options, such as {"mine": BayesFilter()}'
 
 
+@python_words()
 def sweep(
     database: RadioRouteDatabase | Path | str,
     rasters: RxLevRasters,

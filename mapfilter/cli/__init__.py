@@ -6,9 +6,10 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperArgument, TyperCommand
 from typer.main import get_command
 
 from mapfilter._io import program_version
@@ -55,6 +56,17 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
 """Commands, each with an example and a page of the documentation."""
 
 
+class _Command(TyperCommand):
+    """A command that takes its database also by ``--db``, as those do which take a log beside."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse arguments; click's own, where ``--db`` is no option."""
+        if any(one.name == "database" and isinstance(one, TyperArgument) for one in self.params):
+            plain = (arg.removeprefix("--db=") for arg in args)
+            args = [arg for arg in plain if arg != "--db"]
+        return super().parse_args(ctx, args)
+
+
 def _version(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
@@ -77,6 +89,7 @@ def _app_of(commands: Sequence[tuple[Callable[..., None], str, str]]) -> typer.T
     for command, example, page in commands:
         name = command.__name__
         app.command(
+            cls=_Command,
             short_help=(command.__doc__ or "").partition("\n")[0],
             epilog=f"\b\nExample:\n  mapfilter {name} {example}\n\nDocumentation: docs/{page}",
         )(command)

@@ -81,6 +81,15 @@ ColumnOption = Annotated[
     list[str] | None,
     typer.Option("--column", metavar="FIELD=COLUMN", help="Column of a plain CSV; repeatable."),
 ]
+TruthOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--truth", metavar="FILE", help="Recording whose positions are the truth; repeatable."
+    ),
+]
+ZoneOption = Annotated[
+    str | None, typer.Option("--zone", help="Zone of local times in recordings.")
+]
 FactorOption = Annotated[
     list[str] | None,
     typer.Option(

@@ -20,6 +20,8 @@ from mapfilter.cli.options import (
     SeedOption,
     SetOption,
     StepLengthOption,
+    TruthOption,
+    ZoneOption,
     check_custom_filter,
     column_map,
     given_path,
@@ -106,6 +108,8 @@ def locate(
             "--column", metavar="FIELD=COLUMN", help="Column of a plain CSV, the log; repeatable."
         ),
     ] = None,
+    truth: TruthOption = None,
+    zone: ZoneOption = None,
     level_error_db: Annotated[
         float,
         typer.Option(
@@ -130,6 +134,8 @@ def locate(
             method=method,
             crs=crs,
             columns=column_map(column),
+            zone=zone or "",
+            truth=[given_path(path) or path for path in truth or ()],
             level_error_db=level_error_db,
             seed=seed or 0,
             progress=progress,
@@ -151,15 +157,8 @@ def replay(
             help="A log, or a folder of logs; or recordings of one journey, repeatable.",
         ),
     ] = None,
-    truth: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--truth", metavar="FILE", help="Recording whose positions are the truth; repeatable."
-        ),
-    ] = None,
-    zone: Annotated[
-        str | None, typer.Option("--zone", help="Zone of local times in recordings.")
-    ] = None,
+    truth: TruthOption = None,
+    zone: ZoneOption = None,
     column: ColumnOption = None,
     factor: FactorOption = None,
     course_motion: Annotated[

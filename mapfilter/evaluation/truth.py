@@ -1,4 +1,4 @@
-"""Ground truth: the true positions of a journey, and which epochs of a track they cannot judge."""
+"""Ground truth: the true positions of a journey."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats
-from mapfilter._words import number_of
-from mapfilter.positioning.estimate import TrackEstimate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,34 +79,3 @@ class Truth:
         legs_m = np.hypot(np.diff(self.east_m), np.diff(self.north_m))
         travelled_m = np.concatenate([[0.0], np.cumsum(legs_m)])
         return np.asarray(np.interp(np.asarray(time_s, dtype=np.float64), self.time_s, travelled_m))
-
-
-def truth_notes(estimate: TrackEstimate, truth: Truth) -> tuple[str, ...]:
-    """Return notes on what a ground truth cannot judge of a located track.
-
-    Epochs before it begins and after it ends are no reason for a note, as many records are shorter
-    than the log, but for the switch.
-    """
-    inside = (estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1])
-    if len(estimate) and not inside.any():
-        own, its = (f"{one.time_s[0]:.0f} to {one.time_s[-1]:.0f} s" for one in (estimate, truth))
-        return (
-            f"the ground truth ({its}) covers no epoch of the log ({own}): another "
-            "clock or time zone?",
-        )
-    notes = []
-    switch, told = estimate.converged_at, truth.tells(estimate.time_s)
-    if switch is not None and not told[switch]:
-        at_s = estimate.time_s[switch]
-        notes.append(
-            f"the ground truth has no position at the switch ({at_s:.0f} s): whether that was "
-            "right is not known, and counts neither as right nor as wrong"
-        )
-    unknown = int((inside & ~told).sum())
-    if unknown:
-        some = number_of(unknown, "epoch lies", "epochs lie")
-        notes.append(
-            f"{some} in gaps of the ground truth (over {GAP_S:g} s and {GAP_M:g} m), and "
-            f"{'is' if unknown == 1 else 'are'} not scored"
-        )
-    return tuple(notes)

@@ -25,7 +25,7 @@ from mapfilter._kernels import cos_sin32, exp32, hashed, normals, uniforms, wrap
 from mapfilter._threads import ONE, Call
 from mapfilter._types import Floats32
 from mapfilter.geodesy import wrap_rad
-from mapfilter.options import NotNegative, Options, Positive, Share
+from mapfilter.options import NotNegative, Options, Positive, Radians, Share
 
 EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH, RATE = range(8)
 """Rows of the state: metres from the frame's origin; lasting heading error (radians) and logarithm
@@ -84,13 +84,13 @@ class MotionErrors(Options):
 
     step_sd_m: NotNegative = 0.3
     typical_step_m: Positive = 1.4
-    heading_sd_rad: NotNegative = _HEADING_SD_RAD
+    heading_sd_rad: Radians = _HEADING_SD_RAD
     white_share: Share = 0.3
     heading_m: Positive = 28.0
     disturbances_per_m: NotNegative = 0.002
-    disturbed_rad: NotNegative = _DISTURBED_RAD
+    disturbed_rad: Radians = _DISTURBED_RAD
     remounts_per_m: NotNegative = 0.0
-    bias_sd_rad: NotNegative = _BIAS_SD_RAD
+    bias_sd_rad: Radians = _BIAS_SD_RAD
     bias_drift_rad_per_sqrt_m: NotNegative = _BIAS_DRIFT_RAD
     rate_rad_per_m: NotNegative = _RATE_RAD
     rate_share: Share = 0.5

@@ -61,7 +61,7 @@ def check_columns(recording: Recording) -> tuple[str, ...]:
             got = f"{np.nanmedian(np.abs(turn)):.1f} rad in the median, changing slowly"
             hint = "headings (heading_rad, or compass_deg) for their changes"
             faults.add(f"{where}, turn_rad", "changes of heading in each interval", got, hint)
-        elif table == "odometry" and (most := _sideways_mps2(along, turn)):
+        elif table == "odometry" and (most := sideways_mps2(along, turn)):
             got = f"{most:.0f} m/s² sideways (speed times yaw rate) in 5 % of the rows or more"
             hint = "degrees for radians: --column yaw_rate_degps=COLUMN; or another unit of speed"
             faults.add(where, "m/s and rad/s of a vehicle that its tyres hold", got, hint)
@@ -102,7 +102,7 @@ def check_turning(rows: pd.DataFrame, turning: Turning, where: str) -> None:
     lasted_s = np.diff(time_s, prepend=np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
         rate = turning.between(time_s) / lasted_s
-    if most := _sideways_mps2(speed, rate):
+    if most := sideways_mps2(speed, rate):
         expected = "rad/s of a vehicle that its tyres hold"
         got = f"{most:.0f} m/s² sideways (speed times rate of turning) in 5 % of the rows or more"
         hint = "degrees for radians per second: state it in the header, as in gyro_x (deg/s)"
@@ -165,11 +165,18 @@ def _fast_mps(speed_mps: Floats) -> float:
     return fast if fast > _FAST_MPS else 0.0
 
 
-def _sideways_mps2(speed_mps: Floats, rate_radps: Floats) -> float:
-    """Return the acceleration that is exceeded in 5 % of the moving rows; 0 where tyres hold it."""
+def sideways_mps2(speed_mps: Floats, rate_radps: Floats, often: float = _OFTEN) -> float:
+    """Return the acceleration that is often exceeded while moving; 0 where tyres hold it.
+
+    Parameters
+    ----------
+    speed_mps, rate_radps : (N,) arrays
+    often : float
+        Share of the moving rows.
+    """
     moving = np.isfinite(rate_radps) & (np.abs(speed_mps) > _MOVING_MPS)
     sideways = np.abs(speed_mps * rate_radps)[moving]
     if sideways.size < _FEWEST or np.sum(sideways > _SIDEWAYS_MPS2) < _FEWEST_FAST:
         return 0.0
-    most = float(np.quantile(sideways, 1 - _OFTEN))
+    most = float(np.quantile(sideways, 1 - often))
     return most if most > _SIDEWAYS_MPS2 else 0.0

@@ -32,6 +32,7 @@ from mapfilter.tracks.log_checks import (
     check_clocks,
     check_start,
     check_steps,
+    check_turns,
     early_ends,
     truth_far_off,
     undirected_note,
@@ -245,6 +246,7 @@ def make_log(
     if not any(fault.where.endswith("time_s") for fault in faults.found):
         check_clocks(tables, called, faults)
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
+        check_turns(tables["motion"], called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
         if not faults.found and not any(FAR_APART in note for note in every_note):
             every_note += truth_far_off(str(crs), tables)
@@ -254,10 +256,10 @@ def make_log(
                 every_note += undirected_note(tables["motion"], called.get("motion", "motion"))
             places = compared_places(tables["truth"], tables["gnss"])
             for column, wrong in motion_faults(tables["motion"], places).items():
-                fault = f", {column}: {wrong}"
-                # A log that was written and read has its notes of then.
-                if not any(note.endswith(fault) for note in every_note):
-                    every_note += (f"{called.get('motion', 'motion')}{fault}",)
+                found = f", {column}: {wrong.found}; "
+                # A log that was written and read has its notes of then; words of Python mend some.
+                if not any(found in note for note in every_note):
+                    every_note += (f"{called.get('motion', 'motion')}, {column}: {wrong}",)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless and not any(UNPLACED in note for note in every_note):

@@ -1,4 +1,4 @@
-"""Checks of a log's tables against each other: clocks, units of times and of steps."""
+"""Checks of a log's tables against each other: clocks, units of times, steps and turns."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import Faults
 from mapfilter.lattice import Lattice
 from mapfilter.tracks.clock_notes import week_fault
+from mapfilter.tracks.exchanged import sideways_mps2
 from mapfilter.tracks.misplaced import FAR_M, misplaced_by
 from mapfilter.tracks.moved import UNDIRECTED
 
@@ -34,6 +35,7 @@ _SOMEWHERE_M = 100.0
 _KILO = (100.0, 1200.0)
 _FASTEST_KMPS = 0.1
 _AREA_M = 100.0
+_TURNING_SHARE = 0.2
 _EXPECTED = "metres moved in each interval"
 _SINCE_START = "distance since the start; give its differences"
 _COUNTER = (
@@ -182,6 +184,22 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
         note = f"motion, step_m: only {moved_m:.3g} m in {lasted_s:.0f} s; kilometres for metres?"
         return (note,)
     return ()
+
+
+def check_turns(motion: pd.DataFrame, where: str, faults: Faults) -> None:
+    """Note turns that beside the steps push sideways more than tyres or feet hold."""
+    time_s, step_m, turn_rad = (
+        motion[name].to_numpy() for name in ("time_s", "step_m", "turn_rad")
+    )
+    lasted_s = np.diff(time_s, prepend=np.nan)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        lasted_s = np.where(lasted_s > 0, lasted_s, np.nan)
+        most = sideways_mps2(step_m / lasted_s, turn_rad / lasted_s, _TURNING_SHARE)
+    if most:
+        got = f"{most:.0f} m/s² sideways (speed times rate of turning) in {_TURNING_SHARE:.0%} of "
+        got += "the rows or more"
+        expected = "radians turned in each interval, as tyres or feet hold them"
+        faults.add(f"{where}, turn_rad", expected, got, "degrees given for radians")
 
 
 def undirected_note(motion: pd.DataFrame, where: str) -> tuple[str, ...]:

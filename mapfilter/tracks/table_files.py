@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.csv as arrow_csv
 
 from mapfilter._arrow import arrow_bytes, open_parquet
+from mapfilter._cut_ends import without_cut_row, without_zero_end
 from mapfilter._inputs import open_input, read_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Ints
@@ -24,7 +25,6 @@ from mapfilter.tracks.schema import SCHEMA
 
 SEPARATORS = (",", ";", "\t")
 _LARGEST_BYTES = 2 << 30
-_LONGEST_ROW_BYTES = 1 << 16
 _BLOCK_BYTES = 1 << 22
 _MOST_COLUMNS = 1000
 _DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
@@ -88,7 +88,10 @@ def as_frame(table: pa.Table) -> pd.DataFrame:
 
 def _read_csv(table: str, path: Path) -> ReadTable:
     data = read_input(path, _LARGEST_BYTES, "a table").removeprefix(codecs.BOM_UTF8)
-    _check_encoding(path, data)
+    _check_encoding(path, data.rstrip(b"\0"))
+    data, zeros = without_zero_end(data)
+    if zeros and not data:
+        raise fail(InputError, str(path), "a header line", "zero bytes only", "cut off")
     data = without_separator_line(data)
     begin = len(data) - len(data.lstrip(b"\r\n \t"))
     end = data.find(b"\n", begin)
@@ -105,6 +108,7 @@ def _read_csv(table: str, path: Path) -> ReadTable:
         raise fail(InputError, f"{path}, header", expected, len(names), "no table of a log")
     if twice := sorted(name for name, times in Counter(names).items() if name and times > 1):
         raise fail(InputError, f"{path}, header", "each column once", f"{listed(twice)} more often")
+    data, cut = without_cut_row(data, separator, begin + len(header.encode()))
     rows = _plain_rows(data, begin, names, separator)
     if rows is None:
         rows = _any_rows(data, blank_lines, names, separator)
@@ -120,7 +124,11 @@ def _read_csv(table: str, path: Path) -> ReadTable:
         numbers = [column.name for column in SCHEMA[table] if column.kind != "text"]
         for name in rows.columns.intersection(numbers):
             rows[name] = rows[name].str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
-    return ReadTable(rows, lines, _cut_off(path, data, separator, header))
+    notes = [f"{path}: {zeros}"] if zeros else []
+    if cut:
+        ends = data.count(b"\n") or data.count(b"\r")
+        notes.append(f"{path} row {ends + 1}: {cut}, left out")
+    return ReadTable(rows, lines, tuple(notes))
 
 
 def _check_encoding(path: Path, data: bytes) -> None:
@@ -178,11 +186,3 @@ def _any_rows(data: bytes, blank_lines: int, names: list[str], separator: str) -
         given = map(str, rows.columns)
         rows.columns = [name or other for name, other in zip(names, given, strict=True)]
     return rows
-
-
-def _cut_off(path: Path, data: bytes, separator: str, header: str) -> tuple[str, ...]:
-    """Return a note where a file ends without a line's end before the last row has all fields."""
-    last = data[-_LONGEST_ROW_BYTES:].splitlines(keepends=True)[-1].decode(errors="replace")
-    if last.endswith(("\n", "\r")) or last.count(separator) >= header.count(separator):
-        return ()
-    return (f"{path}: ends within a row, as if cut off",)

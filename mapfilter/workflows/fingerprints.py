@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from mapfilter._words import number_of
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import open_database
-from mapfilter.errors import Faults, InputError, MapfilterError, fail, noted
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, noted
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import (
     is_table,
@@ -29,7 +30,7 @@ from mapfilter.tracks.readers.text import read_text
 from mapfilter.tracks.store import is_log
 
 _PEEKED_BYTES = 1 << 18
-_WITHOUT_STEPS = OpenOptions(combine=CombineOptions(walk=None))
+WITHOUT_STEPS = OpenOptions(combine=CombineOptions(walk=None))
 """Single reports need no motion."""
 
 
@@ -56,7 +57,7 @@ def read_reports(
     path: Path,
     crs: str | None,
     plan: CellPlan | None = None,
-    columns: Mapping[str, str] | None = None,
+    options: OpenOptions = WITHOUT_STEPS,
 ) -> tuple[Reports, Sequence[str]]:
     """Return the reports of logs, recordings or a table, and the name of each block.
 
@@ -66,19 +67,26 @@ def read_reports(
         For recordings, and for metres in a table.
     plan : CellPlan, optional
         Gives cells its ids.
-    columns : mapping of str to str, optional
-        Column of each field of a plain CSV, which then is a recording and no table.
+    options : OpenOptions
+        How recordings are read: a plain CSV with columns of fields is no table. Ground truth is
+        that of one recording.
 
     Raises
     ------
     InputError
         With the faults of all logs.
+    ConfigError
+        There is a zone or a ground truth for what is no recording, or for several.
     """
-    if not columns and _is_fingerprints(path):
+    if not options.columns and _is_fingerprints(path):
+        _check_recording(path, "a table of fingerprints", options)
         return read_fingerprint_table(path, crs), ()
-    options = replace(_WITHOUT_STEPS, columns=columns or {})
+    journeys = _journeys(path)
+    if is_log(path) or (options.combine.truth and len(journeys) > 1):
+        own = "a track log" if is_log(path) else number_of(len(journeys), "journey")
+        _check_recording(path, own, options)
     faults, logs, names = Faults(), list[TrackLog](), list[str]()
-    for one in _journeys(path):
+    for one in journeys:
         try:
             frame = crs or (logs[0].crs if logs else "")
             opened = open_log(one, crs=frame, plan=plan, options=options)
@@ -91,6 +99,15 @@ def read_reports(
     faults.raise_if_any(InputError)
     with noted(note for log in logs for note in log.notes):
         return reports_of_logs(logs, plan), names
+
+
+def _check_recording(path: Path, got: str, options: OpenOptions) -> None:
+    """Refuse options that only one recording can have."""
+    faults = Faults()
+    for option, given in (("--zone", options.zone), ("--truth", options.combine.truth)):
+        if given:
+            faults.add(f"{option} of {path}", "a recording of one journey", got)
+    faults.raise_if_any(ConfigError)
 
 
 def _journeys(path: Path) -> list[Path]:

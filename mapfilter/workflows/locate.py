@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +31,9 @@ from mapfilter.report.canvas import BLUE, GREY
 from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
 from mapfilter.report.saving import save
 from mapfilter.tracks.misplaced import check_near
+from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.placeless import is_local_frame
-from mapfilter.workflows.fingerprints import read_database, read_reports
+from mapfilter.workflows.fingerprints import WITHOUT_STEPS, read_database, read_reports
 from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.results import FIGURES, POSITIONS, check_figures_of_reports
 
@@ -80,6 +81,8 @@ def run_locate(
     method: str = AUTO,
     crs: str | None = None,
     columns: Mapping[str, str] | None = None,
+    zone: str = "",
+    truth: Sequence[Path] = (),
     level_error_db: float = 6.0,
     seed: int = 0,
     progress: Progress | None = None,
@@ -99,6 +102,10 @@ def run_locate(
         Of metres in a table.
     columns : mapping of str to str, optional
         Where the log is a plain CSV recording: column of each field.
+    zone : str
+        Where the log is a recording: zone of local times that state none.
+    truth : sequence of Path
+        Recordings whose positions are the truth of the log, a recording.
     level_error_db : float
         Of the levels of a radio-route database.
     seed : int
@@ -112,7 +119,9 @@ def run_locate(
     """
     began_s = time.perf_counter()
     check_figures_of_reports(out)
-    known, (reports, names) = _inputs(database, log, crs, level_error_db, columns or {})
+    combine = replace(WITHOUT_STEPS.combine, truth=tuple(truth))
+    options = replace(WITHOUT_STEPS, zone=zone, columns=columns or {}, combine=combine)
+    known, (reports, names) = _inputs(database, log, crs, level_error_db, options)
     rng = np.random.default_rng(seed)
     with nothing_left(out):
         ensure_writable_folder(out)
@@ -144,7 +153,7 @@ def _inputs(
     log: Path,
     crs: str | None,
     level_error_db: float,
-    columns: Mapping[str, str],
+    options: OpenOptions,
 ) -> tuple[Reports, tuple[Reports, Sequence[str]]]:
     """Read both inputs, and report the faults of both."""
     faults = Faults()
@@ -154,7 +163,7 @@ def _inputs(
     except MapfilterError as error:
         faults.take(error)
     try:
-        query = read_reports(log, known.crs if known is not None else crs, plan, columns)
+        query = read_reports(log, known.crs if known is not None else crs, plan, options)
     except MapfilterError as error:
         faults.take(error)
     if known is not None and query is not None:

@@ -20,7 +20,8 @@ from mapfilter.errors import ConfigError, fail, noted
 from mapfilter.evaluation.accuracy import accuracy, held_by_radius_95
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
-from mapfilter.evaluation.truth import Truth, truth_notes
+from mapfilter.evaluation.truth import Truth
+from mapfilter.evaluation.truth_notes import truth_notes
 from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx

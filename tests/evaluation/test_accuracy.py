@@ -15,7 +15,8 @@ from mapfilter.evaluation.accuracy import (
     percentile_m,
     position_errors_m,
 )
-from mapfilter.evaluation.truth import Truth, truth_notes
+from mapfilter.evaluation.truth import Truth
+from mapfilter.evaluation.truth_notes import truth_notes
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.step_output import Fix

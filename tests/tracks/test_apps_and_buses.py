@@ -52,7 +52,7 @@ def test_a_course_without_a_speed_makes_no_motion_of_nothing(tmp_path):
     way_m = log.motion["step_m"].sum()
     assert way_m == pytest.approx(SPEED_MPS[1:].sum(), rel=0.02)
     assert any("its positions, one to the next" in note for note in log.notes)
-    assert any("(likely: --column speed_mps=speed)" in note for note in log.notes)
+    assert any('(likely: columns={"speed_mps": "speed"})' in note for note in log.notes)
     named = mf.read_log(tmp_path / "log.csv", course_motion=True, columns={"speed_mps": "speed"})
     assert any("speed and course of its fixes" in note for note in named.notes)
 

@@ -32,11 +32,11 @@ def test_azimuths_in_degrees_are_those_of_a_compass(tmp_path, steps, name):
 @pytest.mark.parametrize(
     ("columns", "option"),
     [
-        ({"heading": EAST_THEN_NORTH}, "--column compass_deg=heading"),
-        ({"azimuth": np.radians(EAST_THEN_NORTH)}, "--column compass_deg=azimuth"),
+        ({"heading": EAST_THEN_NORTH}, 'columns={"compass_deg": "heading"}'),
+        ({"azimuth": np.radians(EAST_THEN_NORTH)}, 'columns={"compass_deg": "azimuth"}'),
         ({"azimuth": EAST_THEN_NORTH, "ci": 12, "mcc": 1, "mnc": 1, "rsrp": -90},
-         "--column compass_deg=azimuth"),
-        ({"azimuth": 5 * EAST_THEN_NORTH}, "--column compass_deg=azimuth"),
+         'columns={"compass_deg": "azimuth"}'),
+        ({"azimuth": 5 * EAST_THEN_NORTH}, 'columns={"compass_deg": "azimuth"}'),
     ],
     ids=["heading", "radians", "cells", "no degrees"],
 )  # fmt: skip

@@ -72,7 +72,7 @@ def test_rates_in_degrees_that_no_tyre_holds_are_refused(drive, read):
     """Few of them lie beyond 3.5 rad/s."""
     gentle = np.degrees(drive["rate"]) / 5
     assert np.abs(gentle).max() < 3.5
-    with pytest.raises(InputError, match=r"sideways .* --column yaw_rate_degps=COLUMN"):
+    with pytest.raises(InputError, match=r'sideways .* columns=\{"yaw_rate_degps": "COLUMN"\}'):
         read(wheel_speed_mps=3 * drive["speed"], yaw_rate=gentle)
 
 

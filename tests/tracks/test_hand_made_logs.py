@@ -66,10 +66,11 @@ def test_rows_are_called_by_their_line_in_csv_and_counted_in_parquet(folder):
 
 
 def test_a_row_that_is_cut_off_is_told(folder):
-    (folder / "motion.csv").write_text("time_s,step_m,heading_rad\n1,1.4,0\n2,1.")
+    (folder / "motion.csv").write_text("time_s,step_m,heading_rad\n\n1,1.4,0\n2,1.")
     log = read_log(folder)
-    assert log.notes == (f"{folder / 'motion.csv'}: ends within a row, as if cut off",)
-    assert np.isnan(log.motion["heading_rad"].iloc[-1])
+    how = "cut off within the row (without a line end), left out"
+    assert log.notes == (f"{folder / 'motion.csv'} row 4: {how}",)
+    assert log.motion["time_s"].tolist() == [1.0]
     (folder / "motion.csv").write_text("time_s,step_m,heading_rad\n1\n2,1.4\n3,1.4,0")
     assert read_log(folder).notes == ()
 

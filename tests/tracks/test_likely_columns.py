@@ -75,5 +75,5 @@ def test_a_counter_that_is_named_as_a_length_is_refused_as_a_counter(tmp_path):
     path = tmp_path / "own.csv"
     step = 2 * np.arange(1, 41)
     pd.DataFrame({"time": TIME_S, **PLACES, "step": step}).to_csv(path, index=False)
-    with pytest.raises(InputError, match="--column steps=COLUMN"):
+    with pytest.raises(InputError, match=r'columns=\{"steps": "COLUMN"\}'):
         mf.read_log(path, columns={"step_m": "step"})

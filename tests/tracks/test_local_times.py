@@ -45,7 +45,7 @@ def test_files_of_a_folder_that_all_have_local_times_are_named(notes):
     found, log = notes(track_gpx=gpx(), cells_csv=table(**CELLS), speed_csv=table(speed_mps=1.0))
     (note,) = found
     assert note.startswith(f"cells.csv, speed.csv, track.gpx: {TOLD}, taken for one zone: ")
-    assert "(--zone of convert and replay gives it: that of your place, such as Europe" in note
+    assert "(zone of mf.read_log gives it: that of your place, such as Europe" in note
     assert pd.isna(log.start_utc_s)
 
 

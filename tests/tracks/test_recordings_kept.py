@@ -174,3 +174,41 @@ def test_azimuths_that_run_the_other_way_round_are_told(tmp_path):
     assert any(n.startswith(told) for n in log_notes(tmp_path, -AZIMUTH_DEG % 360, *place))
     assert any(n.startswith(told) for n in log_notes(tmp_path, (40 - AZIMUTH_DEG) % 360, *place))
     assert not any(n.startswith(told) for n in log_notes(tmp_path, AZIMUTH_DEG, *place))
+
+
+@pytest.fixture
+def copied(tmp_path):
+    """Read positions of which a copy ends otherwise."""
+
+    def of(end):
+        rows = "".join(f"{1_777_629_600 + n},24.93{n:05d},60.17{n:05d}\n" for n in range(30))
+        path = tmp_path / "track.csv"
+        path.write_bytes(b"timestamp,lon,lat\n" + rows.encode() + end)
+        found = read_recording(path)
+        return len(found.tables["positions"]), list(found.remarks)
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("end", "count", "what"),
+    [
+        (b"1777629630,24.9300030,60.1700030", 31, None),
+        (b"1777629630,24.9300030,60", 30, "cut off within its last number (60, without a line end"),
+        (bytes(5000), 30, "5000 zero bytes at the end (line 32) left out"),
+        (b"1777629630,24.9300030,60\0", 30, "left out, with the unfinished row before them"),
+    ],
+)
+def test_a_copy_that_was_cut_off_loses_its_last_row_only(copied, end, count, what):
+    found, notes = copied(end)
+    assert found == count
+    assert len(notes) == (what is not None)
+    assert what is None or what in notes[0]
+
+
+@pytest.mark.parametrize("cut", [b"\n", b""])
+def test_of_a_large_table_read_in_parts_the_end_is_cut(copied, cut, monkeypatch):
+    monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", 600)
+    found, notes = copied(b"1777629630,24.9300030,60" + cut)
+    assert found == 30 + bool(cut)
+    assert [note.endswith("without a line end) (line 32)") for note in notes] == [True] * (not cut)

@@ -37,7 +37,7 @@ def told(files, **options):
 def test_tenths_beside_satellites_are_hdop(tmp_path, column):
     path = positions(tmp_path / "a.csv", 3.0, 1, accuracy=hdop(1), **{column: 9})
     (note,) = told(path)
-    assert note.endswith("--column hdop=accuracy reads HDOP")
+    assert note.endswith('columns={"hdop": "accuracy"} reads HDOP')
     log = mf.read_log(path, columns={"hdop": "accuracy"})
     assert not any("HDOP" in note for note in log.notes)
     # As those of GPX and NMEA: 4 m times HDOP hold 68 %.
@@ -81,7 +81,7 @@ def test_errors_several_times_as_large_as_stated_are_noted_beside_others(tmp_pat
     ):
         (note, *_) = told(files, **options)
         assert f"from those of {of}, " in note
-        assert "--column hdop=COLUMN" in note
+        assert 'columns={"hdop": "COLUMN"}' in note
     assert told([fixes, other], truth=other, columns={"hdop": "accuracy"}) == []
 
 

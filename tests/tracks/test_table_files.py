@@ -62,6 +62,53 @@ def test_zero_bytes_are_named(tmp_path):
         read_log(log_of(tmp_path, f"time_s,step_m\n0,\0{ROWS}"))
 
 
+PLACES = "".join(f"{n},{385400 + 1.25 * n:.2f},{6672000.5 + n:.2f}\n" for n in range(30))
+
+
+def places_of(folder, end):
+    log_of(folder)
+    text = f"time_s,east_m,north_m\n{PLACES}".encode()
+    (folder / "truth.csv").write_bytes(text + end)
+    log = read_log(folder)
+    return log.truth["time_s"].tolist(), log.notes
+
+
+@pytest.mark.parametrize(
+    ("end", "why"),
+    [
+        (b"30,385437.50,66", "within its last number (66, without a line end)"),
+        (b"30,385437.50,", "within its last number (nothing, without a line end)"),
+        (b"30,3854", "within the row (without a line end)"),
+    ],
+)
+def test_a_row_in_which_a_file_was_cut_off_is_left_out(tmp_path, end, why):
+    time_s, notes = places_of(tmp_path, end)
+    assert time_s == list(range(30))
+    assert notes == (f"{tmp_path / 'truth.csv'} row 32: cut off {why}, left out",)
+
+
+@pytest.mark.parametrize("end", [b"30,385437.50,6672030.50", b"30,385437.50,6672030\n"])
+def test_other_last_rows_are_kept(tmp_path, end):
+    time_s, notes = places_of(tmp_path, end)
+    assert time_s == list(range(31))
+    assert not notes
+
+
+@pytest.mark.parametrize(
+    ("row", "lost"), [(b"", ""), (b"30,385437.50,667", ", with the unfinished row before them")]
+)
+def test_zero_bytes_that_a_dead_battery_leaves(tmp_path, row, lost):
+    time_s, notes = places_of(tmp_path, row + bytes(4096))
+    assert time_s == list(range(30))
+    what = f"4096 zero bytes at the end (line 32) left out{lost}"
+    assert notes == (f"{tmp_path / 'truth.csv'}: {what}",)
+
+
+def test_a_file_of_zero_bytes_alone_is_refused(tmp_path):
+    with pytest.raises(InputError, match="expected a header line, found zero bytes only"):
+        read_log(log_of(tmp_path, bytes(100)))
+
+
 def test_a_list_in_place_of_a_path_is_refused(tmp_path):
     head = {"crs": "EPSG:32635", "parts": [{"path": ["motion.csv"]}, {"path": {}}, 3]}
     with pytest.raises(MapfilterError, match="tables of a log"):

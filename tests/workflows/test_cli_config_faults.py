@@ -220,6 +220,11 @@ def test_areas(given, told, tmp_path):
         (["build", "--workers", "0"], "'--workers'"),
         (["simulate", "--seed", "-1"], "'--seed'"),
         (["export"], "Missing argument 'DB'"),
+        (["bound", "--db"], "Missing argument 'DB'"),
+        (["bound", "--db", "one", "other"], "unexpected extra argument"),
+        (["bound", "--db", "nowhere"], "nowhere: expected a database folder, found nothing"),
+        (["export", "--db=nowhere", "--to", "a.gpkg"], "nowhere: expected a database folder"),
+        (["learn", "--logs", ".", "--db", "nowhere"], "expected a track log, or a folder of logs"),
         (["info"], "Missing argument 'PATH'"),
     ],
 )

@@ -213,3 +213,42 @@ def test_recordings_with_sensors_make_no_steps(tmp_path):
     notes = " ".join(assert_done(mapfilter("locate", *given)).json["notes"])
     assert "local" in notes or "a frame of its own" in notes
     assert "steps" not in notes
+
+
+def write_upload(path, zone_h=0, *, placed=True):
+    """Write an upload of a walk along a street, in local times without a zone or in UTC."""
+    seconds = np.arange(200) * 5
+    rng = np.random.default_rng(0)
+    place = np.abs(np.cumsum(rng.normal(0, 12, 200))) % 900
+    time = pd.to_datetime(1_600_000_000 + 3600 * zone_h + seconds, unit="s")
+    table = pd.DataFrame({"time": time.strftime("%Y-%m-%d %H:%M:%S") + "Z" * (not zone_h)})
+    if placed:
+        table = table.assign(lat=(45 + place / 111_200).round(7), lon=-75.7)
+    else:
+        table = table.assign(cell=np.where(place > 450, "B", "A"), role="serving")
+        table["level_dbm"] = np.round(-65 - 0.03 * place + rng.normal(0, 2, 200))
+    table.to_csv(path, index=False)
+    return path
+
+
+def test_a_recording_is_scored_by_another_one(tmp_path):
+    cells = write_upload(tmp_path / "cells.csv", 2, placed=False)
+    places = write_upload(tmp_path / "gps.csv")
+    made = mapfilter(
+        "convert", cells, "--truth", places, "--zone", "+02:00", "--out", tmp_path / "db"
+    )
+    assert_done(made)
+    given = ["--db", tmp_path / "db", "--log", cells, "--out", tmp_path / "out", "--json"]
+    assert "scored" not in assert_done(mapfilter("locate", *given)).json
+    found = assert_done(mapfilter("locate", *given, "--truth", places, "--zone", "+02:00")).json
+    assert found["scored"] == found["located"] == 200
+    assert not any("no zone" in note for note in found["notes"])
+
+
+def test_truth_and_zone_are_those_of_one_recording(folder, tmp_path):
+    places = write_upload(tmp_path / "gps.csv")
+    given = ["--db", folder / "surveys", "--out", tmp_path / "out", "--truth", places]
+    for log, got in (("walk", "a track log"), ("surveys", "3 journeys")):
+        outcome = mapfilter("locate", *given, "--log", folder / log)
+        assert_refused(outcome, f"--truth of {folder / log}: expected a recording of one journey")
+        assert_refused(outcome, f"found {got}")

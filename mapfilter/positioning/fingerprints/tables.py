@@ -175,7 +175,8 @@ def _projected(
         crs = _MERCATOR
     if crs is None:
         hint = (
-            "give --crs, such as EPSG:32630; for a frame of its own any projected CRS of the place"
+            "give crs (--crs), such as EPSG:32630; for a frame of its own any projected CRS of the "
+            "place"
         )
         raise fail(InputError, f"{path}, positions", "a CRS of the metres", "none", hint)
-    return projected_crs(crs, "--crs"), places
+    return projected_crs(crs, "crs"), places

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import pyarrow as pa
 
+from mapfilter._cut_ends import without_cut_row
 from mapfilter._types import Ints
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.columns import Columns
@@ -35,6 +36,10 @@ def header_columns(
         if header.strip():
             separator = likely_separator(header)
             names = header_names(header, separator)
+            data, cut = without_cut_row(data, separator, start)
+            if cut:
+                reading.rows += 1
+                reading.refuse(first_line + data.count(b"\n", start), cut)
             rest = _without_headers(data[start:], header, separator, reading)
             return value_columns(
                 memoryview(rest), reading, names, separator, first_line, ragged=ragged

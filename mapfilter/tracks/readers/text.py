@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from mapfilter._cut_ends import without_zero_end
 from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import InputError, fail
@@ -179,6 +180,10 @@ def _as_utf8(path: Path, data: bytes, notes: list[str]) -> bytes:
         notes.append("UTF-16 text")
         # A file cut off may end within a character.
         data = data[: len(data) // 2 * 2].decode(wide, "replace").lstrip("\ufeff").encode()
+    data, note = without_zero_end(data)
+    if note and not data:
+        raise fail(InputError, str(path), "a recording as text", "zero bytes only", "cut off")
+    notes += [note] if note else []
     zeros = data.count(b"\0")
     if zeros > _MOST_ZERO_SHARE * len(data):
         raise fail(InputError, str(path), "a recording as text", "a binary file")

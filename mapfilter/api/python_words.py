@@ -1,0 +1,105 @@
+"""Messages that name options of the commands, in the words of Python's arguments."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import wraps
+from typing import ParamSpec
+
+from mapfilter.errors import MapfilterError, notes_of
+from mapfilter.tracks.log import TrackLog
+
+P = ParamSpec("P")
+
+_COMMAND = re.compile(r"(mapfilter [a-z]+ [^;)]*)")
+"""A whole command to be called in a shell, which stays."""
+_OPTION = re.compile(
+    r"(?<![\w-])--(?P<name>[a-z][a-z-]*[a-z])"
+    r"(?: (?P<key>[\w.-]+)=(?P<value>[^'\s,;)]+))?"
+)
+_QUOTED = re.compile(r"--column '(\w+)=([^']+)'")
+_MAPPINGS = {"column": "columns", "factor": "factors"}
+_ARGUMENTS = {
+    **{name: name for name in ("crs", "zone", "truth")},
+    "course-motion": "course_motion",
+    "db": "database",
+    "filter": "filter",
+    "log": "paths",
+    "pose": "walk=WalkOptions(pose=…)",
+    "declination": "walk=WalkOptions(declination_deg=…)",
+    "step-length": "walk=WalkOptions(step_m=…)",
+}
+_WITH_VALUE = re.compile(r"(?<![\w-])--(crs|filter|truth) (EPSG:\w+|ekf|\S+\.\w+)")
+_CONVERT = ("offset", "origin", "format")
+"""Options that no argument of Python has."""
+
+
+def in_python(text: str) -> str:
+    """Return a message with the arguments of Python in place of options of commands.
+
+    Examples
+    --------
+    >>> in_python("turns run clockwise (--factor turn_rad=-1 mends it)")
+    'turns run clockwise (factors={"turn_rad": -1} mends it)'
+    >>> in_python("give --zone or --offset; --column 'speed_mps=v [m/s]'")
+    'give zone or mapfilter convert --offset; columns={"speed_mps": "v [m/s]"}'
+    >>> in_python("mapfilter convert --crs EPSG:CODE; --crs EPSG:CODE")
+    'mapfilter convert --crs EPSG:CODE; crs="EPSG:CODE"'
+    """
+    parts = _COMMAND.split(text.replace("--zone of convert and replay", "zone of mf.read_log"))
+    return "".join(part if n % 2 else _without_options(part) for n, part in enumerate(parts))
+
+
+@contextmanager
+def python_words() -> Iterator[None]:
+    """Name arguments of Python in errors that are raised within; also decorates a function."""
+    try:
+        yield
+    except MapfilterError as error:
+        error.faults = tuple(
+            replace(
+                one,
+                where=in_python(one.where),
+                expected=in_python(one.expected),
+                hint=in_python(one.hint),
+            )
+            for one in error.faults
+        )
+        error.args = (error.faults,)
+        if notes := notes_of(error):
+            error.__notes__[:] = map(in_python, notes)
+        raise
+
+
+def python_log(make: Callable[P, TrackLog]) -> Callable[P, TrackLog]:
+    """Decorate what makes a log: its errors and the log's notes are in these words."""
+
+    @wraps(make)
+    def made(*args: P.args, **named: P.kwargs) -> TrackLog:
+        with python_words():
+            log = make(*args, **named)
+        return replace(log, notes=tuple(dict.fromkeys(map(in_python, log.notes))))
+
+    return made
+
+
+def _without_options(text: str) -> str:
+    text = _QUOTED.sub(r'columns={"\1": "\2"}', text)
+    text = _WITH_VALUE.sub(lambda found: f'{_ARGUMENTS[found[1]]}="{found[2]}"', text)
+    return _OPTION.sub(_argument, text)
+
+
+def _argument(found: re.Match[str]) -> str:
+    name, key, value = found["name"], found["key"], found["value"]
+    given = "" if key is None else f" {key}={value}"
+    if name in _MAPPINGS:
+        if key is None:
+            return _MAPPINGS[name]
+        shown = value if name == "factor" else f'"{value}"'
+        return f'{_MAPPINGS[name]}={{"{key}": {shown}}}'
+    if name in _CONVERT:
+        return f"mapfilter convert --{name}{given}"
+    return _ARGUMENTS.get(name, f"--{name}") + given

@@ -1,0 +1,83 @@
+"""Python users are told arguments of Python, not options of the commands."""
+
+import ast
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+from mapfilter.api.python_words import in_python, python_words
+from mapfilter.errors import InputError, fail, noted, notes_of
+
+OPTION = re.compile(r"(?<![\w-])--[a-z]")
+COMMAND = re.compile(r"mapfilter [a-z]+ (--)?[^;)]*")
+ROOMS = ("tracks", "positioning", "evaluation", "radio", "geodesy.py")
+
+
+def texts_of(file):
+    """Return the texts of a module that are no docstrings, formatted ones with · for values."""
+    nodes = [*ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
+    formatted = [node for node in nodes if isinstance(node, ast.JoinedStr)]
+    taken = {id(part) for node in formatted for part in node.values}
+    taken |= {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    plain = [
+        node.value
+        for node in nodes
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in taken
+    ]
+    return plain + [
+        "".join(part.value if isinstance(part, ast.Constant) else "·" for part in node.values)
+        for node in formatted
+    ]
+
+
+def test_every_option_that_these_rooms_name_has_words_of_python():
+    package = Path(mf.__file__).parent
+    files = [one for room in ROOMS for one in [*(package / room).rglob("*.py")] or [package / room]]
+    found = [text for file in files for text in texts_of(file) if OPTION.search(text)]
+    assert len(found) > 20
+    left = [text for text in found if OPTION.search(COMMAND.sub("", in_python(text)))]
+    assert not left
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("(likely: --column speed_mps=speed)", '(likely: columns={"speed_mps": "speed"})'),
+        ("--column FIELD=COLUMN, such as", 'columns={"FIELD": "COLUMN"}, such as'),
+        ("not used: acc; see --column", "not used: acc; see columns"),
+        ("--offset a.csv=18 for", "mapfilter convert --offset a.csv=18 for"),
+        ("drive, --factor step_m", "drive, factors step_m"),
+        ("see --origin and --crs", "see mapfilter convert --origin and crs"),
+        ("step_m = 0.8 (--step-length) has", "step_m = 0.8 (walk=WalkOptions(step_m=…)) has"),
+        ("leave out --course-motion", "leave out course_motion"),
+        ("/data/my--zone/a.csv", "/data/my--zone/a.csv"),
+    ],
+)
+def test_options_become_arguments(text, expected):
+    assert in_python(text) == expected
+    assert in_python(expected) == expected
+
+
+def test_faults_and_notes_of_an_error_are_put_in_these_words():
+    with pytest.raises(InputError) as refused, python_words(), noted(["see --zone"]):
+        raise fail(InputError, "--crs", "a CRS", "--crs", "give --crs EPSG:32635")
+    fault = 'crs: expected a CRS, found --crs (likely: give crs="EPSG:32635")'
+    assert str(refused.value) == fault
+    assert refused.value.args == (refused.value.faults,)
+    assert notes_of(refused.value) == ["see zone"]
+
+
+def test_errors_and_notes_of_read_log(tmp_path):
+    path = tmp_path / "walk.csv"
+    rows = pd.DataFrame({"timestamp": 1_777_629_600 + np.arange(30.0), "lat": 60.17, "lon": 24.93})
+    rows.assign(velocity=1.2).to_csv(path, index=False)
+    assert any('columns={"speed_mps": "velocity"}' in note for note in mf.read_log(path).notes)
+    with pytest.raises(mf.MapfilterError, match=r"^zone: expected"):
+        mf.read_log(path, zone="Helsinki")
+    with pytest.raises(mf.MapfilterError, match=r"^crs: expected") as refused:
+        mf.read_log(path, crs="nowhere")
+    assert "--" not in str(refused.value)
