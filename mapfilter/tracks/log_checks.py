@@ -187,17 +187,26 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
 
 
 def check_turns(motion: pd.DataFrame, where: str, faults: Faults) -> None:
-    """Note turns that beside the steps push sideways more than tyres or feet hold."""
-    time_s, step_m, turn_rad = (
-        motion[name].to_numpy() for name in ("time_s", "step_m", "turn_rad")
+    """Note turns that beside the steps push sideways more than tyres or feet hold.
+
+    Turns of a second are added up: from row to row those of a compass are mostly noise.
+    """
+    if motion.empty or motion["turn_rad"].isna().all():
+        return
+    time_s = motion["time_s"].to_numpy()
+    first = np.flatnonzero(np.diff(np.floor(time_s), prepend=np.nan) != 0)
+    last = np.append(first[1:], len(time_s)) - 1
+    step_m, turn_rad = (
+        np.add.reduceat(np.nan_to_num(motion[name].to_numpy()), first)
+        for name in ("step_m", "turn_rad")
     )
-    lasted_s = np.diff(time_s, prepend=np.nan)
+    lasted_s = np.diff(time_s[last], prepend=np.nan)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         lasted_s = np.where(lasted_s > 0, lasted_s, np.nan)
         most = sideways_mps2(step_m / lasted_s, turn_rad / lasted_s, _TURNING_SHARE)
     if most:
         got = f"{most:.0f} m/s² sideways (speed times rate of turning) in {_TURNING_SHARE:.0%} of "
-        got += "the rows or more"
+        got += "the time or more"
         expected = "radians turned in each interval, as tyres or feet hold them"
         faults.add(f"{where}, turn_rad", expected, got, "degrees given for radians")
 

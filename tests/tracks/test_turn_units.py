@@ -28,7 +28,7 @@ def driven(seed=1):
 
 @pytest.mark.parametrize(
     ("step_m", "apart_s", "turn_deg"),
-    [(9.0, 1.0, driven()), (0.14, 0.1, np.clip(driven(), -3, 3))],
+    [(9.0, 1.0, driven()), (0.14, 0.1, np.tile(np.clip(driven(), -3, 3), 5))],
     ids=["drive", "walk"],
 )
 def test_small_turns_in_degrees_are_too_fast(step_m, apart_s, turn_deg):
@@ -38,6 +38,15 @@ def test_small_turns_in_degrees_are_too_fast(step_m, apart_s, turn_deg):
     with pytest.raises(InputError, match=LIKELY) as refused:
         mf.make_log(CRS, motion=motion)
     assert str(refused.value).startswith("motion, turn_rad: expected radians turned in each")
+
+
+def test_noise_of_a_compass_at_50_hz_is_no_turn():
+    heading_deg = np.cumsum(np.repeat(driven() / 50, 50))
+    heading_deg += np.random.default_rng(2).normal(0, 1.5, heading_deg.size)
+    turn_deg = np.diff(heading_deg, prepend=heading_deg[0])
+    motion = motion_of(0.3, turn_deg, 0.02)
+    assert np.quantile(np.abs(15 * motion["turn_rad"] / 0.02), 0.8) > 20
+    assert mf.make_log(CRS, motion=motion).notes == ()
 
 
 @given(
