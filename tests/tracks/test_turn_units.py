@@ -22,7 +22,7 @@ def motion_of(step_m, turn_deg, apart_s=1.0):
 def driven(seed=1):
     """Return turns of a drive, degrees in each second, a third of them in bends."""
     rng = np.random.default_rng(seed)
-    bends = rng.choice([-1, 1], 600) * 4.0
+    bends = np.repeat(rng.choice([-1, 1], 30), 20) * 4.0
     return np.where(np.arange(600) // 20 % 3 == 1, bends, rng.normal(0, 0.6, 600))
 
 
