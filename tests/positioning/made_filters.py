@@ -86,6 +86,7 @@ class Beliefs:
     holds: HoldRules = field(default_factory=HoldRules)
     pulls: PullRules = field(default_factory=PullRules)
     positions: bool = False
+    positioned: bool = False
     asks: bool = False
 
     @property
@@ -109,6 +110,9 @@ class Beliefs:
 
     def by_map_alone(self, _):
         return self.by_map
+
+    def is_positioned(self, _):
+        return self.positioned
 
     def by_carriageways(self, _):
         return self.lanes

@@ -135,6 +135,14 @@ def test_when_a_belief_does_not_converge(changes, state, doubted):
     assert beliefs.filter.readings[0].doubted is doubted
 
 
+@pytest.mark.parametrize("positioned", [False, True])
+def test_without_motion_and_positions_none_converges(positioned):
+    beliefs, searching = Beliefs(positioned=positioned), belief(SEARCHING, -10.0)
+    given = replace(STATE, belief=searching, alternative=rival(-19.0, null=-5.0))
+    weighed(beliefs, given, measured=False)
+    assert [one.doubted for one in beliefs.filter.readings] == [not positioned] * 2
+
+
 @pytest.mark.parametrize("null", [-4.9, -5.0])
 def test_an_alternative_is_weighed_by_its_own_terms(null):
     own = FixedTerm(np.full(1, -7.0))

@@ -82,17 +82,19 @@ class BeliefFilters:
         return not self.model.area.cell_ids and not self.grid
 
     def by_map_alone(self, state: BayesState) -> bool:
-        """Return whether the map alone is the evidence: no position was used for some way.
+        """Return whether the map alone is the evidence: no position was used for some way."""
+        return self.map_may_start and not self.is_positioned(state)
+
+    def is_positioned(self, state: BayesState) -> bool:
+        """Return whether a position was used some way ago, or later.
 
         One that the alternative used counts as well: it is to be found by positions, too.
         """
-        if not self.map_may_start:
-            return False
         gnss: GnssState = state.sources[GnssSource.name]
         used_at_m, other = gnss.used_at_m, state.alternative
         if other is not None and GnssSource.name in other.sources:
             used_at_m = max(used_at_m, other.sources[GnssSource.name].used_at_m)
-        return state.reckoning.travelled_m - used_at_m > _POSITIONED_M
+        return state.reckoning.travelled_m - used_at_m <= _POSITIONED_M
 
     def by_carriageways(
         self, state: BayesState, *, compass: bool | None = None
@@ -254,11 +256,6 @@ class BeliefFilters:
         """Return whether a position or satellites have been used so far."""
         gnss: GnssState = state.sources[GnssSource.name]
         return isfinite(gnss.used_at_m)
-
-    def is_positioned(self, state: BayesState) -> bool:
-        """Return whether a position or satellites were used some way ago, or later."""
-        gnss: GnssState = state.sources[GnssSource.name]
-        return state.reckoning.travelled_m - gnss.used_at_m <= _POSITIONED_M
 
     def _is_led(self, state: BayesState) -> bool:
         # Without directions a belief without positions would soon be anywhere.

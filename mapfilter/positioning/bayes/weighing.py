@@ -125,7 +125,8 @@ class Weighing:
         other_m = beliefs.other_unit_m(state)
         doubt = doubt or is_unit_open(state, before, other_m)
         # Hypotheses that spread to all sides agree on a place by chance.
-        doubt = doubt or not (measured or beliefs.is_positioned(state))
+        by_chance = not (measured or beliefs.is_positioned(state))
+        doubt = doubt or by_chance
         tracked = measured and before.status is Status.TRACKING
         reading = evidence.weighing(before, tracked=tracked, doubted=doubt)
         belief, info = update(before, reading, rng)
@@ -139,7 +140,7 @@ class Weighing:
             other = alternative.belief
             terms = weighed_by(other, updates, measured=measured, alternative=True)
             terms = terms or RadioReading()
-            doubt = plain or lanes is not None
+            doubt = plain or lanes is not None or by_chance
             doubt = doubt or alternative.null.log_odds > rules.converge_log_odds
             terms = replace(terms, doubted=doubt)
             other, _ = update(alternative.belief, terms, rng)
