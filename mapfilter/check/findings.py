@@ -120,8 +120,9 @@ REMEDIES = {
     "correct positions that are wrong.",
     "tilts-upwards": "Change the sign of the tilts: downtilts are positive below the horizon.",
     "values-implausible": "Check rasters.factor and rasters.quantity.",
-    "ways-with-gaps": "Raise half widths to half a pixel, or read the rasters on finer pixels "
-    "(rasters.resolution_m; of rasters that mapfilter predicts, area.resolution_m).",
+    "ways-with-gaps": "Read the rasters on pixels of 10 m or less (rasters.resolution_m; of those "
+    "that mapfilter predicts, area.resolution_m). Half widths of half a pixel close the gaps, but "
+    "the filter bayes does not follow ways on coarser pixels.",
 }
 """Remedies by code."""
 

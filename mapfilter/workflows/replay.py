@@ -27,7 +27,7 @@ from mapfilter.positioning.estimate_store import write_estimate, write_geojson, 
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.siteless import without_cells
-from mapfilter.positioning.log_lacks import advice_of
+from mapfilter.positioning.log_lacks import advice_of, coarse_pixels_note
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
@@ -200,7 +200,8 @@ def run_replay(
         fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
         ends = early_end_note(opened, track.estimate, over_map=database is not None)
         pauses = pause_note(track.estimate)
-        log = replace(log, notes=(*log.notes, *fixes, *pauses, *ends))
+        coarse = coarse_pixels_note(fitted, track.estimate, database)
+        log = replace(log, notes=(*log.notes, *fixes, *pauses, *ends, *coarse))
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)
         if recorder is not None:
