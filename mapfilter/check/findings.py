@@ -53,6 +53,7 @@ REMEDIES = {
     "that is no more.",
     "identical-rasters": "Export the raster of each cell anew (likely: one was copied over the "
     "other), or correct the plan, by which they differ.",
+    "index-shifted": "Move FILE_NAME and the columns after it by one row.",
     "journeys-disagree": "Look at the cell; mapfilter learn proposes a patch with the evidence.",
     "journeys-off-map": "Add the way to the map; mapfilter learn proposes a patch.",
     "journeys-unlisted-cell": "Add the cell to the plan, and build again.",
