@@ -12,12 +12,13 @@ from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
+from mapfilter.check.band_law import check_bands
 from mapfilter.check.extent_checks import check_extents
 from mapfilter.check.fills import check_fills
 from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.identity_checks import check_identities
 from mapfilter.check.index_order import plan_by_index
-from mapfilter.check.level_law import check_bands, check_factor
+from mapfilter.check.level_law import check_factor
 from mapfilter.check.raster_checks import (
     check_ids,
     is_surveyed,
