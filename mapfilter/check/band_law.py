@@ -8,9 +8,9 @@ from itertools import combinations
 import numpy as np
 
 from mapfilter.check.findings import Findings
-from mapfilter.check.level_law import LEAST_IN_RING, LEAST_RINGS, is_macro, lobe, thinned
+from mapfilter.check.level_law import LEAST_IN_RING, LEAST_RINGS, is_macro, lobe
 from mapfilter.check.plan_gain import gain_by_plan_db
-from mapfilter.check.samples import RasterSample
+from mapfilter.check.samples import RasterSample, thinned
 from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
 

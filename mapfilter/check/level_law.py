@@ -9,9 +9,7 @@ it, or 75 where the EIRP is a carrier's and levels are those of a subcarrier.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,11 +17,9 @@ import numpy as np
 from mapfilter._types import Bools, Floats
 from mapfilter.check.findings import REMEDIES, Findings, Severity
 from mapfilter.check.plan_gain import PHONE_M, gain_by_plan_db
-from mapfilter.check.samples import RasterSample
-from mapfilter.lattice import Lattice
+from mapfilter.check.samples import RasterSample, thinned
 from mapfilter.radio.cells import Cell, CellPlan
 
-_MANY_PX = 1 << 16
 _FROM_M = 300.0
 _RINGS_PER_OCTAVE, LEAST_IN_RING, LEAST_RINGS = 4, 30, 4
 _LEAST_DECADES = 0.5
@@ -200,17 +196,6 @@ def _beside(below_db: float) -> str:
 def is_macro(cell: Cell) -> bool:
     """Return whether a cell has a mast of known height outdoors."""
     return not cell.indoor and "height_m" not in cell.assumes
-
-
-def thinned(sample: RasterSample) -> RasterSample:
-    """Return every second, third... pixel each way of a sample of many."""
-    step = math.ceil(math.sqrt(max(sample.values.size, 1) / _MANY_PX))
-    values, grid = sample.values[::step, ::step], sample.lattice
-    side_m = grid.resolution_m
-    shift_m = (0.5 - step / 2) * side_m
-    west_m, north_m = grid.west_m + shift_m, grid.north_m - shift_m
-    lattice = Lattice(grid.crs, west_m, north_m, side_m * step, *values.shape)
-    return replace(sample, values=values, lattice=lattice)
 
 
 def lobe(sample: RasterSample, cell: Cell) -> tuple[Floats, Bools]:
