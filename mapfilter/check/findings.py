@@ -38,6 +38,8 @@ REMEDIES = {
     "the cell that is no more; filters weigh a neighbour less that may be either.",
     "crs-mixed": "Set the CRS that the numbers were made in (column crs of the plan, rasters.crs, "
     "area.crs), or project the file.",
+    "datum-shifted": "Name the CRS that the numbers were made in: column crs of the plan, "
+    "rasters.crs (ED50: EPSG:4230, in UTM zones EPSG:230xx).",
     "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS.",
     "duplicate-id": "Give each cell an id of its own.",
     "east-north-swapped": "Exchange the columns east and north.",

@@ -13,6 +13,7 @@ from rasterio.errors import RasterioError
 from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
 from mapfilter.check.band_law import check_bands
+from mapfilter.check.datum_shift import plan_by_datum
 from mapfilter.check.extent_checks import check_extents
 from mapfilter.check.fills import check_fills
 from mapfilter.check.findings import CheckResult, Findings, Severity
@@ -244,6 +245,7 @@ class _Checks:
         if is_surveyed(rasters):
             # Measured along some ways only: without lobes, and without the plan's EIRP.
             return
+        plan = plan_by_datum(samples, plan, outside, f"{self.plan_name} and {where}", findings)
         in_place = check_against_sites(samples, plan, outside, where, findings)
         if as_declared:
             check_factor(in_place, plan, rasters.factor, quantity, where, findings)
