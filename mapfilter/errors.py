@@ -17,7 +17,7 @@ mapfilter.errors.InputError: cells.csv row 3, lat: expected degrees in -90..90, 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite
@@ -150,6 +150,26 @@ def noted(notes: Iterable[str]) -> Iterator[None]:
         for note in notes:
             if note not in notes_of(error):
                 error.add_note(note)
+        raise
+
+
+@contextmanager
+def already_noted(notes: Collection[str]) -> Iterator[None]:
+    """Take notes that were shown before off an error that is raised within.
+
+    Examples
+    --------
+    >>> try:
+    ...     with already_noted(["seen"]), noted(["seen", "new"]):
+    ...         raise fail(InputError, "a.csv", "positions", "none")
+    ... except InputError as error:
+    ...     notes_of(error)
+    ['new']
+    """
+    try:
+        yield
+    except MapfilterError as error:
+        error.__notes__ = [note for note in notes_of(error) if note not in notes]
         raise
 
 

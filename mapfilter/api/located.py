@@ -28,7 +28,13 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.integrity import DEFAULT_RISK
 from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
-from mapfilter.positioning.log_lacks import NO_MOTION, advice_of, check_places, lack_of_log
+from mapfilter.positioning.log_lacks import (
+    NO_MOTION,
+    advice_of,
+    check_places,
+    coarse_pixels_note,
+    lack_of_log,
+)
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.radio.cells import CellPlan
@@ -232,6 +238,7 @@ def locate(
     notes = _not_located(log, options, found.estimate, database)
     if database is not None and (alone or not database.cell_ids):
         notes += advice_of(log, options, found.estimate)
+    notes += coarse_pixels_note(options, found.estimate, database)
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     return Track(found, log, database, trace)
 

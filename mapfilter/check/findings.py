@@ -38,6 +38,8 @@ REMEDIES = {
     "the cell that is no more; filters weigh a neighbour less that may be either.",
     "crs-mixed": "Set the CRS that the numbers were made in (column crs of the plan, rasters.crs, "
     "area.crs), or project the file.",
+    "datum-shifted": "Name the CRS that the numbers were made in: column crs of the plan, "
+    "rasters.crs (ED50: EPSG:4230, in UTM zones EPSG:230xx).",
     "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS.",
     "duplicate-id": "Give each cell an id of its own.",
     "east-north-swapped": "Exchange the columns east and north.",
@@ -53,6 +55,7 @@ REMEDIES = {
     "that is no more.",
     "identical-rasters": "Export the raster of each cell anew (likely: one was copied over the "
     "other), or correct the plan, by which they differ.",
+    "index-shifted": "Move FILE_NAME and the columns after it by one row.",
     "journeys-disagree": "Look at the cell; mapfilter learn proposes a patch with the evidence.",
     "journeys-off-map": "Add the way to the map; mapfilter learn proposes a patch.",
     "journeys-unlisted-cell": "Add the cell to the plan, and build again.",
@@ -120,8 +123,9 @@ REMEDIES = {
     "correct positions that are wrong.",
     "tilts-upwards": "Change the sign of the tilts: downtilts are positive below the horizon.",
     "values-implausible": "Check rasters.factor and rasters.quantity.",
-    "ways-with-gaps": "Raise half widths to half a pixel, or read the rasters on finer pixels "
-    "(rasters.resolution_m; of rasters that mapfilter predicts, area.resolution_m).",
+    "ways-with-gaps": "Read the rasters on pixels of 10 m or less (rasters.resolution_m; of those "
+    "that mapfilter predicts, area.resolution_m). Half widths of half a pixel close the gaps, but "
+    "the filter bayes does not follow ways on coarser pixels.",
 }
 """Remedies by code."""
 

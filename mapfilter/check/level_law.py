@@ -9,25 +9,19 @@ it, or 75 where the EIRP is a carrier's and levels are those of a subcarrier.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from mapfilter._types import Bools, Floats
-from mapfilter.check.findings import Findings
+from mapfilter.check.findings import REMEDIES, Findings, Severity
 from mapfilter.check.plan_gain import PHONE_M, gain_by_plan_db
-from mapfilter.check.samples import RasterSample
-from mapfilter.errors import listed
-from mapfilter.lattice import Lattice
+from mapfilter.check.samples import RasterSample, thinned
 from mapfilter.radio.cells import Cell, CellPlan
 
-_MANY_PX = 1 << 16
 _FROM_M = 300.0
-_RINGS_PER_OCTAVE, _LEAST_IN_RING, _LEAST_RINGS = 4, 30, 4
+_RINGS_PER_OCTAVE, LEAST_IN_RING, LEAST_RINGS = 4, 30, 4
 _LEAST_DECADES = 0.5
 _LEAST_CELLS = 3
 
@@ -76,9 +70,9 @@ def level_law(sample: RasterSample, cell: Cell, *, losses: bool = False) -> Leve
     losses : bool
         The sample holds losses with a minus sign, which need no EIRP.
     """
-    sample = _thinned(sample)
-    ground_m, used = _lobe(sample, cell)
-    if used.sum() < _LEAST_RINGS * _LEAST_IN_RING:
+    sample = thinned(sample)
+    ground_m, used = lobe(sample, cell)
+    if used.sum() < LEAST_RINGS * LEAST_IN_RING:
         return None
     east_m, north_m = sample.positions_m()
     gain_db = gain_by_plan_db(cell, sample.lattice.crs, east_m[used], north_m[used])
@@ -90,8 +84,8 @@ def level_law(sample: RasterSample, cell: Cell, *, losses: bool = False) -> Leve
     ring = np.floor(_RINGS_PER_OCTAVE * np.log2(ground_m)).astype(np.int64)
     columns = np.array([np.log10(ground_m), level_db, gain_db, free_db])
     rings = [columns[:, ring == number] for number in np.unique(ring)]
-    medians = [np.median(one, axis=1) for one in rings if one.shape[1] >= _LEAST_IN_RING]
-    if len(medians) < _LEAST_RINGS:
+    medians = [np.median(one, axis=1) for one in rings if one.shape[1] >= LEAST_IN_RING]
+    if len(medians) < LEAST_RINGS:
         return None
     law = LevelLaw(*np.array(medians).T)
     return law if np.ptp(law.decades) >= _LEAST_DECADES else None
@@ -100,6 +94,11 @@ def level_law(sample: RasterSample, cell: Cell, *, losses: bool = False) -> Leve
 _UNITS = (1.0, 1 / 2, 1 / 4, 1 / 8, 1 / 10, 1 / 16, 1 / 32, 1 / 64, 1 / 100, 1 / 256, 1 / 1000)
 """dB per stored unit that programs write."""
 _USUAL_UNITS = (1 / 16, 1 / 10, 1.0, *_UNITS)
+_UNIT_NAMES = {
+    1 / 16: "sixteenths of a dB as Atoll stores them",
+    1 / 10: "tenths of a dB",
+    1.0: "whole dB",
+}
 _ROUNDED = 0.01
 _LIKELY_TIMES = 1.8
 _USUAL_SLOPE_DB, _USUAL_BELOW_DB = (20.0, 60.0), (-5.0, 75.0)
@@ -145,63 +144,17 @@ def check_factor(
                 f"{np.copysign(other, factor):g} it is {then.slope_db:.0f} dB, and "
                 f"{_beside(then.strongest_db)} free space."
             )
-            findings.add("raster-factor", where, evidence, "error" if strange > 1 else "warning")
+            likely = f"{np.copysign(other, factor):g}"
+            if other in _UNIT_NAMES:
+                likely += f", {_UNIT_NAMES[other]}"
+            remedy = f"Likely {likely}. {REMEDIES['raster-factor']}"
+            severity: Severity = "error" if strange > 1 else "warning"
+            findings.add("raster-factor", where, evidence, severity, remedy)
             return
 
 
-_LOW_TO_HIGH, _SAME_WAY_DEG = 1.4, 10.0
-_LEAST_PAIRS, _MOST_PAIRS = 3, 0.9
-_BETTER_SHARE, _BEYOND_DB = 0.5, 8.0
-
-
-def check_bands(
-    samples: Sequence[RasterSample],
-    plan: CellPlan,
-    quantity: str,
-    where: str,
-    findings: Findings,
-) -> None:
-    """Check that of a sector's two bands the higher one loses more.
-
-    Free space alone costs 20 dB per tenfold frequency, Okumura and Hata's cities 26 to 34. Compared
-    are levels less their EIRP and the antenna's gain, over the same pixels of cells of one site,
-    direction and technology. Samples are as in :func:`check_factor`.
-    """
-    held = {s.cell_id: s for s in samples if s.cell_id in plan and _is_macro(plan[s.cell_id])}
-    by_site: dict[str, list[Cell]] = {}
-    for cell in plan.cells:
-        if cell.id in held and (quantity == "loss" or "eirp_dbm" not in cell.assumes):
-            by_site.setdefault(cell.site, []).append(cell)
-    more, expected, names = list[float](), list[float](), list[str]()
-    for cells in by_site.values():
-        for one, other in combinations(cells, 2):
-            low, high = sorted((one, other), key=lambda cell: cell.frequency_mhz)
-            free_db = 20 * np.log10(high.frequency_mhz / low.frequency_mhz)
-            if high.frequency_mhz < _LOW_TO_HIGH * low.frequency_mhz or not _alike(low, high):
-                continue
-            more_db = _more_db(held[low.id], low, held[high.id], high, losses=quantity == "loss")
-            if more_db is not None:
-                more.append(more_db)
-                expected.append(free_db)
-                names.append(f"{low.id} and {high.id}")
-    if len(more) < _LEAST_PAIRS:
-        return
-    middle_db, usual_db = float(np.median(more)), float(np.median(expected))
-    exchanged = np.array(more) < 0
-    if exchanged.mean() < _MOST_PAIRS or not (
-        -usual_db - _BEYOND_DB < middle_db < -_BETTER_SHARE * usual_db
-    ):
-        return
-    ids = [name for name, wrong in zip(names, exchanged, strict=True) if wrong]
-    evidence = (
-        f"In {int(exchanged.sum())} of {len(more)} pairs the cell of the higher band loses less, "
-        f"by {-middle_db:.0f} dB (median); in free space it loses {usual_db:.0f} dB more."
-    )
-    findings.add("band-labels-swapped", f"{where}, cells {listed(ids, 3)}", evidence, "warning")
-
-
 def _laws(samples: Sequence[RasterSample], plan: CellPlan, *, losses: bool) -> list[LevelLaw]:
-    cells: Mapping[str, Cell] = {cell.id: cell for cell in plan.cells if _is_macro(cell)}
+    cells: Mapping[str, Cell] = {cell.id: cell for cell in plan.cells if is_macro(cell)}
     laws = [
         level_law(sample, cell, losses=losses)
         for sample in samples
@@ -240,31 +193,12 @@ def _beside(below_db: float) -> str:
     return f"{abs(below_db):.0f} dB {'below' if below_db >= 0 else 'above'} those of"
 
 
-def _is_macro(cell: Cell) -> bool:
+def is_macro(cell: Cell) -> bool:
+    """Return whether a cell has a mast of known height outdoors."""
     return not cell.indoor and "height_m" not in cell.assumes
 
 
-def _alike(one: Cell, other: Cell) -> bool:
-    if one.technology != other.technology or (one.azimuth_deg is None) != (
-        other.azimuth_deg is None
-    ):
-        return False
-    turned_deg = ((one.azimuth_deg or 0.0) - (other.azimuth_deg or 0.0) + 180.0) % 360.0 - 180.0
-    return abs(turned_deg) <= _SAME_WAY_DEG
-
-
-def _thinned(sample: RasterSample) -> RasterSample:
-    """Return every second, third... pixel each way of a sample of many."""
-    step = math.ceil(math.sqrt(max(sample.values.size, 1) / _MANY_PX))
-    values, grid = sample.values[::step, ::step], sample.lattice
-    side_m = grid.resolution_m
-    shift_m = (0.5 - step / 2) * side_m
-    west_m, north_m = grid.west_m + shift_m, grid.north_m - shift_m
-    lattice = Lattice(grid.crs, west_m, north_m, side_m * step, *values.shape)
-    return replace(sample, values=values, lattice=lattice)
-
-
-def _lobe(sample: RasterSample, cell: Cell) -> tuple[Floats, Bools]:
+def lobe(sample: RasterSample, cell: Cell) -> tuple[Floats, Bools]:
     """Return the distance of every pixel (m), and which are known and in the main lobe."""
     ground_m, azimuth_deg = sample.seen_from(cell.east_m, cell.north_m)
     used = ~np.isnan(sample.values) & (ground_m >= _FROM_M)
@@ -272,27 +206,3 @@ def _lobe(sample: RasterSample, cell: Cell) -> tuple[Floats, Bools]:
         off_deg = (azimuth_deg - cell.azimuth_deg + 180.0) % 360.0 - 180.0
         used &= np.abs(off_deg) <= cell.beamwidth_deg / 2
     return ground_m, used
-
-
-def _more_db(
-    low_sample: RasterSample,
-    low: Cell,
-    high_sample: RasterSample,
-    high: Cell,
-    *,
-    losses: bool,
-) -> float | None:
-    """Return by how much more the high band loses than the low one; the median in the lobe."""
-    if low_sample.lattice != high_sample.lattice:
-        return None
-    low_sample, high_sample = _thinned(low_sample), _thinned(high_sample)
-    used = _lobe(low_sample, low)[1] & ~np.isnan(high_sample.values)
-    if used.sum() < _LEAST_RINGS * _LEAST_IN_RING:
-        return None
-    east_m, north_m = low_sample.positions_m()
-    lost = []
-    for sample, cell in ((low_sample, low), (high_sample, high)):
-        gain_db = gain_by_plan_db(cell, sample.lattice.crs, east_m[used], north_m[used])
-        power_db = (0.0 if losses else cell.eirp_dbm) + (0.0 if gain_db is None else gain_db)
-        lost.append(power_db - sample.values[used])
-    return float(np.median(lost[1] - lost[0]))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from mapfilter.rasters.undeclared import nodata_taken_as_level
 MOST_PX = 1 << 22
 """Larger rasters are looked at in a square of so many pixels about the site."""
 _SAMPLED_SIDE_PX = 600
+MANY_PX = 1 << 16
+"""As many pixels tell statistics of a raster as well as all of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +59,8 @@ class RasterSample:
 
     def seen_from(self, east_m: float, north_m: float) -> tuple[Floats, Floats]:
         """Return distance (m) and azimuth (degrees from true north) of every sampled pixel."""
-        east, north = self.positions_m()
+        rows, cols = np.ogrid[: self.lattice.rows, : self.lattice.cols]
+        east, north = self.lattice.east_north(rows, cols)
         lon, lat = unproject(self.lattice.crs, east_m, north_m)
         convergence_rad = grid_convergence_rad(self.lattice.crs, float(lon), float(lat))
         heading_rad = np.arctan2(north - north_m, east - east_m)
@@ -87,6 +91,17 @@ def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> Ras
         part.crs, part.west_m + shift_m, part.north_m - shift_m, side_m * step, *values.shape
     )
     return RasterSample(cell_id, lattice, values, checksum, nodata)
+
+
+def thinned(sample: RasterSample) -> RasterSample:
+    """Return every second, third... pixel each way of a sample of many."""
+    step = math.ceil(math.sqrt(max(sample.values.size, 1) / MANY_PX))
+    values, grid = sample.values[::step, ::step], sample.lattice
+    side_m = grid.resolution_m
+    shift_m = (0.5 - step / 2) * side_m
+    west_m, north_m = grid.west_m + shift_m, grid.north_m - shift_m
+    lattice = Lattice(grid.crs, west_m, north_m, side_m * step, *values.shape)
+    return replace(sample, values=values, lattice=lattice)
 
 
 def _window(lattice: Lattice, cell: Cell | None) -> tuple[int, int, int, int]:

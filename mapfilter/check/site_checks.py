@@ -20,7 +20,7 @@ from mapfilter.check.findings import Findings
 from mapfilter.check.lobes import Lobe, azimuth_mistakes, find_lobe
 from mapfilter.check.place_fits import fits_with_antenna, in_squares, place_fits, places_to_try
 from mapfilter.check.raster_checks import above_free_space_db, falls_with_distance
-from mapfilter.check.samples import RasterSample
+from mapfilter.check.samples import RasterSample, thinned
 from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
 
@@ -243,6 +243,7 @@ def _check_turned(
     seen: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
 ) -> bool:
     """Find rasters that fit their sites much better when they are turned."""
+    seen = [thinned(sample) for sample in seen]
     given = _mean_fall(seen, plan)
     best: tuple[float, str] | None = None
     for words, turn in _TURNS:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Annotated, get_args
 
@@ -34,7 +36,7 @@ from mapfilter.cli.options import (
     undrawn,
     walk_changes,
 )
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, already_noted, fail
 from mapfilter.tracks.schema import Without
 from mapfilter.workflows.progress_bars import progress_bar, stage_bar
 from mapfilter.workflows.terminal import print_message, print_result, print_text
@@ -247,15 +249,29 @@ def replay(
         if config is None and (taken := unnamed_database(loaded)) is not None:
             print_message(f"no --db: the database is {taken}")
         folder = (out or loaded.output.dir / "replay").absolute()
-        with progress_bar("replay") as progress:
+        printed: dict[str, None] = {}
+        with progress_bar("replay") as progress, already_noted(printed):
             result = run_replay(
-                loaded, folder, html=html, beside=True, drawers=drawers, progress=progress
+                loaded,
+                folder,
+                html=html,
+                beside=True,
+                drawers=drawers,
+                progress=progress,
+                on_notes=partial(_print_notes, printed),
             )
         figures = replay_figures(result)
         print_result(figures if as_json else replay_text(figures), as_json)
-        for note in dict.fromkeys(figures["notes"]):
-            print_message(note, "note: ")
+        _print_notes(printed, figures["notes"])
         for warning in result.warnings:
             print_message(warning)
         if result.partial:
             raise typer.Exit(PARTIAL)
+
+
+def _print_notes(printed: dict[str, None], notes: Sequence[str]) -> None:
+    """Print each note that has not been printed, and remember it."""
+    for note in notes:
+        if note not in printed:
+            printed[note] = None
+            print_message(note, "note: ")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, listed
+from mapfilter.filters.contract import Status
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NO_MOTION = "no motion"
+
+_WIDEST_PX_M = 10.0
+"""Pixels of the database that ways are followed on; on those of 15 m few drives were located."""
 
 _BY_CELLS = ("candidate", "grid")
 _BY_STREETS = "the filter bayes starts by the streets alone"
@@ -96,6 +100,36 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
             "filter.bayes.vehicle = true"
         )
     return tuple(notes)
+
+
+def coarse_pixels_note(
+    options: Any, estimate: TrackEstimate, database: RadioRouteDatabase | None
+) -> tuple[str, ...]:
+    """Return a note where a map's pixels are too coarse and a log was lost; empty otherwise.
+
+    The map weighs positions some metres beside a way. Pixels that are wider than the ways put
+    positions on a way beside it, as if all of the map were wrong.
+
+    Parameters
+    ----------
+    options
+        Of the filter.
+    """
+    if database is None or not isinstance(options, BayesFilter) or not estimate.status:
+        return ()
+    pixel_m = database.lattice.resolution_m
+    if pixel_m <= _WIDEST_PX_M:
+        return ()
+    gone = [status in (Status.LOST, Status.OUTSIDE) for status in estimate.status]
+    if not gone[-1] and 2 * sum(gone) <= len(gone):
+        return ()
+    share = sum(gone) / len(gone)
+    return (
+        f"{Status.LOST} or {Status.OUTSIDE} in {share:.0%} of the epochs (likely: pixels of "
+        f"{pixel_m:g} m in the database, on which ways cannot be followed; build it on pixels of "
+        f"{_WIDEST_PX_M:g} m or less, with rasters.resolution_m and rasters.resampling = "
+        '"bilinear", or area.resolution_m for predicted rasters)',
+    )
 
 
 def lacking(

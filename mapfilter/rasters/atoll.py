@@ -105,6 +105,13 @@ def find_index(folder: Path) -> Path | None:
     return found[0] if found else None
 
 
+def index_of(path: Path) -> Path | None:
+    """Return the index of a set of rasters: its path, or one in that folder; None without one."""
+    if path.is_dir():
+        return find_index(path)
+    return path if path.suffix.lower() in INDEX_SUFFIXES else None
+
+
 def read_index(path: Path) -> tuple[IndexRow, ...]:
     """Read an index of rasters.
 

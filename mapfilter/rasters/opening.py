@@ -18,7 +18,7 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.ascii_grids import open_ascii_grid
-from mapfilter.rasters.atoll import INDEX_SUFFIXES, IndexRow, find_index, read_index
+from mapfilter.rasters.atoll import IndexRow, index_of, read_index
 from mapfilter.rasters.files import (
     Declared,
     Quantity,
@@ -101,10 +101,9 @@ def open_rasters(
     _check_options(crs, factor, nodata, resolution_m)
     crs = projected_crs(crs, "rasters, crs") if crs is not None else None
     declared = Declared(crs, nodata, float(factor))
-    index = find_index(path) if path.is_dir() else None
-    if path.suffix.lower() in INDEX_SUFFIXES and not path.is_dir():
+    index = index_of(path)
+    if index == path:
         check_file(path)
-        index = path
     sources: list[tuple[Path, IndexRow | None]] = [(path, None)]
     if index is not None:
         sources = [(row.path, row) for row in read_index(index)]

@@ -24,6 +24,9 @@ from mapfilter.tracks.table_files import SEPARATORS, as_frame
 
 FOLDER = "sensors"
 
+MOTION_TABLES = frozenset({"motion", "odometry", "poses", "steps", "accelerometer"})
+"""Tables of recordings of which motion is made."""
+
 SENSOR_COLUMNS: dict[str, tuple[str, ...]] = {
     "accelerometer": ("time_s", "x_mps2", "y_mps2", "z_mps2"),
     "linear_acceleration": ("time_s", "x_mps2", "y_mps2", "z_mps2"),

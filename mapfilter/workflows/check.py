@@ -12,11 +12,14 @@ from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
+from mapfilter.check.band_law import check_bands
+from mapfilter.check.datum_shift import plan_by_datum
 from mapfilter.check.extent_checks import check_extents
 from mapfilter.check.fills import check_fills
 from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.identity_checks import check_identities
-from mapfilter.check.level_law import check_bands, check_factor
+from mapfilter.check.index_order import plan_by_index
+from mapfilter.check.level_law import check_factor
 from mapfilter.check.raster_checks import (
     check_ids,
     is_surveyed,
@@ -33,6 +36,7 @@ from mapfilter.propagation.remarks import high_antennas, off_frequency, upward_t
 from mapfilter.radio.arrange_cells import UNUSED_COLUMNS
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.atoll import index_of
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -234,11 +238,14 @@ class _Checks:
                 # Of levels that may mean no data, sites are not judged.
                 samples = []
         outside = check_sites(plan, rasters.lattice, self.plan_name, findings, strongest_dbm)
+        if (index := index_of(rasters.path)) is not None:
+            plan = plan_by_index(samples, rasters.cell_ids, plan, index, findings)
         # Where a raster lies elsewhere, it tells nothing of its site.
         outside |= check_extents(rasters, plan, findings)
         if is_surveyed(rasters):
             # Measured along some ways only: without lobes, and without the plan's EIRP.
             return
+        plan = plan_by_datum(samples, plan, outside, f"{self.plan_name} and {where}", findings)
         in_place = check_against_sites(samples, plan, outside, where, findings)
         if as_declared:
             check_factor(in_place, plan, rasters.factor, quantity, where, findings)

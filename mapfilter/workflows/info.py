@@ -66,6 +66,10 @@ def run_info(path: Path) -> dict[str, Any]:
         return found
     if found := _recordings_info(_recordings_in(path), _USE_OF_FOLDERS):
         return found
+    from mapfilter.workflows.info_tables import tables_info
+
+    if found := tables_info(path):
+        return found
     inner = sorted(p.name for p in path.iterdir() if not p.name.startswith("."))
     hint = f"name one of {', '.join(inner)[:200]}" if inner else "an empty folder"
     from mapfilter.rasters.opening import is_raster_folder

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
@@ -21,7 +22,6 @@ from mapfilter.evaluation.accuracy import accuracy, held_by_radius_95
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.evaluation.truth import Truth
-from mapfilter.evaluation.truth_notes import truth_notes
 from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
@@ -48,7 +48,7 @@ from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.planned_cells import cells_beside_log, plan_antennas
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports
-from mapfilter.workflows.replay_lacks import early_end_note, fixes_note, lack_of, pause_note
+from mapfilter.workflows.replay_lacks import lack_of, notes_after
 from mapfilter.workflows.replay_logs import ReplayLogs
 from mapfilter.workflows.replayed import (
     ReplayedLog,
@@ -86,6 +86,7 @@ def run_replay(
     beside: bool = False,
     drawers: Executor | None = None,
     progress: Progress | None = None,
+    on_notes: Callable[[tuple[str, ...]], None] | None = None,
 ) -> ReplayResult:
     """Locate the log or logs of a configuration and write estimates, figures and pictures.
 
@@ -105,6 +106,8 @@ def run_replay(
         What draws, where it was started before (``workflows.drawer``).
     progress : callable, optional
         Called with logs done and logs in all.
+    on_notes : callable, optional
+        Called before a log is located with its notes known then; not where there are several logs.
 
     Raises
     ------
@@ -161,6 +164,8 @@ def run_replay(
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
         notes = (*notes, *assumed_note(log, fitted, filter_.uses))
         log = replace(log, notes=(*log.notes, *notes))
+        if on_notes is not None and count == 1:
+            on_notes(log.notes)
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
         recorder = None
@@ -194,14 +199,12 @@ def run_replay(
         if shown is not None:
             beside_m = baseline.error_m if baseline is not None else None
             pictures = with_error_picture(pictures, shown, drawing, beside_m)
-        if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
-            log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
-        if truth is not None:
-            log = replace(log, notes=(*log.notes, *truth_notes(track.estimate, truth)))
-        fixes = fixes_note(opened, log, config.track.truth, filter_.uses, track.estimate)
-        ends = early_end_note(opened, track.estimate, over_map=database is not None)
-        pauses = pause_note(track.estimate)
-        log = replace(log, notes=(*log.notes, *fixes, *pauses, *ends))
+        alone = database is not None and (STREETS_ALONE in notes or not database.cell_ids)
+        advice = advice_of(log, fitted, track.estimate) if alone else ()
+        later = notes_after(
+            opened, log, fitted, track.estimate, database, config.track.truth, filter_.uses
+        )
+        log = replace(log, notes=(*log.notes, *advice, *later))
         lack = lack_of(opened, log, options, track.estimate, database)
         written = _write(name, log, track, into, pictures, lack, baseline)
         if recorder is not None:

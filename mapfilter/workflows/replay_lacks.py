@@ -12,11 +12,18 @@ import numpy as np
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, listed
 from mapfilter.evaluation.outcome import pauses_s
+from mapfilter.evaluation.truth import Truth
+from mapfilter.evaluation.truth_notes import truth_notes
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import same_crs, short_crs
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.log_lacks import NO_MOTION, check_places, lack_of_log
+from mapfilter.positioning.log_lacks import (
+    NO_MOTION,
+    check_places,
+    coarse_pixels_note,
+    lack_of_log,
+)
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.log_checks import ends_early
 from mapfilter.tracks.open_log import OpenedLog
@@ -109,6 +116,29 @@ def columns_of_motion(opened: OpenedLog) -> str:
         unread = [name for name in one.unread if name not in found]
         text += f", columns not used: {listed(unread)} (--column)" if unread else ""
     return text
+
+
+def notes_after(
+    opened: OpenedLog,
+    log: TrackLog,
+    options: Any,
+    estimate: TrackEstimate,
+    database: RadioRouteDatabase | None,
+    truth: Collection[Path],
+    uses: Collection[str],
+) -> tuple[str, ...]:
+    """Return the notes on a log that are known only after it was located.
+
+    Parameters are those of :func:`lack_of` and :func:`fixes_note`.
+    """
+    path = Truth.of_table(log.truth)
+    return (
+        *(() if path is None else truth_notes(estimate, path)),
+        *fixes_note(opened, log, truth, uses, estimate),
+        *pause_note(estimate),
+        *early_end_note(opened, estimate, over_map=database is not None),
+        *coarse_pixels_note(options, estimate, database),
+    )
 
 
 def fixes_note(

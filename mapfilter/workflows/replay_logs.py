@@ -17,12 +17,11 @@ from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
 from mapfilter.tracks.refused_motion import AS_HEADING, note_refused
 from mapfilter.tracks.schema import TABLES
+from mapfilter.tracks.sensors import MOTION_TABLES
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.replay_lacks import check_log
 
 _MOST_KEPT_ROWS = 1_000_000
-_MOVED = {"motion", "odometry", "poses", "steps", "accelerometer"}
-"""Tables of recordings of which motion is made."""
 
 _UNREAD, _DEGREES = ": not used: ", ("lat_deg", "lon_deg")
 """How a note begins on rows that were left out, and the columns of positions."""
@@ -92,7 +91,7 @@ class ReplayLogs:
                 mended = f"convert the recording again with {fault.option}, or write {AS_HEADING}"
             return mended, f"--factor {fault.column}=1"
 
-        moved = [one.path for one in opened.recordings if _MOVED & set(one.tables)] or [path]
+        moved = [one.path for one in opened.recordings if MOTION_TABLES & set(one.tables)] or [path]
         given = self.config.track.factors.given
         note_refused(opened.log, given, ", ".join(map(str, moved)), mends, faults)
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from check_world import CRS
 
+from mapfilter.check.band_law import check_bands
 from mapfilter.check.findings import Findings
-from mapfilter.check.level_law import check_bands, check_factor, level_law
+from mapfilter.check.level_law import check_factor, level_law
 from mapfilter.check.samples import RasterSample
 from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import PredictionModel
@@ -76,6 +77,8 @@ class TestFactor:
         assert found.severity == "warning"
         assert found.evidence.startswith(f"rasters.factor = {sign * 0.05:g} is no usual unit.")
         assert f"With {sign * 0.0625:g} it is " in found.evidence
+        likely = f"Likely {sign * 0.0625:g}, sixteenths of a dB as Atoll stores them. Set "
+        assert found.remedy.startswith(likely)
 
     @pytest.mark.parametrize("factor", [1.0, 1 / 16, 0.063, 0.1, 0.01, -1.0])
     @pytest.mark.parametrize(

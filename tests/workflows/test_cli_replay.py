@@ -4,8 +4,10 @@ import json
 import os
 import re
 import signal
+import sys
 import time
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -23,6 +25,7 @@ from command_line import (
 
 import mapfilter as mf
 from mapfilter.config.load import load_config
+from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
@@ -209,6 +212,24 @@ def test_notes_of_a_log_are_told(log, replay):
     # Each of them once, with --json as without.
     for one in (done, replay(log, "--json")):
         assert one.err.splitlines() == [f"mapfilter: note: {note}" for note in told]
+
+
+def test_notes_known_before_are_printed_before_a_log_is_located(log, replay, monkeypatch):
+    (log / "motion.txt").write_text("")
+    note, before = f"{log / 'motion.txt'}: not a table of a log, not read", []
+
+    def located(*args, **options):
+        before.append(sys.stderr.getvalue())
+        return locate(*args, **options)
+
+    monkeypatch.setattr(workflow, "locate", located)
+    done = assert_done(replay(log))
+    assert before == [f"mapfilter: note: {note}\n"]
+    assert done.err.count(note) == 1
+
+    refused = fail(InputError, "motion.csv", "steps", "none")
+    monkeypatch.setattr(workflow, "locate", Mock(side_effect=refused))
+    assert_refused(replay(log), note, "found none")
 
 
 def test_a_ground_truth_that_begins_after_the_switch_tells_nothing_of_it(log, replay, tmp_path):

@@ -179,6 +179,31 @@ def test_a_folder_of_recordings(tmp_path):
     assert_refused(mapfilter("info", tmp_path / "all"), "name one of day")
 
 
+def test_tables_without_a_head_are_described_with_what_is_lacking(tmp_path):
+    (tmp_path / "obd.csv").write_text("time,wheel_speed_kmh\n1780200000,3\n1780200001,4\n")
+    (tmp_path / "truth.csv").write_text(
+        "time,lat,lon\n1780200000,49.81,9.31\n1780200001,49.81,9.31\n"
+    )
+    (tmp_path / "mood.csv").write_text("hour,mood\n1,good\n")
+    found = info(tmp_path)
+    assert found == {
+        "kind": "tables",
+        "tables": {
+            "mood.csv": "1 row of hour, mood",
+            "obd.csv": "odometry: 2 rows",
+            "truth.csv": "positions: 2 rows",
+        },
+        "lacking": [
+            "log.json with the CRS, beside truth.csv, for a track log",
+            "cells with levels, or positions",
+        ],
+        "use": "mapfilter replay --db DB --log obd.csv --truth truth.csv",
+    }
+    (tmp_path / "obd.csv").write_text("time,wheel_speed_kmh\n")
+    found = info(tmp_path)
+    assert "motion: steps, speeds or an odometer" in found["lacking"]
+
+
 def test_an_output_folder_names_what_it_holds(world):
     assert_refused(mapfilter("info", world.out), "name one of ", "database, journeys")
 
