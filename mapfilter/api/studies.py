@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import fields
 from functools import partial
 from math import nan
@@ -94,8 +94,8 @@ def sweep(
     filters : mapping of str to options, a class, or the name of a filter
         Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``. A custom
         filter is its class, or a function that makes it of a database, or the name of one,
-        ``"my_module:MyFilter"``. The workers of an executor have to import it: one that is defined
-        in a notebook runs in this process alone.
+        ``"my_module:MyFilter"``. Workers in processes of their own have to import it: one that is
+        defined in a notebook runs in this process alone, also in its threads.
     noises : sequence of ImuNoise, or one, optional
         See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations. Errors of a
         gyro may differ only where a custom filter uses turns (``turns="gyro"``).
@@ -147,7 +147,8 @@ def sweep(
     reports = reports or ReportModel()
     radio = Radio() if reports.radio == AS_PREDICTED else Radio("ground truth", nan)
     journey = JourneyPlan(length_m=length_m, profile=profile, walker=walker or WalkerModel())
-    readings = _readings(filters, here=executor is None)
+    here = executor is None or isinstance(executor, ThreadPoolExecutor)
+    readings = _readings(filters, here=here)
     plans = [
         SweepPlan(
             readings,

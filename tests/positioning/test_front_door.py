@@ -3,7 +3,7 @@
 
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -467,11 +467,12 @@ def test_a_sweep_takes_the_class_of_a_filter(database, rasters, streets):
         pd.testing.assert_frame_equal(found.drop(columns="filter"), by_name.drop(columns="filter"))
         known = mf.locate(walk_log(), database, made).estimate
         assert known.filter == found["filter"].iloc[0]
-    with ThreadPoolExecutor(1) as executor:
-        found = mf.sweep(database, rasters, streets, {"mine": Centre}, executor=executor, **given)
+    with ThreadPoolExecutor(2) as executor:
+        found = mf.sweep(database, rasters, streets, {"mine": Local}, executor=executor, **given)
         pd.testing.assert_frame_equal(
             found.runs.drop(columns="filter"), by_name.drop(columns="filter")
         )
+    with ProcessPoolExecutor(1) as executor:
         for nameless in (Local, lambda area: Centre(area), partial(Local)):
             with pytest.raises(mf.MapfilterError, match=r"can import, .*in?to a file of its own"):
                 mf.sweep(database, rasters, streets, {"mine": nameless}, executor=executor)
