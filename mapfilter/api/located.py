@@ -30,9 +30,11 @@ from mapfilter.positioning.integrity import DEFAULT_RISK
 from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.positioning.log_lacks import (
     NO_MOTION,
+    POSITIONS_ALONE,
     advice_of,
     check_places,
     coarse_pixels_note,
+    follows_positions,
     lack_of_log,
 )
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
@@ -243,14 +245,19 @@ def locate(
     return Track(found, log, database, trace)
 
 
+_COURSE_MOTION = "mf.read_log makes it of a recording's positions with course_motion=True"
+
+
 def _not_located(
     log: TrackLog, options: Any, estimate: TrackEstimate, database: RadioRouteDatabase | None
 ) -> tuple[str, ...]:
-    """Return a note on what a log lacks that was not located, with a remedy."""
+    """Return a note on what a log lacks that was not located, or not by motion; with a remedy."""
+    if follows_positions(log, options, estimate):
+        return (f"{POSITIONS_ALONE} ({_COURSE_MOTION})",)
     lack = lack_of_log(log, options, estimate, database)
     remedies = []
     if NO_MOTION in lack and max(len(log.gnss), len(log.truth)) > 1:
-        remedies.append("mf.read_log makes it of a recording's positions with course_motion=True")
+        remedies.append(_COURSE_MOTION)
     if NO_MOTION in lack and len(log.radio):
         remedies.append("mf.locate_reports needs none")
     if NO_MOTION in lack and len(log.gnss):

@@ -73,7 +73,14 @@ class JourneyTrack:
 
 
 def placed(log: TrackLog, track: JourneyTrack) -> Placed:
-    """Return the reports of a log where a track has them."""
+    """Return the reports of a log where a track has them.
+
+    Reports that alone tell where they were heard prove nothing: their positions are unknown.
+    """
     merged = epochs(log)
     time_s = np.array([epoch.time_s for epoch in merged])
-    return Placed(merged, *track.at(time_s))
+    east_m, north_m, radius_m = track.at(time_s)
+    others = len(log.gnss) + len(log.truth) + len(log.pseudoranges)
+    if not others and not log.motion["step_m"].notna().any():
+        radius_m = np.full_like(radius_m, np.inf)
+    return Placed(merged, east_m, north_m, radius_m)

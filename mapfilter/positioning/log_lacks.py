@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NO_MOTION = "no motion"
+POSITIONS_ALONE = f"{NO_MOTION}: positions alone are followed"
 
 _WIDEST_PX_M = 10.0
 """Pixels of the database that ways are followed on; on those of 15 m few drives were located."""
@@ -63,6 +64,13 @@ def lack_of_log(
     if lack and name in _BY_CELLS and alone:
         return f"{lack} ({_BY_STREETS})"
     return lack
+
+
+def follows_positions(log: TrackLog, options: Any, estimate: TrackEstimate) -> bool:
+    """Return whether a map filter located a log without motion, by its positions alone."""
+    if estimate.converged_at is None or not isinstance(options, BayesFilter):
+        return False
+    return not log.motion["step_m"].notna().any()
 
 
 def _unused_ranges(log: TrackLog) -> str:

@@ -20,8 +20,10 @@ from mapfilter.lattice import Lattice
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.log_lacks import (
     NO_MOTION,
+    POSITIONS_ALONE,
     check_places,
     coarse_pixels_note,
+    follows_positions,
     lack_of_log,
 )
 from mapfilter.tracks.log import TrackLog
@@ -99,6 +101,17 @@ def lack_of(
     return f"{lack}{hint}{columns_of_motion(opened)}"
 
 
+def _motion_note(
+    opened: OpenedLog, log: TrackLog, options: Any, estimate: TrackEstimate
+) -> tuple[str, ...]:
+    """Return a note on a log without motion that was located by its positions."""
+    if not follows_positions(log, options, estimate):
+        return ()
+    source = receiver_motion(opened)
+    made = f" (--course-motion, track.course_motion, makes it from {source})" if source else ""
+    return (f"{POSITIONS_ALONE}{made}{columns_of_motion(opened)}",)
+
+
 def columns_of_motion(opened: OpenedLog) -> str:
     """Return which columns of motion tables were looked for, and which others there are."""
     if not opened.recordings:
@@ -135,6 +148,7 @@ def notes_after(
     return (
         *(() if path is None else truth_notes(estimate, path)),
         *fixes_note(opened, log, truth, uses, estimate),
+        *_motion_note(opened, log, options, estimate),
         *pause_note(estimate),
         *early_end_note(opened, estimate, over_map=database is not None),
         *coarse_pixels_note(options, estimate, database),

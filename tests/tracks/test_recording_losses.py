@@ -85,7 +85,7 @@ def test_a_few_levels_out_of_range_and_bad_rows_are_notes_of_the_log(walk, read)
         "phone.csv: not used: 1 row: lat_deg: not degrees in -90..90",
         "phone.csv: radio, level_dbm: 1 value is not dBm in -200..0, ignored (first in line 5)",
         "phone.csv: compass_deg: 1 value is no number, taken as missing",
-        "phone.csv: columns not used: mood; see --column",
+        "phone.csv: columns not used: mood; see columns",
         "phone.csv: radio: times go backwards in 1 place; sorted",
         "phone.csv: radio: 1 exact duplicate row dropped",
     ):
