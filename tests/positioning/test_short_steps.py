@@ -11,7 +11,7 @@ from made_town import CRS, Town, slowed, walk_log
 
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
 from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.sensors.short_steps import LEAST_M, ShortSteps
 from mapfilter.serving import state_file
@@ -122,6 +122,8 @@ def test_a_rest_goes_on_in_what_waits():
     [
         {"radio": (ReportRow("serving", "A", None, None, -70.0, 0, nan),)},
         {"fix": GnssFix(0.0, 0.0, 9.0, 9.0, 0.0)},
+        {"ranges": (Pseudorange("G01", 2e7, 3.0, (2e7, 0.0, 0.0)),)},
+        {"differences": (Difference("A", "B", 40.0, 10.0),)},
     ],
 )
 def test_nothing_waits_for_what_is_measured(measured):
