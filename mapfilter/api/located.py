@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     import geopandas as gpd
     from matplotlib.axes import Axes
 
+_COURSE_MOTION = "mf.read_log makes it of a recording's positions with course_motion=True"
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Track:
@@ -243,9 +245,6 @@ def locate(
     notes += coarse_pixels_note(options, found.estimate, database)
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     return Track(found, log, database, trace)
-
-
-_COURSE_MOTION = "mf.read_log makes it of a recording's positions with course_motion=True"
 
 
 def _not_located(

@@ -91,8 +91,8 @@ def lack_of(
     if NO_MOTION not in lack:
         return lack
     remedies = []
-    if source := receiver_motion(opened):
-        remedies.append(f"--course-motion, track.course_motion, makes it from {source}")
+    if made := _made_of_course(opened):
+        remedies.append(made)
     if len(log.radio) and (database is None or database.cell_ids):
         remedies.append("mapfilter locate needs none")
     if len(log.gnss):
@@ -107,9 +107,14 @@ def _motion_note(
     """Return a note on a log without motion that was located by its positions."""
     if not follows_positions(log, options, estimate):
         return ()
+    made = _made_of_course(opened)
+    hint = f" ({made})" if made else ""
+    return (f"{POSITIONS_ALONE}{hint}{columns_of_motion(opened)}",)
+
+
+def _made_of_course(opened: OpenedLog) -> str:
     source = receiver_motion(opened)
-    made = f" (--course-motion, track.course_motion, makes it from {source})" if source else ""
-    return (f"{POSITIONS_ALONE}{made}{columns_of_motion(opened)}",)
+    return f"--course-motion, track.course_motion, makes it from {source}" if source else ""
 
 
 def columns_of_motion(opened: OpenedLog) -> str:

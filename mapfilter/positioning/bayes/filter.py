@@ -50,6 +50,7 @@ from mapfilter.positioning.step_output import StepOutput, UnusedReading
 
 _LEAST_AT_START = 0.8
 """Share of a known start within 50 m from which on it is one place, and tracked."""
+_POSITIONS = frozenset[Kind]({"gnss", "pseudorange"})
 _TOLD_ELSEWHERE = (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING, Reason.STALE_RADIO)
 
 
@@ -269,9 +270,6 @@ class BayesPositioner(Filter[BayesState]):
             belief.state[1].astype(np.float64) + south,
             belief.weight.astype(np.float64),
         )
-
-
-_POSITIONS = frozenset[Kind]({"gnss", "pseudorange"})
 
 
 def _tracked(state: BayesState) -> BayesState:

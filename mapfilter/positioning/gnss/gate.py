@@ -169,6 +169,7 @@ class GnssGate:
                 return found.without("gnss", [""], why, state=state, compared=True)
         gone_m = travelled_m - state.fix_used_at_m
         times = max(options.fix_memory_m / max(gone_m, _MIN_MOVED_M), 1.0)
+        # A belief that has grown wider than a fix is no more precise by its error than the fix.
         times = min(times, repeated(belief, widened(fix, 1.0)))
         # What it adds is little where its error is that of the one before, and less where fixes are
         # less precise than they state. Neither makes one that is far away agree.

@@ -74,6 +74,8 @@ class SensorWatch(NamedTuple):
     has_motion : bool
         Whether motion is measured, as far as is known; False for a log without any, and as long
         as there was none though positions have moved.
+    short : ShortSteps
+        Steps that wait until they are long enough.
     """
 
     pace: Pace = Pace()
