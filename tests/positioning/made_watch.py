@@ -2,7 +2,8 @@
 
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 
 STEP = (MotionStep(1.4, 0.0),)
 NO_STEP = (MotionStep(float("nan"), 0.0),)

@@ -15,7 +15,8 @@ from mapfilter.positioning.gnss.fixes import FixTerm, RejectedFixTerm
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.sensors.places import Places
 from mapfilter.positioning.sensors.rest import Rest
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 from mapfilter.tracks.log import make_log
 
 

@@ -12,7 +12,8 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.sensors.impossible_steps import without_impossible
 from mapfilter.positioning.sensors.pace import Pace
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 
 SMALL = BayesFilter(max_particles=1500, min_search_particles=800, min_particles=300)
 WALKER = Pace(100.0, 100.0, 100, 1.0, 0.0, False, 1.4, 1.4, 2.0)

@@ -11,7 +11,8 @@ from mapfilter.positioning.sensors.pace import Going, Pace
 from mapfilter.positioning.sensors.pauses import RowTimes, unrecorded_s
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.unmeasured import spread_m2
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 
 HEARD = (ReportRow("serving", "A", None, None, -70.0, False),)
 ALWAYS = Pace(100.0, 100.0, 100, 1.0, rests=True, speed_mps=1.4, recent_mps=1.4, fastest_mps=2.0)

@@ -11,7 +11,7 @@ from made_town import Town, walk_log
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import UpdateInfo
 from mapfilter.geodesy import wrap_rad
-from mapfilter.positioning.bayes import moving
+from mapfilter.positioning.bayes import own_draws
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -20,7 +20,6 @@ from mapfilter.positioning.bayes.held import (
     after_takeover,
     is_ahead,
     jumps,
-    own_rng,
     still_open,
     winner,
 )
@@ -29,6 +28,7 @@ from mapfilter.positioning.bayes.hold_rules import HoldRules
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.own_draws import own_rng
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.merging import epochs
 from mapfilter.serving.state_file import decode, encode
@@ -256,7 +256,7 @@ def test_few_hypotheses_are_enough_for_beliefs_in_which_the_phone_was_turned():
 
 def test_rows_of_one_time_have_draws_of_their_own(monkeypatch):
     made = []
-    monkeypatch.setattr(moving, "own_rng", lambda *key: made.append(key) or own_rng(*key))
+    monkeypatch.setattr(own_draws, "own_rng", lambda *key: made.append(key) or own_rng(*key))
     state, rng = begun()
     motion = tuple(MotionStep(1.4, heading) for heading in (0.0, 3.0, 3.0, 0.0, 0.0))
     state, _ = WATCHED.step(state, Epoch(1.0, motion), rng)

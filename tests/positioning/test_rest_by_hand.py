@@ -10,7 +10,8 @@ from scipy.stats import multivariate_normal
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.sensors.rest import Rest, _added, _carried, _left, levels_of
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 
 
 def row(cell, level_dbm, role="neighbour", censored=0, **more):

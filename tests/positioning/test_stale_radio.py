@@ -12,7 +12,8 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.loop import locate
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 from mapfilter.tracks.log import make_log
 
 TOWN = Town.of(1)

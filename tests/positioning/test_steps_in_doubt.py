@@ -23,7 +23,8 @@ from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.rest import Rest
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 from mapfilter.serving.state_file import decode, encode
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.speeds import speed_fault

@@ -20,12 +20,12 @@ from mapfilter.positioning.bayes.held import (
     forked,
     is_ahead,
     jumps,
-    own_rng,
     still_open,
     winner,
 )
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.own_draws import Purpose, own_rng
 
 RULES = HoldRules(
     jump_deg=60.0, around_deg=150.0, probability=0.01, around_probability=0.2, mirrored_odds=0.3,
@@ -149,8 +149,8 @@ def test_the_white_noise_of_two_headings_is_in_their_bias():
 
 
 def test_draws_are_of_the_time_and_of_what_they_are_for():
-    def drawn(time_s, salt):
-        return own_rng(time_s, salt).random(3).tolist()
+    def drawn(time_s, purpose):
+        return own_rng(time_s, Purpose(purpose)).random(3).tolist()
 
     assert drawn(12.345, 7) == drawn(12.345, 7) == drawn(12.3451, 7)
     assert drawn(12.345, 7) not in (drawn(12.346, 7), drawn(12.345, 8))

@@ -12,7 +12,8 @@ from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.unmeasured import spread_m2, unmeasured_step
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 
 
 def epoch(time_s, *lengths_m, radio=()):

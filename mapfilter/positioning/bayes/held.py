@@ -30,8 +30,6 @@ from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import HoldRules, RivalRules
 
-_MILLISECONDS, _SEEDS = 1000.0, 2**32
-
 
 @dataclass(frozen=True, eq=False)
 class HeldOtherwise:
@@ -75,11 +73,6 @@ class HeldOtherwise:
         """Return whether its position is another one."""
         own, other = self.belief.summary.mean, main.summary.mean
         return hypot(own[0] - other[0], own[1] - other[1]) > NEAR_M
-
-
-def own_rng(time_s: float, salt: int) -> np.random.Generator:
-    """Return a generator for an epoch, so that the draws of the main belief stay as they are."""
-    return np.random.default_rng((salt, round(_MILLISECONDS * abs(time_s)) % _SEEDS))
 
 
 def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:

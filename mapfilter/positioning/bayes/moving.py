@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import isfinite, nan
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.bayes.alternative import MapBelief
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.belief_changes import (
     carried_on,
     counted_from,
@@ -25,51 +24,17 @@ from mapfilter.positioning.bayes.held import (
     as_measured,
     forked,
     jumps,
-    own_rng,
     still_open,
 )
-from mapfilter.positioning.bayes.mirrored import mirrored_step
-from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.mirrored import MirroredTwin, mirrored_step
+from mapfilter.positioning.bayes.own_draws import OwnDraws
+from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.unaided import without_positions
 from mapfilter.positioning.epochs import Epoch, headed
+from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.step_output import UnusedReading
-
-_FORKED, _MOVED, _AWAY = 1, 2, 4
-"""Salts of the draws of beliefs in which the phone was turned, and of hypotheses carried on."""
-_BEGUN, _UNAIDED = 5, 7
-"""Salts of the draws of the belief without positions."""
-
-
-@dataclass(frozen=True)
-class _OwnDraws:
-    """Generators of an epoch for rivals of the belief.
-
-    Each is made when it is first asked for, which few epochs do: it takes 10 µs.
-    """
-
-    time_s: float
-
-    @cached_property
-    def forking(self) -> np.random.Generator:
-        """For beliefs that begin."""
-        return own_rng(self.time_s, _FORKED)
-
-    @cached_property
-    def beginning(self) -> np.random.Generator:
-        """For a belief without positions that begins."""
-        return own_rng(self.time_s, _BEGUN)
-
-    @cached_property
-    def unaided(self) -> np.random.Generator:
-        """For one that moves."""
-        return own_rng(self.time_s, _UNAIDED)
-
-    @cached_property
-    def moving(self) -> np.random.Generator:
-        """For beliefs that move."""
-        return own_rng(self.time_s, _MOVED)
 
 
 def moved(
@@ -99,138 +64,217 @@ def moved(
     unused : list of UnusedReading
         Motion that was not used.
     """
-    unused: list[UnusedReading] = []
     rested = state.watch.rest if watch.rest is None else None
     if beliefs.may_be_anywhere(state, watch, epoch.time_s):
         state = state.begun_anew()
-    belief, compass, alternative = state.belief, state.compass, state.alternative
-    reckoning, path, heading_rad = state.reckoning, state.path, state.heading_rad
-    twin = state.twin
-    hold, walking_rad, rules = state.hold, state.walking_rad, beliefs.holds
-    held = state.held
-    ranged = any(isfinite(one.range_m) for one in epoch.ranges)
-    positioned = epoch.fix is not None or ranged
-    if ranged:
-        # Pseudoranges are compared with the main belief alone, so there is no doubt of a jump.
-        as_is = (one for one in held if one.hold.is_as_measured)
-        held = () if hold.is_as_measured else tuple(as_is)
-    if not epoch.time_s - state.watch.pace.stepped_s <= rules.longest_pause_s:
-        # Who stood may have turned there.
-        walking_rad = nan
-    own = _OwnDraws(epoch.time_s)
-    # Positions tell whether headings are still read rightly.
-    plain = hold.is_as_measured or any(one.hold.is_as_measured for one in held)
-    if positioned and not plain and isinstance(belief, ParticleBelief):
-        gone_m, white_rad = reckoning.travelled_m, beliefs.model.motion.white_rad
-        if state.status is belief.status is Status.TRACKING:
-            plainly = as_measured(rules, belief, state.null, hold, gone_m, white_rad, own.forking)
-            held = (*held, plainly)
-    unaided = state.unaided
-    if positioned and isinstance(belief, ParticleBelief) and beliefs.positions_lead(state):
-        gone_m, pulls = reckoning.travelled_m, beliefs.pulls
-        alone = without_positions(pulls, belief, state.null, hold, gone_m, own.beginning)
-        unaided = (*unaided, alone)
-    if belief is not None and rested is not None and beliefs.may_have_left(state):
-        gone_s = epoch.time_s - rested.since_s
-        belief = carried_on(belief, rested, gone_s, own_rng(epoch.time_s, _AWAY))
-    # Courses along the ways count from a heading of 0, those of a compass from its headings.
-    by_course = beliefs.followed_ways(state)
-    for raw in epoch.motion:
-        if by_course and belief is not None and isfinite(raw.heading_rad):
-            by_course, held, unaided = False, (), ()
-            belief = counted_from(belief, raw.heading_rad)
-            if alternative is not None:
-                other = counted_from(alternative.belief, raw.heading_rad)
-                alternative = replace(alternative, belief=other)
-        step, heading_rad = headed(raw, heading_rad)
-        if compass and step.turned_sd_rad > 0:
+    move = _Move.of(beliefs, state, epoch, rng)
+    move.begin_rivals()
+    if rested is not None:
+        move.carry_on(rested)
+    for row in epoch.motion:
+        move.by_row(row)
+    return move.after(watch), move.unused
+
+
+@dataclass(slots=True)
+class _Move:
+    """What the motion of an epoch changes, row by row; ``state`` is that before the motion."""
+
+    beliefs: BeliefFilters
+    state: BayesState
+    epoch: Epoch
+    rng: np.random.Generator
+    own: OwnDraws
+    ranged: bool
+    positioned: bool
+    by_course: bool
+    belief: MapBelief | None
+    alternative: AlternativeHypothesis | None
+    twin: MirroredTwin | None
+    held: tuple[HeldOtherwise, ...]
+    unaided: tuple[HeldOtherwise, ...]
+    reckoning: DeadReckoning
+    path: RecentPath
+    heading_rad: float
+    walking_rad: float
+    compass: bool
+    unused: list[UnusedReading]
+
+    @classmethod
+    def of(
+        cls, beliefs: BeliefFilters, state: BayesState, epoch: Epoch, rng: np.random.Generator
+    ) -> _Move:
+        """Return the motion of an epoch before its first row."""
+        ranged = any(isfinite(one.range_m) for one in epoch.ranges)
+        stood_s = epoch.time_s - state.watch.pace.stepped_s
+        return cls(
+            beliefs=beliefs,
+            state=state,
+            epoch=epoch,
+            rng=rng,
+            own=OwnDraws(epoch.time_s),
+            ranged=ranged,
+            positioned=epoch.fix is not None or ranged,
+            # Courses along ways count from a heading of 0, those of a compass from its headings.
+            by_course=beliefs.followed_ways(state),
+            belief=state.belief,
+            alternative=state.alternative,
+            twin=state.twin,
+            held=state.held,
+            unaided=state.unaided,
+            reckoning=state.reckoning,
+            path=state.path,
+            heading_rad=state.heading_rad,
+            # Who stood may have turned there.
+            walking_rad=state.walking_rad if stood_s <= beliefs.holds.longest_pause_s else nan,
+            compass=state.compass,
+            unused=[],
+        )
+
+    def begin_rivals(self) -> None:
+        """Begin beliefs beside the main one that this epoch's positions call for."""
+        belief, hold, gone_m = self.belief, self.state.hold, self.reckoning.travelled_m
+        if self.ranged:
+            # Pseudoranges are compared with the main belief alone, so there is no doubt of a jump.
+            as_is = (one for one in self.held if one.hold.is_as_measured)
+            self.held = () if hold.is_as_measured else tuple(as_is)
+        if not self.positioned or not isinstance(belief, ParticleBelief):
+            return
+        beliefs, null = self.beliefs, self.state.null
+        # Positions tell whether headings are still read rightly.
+        plain = hold.is_as_measured or any(one.hold.is_as_measured for one in self.held)
+        if not plain and self.state.status is belief.status is Status.TRACKING:
+            white_rad, own = beliefs.model.motion.white_rad, self.own.forking
+            plainly = as_measured(beliefs.holds, belief, null, hold, gone_m, white_rad, own)
+            self.held = (*self.held, plainly)
+        if beliefs.positions_lead(self.state):
+            own = self.own.beginning
+            alone = without_positions(beliefs.pulls, belief, null, hold, gone_m, own)
+            self.unaided = (*self.unaided, alone)
+
+    def carry_on(self, rested: Rest) -> None:
+        """Spread the belief over where one may have been carried during a rest that has ended."""
+        if self.belief is not None and self.beliefs.may_have_left(self.state):
+            gone_s = self.epoch.time_s - rested.since_s
+            self.belief = carried_on(self.belief, rested, gone_s, self.own.carrying)
+
+    def by_row(self, row: MotionStep) -> None:
+        """Move everything by one row of motion."""
+        if self.by_course and self.belief is not None and isfinite(row.heading_rad):
+            self._count_from(self.belief, row.heading_rad)
+        measured, self.heading_rad = headed(row, self.heading_rad)
+        if self.compass and measured.turned_sd_rad > 0:
             # A compass tells where the phone points afterwards.
-            step = replace(step, turned_sd_rad=0.0)
-        measured = step
-        step = hold.read(measured)
+            measured = replace(measured, turned_sd_rad=0.0)
+        step = self.state.hold.read(measured)
         why = Reason.NOT_STARTED
-        if beliefs.map_may_start:
-            known = isfinite(raw.heading_rad) == compass or not path.here.travelled_m
-            path = (path if known else RecentPath()).moved(step)
+        if self.beliefs.map_may_start:
+            known = isfinite(row.heading_rad) == self.compass or not self.path.here.travelled_m
+            self.path = (self.path if known else RecentPath()).moved(step)
             why = Reason.USED if isfinite(step.step_m) else Reason.NO_STEP
-        if belief is None:
+        if self.belief is not None:
+            why = self._move_beliefs(self.belief, row, measured, step)
+        elif not isfinite(row.spread_m):
             # An unmeasured way says nothing of the compass.
-            compass = compass if isfinite(raw.spread_m) else isfinite(raw.heading_rad)
-        else:
-            turned = isfinite(raw.heading_rad) or isfinite(raw.spread_m)
-            if compass and not turned and reckoning.travelled_m == 0:
-                # Nothing has moved yet, so headings can still be relative to the first one.
-                compass, belief = False, beliefs.without_compass(belief, rng)
-                # What began beside it has headings of a compass.
-                unaided = ()
-            predict = beliefs.moving_filter(state, compass=compass).predict
-            tracked = state.status is Status.TRACKING and belief.status is Status.TRACKING
-            jumped = compass and not ranged and jumps(walking_rad, raw, rules)
-            if jumped and not positioned and belief.status is Status.SEARCHING:
-                changed_rad = raw.heading_rad - walking_rad
-                belief = turned_at_jump(belief, rules, hold.sign * changed_rad, own.forking)
-            if tracked and jumped and isinstance(belief, ParticleBelief):
-                more = forked(
-                    rules,
-                    belief,
-                    state.null,
-                    hold,
-                    (walking_rad, raw.heading_rad),
-                    reckoning.travelled_m,
-                    beliefs.model.motion.white_rad,
-                    own.forking,
-                )
-                held = still_open(rules, (*held, *more), belief, reckoning.travelled_m)
-            if held:
-                held = tuple(_moved_as_read(one, predict, measured, own.moving) for one in held)
-            if unaided:
-                unaided = tuple(
-                    _moved_as_read(one, predict, measured, own.unaided) for one in unaided
-                )
-            belief, why = predict(belief, _assumed(step, belief), rng)
-            belief = remounted(belief, beliefs.model.motion, abs(step.step_m), rng)
-            reckoning = reckoning.moved(step)
-            if alternative is not None:
-                other = alternative.belief
-                as_read = alternative.hold.read(measured)
-                other, _ = predict(other, _assumed(as_read, other), rng)
-                alternative = replace(alternative, belief=other)
-            if twin is not None:
-                other = twin.belief
-                other, _ = predict(other, _assumed(mirrored_step(step), other), rng)
-                twin = replace(twin, belief=other)
-        if isfinite(raw.heading_rad) and raw.step_m > 0:
-            walking_rad = raw.heading_rad
-        elif isfinite(raw.spread_m):
-            walking_rad = nan
+            self.compass = isfinite(row.heading_rad)
+        if isfinite(row.heading_rad) and row.step_m > 0:
+            self.walking_rad = row.heading_rad
+        elif isfinite(row.spread_m):
+            self.walking_rad = nan
         if why is not Reason.USED:
-            unused.append(UnusedReading(epoch.time_s, "motion", "", why))
-    return BayesState(
-        belief=belief,
-        status=state.status,
-        contested=state.contested,
-        sources=state.sources,
-        reckoning=reckoning,
-        heading_rad=heading_rad,
-        compass=compass,
-        null=state.null,
-        alternative=alternative,
-        takeovers=state.takeovers,
-        path=path,
-        reported=state.reported,
-        watch=watch,
-        last_fix=state.last_fix,
-        recovery=state.recovery,
-        twin=twin,
-        hold=hold,
-        walking_rad=walking_rad,
-        held=held,
-        alternatives=state.alternatives,
-        unaided=unaided,
-        proven=state.proven,
-        alone_from_m=state.alone_from_m,
-        area=state.area,
-    ), unused
+            self.unused.append(UnusedReading(self.epoch.time_s, "motion", "", why))
+
+    def _count_from(self, belief: MapBelief, heading_rad: float) -> None:
+        """Count what followed the ways from the first heading of a compass."""
+        self.by_course, self.held, self.unaided = False, (), ()
+        self.belief = counted_from(belief, heading_rad)
+        if self.alternative is not None:
+            other = counted_from(self.alternative.belief, heading_rad)
+            self.alternative = replace(self.alternative, belief=other)
+
+    def _move_beliefs(
+        self, belief: MapBelief, row: MotionStep, measured: MotionStep, step: MotionStep
+    ) -> Reason:
+        """Move the main belief by a step as it reads it, and all beside it as they do."""
+        turned = isfinite(row.heading_rad) or isfinite(row.spread_m)
+        if self.compass and not turned and self.reckoning.travelled_m == 0:
+            # Nothing has moved yet, so headings can still be relative to the first one.
+            self.compass, belief = False, self.beliefs.without_compass(belief, self.rng)
+            # What began beside it has headings of a compass.
+            self.unaided = ()
+        predict = self.beliefs.moving_filter(self.state, compass=self.compass).predict
+        if self.compass and not self.ranged and jumps(self.walking_rad, row, self.beliefs.holds):
+            belief = self._at_a_jump(belief, row.heading_rad)
+        if self.held:
+            own = self.own.moving
+            self.held = tuple(_moved_as_read(one, predict, measured, own) for one in self.held)
+        if self.unaided:
+            own = self.own.unaided
+            beside = (_moved_as_read(one, predict, measured, own) for one in self.unaided)
+            self.unaided = tuple(beside)
+        belief, why = predict(belief, _assumed(step, belief), self.rng)
+        motion = self.beliefs.model.motion
+        self.belief = remounted(belief, motion, abs(step.step_m), self.rng)
+        self.reckoning = self.reckoning.moved(step)
+        if self.alternative is not None:
+            other = self.alternative.belief
+            as_read = self.alternative.hold.read(measured)
+            other, _ = predict(other, _assumed(as_read, other), self.rng)
+            self.alternative = replace(self.alternative, belief=other)
+        if self.twin is not None:
+            other = self.twin.belief
+            other, _ = predict(other, _assumed(mirrored_step(step), other), self.rng)
+            self.twin = replace(self.twin, belief=other)
+        return why
+
+    def _at_a_jump(self, belief: MapBelief, heading_rad: float) -> MapBelief:
+        """Begin beliefs in which the phone was turned where a heading jumps; return the main one.
+
+        A search takes them into itself.
+        """
+        if belief.status is Status.SEARCHING:
+            if self.positioned:
+                return belief
+            changed_rad = self.state.hold.sign * (heading_rad - self.walking_rad)
+            return turned_at_jump(belief, self.beliefs.holds, changed_rad, self.own.forking)
+        tracked = self.state.status is Status.TRACKING and belief.status is Status.TRACKING
+        if tracked and isinstance(belief, ParticleBelief):
+            beliefs, null, hold = self.beliefs, self.state.null, self.state.hold
+            rules, white_rad, own = beliefs.holds, beliefs.model.motion.white_rad, self.own.forking
+            gone_m, jump_rad = self.reckoning.travelled_m, (self.walking_rad, heading_rad)
+            more = forked(rules, belief, null, hold, jump_rad, gone_m, white_rad, own)
+            self.held = still_open(rules, (*self.held, *more), belief, gone_m)
+        return belief
+
+    def after(self, watch: SensorWatch) -> BayesState:
+        """Return the state after the motion, with that of the sensors."""
+        state = self.state
+        return BayesState(
+            belief=self.belief,
+            status=state.status,
+            contested=state.contested,
+            sources=state.sources,
+            reckoning=self.reckoning,
+            heading_rad=self.heading_rad,
+            compass=self.compass,
+            null=state.null,
+            alternative=self.alternative,
+            takeovers=state.takeovers,
+            path=self.path,
+            reported=state.reported,
+            watch=watch,
+            last_fix=state.last_fix,
+            recovery=state.recovery,
+            twin=self.twin,
+            hold=state.hold,
+            walking_rad=self.walking_rad,
+            held=self.held,
+            alternatives=state.alternatives,
+            unaided=self.unaided,
+            proven=state.proven,
+            alone_from_m=state.alone_from_m,
+            area=state.area,
+        )
 
 
 def _moved_as_read(

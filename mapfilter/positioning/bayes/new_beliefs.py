@@ -27,8 +27,8 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.held import own_rng
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.own_draws import Purpose, own_rng
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.step_units import (
     log_odds_of_unit,
@@ -37,9 +37,6 @@ from mapfilter.positioning.bayes.step_units import (
 from mapfilter.positioning.bayes.unaided import searching_alone
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.gnss.trail import Contradiction
-
-_ALONE = 8
-"""Salt of the draws of a belief that begins without positions."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,7 @@ class NewBeliefs:
         if reading is None or not isinstance(main, ParticleBelief):
             return state
         filter_ = self.beliefs.filter_of(state)
-        begun = filter_.init(Start(reading, state.compass), own_rng(epoch.time_s, _ALONE))
+        begun = filter_.init(Start(reading, state.compass), own_rng(epoch.time_s, Purpose.ALONE))
         pulls, gone_m = self.beliefs.pulls, state.reckoning.travelled_m
         one = searching_alone(pulls, main, begun, state.hold, gone_m)
         return replace(state, unaided=(*state.unaided, one))

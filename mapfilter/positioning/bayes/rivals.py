@@ -28,15 +28,12 @@ from mapfilter.positioning.bayes.held import (
     HeldOtherwise,
     after_takeover,
     is_ahead,
-    own_rng,
     still_open,
     winner,
 )
 from mapfilter.positioning.bayes.hold_rules import PullRules
+from mapfilter.positioning.bayes.own_draws import Purpose, own_rng
 from mapfilter.positioning.bayes.state import BayesState
-
-_TURNED, _UNAIDED = 3, 6
-"""Salts of the draws of beliefs in which the phone was turned, and of the one without positions."""
 
 _SAYS_NOTHING = FixedTerm(np.zeros(1))
 
@@ -62,7 +59,7 @@ class Rivals:
         if not state.held or not isinstance(main, ParticleBelief):
             return state
         rules, holds = self.beliefs.rules_of(state), self.beliefs.holds
-        rng, filter_ = own_rng(time_s, _TURNED), self.beliefs.held_otherwise
+        rng, filter_ = own_rng(time_s, Purpose.WEIGHED), self.beliefs.held_otherwise
         # Pseudoranges are compared with the main belief alone, whose total likelihood they leave.
         evidence = evidence.for_other_hypotheses()
         weighed = (
@@ -108,7 +105,7 @@ class Rivals:
         ]
         # With positions alone the main belief settles what the way has cost it, and so must these.
         evidence = joined(others) or RadioReading(terms=(_SAYS_NOTHING,))
-        rng, rules = own_rng(time_s, _UNAIDED), self.beliefs.rules_of(state)
+        rng, rules = own_rng(time_s, Purpose.UNAIDED_WEIGHED), self.beliefs.rules_of(state)
         smaller = self.beliefs.alone
         left: list[HeldOtherwise] = []
         for one in rivals:

@@ -9,7 +9,8 @@ from typing import NamedTuple
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
-from mapfilter.positioning.sensors.watch import UNMEASURED, SensorWatch, watched
+from mapfilter.positioning.sensors.watch import UNMEASURED, SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 from mapfilter.positioning.step_output import UnusedReading
 
 
@@ -21,7 +22,7 @@ class UsableEpoch(NamedTuple):
     watch : SensorWatch
         After the epoch.
     epoch : Epoch
-        As of :func:`mapfilter.positioning.sensors.watch.watched`, without a fix that has no
+        As of :func:`mapfilter.positioning.sensors.watching.watched`, without a fix that has no
         position or repeats the last one that was used, and without positions that are too near to
         the last one.
     motion, radio : Reason

@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.grid import GridBelief
-from mapfilter.positioning.bayes.alternative import MapBelief
+from mapfilter.positioning.bayes.alternative import (
+    AlternativeHypothesis,
+    MapBelief,
+    NullHypothesis,
+)
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.contradicted import misreads
 from mapfilter.positioning.bayes.evidence import (
     Context,
@@ -115,34 +121,20 @@ class Weighing:
             return state, Reason.USED
         beliefs, area = self.beliefs, self.beliefs.model.area
         update, rules = beliefs.filter_of(state).update, beliefs.rules_of(state)
-        by_map_alone = beliefs.by_map_alone(state)
-        lanes, turned_rad = beliefs.by_carriageways(state), state.path.turned_rad
-        if lanes is None:
-            plain = by_map_alone and not state.path.is_distinctive
-        else:
-            plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
-        doubt = plain or doubted(rules, before, state.null, state.alternative)
-        other_m = beliefs.other_unit_m(state)
-        doubt = doubt or is_unit_open(state, before, other_m)
-        # Hypotheses that spread to all sides agree on a place by chance.
-        by_chance = not (measured or beliefs.is_positioned(state))
-        doubt = doubt or by_chance
+        lanes = beliefs.by_carriageways(state)
+        doubt = self._doubt(state, before, lanes, measured=measured)
         tracked = measured and before.status is Status.TRACKING
-        reading = evidence.weighing(before, tracked=tracked, doubted=doubt)
+        reading = evidence.weighing(before, tracked=tracked, doubted=doubt.main)
         belief, info = update(before, reading, rng)
         if info.reason is Reason.NO_CANDIDATES_LEFT and not belief.count:
             return state.begun_anew(), info.reason
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
         null = challenged(rules, state.null, reading, before, belief)
-        sources, alternative = state.sources, state.alternative
+        alternative = state.alternative
         if alternative is not None:
-            other = alternative.belief
-            terms = weighed_by(other, updates, measured=measured, alternative=True)
-            terms = terms or RadioReading()
-            doubt = plain or lanes is not None or by_chance
-            doubt = doubt or alternative.null.log_odds > rules.converge_log_odds
-            terms = replace(terms, doubted=doubt)
+            terms = weighed_by(alternative.belief, updates, measured=measured, alternative=True)
+            terms = replace(terms or RadioReading(), doubted=doubt.alternative)
             other, _ = update(alternative.belief, terms, rng)
             own = challenged(rules, alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)
@@ -157,49 +149,19 @@ class Weighing:
             at_edge=area.at_edge(belief.summary.mean),
             gone=gone,
         )
-        if now.taken_over and alternative is not None:
-            sources = {**sources, **alternative.sources}
-        alternative = now.alternative
-        disputed = any(one.disputed for one in updates)
+        after = self._resolved(state, before, now, null, alternative)
         contradiction = next((one.contradiction for one in updates if one.contradiction), None)
-        disputed = disputed or asks_for_unit(state, now.belief, other_m)
-        disputed = disputed or now.null.log_odds >= rules.start_log_odds or gone
-        # Who is lost on ways without directions comes to no other place.
-        disputed = disputed or beliefs.goes_by_ways(state)
+        disputed = self._is_disputed(state, now, updates, gone=gone)
         # A turned phone may be ahead only because the belief is in a wrong place.
         if (
-            (state.alternative is None or misreads(alternative, state, contradiction))
+            (state.alternative is None or misreads(now.alternative, state, contradiction))
             and now.status is not Status.CONVERGED
             and (disputed or beliefs.is_contested(state))
         ):
-            alternative = self.new_beliefs.alternative(state, now.belief, epoch, contradiction, rng)
-        after = BayesState(
-            belief=now.belief,
-            status=now.status,
-            contested=state.contested,
-            sources=sources,
-            reckoning=state.reckoning,
-            heading_rad=state.heading_rad,
-            compass=state.compass,
-            null=null if by_map_alone and not now.taken_over else now.null,
-            alternative=alternative,
-            takeovers=state.takeovers + now.taken_over,
-            path=state.path,
-            reported=state.reported,
-            watch=state.watch,
-            last_fix=state.last_fix,
-            recovery=None if now.taken_over else state.recovery,
-            twin=state.twin,
-            # Headings are read as the alternative reads them.
-            hold=hold_after_takeover(state) if now.taken_over else state.hold,
-            walking_rad=state.walking_rad,
-            held=() if now.taken_over else state.held,
-            alternatives=state.alternatives + (disputed and alternative is not now.alternative),
-            unaided=beside_alternative(state, before) if now.taken_over else state.unaided,
-            proven=self._proven(state, now, before),
-            alone_from_m=state.alone_from_m,
-            area=state.area,
-        )
+            begun = self.new_beliefs.alternative(state, now.belief, epoch, contradiction, rng)
+            started = disputed and begun is not now.alternative
+            count = state.alternatives + started
+            after = replace(after, alternative=begun, alternatives=count)
         if lanes is not None or state.twin is not None:
             twin = self.new_beliefs.twin(after, lanes, reading, rng, now.taken_over)
             after = replace(after, twin=twin)
@@ -211,6 +173,87 @@ class Weighing:
             after = self.new_beliefs.asked_for_proof(after, epoch)
         return after, Reason.USED
 
+    def _doubt(
+        self,
+        state: BayesState,
+        before: MapBelief,
+        lanes: CarriagewayFilters | None,
+        *,
+        measured: bool,
+    ) -> _Doubt:
+        """Return for which beliefs it is too early to converge, before they are weighed."""
+        beliefs, rules = self.beliefs, self.beliefs.rules_of(state)
+        if lanes is None:
+            plain = beliefs.by_map_alone(state) and not state.path.is_distinctive
+        else:
+            turned_rad = state.path.turned_rad
+            plain = not lanes.mirror.proven(before, state.twin, turned_rad, lanes.places)
+        # Hypotheses that spread to all sides agree on a place by chance.
+        plain = plain or not (measured or beliefs.is_positioned(state))
+        alternative = state.alternative
+        main = plain or doubted(rules, before, state.null, alternative)
+        main = main or is_unit_open(state, before, beliefs.other_unit_m(state))
+        other = plain or lanes is not None
+        if alternative is not None:
+            other = other or alternative.null.log_odds > rules.converge_log_odds
+        return _Doubt(main, other)
+
+    def _is_disputed(
+        self, state: BayesState, now: Resolution, updates: list[EvidenceUpdate], *, gone: bool
+    ) -> bool:
+        """Return whether anything asks for a belief elsewhere."""
+        beliefs = self.beliefs
+        return (
+            gone
+            or any(one.disputed for one in updates)
+            or asks_for_unit(state, now.belief, beliefs.other_unit_m(state))
+            or now.null.log_odds >= beliefs.rules_of(state).start_log_odds
+            # Who is lost on ways without directions comes to no other place.
+            or beliefs.goes_by_ways(state)
+        )
+
+    def _resolved(
+        self,
+        state: BayesState,
+        before: MapBelief,
+        now: Resolution,
+        null: NullHypothesis,
+        weighed: AlternativeHypothesis | None,
+    ) -> BayesState:
+        """Return the state after a belief and its alternative, with odds, were weighed."""
+        taken_over = now.taken_over
+        by_map_alone = self.beliefs.by_map_alone(state)
+        sources = state.sources
+        if taken_over and weighed is not None:
+            sources = {**sources, **weighed.sources}
+        return BayesState(
+            belief=now.belief,
+            status=now.status,
+            contested=state.contested,
+            sources=sources,
+            reckoning=state.reckoning,
+            heading_rad=state.heading_rad,
+            compass=state.compass,
+            null=null if by_map_alone and not taken_over else now.null,
+            alternative=now.alternative,
+            takeovers=state.takeovers + taken_over,
+            path=state.path,
+            reported=state.reported,
+            watch=state.watch,
+            last_fix=state.last_fix,
+            recovery=None if taken_over else state.recovery,
+            twin=state.twin,
+            # Headings are read as the alternative reads them.
+            hold=hold_after_takeover(state) if taken_over else state.hold,
+            walking_rad=state.walking_rad,
+            held=() if taken_over else state.held,
+            alternatives=state.alternatives,
+            unaided=beside_alternative(state, before) if taken_over else state.unaided,
+            proven=self._proven(state, now, before),
+            alone_from_m=state.alone_from_m,
+            area=state.area,
+        )
+
     def _proven(self, state: BayesState, now: Resolution, before: MapBelief) -> bool:
         """Return whether the belief was found without positions, and has not been lost since."""
         lost = before.status is Status.TRACKING and now.belief.status is Status.SEARCHING
@@ -218,6 +261,13 @@ class Weighing:
             return False
         found = now.status is Status.CONVERGED and not self.beliefs.used_positions(state)
         return state.proven or found
+
+
+class _Doubt(NamedTuple):
+    """Whether it is too early to converge, whatever is read now."""
+
+    main: bool
+    alternative: bool
 
 
 def weighed_by(

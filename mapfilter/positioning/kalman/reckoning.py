@@ -31,7 +31,8 @@ from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.kalman.turned import Lasting, RecentWay, Turn
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.positioning.sensors.unmeasured import common_way_m2, headless_step, missed_step
-from mapfilter.positioning.sensors.watch import SensorWatch, watched
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.sensors.watching import watched
 from mapfilter.positioning.step_output import UnusedReading
 
 RECKONED = StateLayout(5, 0, 1)
@@ -136,7 +137,7 @@ class Reckoning:
         return self.fixed_s < rest.since_s
 
     def watched(self, epoch: Epoch) -> tuple[Reckoning, Epoch, list[UnusedReading]]:
-        """Look at the sensors of an epoch (:func:`mapfilter.positioning.sensors.watch.watched`).
+        """Look at the sensors of an epoch (:func:`mapfilter.positioning.sensors.watching.watched`).
 
         Returns
         -------

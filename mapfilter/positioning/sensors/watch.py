@@ -1,39 +1,20 @@
-"""Sensors that no longer measure what they seem to: dead, stuck or stale.
-
-A log goes on after a sensor has died. Motion rows end, steps lack a length or have one that nothing
-can have gone, or a counter stands still, or misses most steps, while the phone is carried on; a
-modem repeats its last report. :func:`watched` looks at an epoch before any evidence is taken from
-it. For motion that was not measured it puts a step to all sides into the epoch, as long as one goes
-in that time, so the belief grows as it must; a report that stands still while the phone moves is
-taken out.
-
-Rows that are missing, or lengths of zero, can also be those of a phone that rests, and short ones
-those of a stroll, so levels decide (:mod:`mapfilter.positioning.sensors.rest`), or the turns of a
-vehicle.
-"""
+"""What is known of the sensors after an epoch, and why the way of an epoch is not known."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import isfinite, nan
+from math import nan
 from typing import NamedTuple
 
-from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.epochs import ReportRow
 from mapfilter.positioning.sensors import unheard
-from mapfilter.positioning.sensors.impossible_steps import without_impossible
-from mapfilter.positioning.sensors.pace import Going, Pace
-from mapfilter.positioning.sensors.pauses import RowTimes, longest_s, unrecorded_s
+from mapfilter.positioning.sensors.pace import Pace
+from mapfilter.positioning.sensors.pauses import RowTimes
 from mapfilter.positioning.sensors.places import Places
-from mapfilter.positioning.sensors.repeats import MotionRepeats, without_repeats
+from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.short_steps import ShortSteps
-from mapfilter.positioning.sensors.stale_radio import STALE_NATS, repeated_nats
 from mapfilter.positioning.sensors.undirected import UndirectedWay
-from mapfilter.positioning.sensors.unmeasured import unmeasured_step
-
-_STRETCH_M = 60.0
-"""Way as measured after which levels that agree with it have shown a stroll."""
 
 
 class SensorWatch(NamedTuple):
@@ -114,7 +95,7 @@ class SensorWatch(NamedTuple):
         watch = self if way is self.undirected else self._replace(undirected=way)
         if self.rest is None or not self.rest.measured_m > 0:
             return watch
-        return watch._moving(time_s)
+        return watch.after_way(time_s)
 
     def carried(self) -> SensorWatch:
         """Return the watch of what goes on though no step is counted, as positions have shown.
@@ -125,7 +106,7 @@ class SensorWatch(NamedTuple):
             return self
         return self._replace(rest=self.rest.carried(), places=Places())
 
-    def _moving(self, time_s: float) -> SensorWatch:
+    def after_way(self, time_s: float) -> SensorWatch:
         """Return the watch after a measured way to a time."""
         return self._replace(moving_s=time_s, known_s=time_s, rest=None, unmeasured_s=0.0)
 
@@ -140,161 +121,3 @@ UNMEASURED = frozenset(
     }
 )
 """Reasons for which the way of an epoch is not known."""
-
-
-def watched(
-    watch: SensorWatch, epoch: Epoch, step_unit_m: float = 1.0
-) -> tuple[SensorWatch, Epoch, tuple[Reason, Reason]]:
-    """Look at the sensors of an epoch, whose steps are read in a unit.
-
-    Returns
-    -------
-    watch : SensorWatch
-    epoch : Epoch
-        With a step to all sides for motion that was not measured, without a report that is stale.
-    reasons : tuple of Reason
-        Of motion and of the report: ``USED``, or ``NO_STEP``, ``IMPOSSIBLE_STEP``,
-        ``MOTION_MISSING``, ``MOTION_STUCK``, ``HEADING_STUCK`` or ``DELIVERED_TWICE``, and
-        ``STALE_RADIO``.
-    """
-    before, given = watch, epoch.motion
-    possible = without_impossible(watch.pace, epoch.time_s, given, step_unit_m)
-    repeats, motion, repeated = without_repeats(watch.repeats, epoch.time_s, possible, step_unit_m)
-    if motion is not given:
-        epoch = replace(epoch, motion=motion)
-    watch, epoch, why = _followed(watch, epoch, step_unit_m)
-    if possible is not given and why in (Reason.USED, Reason.NO_STEP):
-        why = Reason.IMPOSSIBLE_STEP
-    why = repeated if why is Reason.USED else why
-    report, moved_m, nats = before.report, watch.moved_m, before.repeated_nats
-    stepped_m, rode = watch.stepped_m, False
-    if epoch.radio:
-        nats = repeated_nats(nats, report, epoch.radio, step_unit_m * moved_m)
-        heard = report, epoch.radio
-        rode = unheard.was_ride(
-            before.pace, before.times, epoch.time_s, stepped_m, heard, step_unit_m
-        )
-        report, moved_m, stepped_m = epoch.radio, 0.0, 0.0
-    watch = watch._replace(
-        moved_m=moved_m,
-        report=report,
-        repeated_nats=nats,
-        repeats=repeats,
-        stepped_m=stepped_m,
-        rode_unheard=rode,
-    )
-    if epoch.radio and nats >= STALE_NATS:
-        return watch, replace(epoch, radio=()), (why, Reason.STALE_RADIO)
-    return watch, epoch, (why, Reason.USED)
-
-
-def _followed(
-    watch: SensorWatch, epoch: Epoch, step_unit_m: float
-) -> tuple[SensorWatch, Epoch, Reason]:
-    """Follow the motion rows; add the way that they lack."""
-    time_s, steps = epoch.time_s, epoch.motion
-    known, times, before_m = watch.pace, watch.times, watch.moved_m
-    pace, going = known.read(time_s, steps, step_unit_m)
-    watch = watch._replace(
-        pace=pace,
-        moved_m=before_m + going.gone_m,
-        has_motion=watch.has_motion or bool(steps),
-        stepped_m=watch.stepped_m + going.gone_m,
-        times=times.read(time_s, has_report=bool(epoch.radio)),
-    )
-    if isfinite(watch.moving_s):
-        rested = watch.rest is not None
-        paused_s = unrecorded_s(known, times, time_s, going, watch.known_s, rested=rested)
-        if paused_s > 0:
-            return _after_a_pause(watch, epoch, paused_s, known.speed_mps, going)
-    if going.moves and not going.slows:
-        watch = watch._replace(places=Places()) if watch.places.rows else watch
-        return watch._moving(time_s), epoch, Reason.USED
-    if not isfinite(watch.moving_s):
-        watch = watch._moving(time_s)
-    if not pace.rows and watch.places.are_left_by(epoch.fix):
-        watch = watch._replace(has_motion=False)
-    places = watch.places.after(time_s, epoch.fix, step_unit_m * going.gone_m)
-    found = places.carried if places is not watch.places else None
-    if watch.rest is not None and watch.rest.is_carried and (standing := places.standing):
-        # The ride has ended.
-        watch, places, found = watch._moving(time_s), standing, None
-    watch = watch._replace(places=places)
-    was_shown = watch.rest is not None and watch.rest.carried_mps > 0
-    if going.moves and found is None and not was_shown:
-        return watch._moving(time_s), epoch, Reason.USED
-    rest = watch.rest or Rest(
-        watch.known_s,
-        pace_mps=step_unit_m * pace.speed_mps,
-        braked_mps2=known.braked_mps2(time_s) if going.measured else 0.0,
-    )
-    if found is not None and rest.may_be_carried_at(found.speed_mps):
-        if not rest.is_carried:
-            # The way is measured up to where it began.
-            watch = watch._replace(moving_s=found.since_s, known_s=found.since_s, unmeasured_s=0.0)
-            rest = replace(rest, since_s=found.since_s, measured_m=0.0)
-        rest = rest.carried(found.speed_mps)
-    was_carried = rest.is_carried
-    rest = rest.heard(time_s, epoch.radio, step_unit_m * going.gone_m).turned(time_s, steps)
-    if rest.is_carried and not was_carried:
-        watch = watch._replace(places=Places())
-    why = Reason.USED
-    if steps and not going.measured:
-        why = Reason.NO_STEP
-    elif not watch.has_motion:
-        why = Reason.MOTION_MISSING
-    elif not steps and pace.reports_always:
-        missing = time_s - pace.motion_s > longest_s(pace)
-        why = Reason.MOTION_MISSING if missing else Reason.USED
-    if why is Reason.USED and rest.is_carried:
-        why = Reason.MOTION_STUCK if steps else Reason.MOTION_MISSING
-    if why is Reason.USED:
-        rested_s = time_s - rest.since_s
-        if rest.measured_m >= _STRETCH_M and not rest.is_doubtful and rested_s > 0:
-            strolled_mps = rest.measured_m / step_unit_m / rested_s
-            slower = watch._replace(pace=pace.slowed(strolled_mps))
-            return slower._moving(time_s), epoch, why
-        known_s = time_s if going.measured else watch.known_s
-        return watch._replace(rest=rest, known_s=known_s), epoch, why
-    # A measured rest is none of the way, unless it was a counter that stood still.
-    to_s = watch.unmeasured_s + time_s - watch.known_s
-    missed = 1.0
-    if rest.is_carried:
-        to_s, rested_s = time_s - watch.moving_s, time_s - rest.since_s
-        if not was_carried and rested_s > 0:
-            # What the counter did not miss is in the belief already.
-            missed = max(1 - rest.measured_m / (rest.pace_mps * rested_s), 0.0)
-    speed_mps = missed * pace.speed_mps
-    if rest.carried_mps > 0:
-        speed_mps = rest.carried_mps / step_unit_m
-    step = unmeasured_step(speed_mps, watch.unmeasured_s, to_s)
-    if any(isfinite(one.turn_rad) for one in steps):
-        step = replace(step, turned_sd_rad=0.0)
-    watch = watch._replace(
-        known_s=time_s, rest=rest, unmeasured_s=to_s, moved_m=before_m + step.step_m
-    )
-    return watch, replace(epoch, motion=(*_turns_of(steps), step)), why
-
-
-def _after_a_pause(
-    watch: SensorWatch, epoch: Epoch, paused_s: float, speed_mps: float, going: Going
-) -> tuple[SensorWatch, Epoch, Reason]:
-    """Add the way of a pause of the recording before an epoch's own motion."""
-    to_s = watch.unmeasured_s + paused_s
-    step = unmeasured_step(speed_mps, watch.unmeasured_s, to_s)
-    # What was gone in it is in no position's way.
-    moved_m = watch.moved_m + step.step_m
-    watch = watch._moving(epoch.time_s)._replace(moved_m=moved_m, places=Places())
-    if not going.measured:
-        # The way may go on, with the direction that it has.
-        watch = watch._replace(moving_s=epoch.time_s - to_s, unmeasured_s=to_s)
-    return watch, replace(epoch, motion=(step, *epoch.motion)), Reason.MOTION_MISSING
-
-
-def _turns_of(steps: tuple[MotionStep, ...]) -> tuple[MotionStep, ...]:
-    """Return the steps without their lengths, which an unmeasured way has in their place."""
-    return tuple(
-        replace(step, step_m=0.0) if isfinite(step.step_m) else step
-        for step in steps
-        if isfinite(step.step_m) or isfinite(step.turn_rad)
-    )
