@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import cos, isfinite, nan, sin
+from math import isfinite, nan
 from typing import Any, Generic, Protocol, Self
 
 import numpy as np
@@ -22,40 +22,19 @@ from mapfilter._types import Floats, Floats32
 from mapfilter.filters.array_summary import summarise_arrays
 from mapfilter.filters.belief_models import Cloud, PriorT, ReadingT, WeighingModel
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.grid_transport import shifted, taps, turned
+from mapfilter.filters.grid_transport import (
+    Spread,
+    Transport,
+    Waiting,
+    carried,
+    spread_along,
+)
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.filters.switch_rule import switched
 
 _LEAST_MASS = 1e-9
-_NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Transport:
-    """Effect of one stretch of dead reckoning on mass.
-
-    Parameters
-    ----------
-    right_px, down_px, sd_right_px, sd_down_px : ndarray, shape (B,)
-        Mean displacement of each bin of the heading error and its deviation, in pixels.
-    turned_bins : float
-        Standard deviation of the heading error's change, in bins.
-    on, off : ndarray of float32, shape (rows, cols), and float
-        Likelihood of the map at each pixel, and off it.
-    leave, come_back : float
-        Probabilities of leaving the map and of coming back.
-    """
-
-    right_px: Floats
-    down_px: Floats
-    sd_right_px: Floats
-    sd_down_px: Floats
-    turned_bins: float
-    on: Floats32
-    off: float
-    leave: float
-    come_back: float
+_NOTHING = Waiting()
 
 
 class GridModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
@@ -91,6 +70,9 @@ class GridModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
         heading that was not measured.
         """
 
+    def spread(self, aside_m: float, aside_m2: float) -> Spread:
+        """Return the effect of a way to all sides, of some length and variance along each axis."""
+
     def placed(self, device: Device) -> Self:
         """Return the model with its arrays on a device: itself if they lie there already."""
 
@@ -105,10 +87,8 @@ class GridBelief:
         Mass of those on and off the map; together they sum to one after an update.
     shared : object
         What the model shares between all pixels after the last reading.
-    waiting : (float, float, float, float, float)
-        Displacement east and north (m), its length (m), the variance of steps without a heading
-        (m², along each axis) and that of turns that were not measured (rad²), which mass has not
-        been moved by yet.
+    waiting : Waiting
+        Motion that mass has not been moved by yet.
     travelled_m, log_evidence, status, agreement_start_m
         As of :class:`mapfilter.filters.particle.ParticleBelief`.
     """
@@ -117,7 +97,7 @@ class GridBelief:
     off: Floats32
     model: GridModel[Any, Any]
     shared: Any = None
-    waiting: tuple[float, float, float, float, float] = _NOTHING
+    waiting: Waiting = _NOTHING
     travelled_m: float = 0.0
     log_evidence: float = 0.0
     status: Status = Status.SEARCHING
@@ -131,27 +111,21 @@ class GridBelief:
     @cached_property
     def moved(self) -> GridBelief:
         """The belief with all mass moved by the displacement that waits, and weighed by the map."""
-        if self.waiting[2] == 0:
+        if self.waiting == _NOTHING:
             return self
-        model = self.model
-        step = model.transport(*self.waiting)
-        # Masses of a restored belief may lie elsewhere than a model that it was given since.
-        arrays = arrays_of(step.on)
-        before_on, before_off = arrays.asarray(self.on), arrays.asarray(self.off)
-        on, off = arrays.empty_like(before_on), arrays.empty_like(before_off)
-        for b in range(on.shape[0]):
-            right = taps(step.right_px[b], step.sd_right_px[b])
-            down = taps(step.down_px[b], step.sd_down_px[b])
-            for source, target in ((before_on, on), (before_off, off)):
-                target[b] = shifted(shifted(source[b], *right, axis=1), *down, axis=0)
-        if step.turned_bins > 0 and on.shape[0] > 1:
-            spread = taps(0.0, step.turned_bins)
-            on, off = (turned(mass, *spread, circular=model.circular) for mass in (on, off))
-        leave, come_back = np.float32(step.leave), np.float32(step.come_back)
-        stayed = on * (1 - leave) + off * come_back
-        away = on * leave + off * (1 - come_back)
-        off_cost = np.float32(step.off)
-        return replace(self, on=stayed * step.on, off=away * off_cost, waiting=_NOTHING)
+        model, waiting = self.model, self.waiting
+        on, off = self.on, self.off
+        if waiting.length_m > 0 or waiting.turned_rad2 > 0:
+            step = model.transport(*waiting[:5])
+            # Masses of a restored belief may lie elsewhere than a model that it was given since.
+            arrays = arrays_of(step.on)
+            on, off = arrays.asarray(on), arrays.asarray(off)
+            on, off = carried(on, off, step, circular=model.circular)
+        if waiting.aside_m > 0:
+            way = model.spread(waiting.aside_m, waiting.aside_m2)
+            arrays = arrays_of(way.ways)
+            on, off = spread_along(arrays.asarray(on), arrays.asarray(off), way)
+        return replace(self, on=on, off=off, waiting=_NOTHING)
 
     @cached_property
     def _held(self) -> tuple[Any, Any]:
@@ -248,15 +222,7 @@ class GridFilter(Generic[PriorT, ReadingT]):
         reason = Reason.USED if isfinite(motion.heading_rad) else Reason.NO_HEADING
         if motion.step_m == 0:
             return belief, reason
-        east_m, north_m, length_m, spread_m2, turned_rad2 = belief.waiting
-        if reason is Reason.USED:
-            east_m += motion.step_m * cos(motion.heading_rad)
-            north_m += motion.step_m * sin(motion.heading_rad)
-            spread_m2 += motion.sampling_sd_m**2
-        else:
-            spread_m2 += motion.all_sides_m**2 / 2
-            turned_rad2 += motion.turned_sd_rad**2
-        waiting = (east_m, north_m, length_m + abs(motion.step_m), spread_m2, turned_rad2)
+        waiting = belief.waiting.after(motion)
         travelled_m = belief.travelled_m + abs(motion.step_m)
         return replace(belief, waiting=waiting, travelled_m=travelled_m), reason
 

@@ -34,7 +34,7 @@ from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.state import BayesState, Reported
-from mapfilter.positioning.bayes.timing import TimingState
+from mapfilter.positioning.bayes.timing import ErrorFactor, TimingState
 from mapfilter.positioning.epochs import GnssFix, ReportRow
 from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.receiver import Receiver
@@ -52,7 +52,7 @@ from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 
-FORMAT, VERSION = "mapfilter session", 17
+FORMAT, VERSION = "mapfilter session", 18
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -67,6 +67,7 @@ _CLASSES: dict[str, type] = {
         Bins,
         Contradiction,
         DeadReckoning,
+        ErrorFactor,
         Fix,
         FixTrail,
         FixWander,

@@ -9,7 +9,8 @@ import strict_arrays
 
 from mapfilter._device import PROCESSOR, Device, on_host
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.filters.grid import GridBelief, GridFilter, Transport
+from mapfilter.filters.grid import GridBelief, GridFilter
+from mapfilter.filters.grid_transport import Transport, Waiting
 from mapfilter.filters.hypotheses import Bins
 
 DEVICE = Device("gpu", strict_arrays)
@@ -145,7 +146,7 @@ def test_mass_that_lies_elsewhere_than_the_model_is_moved_with_it():
     assert isinstance(found.on, strict_arrays.Array)
     np.testing.assert_array_equal(on_host(found.on), on_host(ahead.moved.on))
     np.testing.assert_array_equal(on_host(found.off), on_host(ahead.moved.off))
-    assert found.waiting == (0.0, 0.0, 0.0, 0.0, 0.0)
+    assert found.waiting == Waiting()
 
 
 @pytest.mark.parametrize("device", [PROCESSOR, DEVICE])

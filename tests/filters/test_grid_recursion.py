@@ -9,7 +9,8 @@ import pytest
 import scalar_oracle as oracle
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.filters.grid import GridFilter, Transport
+from mapfilter.filters.grid import GridFilter
+from mapfilter.filters.grid_transport import Spread, Transport, Waiting
 from mapfilter.filters.hypotheses import Bins
 
 ROWS, COLS, PIXEL_M = 4, 5, 10.0
@@ -67,6 +68,10 @@ class Tiny:
             LEAVE,
             COME_BACK,
         )
+
+    def spread(self, aside_m, aside_m2):
+        self.asked.append((aside_m, aside_m2))
+        return Spread(1.0, ON.astype(np.float32), OFF, LEAVE, COME_BACK)
 
     def weigh(self, cloud, log_weight, reading):
         if reading is None:
@@ -181,7 +186,7 @@ def test_steps_wait_for_a_reading_and_are_summed():
     assert info.reason is Reason.NO_READING
     weighed, _ = filter_.update(belief, 1, rng)
     assert model.asked[-1] == pytest.approx((2.0, 4.0, 8.0, 0.0, 0.0))
-    assert weighed.waiting == (0.0, 0.0, 0.0, 0.0, 0.0)
+    assert weighed.waiting == Waiting()
     assert weighed.travelled_m == belief.travelled_m == 8.0
     one = oracle.forward(PRIOR.ravel(), [(transition(2.0, 4.0, circular=False), likelihood(1))])
     np.testing.assert_allclose(np.stack([weighed.on, weighed.off]).ravel(), one[0][0], rtol=2e-4)
@@ -199,7 +204,9 @@ def test_steps_without_a_heading_wait_as_a_variance_to_all_sides():
     assert belief.travelled_m == 9.0
     filter_.update(belief, 1, rng)
     # The mean square of each step's distance is that of the step: a half of it on each axis.
-    assert model.asked[-1] == pytest.approx((3.0, 0.0, 9.0, 8.0 + 2.0, 0.09))
+    measured, aside = model.asked[-2:]
+    assert measured == pytest.approx((3.0, 0.0, 3.0, 0.0, 0.09))
+    assert aside == pytest.approx((6.0, 8.0 + 2.0))
     same, reason = filter_.predict(belief, MotionStep(0.0, nan), rng)
     assert same is belief
     assert reason is Reason.NO_HEADING

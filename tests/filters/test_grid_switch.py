@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.filters.grid import GridBelief, GridFilter, Transport
-from mapfilter.filters.grid_transport import shifted, taps, turned
+from mapfilter.filters.grid import GridBelief, GridFilter
+from mapfilter.filters.grid_transport import Transport, Waiting, shifted, taps, turned
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleOptions
 
@@ -164,7 +164,7 @@ def test_motion_of_a_grid_that_is_absent_or_nothing():
     assert start.moved is start
     assert (start.travelled_m, start.log_evidence, start.status) == (0.0, 0.0, Status.SEARCHING)
     assert np.isnan(start.agreement_start_m)
-    assert start.waiting == (0.0, 0.0, 0.0, 0.0, 0.0)
+    assert start.waiting == Waiting()
     np.testing.assert_allclose(np.exp(start.log_weight), start.weight)
     assert start.state[3].tolist() == [0.25]
 

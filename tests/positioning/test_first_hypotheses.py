@@ -224,18 +224,6 @@ def test_a_step_moves_by_the_bias_and_weighs_by_the_map_where_it_ends():
         assert moved[OFF, i] == pytest.approx(off, abs=1e-4)
 
 
-def test_a_step_without_a_heading_spreads_to_all_sides():
-    state = np.zeros((STATES, COUNT), dtype=np.float32)
-    state[EAST], state[NORTH], state[BIAS] = 45.0, 35.0, 0.4
-    moved, _ = MODEL.move(state, np.zeros(COUNT), MotionStep(8.0, np.nan), np.uint64(5))
-    gone = moved[:2].astype(np.float64) - np.array([[45.0], [35.0]])
-    # The mean square of the distance is that of the step; five standard errors.
-    assert np.all(np.abs(gone.mean(axis=1)) < 5 * 8.0 / sqrt(2 * COUNT))
-    np.testing.assert_allclose(gone.var(axis=1), 32.0, rtol=5 * sqrt(2 / COUNT))
-    np.testing.assert_array_equal(moved[[BIAS, LOG_SCALE, TURN, STRETCH]],
-                                  state[[BIAS, LOG_SCALE, TURN, STRETCH]])  # fmt: skip
-
-
 def test_a_turn_that_was_not_measured_leaves_headings_open():
     """On the grid by as much as of hypotheses; around the circle, where it is wide."""
     state = np.zeros((STATES, COUNT), dtype=np.float32)

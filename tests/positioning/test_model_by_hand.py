@@ -119,15 +119,27 @@ def test_each_metre_beyond_the_area_costs_as_much(length_m, per_m):
 
 
 def test_a_step_without_a_heading_leads_to_all_sides():
+    """Where the map tells nothing; else along ways (``tests/models/test_way_spread``)."""
+    model = replace(MODEL, weights=MapWeights(weight_per_m=0.0))
     state = at_places(*[(45.0, 35.0)] * 20_000)
-    moved, _ = MODEL.move(state, np.zeros(20_000), MotionStep(6.0, nan), np.uint64(3))
+    moved, _ = model.move(state, np.zeros(20_000), MotionStep(6.0, nan), np.uint64(3))
     off_m = (moved - state)[:2]
     assert np.mean(np.sum(off_m**2, axis=0)) == pytest.approx(36.0, rel=0.03)
     assert off_m.std(axis=1) == pytest.approx([6 / 2**0.5] * 2, rel=0.03)
-    spread, _ = MODEL.move(
+    spread, _ = model.move(
         state, np.zeros(20_000), MotionStep(6.0, nan, spread_m=2.0), np.uint64(3)
     )
     assert (spread - state)[:2].std(axis=1) == pytest.approx([2**0.5] * 2, rel=0.03)
+
+
+def test_a_step_without_a_heading_is_no_evidence():
+    """Each metre of it costs what one off the map does, on a way, beside it and beyond the area."""
+    state = at_places((35.0, 45.0), (80.0, 5.0), (-500.0, 35.0))
+    given = np.array([-1.0, -2.0, -3.0])
+    for step in (MotionStep(6.0, nan), MotionStep(-6.0, nan, spread_m=30.0)):
+        _, weighed = MODEL.move(state, given, step, np.uint64(3))
+        cost = 6.0 * MODEL.weights.off_cost_per_m
+        np.testing.assert_allclose(weighed, given - cost)
 
 
 @pytest.mark.parametrize(("length_m", "share"), [(0.0, 1.0), (25.0, 1 - np.exp(-1.0)), (inf, 1.0)])

@@ -324,14 +324,14 @@ def paced(pace_mps, fix_sd_m, lasts_s):
     return make_log(CRS, motion=motion, gnss=fixes, truth=places)
 
 
-@pytest.mark.parametrize("fix_sd_m", [5.0, 10.0])
-def test_a_walk_of_lengths_alone_is_followed_by_its_fixes(town, fix_sd_m):
+@pytest.mark.parametrize(("fix_sd_m", "held"), [(5.0, 0.8), (10.0, 0.75)])
+def test_a_walk_of_lengths_alone_is_followed_by_its_fixes(town, fix_sd_m, held):
     """Fixes a step apart were all ahead, and then rejected: hundreds of metres off."""
     log = paced(1.4, fix_sd_m, 500.0)
     track = mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW))
     score = mf.score(track, log.truth)
     assert score.error_mean_m < 2.5 * fix_sd_m
-    assert score.within_95 > 0.8
+    assert score.within_95 > held
     assert any("of way apart only the first is used" in note for note in track.log.notes)
     left_out = [one for one in track.estimate.unused if one.reason is Reason.NOT_MOVED_ENOUGH]
     assert len(left_out) > 300

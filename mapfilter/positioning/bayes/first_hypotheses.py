@@ -42,7 +42,7 @@ _F = np.float32
 _OFF_SHARE, _TRIES = 0.2, 2
 BEYOND_M = 300.0
 """Width of the belt around the area in which some of the first hypotheses lie."""
-_BEYOND_SHARE, _BEYOND_AT_START = 0.15, 0.02
+_BEYOND_SHARE, BEYOND_AT_START = 0.15, 0.02
 """Share of the first hypotheses in the belt, and that of the first belief."""
 
 
@@ -134,12 +134,12 @@ def _spread(
         around = searched.around(area.size_m, BEYOND_M, beyond, rng)
         if not around.shape[1]:
             on, beyond = on + beyond, 0
-    inside = 1 - _BEYOND_AT_START
+    inside = 1 - BEYOND_AT_START
     first = 0
     for count, points, pixel_m, is_off, share in (
         (on, on_ways, spread_m, 0.0, inside * (1 - OFF_AT_START)),
         (off, anywhere, 0.0, 1.0, inside * OFF_AT_START),
-        (beyond, around, 0.0, OFF_AT_START, _BEYOND_AT_START),
+        (beyond, around, 0.0, OFF_AT_START, BEYOND_AT_START),
     ):
         part = slice(first, first + count)
         first += count

@@ -18,10 +18,11 @@ from mapfilter._device import PROCESSOR, Device, arrays_of
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Reason
-from mapfilter.filters.grid import Transport
+from mapfilter.filters.grid_transport import Spread, Transport
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
+from mapfilter.models.way_spread import LEAST_LOG, ways_exponent
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.model import BayesModel
@@ -150,6 +151,15 @@ class StreetGrid:
             over.leave,
             over.come_back,
         )
+
+    def spread(self, aside_m: float, aside_m2: float) -> Spread:
+        """Return the effect of a way to all sides."""
+        weights, arrays = self.model.weights, self.device.arrays
+        over = weights.over(aside_m)
+        log_ways = ways_exponent(weights, sqrt(2 * aside_m2)) * self._log_map
+        ways = arrays.exp(arrays.maximum(log_ways, LEAST_LOG))
+        sd_px = sqrt(aside_m2) / self.model.area.lattice.resolution_m
+        return Spread(sd_px, ways, over.off, over.leave, over.come_back)
 
     def weigh(
         self, cloud: Cloud, log_weight: Floats, reading: RadioReading

@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from math import isfinite, nan, sqrt
+from math import isfinite, nan
 
 import numpy as np
 
-from mapfilter._threads import Call
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep
@@ -29,10 +28,16 @@ from mapfilter.models.way_map import (
     weigh_by_ways,
     weighed_at_places,
 )
+from mapfilter.models.way_spread import density_beyond, spread_along_ways
 from mapfilter.positioning.bayes.beyond_edge import BEYOND_COST_PER_M
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.evidence_model import EvidenceModel
-from mapfilter.positioning.bayes.first_hypotheses import BEYOND_M, Start, first_hypotheses
+from mapfilter.positioning.bayes.first_hypotheses import (
+    BEYOND_AT_START,
+    BEYOND_M,
+    Start,
+    first_hypotheses,
+)
 from mapfilter.positioning.bayes.likely_points import KEPT_REPORTS, KnownReading, likelihoods
 from mapfilter.positioning.bayes.tiled_area import TiledArea
 
@@ -82,42 +87,25 @@ class BayesModel(EvidenceModel):
         self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
     ) -> tuple[Floats32, Floats]:
         """Move by one step and weigh by the map, by the metre."""
-        length_m, count = abs(motion.step_m), log_weight.size
-        calls: list[Call] = []
         if self.motion.corners_per_m > 0 and motion.is_undirected:
             return self._along_ways(state, log_weight, motion, key)
-        if isfinite(motion.heading_rad):
-            call, moved = moving(
-                state,
-                motion.step_m,
-                motion.heading_rad,
-                self.motion,
-                key,
-                motion.sampling_sd_m,
-            )
-            calls.append(call)
-        else:
-            # To all sides.
-            moved = move(state, 0.0, 0.0, self.motion, key)
-            draws = np.random.default_rng(int(key))
-            noise = draws.standard_normal((2, count))
-            moved[: NORTH + 1] += (motion.all_sides_m / sqrt(2.0) * noise).astype(np.float32)
-            if motion.turned_sd_rad > 0:
-                turned = draws.standard_normal(count, dtype=np.float32)
-                moved[BIAS] = wrap_rad(moved[BIAS] + np.float32(motion.turned_sd_rad) * turned)
-        beyond = self._beyond_per_m
-        factors = self.weights.over(length_m)
+        if not isfinite(motion.heading_rad):
+            return self._to_all_sides(state, log_weight, motion, key)
+        call, moved = moving(
+            state, motion.step_m, motion.heading_rad, self.motion, key, motion.sampling_sd_m
+        )
+        beyond, factors = self._beyond_per_m, self.weights.over(abs(motion.step_m))
         weighed: Floats
         if isinstance(self.area, TiledArea):
-            self.threads.over(count, *calls)
+            self.threads.over(log_weight.size, call)
             on_map = self.area.log_map_at(moved, self.weights.sd_m)
             weighed = weighed_at_places(
                 moved, on_map, self.area.size_m, factors, beyond, log_weight
             )
         else:
             weighed = np.empty_like(log_weight)
-            calls.append((weigh_by_ways, moved, self._ways, factors, beyond, log_weight, weighed))
-            self.threads.over(count, *calls)
+            by_ways = (weigh_by_ways, moved, self._ways, factors, beyond, log_weight, weighed)
+            self.threads.over(log_weight.size, call, by_ways)
         return moved, weighed
 
     def _along_ways(
@@ -131,6 +119,33 @@ class BayesModel(EvidenceModel):
         factors = self.weights.over(abs(motion.step_m))
         size_m, beyond = self.area.size_m, self._beyond_per_m
         return moved, weighed_at_places(moved, fit, size_m, factors, beyond, log_weight)
+
+    def _to_all_sides(
+        self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
+    ) -> tuple[Floats32, Floats]:
+        """Move by a step that nothing measured, or whose direction nothing did.
+
+        It is no evidence for any place, nor against what the belief leaves out: each metre costs
+        what one off the map does.
+        """
+        length_m, size_m = abs(motion.step_m), self.area.size_m
+        beyond = (density_beyond(size_m, BEYOND_AT_START, BEYOND_M), BEYOND_M)
+        moved = spread_along_ways(
+            state,
+            motion.all_sides_m,
+            length_m,
+            self.weights,
+            self._log_map_at,
+            size_m,
+            beyond,
+            key,
+        )
+        if motion.turned_sd_rad > 0:
+            turned = np.random.default_rng(int(key)).standard_normal(
+                log_weight.size, dtype=np.float32
+            )
+            moved[BIAS] = wrap_rad(moved[BIAS] + np.float32(motion.turned_sd_rad) * turned)
+        return moved, log_weight - self.weights.off_cost_per_m * length_m
 
     @property
     def _beyond_per_m(self) -> float:
