@@ -34,7 +34,8 @@ from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.state import BayesState, Reported
-from mapfilter.positioning.bayes.timing import ErrorFactor, TimingState
+from mapfilter.positioning.bayes.timing import TimingState
+from mapfilter.positioning.bayes.timing_errors import DifferenceErrors
 from mapfilter.positioning.epochs import GnssFix, ReportRow
 from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.receiver import Receiver
@@ -67,7 +68,7 @@ _CLASSES: dict[str, type] = {
         Bins,
         Contradiction,
         DeadReckoning,
-        ErrorFactor,
+        DifferenceErrors,
         Fix,
         FixTrail,
         FixWander,

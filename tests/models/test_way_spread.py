@@ -52,7 +52,8 @@ def test_it_ends_on_a_way_as_often_as_places_drawn_by_hand_do():
     rng = np.random.default_rng(5)
     north_m = rng.normal(0.0, 30.0 / 2**0.5, (COUNT, PLACES))
     on = np.abs(north_m) <= 5.0
-    weight = np.where(on, 1.0, np.exp(-3.0))
+    power = (1 + 30.0**2 / (30.0**2 + 2 * 10.0**2)) / 2
+    weight = np.where(on, 1.0, np.exp(-3.0 * power))
     by_hand = (weight * on).sum(axis=1) / weight.sum(axis=1)
     found = np.abs(moved[NORTH] - 450.0) <= 5.0
     error = 5 * (found.std() + by_hand.std()) / COUNT**0.5

@@ -77,7 +77,7 @@ def test_the_state_before_the_first_epoch():
     assert (state.null, state.reckoning) == (NullHypothesis(log(0.05 / 0.95)), DeadReckoning())
     assert (state.alternative, state.takeovers, state.sources) == (None, 0, {})
     assert np.isnan(state.heading_rad)
-    assert TimingState() == (-inf, -inf)
+    assert TimingState()[:2] == (-inf, -inf)
     gnss = GnssState()
     assert (gnss.receiver, gnss.fix_used_at_m, gnss.compared_at_m) == (None, -inf, -inf)
     assert (gnss.compared_at_s, gnss.probation_until_s, gnss.rejecting) == (-inf, -inf, False)

@@ -40,7 +40,7 @@ def read(area, epoch, before=(), travelled_m=0.0, options=LTE):
 def test_a_timing_advance_is_a_ring(area):
     epoch = Epoch(0.0, radio=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
     update = read(area, epoch)
-    assert (update.state, update.unused) == ((0.0, -inf), [])
+    assert (update.state, update.unused) == (TimingState(0.0), [])
     # Cell W stands at (0, 150) and 28.5 m above the phone: 1.5 steps are 117.15 m.
     places = state((100.0, 150.0), (0.0, 263.6), (300.0, 150.0))
     gain = update.terms[0].log_likelihood(places)
@@ -61,7 +61,7 @@ def test_errors_that_last_count_once(area):
     np.testing.assert_allclose(soon.terms[0].log_likelihood(place), share * whole)
     still = read(area, epoch, (0.0, -inf), 0.0)
     assert (still.terms, still.under_null) == ((), 0)
-    assert still.state == (0.0, -inf)
+    assert still.state == TimingState(0.0)
 
 
 def timed(cell, steps):
@@ -71,14 +71,14 @@ def timed(cell, steps):
 def test_advances_of_one_report_are_one_term_beside_rows_without_any(area):
     epoch = Epoch(0.0, radio=(timed("W", nan), timed("E", 2.0), timed(None, 3.0), timed("W", 1.0)))
     update = read(area, epoch, (10.0, 20.0), 20.0)
-    assert (update.state, update.unused) == ((20.0, 20.0), [])
+    assert (update.state, update.unused) == (TimingState(20.0, 20.0), [])
     (term,) = update.terms
     # The middles of their steps; what is new of them after 10 m.
     np.testing.assert_allclose(term.reading_m, [2.5 * 78.1, 1.5 * 78.1])
     assert term.weight == pytest.approx(1 - np.exp(-2 * 10.0 / 50.0))
     # Two readings: half as bad again as is expected at the true position.
     assert update.under_null == pytest.approx(-0.5 * 1.5 * 2 * term.weight)
-    assert TimingSource(area, LTE).first(epoch).state == (0.0, -inf)
+    assert TimingSource(area, LTE).first(epoch).state == TimingState(0.0)
     # A measured map of timing advances stands in for distances.
     without = TimingSource(area, LTE, advances=False).read(TimingState(), epoch, 20.0)
     assert (without.terms, without.state) == ((), TimingState())
@@ -88,14 +88,13 @@ def test_differences_count_by_what_is_new_of_them(area):
     rows = (Difference("E", "W", 120.0, 5.0, 8.0), Difference("W", "E", -115.0, 5.0, 8.0))
     options = replace(LTE, difference_memory_m=20.0)
     update = read(area, Epoch(0.0, differences=rows), (7.0, 30.0), 34.0, options)
-    assert update.state == (7.0, 34.0)
+    assert update.state == TimingState(7.0, 34.0)
     share = 1 - np.exp(-2 * 4.0 / 20.0)
     assert [term.weight for term in update.terms] == pytest.approx([share] * 2)
     assert [term.reading_m.tolist() for term in update.terms] == [[120.0], [-115.0]]
-    assert update.under_null == pytest.approx(-0.5 * 1.5 * 2 * share)
     # Nothing of them is new where they were used.
     same = read(area, Epoch(0.0, differences=rows), (7.0, 34.0), 34.0, options)
-    assert (same.terms, same.state) == ((), (7.0, 34.0))
+    assert (same.terms, same.state) == ((), TimingState(7.0, 34.0))
 
 
 def test_deviations_that_are_not_stated_are_the_usual_ones(area):
@@ -111,14 +110,19 @@ def test_deviations_that_are_not_stated_are_the_usual_ones(area):
 def test_differences_share_the_error_of_their_reference(area):
     rows = (Difference("E", "W", 120.0, 5.0, 8.0), Difference("NW", "W", -40.0, 12.0, 8.0))
     update = read(area, Epoch(0.0, differences=rows))
-    assert (update.state, update.unused) == ((-inf, 0.0), [])
+    assert (update.state, update.unused) == (TimingState(-inf, 0.0), [])
     place = state((150.0, 150.0))
     sites = np.array([[400.0, 150.0], [0.0, 300.0]])
     away = np.sqrt(np.sum((sites - 150.0) ** 2, axis=1) + 28.5**2)
     off = np.array([120.0, -40.0]) - (away - np.hypot(150.0, 28.5))
     noise = np.diag([25.0, 144.0]) + 64.0
-    square = min(float(off @ np.linalg.solve(noise, off)), 2 * 9.0)
-    np.testing.assert_allclose(update.terms[0].log_likelihood(place), -0.5 * square, rtol=1e-5)
+    (term,) = update.terms
+    assert term.stations == ("W", "E", "NW")
+    np.testing.assert_allclose(term.sigma_m, [8.0, 5.0, 12.0])
+    stated = next(case for case in term.cases if case.factor == 1.0 and case.at_fault is None)
+    density = term.log_densities(place)[term.cases.index(stated)]
+    square = float(off @ np.linalg.solve(noise, off))
+    np.testing.assert_allclose(density, -0.5 * min(square, 2 * 9.0), rtol=1e-5)
 
 
 def test_readings_of_unknown_cells_are_reported_unused(area):

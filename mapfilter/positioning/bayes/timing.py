@@ -1,16 +1,14 @@
 """Timing advances and time differences of arrival as evidence.
 
 Their errors last for some distance: readings in a row count as one over the distance at which the
-errors become independent. What is stated of the errors of time differences seldom includes paths
-that are longer than the line of sight, or a clock that is off. So their deviations are taken times
-an unknown factor, of which the readings themselves tell (:class:`ErrorFactor`).
+errors become independent. Those of time differences may be other than stated
+(:mod:`mapfilter.positioning.bayes.timing_errors`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, hypot, inf, isfinite, log, nan
+from math import exp, hypot, inf, isfinite, nan
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -24,6 +22,7 @@ from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.bayes.timing_errors import DifferenceErrors, DifferenceTerm
 from mapfilter.positioning.epochs import Difference, Epoch
 from mapfilter.positioning.gnss.options import TimingOptions
 from mapfilter.positioning.step_output import UnusedReading
@@ -32,98 +31,50 @@ from mapfilter.tracks.schema import Kind
 _NULL_FACTOR = 1.5
 """Log-likelihood under the null hypothesis, as a multiple of what is expected of the belief."""
 
-FACTORS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Factors of stated deviations."""
-_PRIOR = (0.7, 0.2, 0.06, 0.02, 0.01, 0.01)
-_CHANGES, _LEAST = 0.02, 1e-300
-"""How often a factor becomes any other between independent readings; least likelihood."""
-
-
-class ErrorFactor(NamedTuple):
-    """By how much errors are larger than stated: the probability of each of :data:`FACTORS`."""
-
-    shares: tuple[float, ...] = _PRIOR
-
-    def after(self, terms: Sequence[TimingTerm], belief: MapBelief) -> ErrorFactor:
-        """Return it after readings, whose place is as probable as a belief has it."""
-        log_shares = np.log(self.shares)
-        state, weight = belief.state, belief.weight.astype(np.float64)
-        for term in terms:
-            likely = np.exp(term.log_likelihoods(state))
-            log_shares = log_shares + term.weight * np.log(likely @ weight + _LEAST)
-        shares = np.exp(log_shares - log_shares.max())
-        changed = _CHANGES * max((term.weight for term in terms), default=0.0)
-        shares = (1 - changed) * shares / shares.sum() + changed * np.array(_PRIOR)
-        return ErrorFactor(tuple(shares.tolist()))
-
 
 class TimingState(NamedTuple):
     """Distances travelled when timing advances and differences were last used.
 
-    ``factor`` is that of the errors of differences.
+    ``errors`` is what is known of those of differences.
     """
 
     advance_m: float = -inf
     difference_m: float = -inf
-    factor: ErrorFactor = ErrorFactor()
+    errors: DifferenceErrors = DifferenceErrors()
 
 
 @dataclass(frozen=True, eq=False)
 class TimingTerm:
-    """Log-likelihood of distances, or of differences of them.
+    """Log-likelihood of distances.
 
     Parameters
     ----------
     model : GaussianTerms
         Of east and north in the frame of the hypotheses.
     reading_m : (m,) array
-        Measured distances, or differences of distances.
+        Measured distances.
     weight : float
         Share of the reading that is new, 0 to 1.
     clip_sd : float
         Largest innovation in standard deviations; outliers count as this.
-    factor : ErrorFactor or None
-        Of the deviations; None for those that are stated.
     """
 
     model: GaussianTerms
     reading_m: Floats
     weight: float
     clip_sd: float
-    factor: ErrorFactor | None = None
 
     def log_likelihood(self, state: Floats32) -> Floats:
         """Return the log-likelihood of each hypothesis."""
-        if self.factor is None:
-            return self.weight * self._log_density(self._squares(state), 1.0)
-        log_shares = np.log(self.factor.shares)[:, None]
-        each = log_shares + self.log_likelihoods(state)
-        return np.asarray(self.weight * np.logaddexp.reduce(each, axis=0))
-
-    def log_likelihoods(self, state: Floats32) -> Floats:
-        """Return the log-likelihood of each hypothesis by each of the factors, not weighted."""
-        squares = self._squares(state)
-        return np.stack([self._log_density(squares, factor) for factor in FACTORS])
+        off = self.reading_m - self.model.mean(state[:2].T.astype(np.float64))
+        white = np.linalg.solve(np.linalg.cholesky(self.model.noise), off.T)
+        square = np.minimum(np.sum(white**2, axis=0), self.clip_sd**2 * self.reading_m.size)
+        return np.asarray(-0.5 * self.weight * square)
 
     @property
     def under_null(self) -> float:
         """Log-likelihood under the null hypothesis, from what is expected at the true position."""
-        expected = -0.5 * _NULL_FACTOR * self.reading_m.size
-        if self.factor is not None:
-            smaller = self.reading_m.size * np.log(FACTORS)
-            expected += np.logaddexp.reduce(np.log(self.factor.shares) - smaller)
-        return float(self.weight * expected)
-
-    def _squares(self, state: Floats32) -> Floats:
-        """Return the squared innovation of each hypothesis in stated deviations."""
-        off = self.reading_m - self.model.mean(state[:2].T.astype(np.float64))
-        white = np.linalg.solve(np.linalg.cholesky(self.model.noise), off.T)
-        return np.asarray(np.sum(white**2, axis=0))
-
-    def _log_density(self, squares: Floats, factor: float) -> Floats:
-        count = self.reading_m.size
-        clipped = np.minimum(squares / factor**2, self.clip_sd**2 * count)
-        return np.asarray(-0.5 * clipped - count * log(factor))
+        return -0.5 * _NULL_FACTOR * self.weight * self.reading_m.size
 
 
 @dataclass(frozen=True)
@@ -161,7 +112,7 @@ class TimingSource(EvidenceSource):
     ) -> EvidenceUpdate:
         """Return the terms of an epoch, each weighted by the share of its error that is new."""
         unused: list[UnusedReading] = []
-        terms: list[TimingTerm] = []
+        terms: list[TimingTerm | DifferenceTerm] = []
         if not epoch.differences and not any(isfinite(row.timing_advance) for row in epoch.radio):
             return EvidenceUpdate(state, unused=unused)
         share = _new_share(travelled_m - state.advance_m, self.options.advance_memory_m)
@@ -169,11 +120,11 @@ class TimingSource(EvidenceSource):
             state = state._replace(advance_m=travelled_m)
         share = _new_share(travelled_m - state.difference_m, self.options.difference_memory_m)
         if share > 0:
-            differences = self._differences(epoch, share, state.factor, unused)
+            differences = self._differences(epoch, share, state.errors, unused)
             if differences:
                 state = state._replace(difference_m=travelled_m)
                 if belief is not None:
-                    state = state._replace(factor=state.factor.after(differences, belief))
+                    state = state._replace(errors=state.errors.after(differences, belief))
             terms += differences
         under_null = sum(one.under_null for one in terms)
         return EvidenceUpdate(state, tuple(terms), under_null=under_null, unused=unused)
@@ -187,7 +138,11 @@ class TimingSource(EvidenceSource):
         return [east - west, north - south, up]
 
     def _add_advances(
-        self, epoch: Epoch, share: float, terms: list[TimingTerm], unused: list[UnusedReading]
+        self,
+        epoch: Epoch,
+        share: float,
+        terms: list[TimingTerm | DifferenceTerm],
+        unused: list[UnusedReading],
     ) -> bool:
         options, known = self.options, []
         for row in epoch.radio:
@@ -206,8 +161,8 @@ class TimingSource(EvidenceSource):
         return True
 
     def _differences(
-        self, epoch: Epoch, share: float, factor: ErrorFactor, unused: list[UnusedReading]
-    ) -> list[TimingTerm]:
+        self, epoch: Epoch, share: float, errors: DifferenceErrors, unused: list[UnusedReading]
+    ) -> list[DifferenceTerm]:
         """Return one term for each reference, as its differences share the reference's error."""
         by_reference: dict[str, dict[str, Difference]] = {}
         for row in epoch.differences:
@@ -221,19 +176,20 @@ class TimingSource(EvidenceSource):
                 unused.append(UnusedReading(epoch.time_s, "tdoa", row.cell, Reason.SECOND_READING))
             elif self._site(row.cell) != self._site(row.reference):
                 of[row.cell] = row
-        terms: list[TimingTerm] = []
+        terms: list[DifferenceTerm] = []
         for reference, rows in by_reference.items():
             if not rows:
                 continue
+            stations = (reference, *rows)
             reference_m = next((one.reference_sigma_m for one in rows.values()), nan)
-            sigma_m = [reference_m, *(one.sigma_m for one in rows.values())]
-            model = range_differences(
-                self._layout,
-                [self._site(reference), *(self._site(cell) for cell in rows)],
-                [value if isfinite(value) else self.options.difference_sd_m for value in sigma_m],
-            )
+            stated_m = np.array([reference_m, *(one.sigma_m for one in rows.values())])
+            sigma_m = np.where(np.isfinite(stated_m), stated_m, self.options.difference_sd_m)
+            sites = [self._site(cell) for cell in stations]
+            model = range_differences(self._layout, sites, sigma_m)
             reading_m = np.array([one.difference_m for one in rows.values()])
-            terms.append(TimingTerm(model, reading_m, share, self.options.clip_sd, factor))
+            clip_sd = self.options.clip_sd
+            term = DifferenceTerm(model, reading_m, stations, sigma_m, share, clip_sd, errors)
+            terms.append(term)
         return terms
 
 
