@@ -14,6 +14,7 @@ from mapfilter.geodesy import project
 from mapfilter.tracks.column_values import TableFaults, column_values
 from mapfilter.tracks.no_fix import first_row, no_fix_note, rows_without_fix
 from mapfilter.tracks.position_units import RADIUS_68
+from mapfilter.tracks.rounded_degrees import with_rounding
 from mapfilter.tracks.schema import SCHEMA, Column
 
 _SWAPPED = "longitude and latitude swapped, or metres given for degrees"
@@ -43,7 +44,8 @@ def in_metres(
     """Return a table of positions with columns in metres in place of those in degrees.
 
     Rows without a position, as receivers write them while they have no fix, are left out: both
-    degrees are missing, or both are 0.
+    degrees are missing, or both are 0. Degrees of three decimals or fewer have at least the error
+    of rounding.
 
     Parameters
     ----------
@@ -71,9 +73,14 @@ def in_metres(
     stated = bool(set(_VARIANCES) & set(given.columns))
     if table == "gnss" and "accuracy_m" in given.columns and not stated:
         accuracy_m = column_values(_ACCURACY, given, found)
+    places = pd.DataFrame({"lat_deg": lat_deg, "lon_deg": lon_deg})
+    if accuracy_m is not None:
+        places = places.assign(accuracy_m=accuracy_m)
     rest = given.drop(columns=[*degrees, *(() if accuracy_m is None else ("accuracy_m",))])
     if crs is None or len(faults.found) > before:
         return PlacedTable(rest.assign(east_m=0.0, north_m=0.0), numbers, notes)
+    places, rounded = with_rounding(places, where)
+    notes += (rounded,) if rounded else ()
     east_m, north_m = project(crs, lon_deg, lat_deg)
     beyond = ~(np.isfinite(east_m) & np.isfinite(north_m))
     found.add_rows(
@@ -84,8 +91,9 @@ def in_metres(
         lambda _: "",
     )
     placed = rest.assign(east_m=np.where(beyond, 0, east_m), north_m=np.where(beyond, 0, north_m))
-    if accuracy_m is None:
+    if table != "gnss" or stated or "accuracy_m" not in places:
         return PlacedTable(placed, numbers, notes)
+    accuracy_m = places["accuracy_m"].to_numpy(dtype=np.float64)
     variance_m2 = np.where(accuracy_m > 0, (accuracy_m / RADIUS_68) ** 2, np.nan)
     placed = placed.assign(
         var_east_m2=variance_m2,
