@@ -170,7 +170,8 @@ def locate(
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out. What the log states
-        takes the place of defaults: the step of timing advance by technology, and of levels; turns
+        takes the place of defaults, also of those of a filter that options made (``over``,
+        ``over_sites``): the step of timing advance by technology, and of levels; turns
         without headings, at a vehicle's speed, are a vehicle's. A log of motion alone is located by
         the streets alone. The notes of the track's ``log`` say so, and what is lacking where
         nothing was located.
@@ -227,12 +228,16 @@ def locate(
         check_places("log", log, database.lattice, faults)
         faults.raise_if_any(InputError)
     log = with_range_notes(name_by_plan(log, plan), plan)
-    options, notes = fitted_to_log(given_filter, log)
-    alone = database is not None and by_streets_alone(options, log, database)
+    made = given_filter if isinstance(given_filter, Filter) else None
+    chosen = given_filter if made is None or made.made_of is None else made.made_of
+    options, notes = fitted_to_log(chosen, log)
+    alone = made is None and database is not None and by_streets_alone(options, log, database)
     notes = (*notes, STREETS_ALONE) if alone else notes
     notes = (*notes, *undirected_notes(log, options))
-    if database is None:
-        bound: Filter[Any] = over_sites(options, plan)
+    if made is not None:
+        bound = made if options is chosen else made.with_options(options)
+    elif database is None:
+        bound = over_sites(options, plan)
     else:
         bound = as_filter(options, database.without_cells() if alone else database, ways=ways)
     notes = (*notes, *assumed_note(log, options, bound.uses))

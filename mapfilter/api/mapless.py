@@ -55,8 +55,11 @@ def without_sites(log: TrackLog) -> TrackLog:
 
 
 def over_sites(given: Any, plan: CellPlan) -> KalmanTracker:
-    """Return a filter without a map over some sites, or over its own where it has them."""
-    if isinstance(given, KalmanTracker):
-        return given
+    """Return a filter without a map over some sites.
+
+    Parameters
+    ----------
+    given : KalmanFilter or its class
+    """
     options: KalmanFilter = given() if isinstance(given, type) else given
     return options.over_sites(plan)

@@ -71,6 +71,8 @@ REMEDIES = {
     "levels-above-eirp": "Check the EIRP, or what the rasters hold.",
     "log-cells-unknown": "Take the plan of the network that was received, with mcc, mnc, lac and "
     "ci, or name the cells in the log by the plan's ids.",
+    "log-degrees-rounded": "Export positions with five decimals or more of a degree; with three "
+    "they lie in steps of 100 m.",
     "log-headings": "Give headings in radians counter-clockwise from grid east: pi/2 minus a "
     "compass azimuth in radians; mapfilter convert reads a column of degrees as compass_deg. "
     "track.factors.heading_rad = 1 takes them as they are.",

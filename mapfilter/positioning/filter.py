@@ -98,6 +98,15 @@ class Filter(ABC, Generic[StateT]):
     ) -> tuple[StateT, StepOutput]:
         """Take one epoch: first move, then measure."""
 
+    @property
+    def made_of(self) -> Any:
+        """Options that it was made of, where :meth:`with_options` takes others; else None."""
+        return None
+
+    def with_options(self, options: Any) -> Filter[StateT]:  # noqa: ARG002
+        """Return the filter by other options, such as those that a log states, where it was."""
+        return self
+
     def warm_up(self, merged: Sequence[Epoch]) -> None:
         """Load kernels and map data before the clock starts."""
 

@@ -11,7 +11,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.kalman.filter import KalmanFilter, KalmanTracker
+from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.log_options import by_streets_alone
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import check_near
@@ -40,13 +40,13 @@ def lack_of_log(
     log : TrackLog
         What the filter was given.
     options
-        Of the filter, or the filter itself.
+        Of the filter.
     database : RadioRouteDatabase or None
         None where the filter only takes sites.
     """
     if estimate.converged_at is not None:
         return ""
-    if isinstance(options, KalmanFilter | KalmanTracker):
+    if isinstance(options, KalmanOptions):
         if log.gnss.empty and log.radio.empty and log.tdoa.empty:
             scored = " (those of the truth serve for scores only)" if len(log.truth) else ""
             return f"no positions and no radio to start from{scored}{_unused_ranges(log)}"

@@ -21,6 +21,7 @@ from mapfilter.tracks.misplaced import (
     misplaced_by,
     nearest_m,
 )
+from mapfilter.tracks.no_fix import holds_no_fix, no_fix_note
 from mapfilter.tracks.position_units import RADIUS_68
 
 _RANGES = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": MOST_SD_M}
@@ -65,7 +66,9 @@ def start_of(
 def in_metres(
     row: Mapping[str, Any], where: str, crs: str, faults: Faults
 ) -> Mapping[str, Any] | None:
-    """Return a row of ``gnss`` in a CRS, also where it is as phones give it; None, with faults.
+    """Return a row of ``gnss`` in a CRS, also where it is as phones give it.
+
+    None, with faults, where it is wrong; and without any where it holds no position.
 
     Parameters
     ----------
@@ -77,6 +80,8 @@ def in_metres(
         return row
     before = len(faults.found)
     check_keys(row, _AS_A_PHONE, where, faults)
+    if _is_placeless(row):
+        return None
     lat_deg, lon_deg = (
         number(
             row.get(key), f"{where}.{key}", f"degrees in -{most:g}..{most:g}", faults, -most, most
@@ -99,6 +104,27 @@ def in_metres(
     variance_m2 = (radius_m / RADIUS_68) ** 2
     both = {"var_east_m2": variance_m2, "var_north_m2": variance_m2, "cov_east_north_m2": 0.0}
     return {**found, **both}
+
+
+def placeless_note(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a note on positions of a request that are none; empty without any.
+
+    Parameters
+    ----------
+    document : mapping
+        A request whose epochs were checked.
+    """
+    placeless = [
+        f"epochs[{at}].gnss[{index}]"
+        for at, epoch in enumerate(document["epochs"])
+        for index, row in enumerate(epoch.get("gnss") or ())
+        if any(key in row for key in _AS_A_PHONE) and _is_placeless(row)
+    ]
+    return (no_fix_note("gnss", len(placeless), placeless[0]),) if placeless else ()
+
+
+def _is_placeless(row: Mapping[str, Any]) -> bool:
+    return holds_no_fix(row.get("lat_deg"), row.get("lon_deg"))
 
 
 def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -> None:

@@ -23,7 +23,7 @@ from mapfilter.serving.documents import RequestError, check_keys, text, whole
 from mapfilter.serving.epoch_rows import check_pace, read_epochs
 from mapfilter.serving.events import fix_document, json_bytes
 from mapfilter.serving.filters import LOG, SessionFilter, statement_of
-from mapfilter.serving.places import check_fixes, start_of
+from mapfilter.serving.places import check_fixes, placeless_note, start_of
 from mapfilter.serving.session import Progress
 from mapfilter.serving.watching import Watcher
 
@@ -111,7 +111,8 @@ def stepped(
     belief = b""
     if watcher is not None:
         belief = shown_or(b"", partial(watcher.belief, state, count), faults)
-    return Stepped(progress, fixes, details, belief, filter_.unused(document), faults[-1])
+    notes = (*filter_.unused(document), *placeless_note(document))
+    return Stepped(progress, fixes, details, belief, notes, faults[-1])
 
 
 def _detail(

@@ -165,7 +165,8 @@ def make_log(
         Tables with the columns of :class:`TrackLog`. Required are only ``time_s``, ``role``
         (radio), ``east_m`` and ``north_m`` (gnss, truth), ``satellite`` (pseudoranges), ``cell``
         and ``reference`` (tdoa). Instead of metres positions may have ``lat_deg`` and ``lon_deg``,
-        and those of gnss ``accuracy_m``, the radius that holds 68 % as phones state it. Instead of
+        and those of gnss ``accuracy_m``, the radius that holds 68 % as phones state it; rows in
+        which both degrees are missing, or both 0, hold no fix and are left out. Instead of
         ``time_s`` in seconds there may be timestamps with a time zone, in a column ``time_s`` or
         ``time``: then the first of all is second 0.
     almanac : Almanac, optional
@@ -236,11 +237,12 @@ def make_log(
     given, of_clocks = with_clocks_gone_on(given, called)
     tables, every_note = dict[str, pd.DataFrame](), (*notes, *of_clocks)
     for table in TABLES:
-        name, number = called.get(table, table), numbers.get(table)
-        if table in _PLACED and table in given:
+        name, rows, number = called.get(table, table), given.get(table), numbers.get(table)
+        if table in _PLACED and rows is not None:
             used = str(crs) if known else None
-            given[table] = in_metres(table, given[table], name, used, faults, number)
-        tables[table], more = tidy_table(table, given.get(table), name, faults, number)
+            rows, number, more = in_metres(table, rows, name, used, faults, number)
+            every_note += more
+        tables[table], more = tidy_table(table, rows, name, faults, number)
         every_note += more
     check_start(start_utc_s, tables, faults, whole)
     if not any(fault.where.endswith("time_s") for fault in faults.found):

@@ -11,8 +11,8 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.position_units import RADIUS_68
-from mapfilter.tracks.readers.held_positions import rounding_m
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.rounded_degrees import rounding_m
 from mapfilter.tracks.stated_errors import stated_note
 
 PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
@@ -154,7 +154,7 @@ def without_held(
     motion : pandas.DataFrame or None
         time_s and step_m.
     rounded_m : float
-        The step of rounded degrees, see :func:`mapfilter.tracks.readers.held_positions.rounding_m`.
+        The step of rounded degrees, see :func:`mapfilter.tracks.rounded_degrees.rounding_m`.
     driven : bool
         Whether motion is that of wheels.
 

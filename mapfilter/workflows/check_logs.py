@@ -20,6 +20,7 @@ from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.range_units import range_notes
 from mapfilter.tracks.refused_motion import mirrored_notes, refused_faults
+from mapfilter.tracks.rounded_degrees import rounded_notes
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.speeds import speed_fault
 from mapfilter.workflows.logs import journeys_of, open_journey
@@ -51,6 +52,8 @@ def check_logs(
             for note in fault_notes(opened.log.notes, column):
                 severity: Severity = "error" if column in refused else "warning"
                 findings.add(code, str(path), f"{note}.", severity)
+        for note in rounded_notes(opened.log.notes):
+            findings.add("log-degrees-rounded", str(path), f"{note}.", "warning")
         for note in mirrored_notes(opened.log):
             severity = "error" if "heading_rad" in refused else "warning"
             findings.add("log-mirrored", str(path), note, severity)

@@ -31,6 +31,7 @@ from mapfilter.tracks.log_checks import ends_early
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers.csv_fields import MOTION_FIELDS
+from mapfilter.tracks.rounded_degrees import rounded_notes
 from mapfilter.tracks.turn_drift import turn_drift_radps
 from mapfilter.viewing.words import REASONS
 
@@ -45,10 +46,10 @@ _UNLOCATED = {
     Status.OUTSIDE: "as nothing on the map explains the readings",
 }
 
-_CONTRADICTING = (
-    "steps in another unit, turns the other way round, another journey, or positions whose "
-    "latitude and longitude are swapped"
-)
+_MOTION_AT_FAULT = "steps in another unit", "turns the other way round"
+_POSITIONS_AT_FAULT = "another journey", "positions whose latitude and longitude are swapped"
+_POSITIONS_ROUNDED = "positions in degrees of few decimals"
+_DIFFERENCES_AT_FAULT = "time differences of a site whose clock is off, or without line of sight"
 
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
@@ -155,7 +156,7 @@ def notes_after(
         *fixes_note(opened, log, truth, uses, estimate),
         *_motion_note(opened, log, options, estimate),
         *pause_note(estimate),
-        *early_end_note(opened, estimate, over_map=database is not None),
+        *early_end_note(opened, log, estimate, uses, over_map=database is not None),
         *coarse_pixels_note(options, estimate, database),
     )
 
@@ -204,7 +205,12 @@ def pause_note(estimate: TrackEstimate) -> tuple[str, ...]:
 
 
 def early_end_note(
-    opened: OpenedLog, estimate: TrackEstimate, *, over_map: bool
+    opened: OpenedLog,
+    log: TrackLog,
+    estimate: TrackEstimate,
+    uses: Collection[str],
+    *,
+    over_map: bool,
 ) -> tuple[str, ...]:
     """Return a note where a track is located until long before its rows end, and why; else none.
 
@@ -212,6 +218,10 @@ def early_end_note(
     ----------
     opened : OpenedLog
         The log as it was opened, with its sensors.
+    log : TrackLog
+        Without what is hidden from the filter.
+    uses : collection of str
+        Kinds of measurements that the filter uses.
     over_map : bool
         Whether a map may lack the way that was gone.
     """
@@ -234,20 +244,28 @@ def early_end_note(
         unused[one.reason] += one.readings if one.time_s > last_s else 0
     reason, count = unused.most_common(1)[0] if unused else (Reason.USED, 0)
     text += f"{status} from there on, {_UNLOCATED[status]}"
-    if status is Status.LOST and len(opened.log.gnss) and len(opened.log.motion):
-        text += f" (likely: {_likely(opened.log, over_map=over_map)})"
+    if status is Status.LOST and (likely := _likely(log, uses, over_map=over_map)):
+        text += f" (likely: {likely})"
     return (f"{text}; {count} readings: {reason} ({REASONS[reason]})" if count else text,)
 
 
-def _likely(log: TrackLog, *, over_map: bool) -> str:
-    """Return why motion and fixes of a log contradict each other, as far as they show it."""
-    drift_deg_per_s = abs(float(np.degrees(turn_drift_radps(log.motion, log.gnss))))
-    if drift_deg_per_s > 0:
+def _likely(log: TrackLog, uses: Collection[str], *, over_map: bool) -> str:
+    """Return why the readings of a log contradict each other, as far as they show it; else ""."""
+    placed = len(log.gnss) > 0 and "gnss" in uses
+    timed = len(log.tdoa) > 0 and "tdoa" in uses
+    moved = len(log.motion) > 0
+    drift_rad_per_s = turn_drift_radps(log.motion, log.gnss) if moved and placed else 0.0
+    if (drift_deg_per_s := abs(float(np.degrees(drift_rad_per_s)))) > 0:
         return (
             f"a gyroscope noisier than stated: turns drift by {drift_deg_per_s:.2g} deg/s beside "
             "the course of the positions; convert a recording that begins with 10 s at rest"
         )
-    return f"{_CONTRADICTING}{', or ways that the map lacks' if over_map else ''}"
+    causes = [*_MOTION_AT_FAULT] if moved and (placed or timed) else []
+    causes += _POSITIONS_AT_FAULT if moved and placed else ()
+    causes += [_POSITIONS_ROUNDED] if placed and rounded_notes(log.notes) else []
+    causes += [_DIFFERENCES_AT_FAULT] if timed else []
+    causes += ["ways that the map lacks"] if causes and over_map else []
+    return ", or ".join(part for part in (", ".join(causes[:-1]), *causes[-1:]) if part)
 
 
 def receiver_motion(opened: OpenedLog) -> str:

@@ -181,13 +181,11 @@ def _filters(config: Config, database: RadioRouteDatabase) -> SessionFilters:
         hint = "states of other filters cannot be saved, and nothing live can be smoothed"
         raise fail(ConfigError, "filter", "bayes, without smooth", got, hint)
     assert isinstance(chosen, BayesFilter)
-    usual, measured = chosen.over(database), database.measured() is not None
+    usual = chosen.over(database)
 
     def make(fitted: BayesFilter) -> BayesPositioner:
-        if fitted == chosen:
-            return usual
-        # The map is shared; a surveyed one depends on the options.
-        return fitted.over(database) if measured else fitted.over_area(usual.area)
+        # The map is shared.
+        return usual if fitted == chosen else usual.with_options(fitted)
 
     return SessionFilters(chosen, make, database.plan)
 

@@ -241,10 +241,13 @@ def test_options_that_are_not_given_are_those_of_surveys_over_one(monkeypatch, r
     monkeypatch.setattr(tested, "filled_field", lambda field, measured: (field, measured))
     held = SimpleNamespace(of_field=lambda *given: (given, make_area())[1])
     monkeypatch.setattr(tested, "AreaMap", held)
-    monkeypatch.setattr(tested, "over_survey", lambda bound, *given: (bound, given))
+    asked = []
+    over_survey = lambda bound, *given: (asked.append(given), bound)[1]  # noqa: E731
+    monkeypatch.setattr(tested, "over_survey", over_survey)
     database = Surveyed(*roles)
-    bound, given = BayesFilter(level_weight=0.8).over(database)
-    assert given == (database, "measured")
+    bound = BayesFilter(level_weight=0.8).over(database)
+    assert asked == [(database, "measured")]
+    assert bound.made_of == BayesFilter(level_weight=0.8)
     assert bound.model.weights.sd_m == map_sd_m
     assert bound.model.evidence.levels.weight == 0.8
     assert bound.model.evidence.levels.device_db == 2.0

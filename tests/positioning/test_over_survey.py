@@ -418,3 +418,17 @@ def test_twenty_reports_of_serving_cells_are_enough_for_statistics(surveyed, cou
     others = replace(parts.readings, serving=kept)
     model = over_survey(bound, database, replace(parts, readings=others)).model
     assert (model.serving_model is not None) == told
+
+
+def test_other_options_of_a_filter_are_over_the_same_survey(surveyed):
+    database, _, _ = surveyed
+    options = BayesFilter(timing_step_m=78.0, step_sd_m=0.4)
+    found, plain = BayesFilter().over(database).with_options(options), options.over(database)
+    assert found.made_of == options
+    assert isinstance(found.model, MeasuredMapModel)
+    assert (found.timing, found.options) == (plain.timing, plain.options)
+    assert (found.model.motion, found.model.evidence, found.model.weights) == (
+        plain.model.motion,
+        plain.model.evidence,
+        plain.model.weights,
+    )

@@ -139,3 +139,18 @@ def test_true_positions_beside_the_meridian_of_greenwich_count(lon_deg, believed
 def test_a_device_may_leave_the_area(positioner, cross):
     near, far = {"gnss": [fix(EAST_M, NORTH_M)]}, {"gnss": [fix(EAST_M, NORTH_M + 20_000)]}
     assert [one.code for one in answers_of(positioner, cross, None, near, far)] == [201, 200, 200]
+
+
+def test_an_answer_names_positions_that_are_none(positioner, cross):
+    """Also degrees of 0, which otherwise would be those of another area."""
+    nowhere = {"lat_deg": 0.0, "lon_deg": 0.0, "accuracy_m": 0.0}
+    _, answer, again = answers_of(
+        positioner, cross, None, {"gnss": [nowhere]}, {"radio": [SERVING]}
+    )
+    assert (answer.code, again.code) == (200, 200)
+    assert answer.json["notes"] == [
+        "gnss: 1 row without a position left out (latitude and longitude both empty, or both 0: "
+        "no fix; first epochs[0].gnss[0])"
+    ]
+    assert answer.json["fixes"][0]["unused"] == []
+    assert again.json["notes"] == []

@@ -24,6 +24,7 @@ from mapfilter.serving.documents import RequestError
 from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.geolocate import geolocator
 from mapfilter.serving.limits import RateLimit
+from mapfilter.serving.places import placeless_note
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import make_log
 
@@ -449,3 +450,37 @@ def test_no_debt_grows_beyond_its_bound():
     limit = RateLimit(per_s=1.0, burst=10.0, most_debt=30.0)
     assert limit.wait_s("a", 1e6, now_s=0.0) == 0.0
     assert limit.wait_s("a", 1.0, now_s=0.0) == 31.0
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        {"lat_deg": 0, "lon_deg": 0.0, "accuracy_m": 0},
+        {"lat_deg": None, "lon_deg": None, "accuracy_m": -1},
+        {"lat_deg": "NaN", "lon_deg": ""},
+    ],
+    ids=str,
+)
+def test_a_position_that_is_none_counts_as_none(cross, row):
+    """As such a row of a log does."""
+    names = PlanNames(cross.plan)
+    body = epoch(gnss=[row], motion=[{"step_m": 1.0}])
+    (bare,), (found,) = (
+        read_epochs(one, names, nan) for one in (epoch(motion=[{"step_m": 1.0}]), body)
+    )
+    assert found == bare
+    assert placeless_note(body) == (
+        "gnss: 1 row without a position left out (latitude and longitude both empty, or both 0: "
+        "no fix; first epochs[0].gnss[0])",
+    )
+    assert placeless_note(epoch(gnss=[{"lat_deg": 0.0, "lon_deg": 8.0}], radio=None)) == ()
+    metres = epoch(gnss=[{"east_m": 0.0, "north_m": 0.0}])
+    assert placeless_note(metres) == ()
+    assert read_epochs(metres, names, nan)[0].fix is not None
+
+
+@pytest.mark.parametrize("row", [{"lat_deg": 0, "lon_deg": None}, {"lat_deg": 41.0}], ids=str)
+def test_half_a_position_is_a_fault(cross, row):
+    with pytest.raises(RequestError) as caught:
+        read_epochs(epoch(gnss=[row]), PlanNames(cross.plan), nan)
+    assert [fault.where for fault in caught.value.faults] == ["epochs[0].gnss[0].lon_deg"]

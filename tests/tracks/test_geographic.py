@@ -98,3 +98,28 @@ def test_given_variances_count_and_a_truth_has_no_accuracy():
     assert "var_east_m2" not in log.truth
     unused = [note for note in log.notes if "not used" in note]
     assert unused == ["gnss: column accuracy_m is not used", "truth: column accuracy_m is not used"]
+
+
+@pytest.mark.parametrize(("decimals", "sd_m"), [(3, 32.1), (2, 321.0), (4, None)])
+def test_degrees_of_few_decimals_have_their_error(decimals, sd_m):
+    """As those of a recording."""
+    step = np.arange(12)
+    degrees = {"lat_deg": (50.0 + 3e-3 * step).round(decimals), "lon_deg": 14.0 + step / 100}
+    rows = pd.DataFrame({"time_s": 1.0 * step, **degrees})
+    if decimals == 4:
+        rows["lat_deg"] += 1e-4
+    log = make_log(CRS, gnss=rows.assign(accuracy_m=[3.03] * 11 + [np.nan]), truth=rows)
+    found_m = np.sqrt(log.gnss["var_east_m2"].to_numpy())
+    if sd_m is None:
+        assert (log.notes, found_m[0]) == ((), pytest.approx(2.0, rel=1e-3))
+        assert np.isnan(found_m[-1])
+        return
+    assert found_m == pytest.approx([np.hypot(2.0, sd_m)] * 11 + [sd_m], rel=2e-3)
+    of = f"degrees of {decimals} decimals, in steps of {111195 / 10**decimals:.0f} m: errors"
+    assert [note.split(": ", 1)[1].startswith(of) for note in log.notes] == [True, True]
+    assert [note.split(": ", 1)[0] for note in log.notes] == ["gnss", "truth"]
+    stated = {"var_east_m2": 4.0, "var_north_m2": 4.0, "cov_east_north_m2": 0.0}
+    assert set(make_log(CRS, gnss=rows.assign(**stated)).gnss["var_east_m2"]) == {4.0}
+    # A few rows may be round by chance, and a place that was stated once is no receiver's.
+    assert make_log(CRS, gnss=rows.iloc[:9]).notes == ()
+    assert make_log(CRS, gnss=rows.assign(lat_deg=50.0, lon_deg=14.0)).notes == ()

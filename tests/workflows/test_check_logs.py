@@ -114,6 +114,21 @@ def test_timing_advances_in_metres_are_a_finding(check, log):
     assert "(metres for steps" in found["log-ranges"]["evidence"]
 
 
+@pytest.mark.parametrize(("decimals", "step_m"), [(3, 111), (4, None)])
+def test_degrees_of_few_decimals_are_a_finding(check, log, decimals, step_m):
+    truth = read_log(log).truth
+    lon_deg, lat_deg = unproject(read_log(log).crs, truth["east_m"], truth["north_m"])
+    degrees = {"lat_deg": lat_deg.round(decimals), "lon_deg": lon_deg.round(decimals)}
+    pd.DataFrame({"time_s": truth["time_s"], **degrees}).to_csv(log / "gnss.csv", index=False)
+    found = check(log)
+    if step_m is None:
+        assert "log-degrees-rounded" not in found
+        return
+    assert found["log-degrees-rounded"]["severity"] == "warning"
+    evidence = found["log-degrees-rounded"]["evidence"]
+    assert f"gnss.csv: degrees of {decimals} decimals, in steps of {step_m} m: errors" in evidence
+
+
 def test_motion_alone_is_no_fault(check, log):
     for table in ("radio", "gnss", "truth"):
         (log / f"{table}.csv").unlink(missing_ok=True)

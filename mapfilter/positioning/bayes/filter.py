@@ -11,6 +11,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import expm1
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from mapfilter.positioning.bayes.claims import judged
 from mapfilter.positioning.bayes.evidence import EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
+from mapfilter.positioning.bayes.maker import Maker
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.moving import moved
@@ -63,7 +65,8 @@ class BayesPositioner(Filter[BayesState]):
     holds the options and rules that take the place of the others as long as positions or satellites
     are measured; None for the same ones. ``carriageways`` locate a vehicle as long as nothing but
     its turns and the map do. ``holds`` says when a phone may have been turned. ``scored`` is
-    whether outputs leave out what scores do not need. Masses on a grid lie on ``device``.
+    whether outputs leave out what scores do not need. Masses on a grid lie on ``device``. ``maker``
+    made it of options.
     """
 
     model: BayesModel
@@ -80,6 +83,16 @@ class BayesPositioner(Filter[BayesState]):
     pulls: PullRules = field(default_factory=PullRules)
     scored: bool = False
     device: Device = PROCESSOR
+    maker: Maker | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def made_of(self) -> Any:
+        """Options that it was made of; None where it was made by hand."""
+        return None if self.maker is None else self.maker.options
+
+    def with_options(self, options: Any) -> BayesPositioner:
+        """Return the filter by other options over the same area."""
+        return self if self.maker is None else self.maker.remade(self, options)
 
     @property
     def crs(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from math import radians
 from typing import Annotated, Any
 
@@ -11,6 +12,7 @@ from annotated_types import Ge, Gt, Le
 
 from mapfilter._device import DeviceName, open_device
 from mapfilter._threads import Threads
+from mapfilter.database.measured import MeasuredParts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.filters.particle import ParticleOptions
@@ -25,6 +27,7 @@ from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
+from mapfilter.positioning.bayes.maker import Maker
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.over_survey import (
@@ -189,10 +192,10 @@ class BayesFilter(Options):
             return self.over_area(open_area(database, whole=self.name == "grid"))
         roles = {one["role"] for one in database.manifest["inputs"]}
         tracks = "tracks" in roles and not roles & {"map", "roads"}
-        options = self._with({**SURVEYED, **(SURVEYED_WAYS if tracks else {})})
+        usual = {**SURVEYED, **(SURVEYED_WAYS if tracks else {})}
         field = filled_field(database.field(), measured)
         area = AreaMap.of_field(field, database.plan, database.floor_dbm)
-        return over_survey(options.over_area(area), database, measured)
+        return _over_measured(area, usual, database, measured, self)
 
     @property
     def resolved(self) -> BayesFilter:
@@ -209,7 +212,8 @@ class BayesFilter(Options):
 
     def over_area(self, area: AreaFrame) -> BayesPositioner:
         """Return the filter over an area."""
-        return self.resolved._over_area(area)
+        maker = Maker(self, partial(_over_area, area))
+        return replace(self.resolved._over_area(area), maker=maker)
 
     def _over_area(self, area: AreaFrame) -> BayesPositioner:
         motion = MotionErrors(
@@ -318,3 +322,20 @@ class GridFilter(BayesFilter):
         device = open_device(self.device, "filter.grid.device")
         # Without arguments super() does not work in a dataclass with slots.
         return replace(BayesFilter._over_area(self, area), device=device)
+
+
+def _over_area(area: AreaFrame, options: BayesFilter) -> BayesPositioner:
+    return options.over_area(area)
+
+
+def _over_measured(
+    area: AreaMap,
+    usual: Mapping[str, float],
+    database: RadioRouteDatabase,
+    measured: MeasuredParts,
+    options: BayesFilter,
+) -> BayesPositioner:
+    """Return the filter over what a survey measured, with other usual values for defaults."""
+    bound = over_survey(options._with(usual).over_area(area), database, measured)
+    make = partial(_over_measured, area, usual, database, measured)
+    return replace(bound, maker=Maker(options, make))

@@ -92,6 +92,15 @@ class KalmanTracker(Filter[KalmanState]):
         """Kinds of measurements that it takes."""
         return ("motion", "serving", "neighbour", "gnss")
 
+    @property
+    def made_of(self) -> KalmanOptions:
+        """Options that it was made of."""
+        return self.sites.options
+
+    def with_options(self, options: KalmanOptions) -> KalmanTracker:
+        """Return the filter by other options over the same sites."""
+        return replace(self, sites=SiteModels(self.sites.plan, options, self.sites.antennas))
+
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> KalmanState:
         """Return the state before the first epoch."""
         layout = RECKONED if "motion" in kinds else MOVING

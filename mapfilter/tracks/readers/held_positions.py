@@ -7,7 +7,8 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.tracks.position_units import METRES_PER_DEGREE, RADIUS_68
+from mapfilter.tracks.position_units import METRES_PER_DEGREE
+from mapfilter.tracks.rounded_degrees import with_rounding
 
 _FEWEST = 20
 _LONGEST_RUN_S, _ALIKE, _LONG = 5.0, 0.8, 3
@@ -15,7 +16,6 @@ _LONGEST_RUN_S, _ALIKE, _LONG = 5.0, 0.8, 3
 _JUMP_M, _JUMP_MPS, _SETTLED = 2000.0, 350.0, 10
 _FIRST_SHARE, _FIRST_ROWS = 0.02, 3
 _JOURNEY_S = 6 * 3600.0
-_DECIMALS, _EXACT_DEG = 3, 1e-9
 
 
 def own_positions(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -32,7 +32,7 @@ def own_positions(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
         time_s, in order, lat_deg, lon_deg and accuracy_m.
     """
     notes: tuple[str, ...] = ()
-    for part in (_without_first, _without_repeated, _with_rounding):
+    for part in (_without_first, _without_repeated, with_rounding):
         rows, note = part(rows)
         notes += (note,) if note else ()
     pause_s = float(rows["time_s"].diff().max()) if len(rows) > 1 else 0.0
@@ -95,48 +95,6 @@ def _measured(first: Ints, length: Ints, usual: int) -> Bools:
     number = np.arange(int(length.sum())) - np.repeat(first, length)
     rests = np.repeat(length >= _LONG * usual, length)
     return np.asarray((number == 0) | (rests & (number % usual == 0)))
-
-
-def rounding_m(rows: pd.DataFrame) -> float:
-    """Return the step of positions whose degrees have three decimals or fewer; 0 for others.
-
-    Parameters
-    ----------
-    rows : pandas.DataFrame
-        lat_deg and lon_deg; or other positions, which have no such step.
-
-    Examples
-    --------
-    >>> degrees = 60 + np.arange(30) / 1000
-    >>> round(rounding_m(pd.DataFrame({"lat_deg": degrees, "lon_deg": 25.0})))
-    111
-    """
-    decimals = _decimals(rows) if "lat_deg" in rows else None
-    return 0.0 if decimals is None else METRES_PER_DEGREE * 10.0**-decimals
-
-
-def _decimals(rows: pd.DataFrame) -> int | None:
-    degrees = rows[["lat_deg", "lon_deg"]].to_numpy(dtype=np.float64)
-    if len(rows) < _FEWEST or (np.ptp(degrees, axis=0) == 0).all():
-        return None
-    return next(
-        (
-            count
-            for count in range(_DECIMALS + 1)
-            if (np.abs(degrees - np.round(degrees, count)) < _EXACT_DEG).all()
-        ),
-        None,
-    )
-
-
-def _with_rounding(rows: pd.DataFrame) -> tuple[pd.DataFrame, str]:
-    decimals = _decimals(rows)
-    if decimals is None:
-        return rows, ""
-    sd_m = METRES_PER_DEGREE * 10.0**-decimals / 12**0.5
-    given_m = rows["accuracy_m"].fillna(0.0).to_numpy(dtype=np.float64)
-    note = f"positions: degrees of {number_of(decimals, 'decimal')}: errors of ± {sd_m:.0f} m"
-    return rows.assign(accuracy_m=np.hypot(given_m, RADIUS_68 * sd_m)), note
 
 
 def _metres(rows: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
