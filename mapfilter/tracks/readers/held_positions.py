@@ -7,7 +7,7 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.tracks.position_units import METRES_PER_DEGREE, RADIUS_68
+from mapfilter.tracks.position_units import METRES_PER_DEGREE, RADIUS_68, metres_about_middle
 
 _FEWEST = 20
 _LONGEST_RUN_S, _ALIKE, _LONG = 5.0, 0.8, 3
@@ -140,8 +140,5 @@ def _with_rounding(rows: pd.DataFrame) -> tuple[pd.DataFrame, str]:
 
 
 def _metres(rows: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
-    time_s, lat, lon = (
-        rows[name].to_numpy(dtype=np.float64) for name in ("time_s", "lat_deg", "lon_deg")
-    )
-    wide = np.cos(np.radians(np.median(lat)))
-    return time_s, METRES_PER_DEGREE * wide * lon, METRES_PER_DEGREE * lat
+    time_s = rows["time_s"].to_numpy(dtype=np.float64)
+    return time_s, *metres_about_middle(rows["lon_deg"], rows["lat_deg"])
