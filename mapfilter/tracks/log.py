@@ -29,11 +29,13 @@ from mapfilter.tracks.clock_steps import with_clocks_gone_on
 from mapfilter.tracks.geographic import in_metres
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import (
+    TIMES_BEGIN,
     check_clocks,
     check_start,
     check_steps,
     check_turns,
     early_ends,
+    odd_start,
     truth_far_off,
     undirected_note,
 )
@@ -248,6 +250,8 @@ def make_log(
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
         check_turns(tables["motion"], called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
+        if not any(TIMES_BEGIN in note for note in every_note):
+            every_note += odd_start(start_utc_s, tables, whole)
         if not faults.found and not any(FAR_APART in note for note in every_note):
             every_note += truth_far_off(str(crs), tables)
         # Of values that are refused nothing is told besides.
