@@ -13,7 +13,13 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
-from mapfilter.tracks.readers.csv_weeks import over_days, over_weeks, week_column, weeks_of
+from mapfilter.tracks.readers.csv_weeks import (
+    over_days,
+    over_stuck_weeks,
+    over_weeks,
+    week_column,
+    weeks_of,
+)
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
@@ -52,7 +58,8 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
         if week := week_column(mapped):
             reading.clock = Clock("gps")
             reading.note(f"time: seconds of the GPS week in column {week}")
-            return utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
+            counted_s = utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
+            return over_stuck_weeks(reading, counted_s, week)
         reading.clock = Clock("monotonic")
         return over_days(reading, over_weeks(reading, number))
     reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
