@@ -11,8 +11,8 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
+from mapfilter.tracks.readers.local_times import parse_zone
 from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.readers.times import parse_zone
 from mapfilter.tracks.readers.zipped import check_zipped, files_in_zip, is_zip
 from mapfilter.tracks.store import files_in, is_log
 

@@ -21,6 +21,7 @@ from mapfilter.tracks.readers.csv_weeks import (
     weeks_of,
 )
 from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.local_times import change_notes, utc_from_local_s
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.times import (
@@ -28,7 +29,6 @@ from mapfilter.tracks.readers.times import (
     parse_times,
     unix_seconds,
     utc_from_gps_s,
-    utc_from_local_s,
     utc_from_week_s,
     without_midnights,
 )
@@ -126,7 +126,12 @@ def _is_days(known: Floats) -> bool:
 
 def _local(reading: Reading, local_s: Floats, zone: str) -> Floats:
     reading.clock = Clock("local", zone)
-    return utc_from_local_s(local_s, zone, reading.last_s) if zone else local_s
+    if not zone:
+        return local_s
+    utc_s = utc_from_local_s(local_s, zone, reading.last_s)
+    for note in change_notes(local_s, utc_s, zone, reading.last_s):
+        reading.note(note)
+    return utc_s
 
 
 def _note_gps(reading: Reading, name: str, known: Floats) -> None:
