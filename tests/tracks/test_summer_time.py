@@ -197,7 +197,7 @@ def test_a_walk_that_leaves_or_repeats_that_hour_is_not(tmp_path, begin_s, end_s
 @pytest.mark.parametrize("begin_s", [-300, 0, 1800, 3300])
 def test_times_that_a_clock_set_forward_leaves_out_are_noted(tmp_path, begin_s):
     times_s = FORWARD_S + 3600 + begin_s + np.arange(600.0)
-    (note,) = notes_of(tmp_path, times_s)
+    (note,) = (one for one in notes_of(tmp_path, times_s) if "sorted" not in one)
     count = int(np.sum((times_s >= FORWARD_S + 3600) & (times_s < FORWARD_S + 7200)))
     assert note.startswith(f"time: {count} times are not of Europe/Berlin, from 2026-03-29 02:")
     assert "taken for UTC+01:00 (likely: a clock that was not set, --zone +01:00" in note
