@@ -31,6 +31,7 @@ from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import (
     TIMES_BEGIN,
     check_clocks,
+    check_days,
     check_start,
     check_steps,
     check_turns,
@@ -245,6 +246,7 @@ def make_log(
         tables[table], more = tidy_table(table, given.get(table), name, faults, number)
         every_note += more
     check_start(start_utc_s, tables, faults, whole)
+    check_days(tables, called, faults)
     if not any(fault.where.endswith("time_s") for fault in faults.found):
         check_clocks(tables, called, faults)
         every_note += check_steps(tables, called.get("motion", "motion"), faults)

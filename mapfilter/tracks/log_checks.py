@@ -16,6 +16,7 @@ from mapfilter.tracks.clock_notes import week_fault
 from mapfilter.tracks.exchanged import sideways_mps2
 from mapfilter.tracks.misplaced import FAR_M, misplaced_by
 from mapfilter.tracks.moved import UNDIRECTED
+from mapfilter.tracks.readers.times import are_days
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0
@@ -73,6 +74,18 @@ def check_clocks(
         spans = "; ".join(f"{name} {time[0]:.10g}..{time[-1]:.10g}" for name, time in times.items())
         whole = names.get("log", "log")
         faults.add(f"{whole}, time_s", "tables that overlap in time", spans, hint)
+
+
+def check_days(
+    tables: Mapping[str, pd.DataFrame], names: Mapping[str, str], faults: Faults
+) -> None:
+    """Note tables whose times are days of a spreadsheet: a walk would last milliseconds."""
+    for table, rows in tables.items():
+        time_s = rows["time_s"].to_numpy()
+        if len(rows) >= _FEW_ROWS and are_days(time_s):
+            got = f"{time_s[0]:.6f} to {time_s[-1]:.6f}"
+            hint = "days of a spreadsheet; take the first from them, and multiply by 86400"
+            faults.add(f"{names.get(table, table)}, time_s", "seconds", got, hint)
 
 
 def ends_early(before_s: float, whole_s: float) -> bool:

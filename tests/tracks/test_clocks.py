@@ -117,3 +117,13 @@ def test_a_start_in_no_usual_year_is_noted(tmp_path, start_utc_s, first_s, year,
     assert all(f"times begin in {year} (likely: " in note and cause in note for note in told)
     write_log(log, tmp_path / "log")
     assert read_log(tmp_path / "log").notes == log.notes
+
+
+def test_days_of_a_spreadsheet_are_named_in_each_table():
+    days = 46_143.416667 + TIME_S / 86_400
+    with pytest.raises(InputError) as caught:
+        make_log(CRS, motion=motion(days), radio=radio(days[::2]))
+    assert [fault.where for fault in caught.value.faults] == ["motion, time_s", "radio, time_s"]
+    assert all("days of a spreadsheet" in fault.hint for fault in caught.value.faults)
+    assert caught.value.faults[0].got == "46143.416667 to 46143.418739"
+    make_log(CRS, motion=motion(46_143 + TIME_S), radio=radio(46_143 + TIME_S))

@@ -17,6 +17,8 @@ from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.orbits import LEAPS_UTC_S
 from mapfilter.tracks.readers.local_times import utc_from_local_s
 
+_DAYS, _NEAREST_S = (36_526.0, 73_050.0), 1e-3
+"""Days of the years 2000 to 2099 since 1900, and rows a thousand a second."""
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
 _DOTTED = re.compile(r"^\s*(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)(?!\d)", re.ASCII)
 """Day, month and year with dots, which no one writes in another order."""
@@ -76,6 +78,24 @@ def unix_seconds(values: ArrayLike) -> Floats:
         large = np.abs(number) > least
         number[large] /= scale
     return number
+
+
+def in_days(numbers: Floats) -> bool:
+    """Return whether numbers are in the range of a spreadsheet's days of this century."""
+    low, high = _DAYS
+    return bool(numbers.size and low <= numbers.min() and numbers.max() <= high)
+
+
+def are_days(numbers: Floats) -> bool:
+    """Return whether numbers are days of a spreadsheet: as seconds, rows would be too near.
+
+    Examples
+    --------
+    >>> are_days(46_143 + np.arange(60) / 86_400), are_days(46_143 + np.arange(60.0))
+    (True, False)
+    """
+    steps = np.diff(np.unique(numbers))
+    return in_days(numbers) and bool(steps.size and np.median(steps) < _NEAREST_S)
 
 
 def parse_times(
