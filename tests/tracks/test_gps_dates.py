@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.errors import InputError
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
@@ -190,3 +191,24 @@ def test_hours_of_1_to_12_without_am_and_pm_are_named(tmp_path, fall_s, named):
     notes = open_log([tmp_path / "walk.csv"]).log.notes
     assert any("sorted" in note for note in notes)
     assert any("hours of 1 to 12 without AM or PM" in note for note in notes) == named
+
+
+@pytest.mark.parametrize(
+    ("name", "times"), [("tow_ms", 1000), ("gps_tow_ms", 1000), ("tow [s]", 1)]
+)
+def test_seconds_of_the_week_in_another_unit(tmp_path, name, times):
+    tow_s = 468_018 + np.arange(300)
+    rows = {"gps_week": 2416, name: times * tow_s, "latitude": 60 + 1e-6 * np.arange(300)}
+    pd.DataFrame({**rows, "longitude": 25.0}).to_csv(tmp_path / "walk.csv", index=False)
+    log = open_log([tmp_path / "walk.csv"]).log
+    assert log.start_utc_s == utc_from_week_s(2416, 468_018)
+    assert log.duration_s == 299.0
+
+
+@pytest.mark.parametrize("year", [2106, 2150, 1979])
+def test_years_that_are_not_read_are_named(tmp_path, year):
+    times = [f"{year}-02-07T06:27:{second:02d}Z" for second in range(60)]
+    rows = {"time": times, "latitude": 60 + 1e-6 * np.arange(60), "longitude": 25.0}
+    pd.DataFrame(rows).to_csv(tmp_path / "walk.csv", index=False)
+    with pytest.raises(InputError, match=r"1980 (to 2099 are read|and 2100)"):
+        open_log([tmp_path / "walk.csv"])

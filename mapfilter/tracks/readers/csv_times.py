@@ -177,6 +177,8 @@ def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
 
 def _of_time(text: str) -> str:
     """Return the likely mistake behind a text that is no time."""
+    if (year := re.match(r"(\d{4})-\d\d", text.strip())) and not 1980 <= int(year[1]) <= 2099:
+        return "a wrong year; times of 1980 to 2099 are read"
     if re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", text.strip()):
         return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
     if re.match(r"\d{1,2}:\d\d", text.strip()):
