@@ -141,18 +141,20 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
         axis.unit_name not in ("metre", "meter") or axis.direction == "west" for axis in horizontal
     ):
         axes = ", ".join(f"{axis.unit_name} {axis.direction}" for axis in horizontal) or "no unit"
-        hint = _metres_about(crs) if "foot" in axes else ""
+        hint = _metres_about(crs, axes) if crs.is_projected else ""
         raise fail(InputError, where, "metres east and north", f"{crs.name} ({axes})", hint)
     authority = crs.to_authority(min_confidence=100)
     return f"{authority[0]}:{authority[1]}" if authority else str(crs.to_wkt())
 
 
-def _metres_about(crs: CRS) -> str:
-    """Return what to do with coordinates in feet."""
-    area, target = crs.area_of_use, "and a UTM zone"
+def _metres_about(crs: CRS, axes: str) -> str:
+    """Return what to do with coordinates in other units, or counted to the west or south."""
+    area, target = crs.area_of_use, "and the code of a UTM zone"
     if area is not None:
         target = utm_crs((area.west + area.east) / 2, (area.south + area.north) / 2)
-    return f"coordinates in feet; project them, as by gdalwarp or ogr2ogr -t_srs {target}"
+    ways = {"foot": "in feet", "kilometre": "in kilometres", "west": "to the west"}
+    given = next((way for word, way in ways.items() if word in axes), f"of {axes}")
+    return f"coordinates {given}; project them, as by gdalwarp or ogr2ogr -t_srs {target}"
 
 
 _LONGEST_MEANT = 40
@@ -273,6 +275,10 @@ def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: st
     middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
     ends_m = middle_m + np.array([[0.0, _SHORT_M], [0.0, 0.0]])
     lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
+    if abs(lon_rad[1] - lon_rad[0]) > np.pi:
+        got = f"{crs}, {west:.0f}..{east:.0f} m east, across it"
+        hint = "no maps are made across it: cut rasters and area there, and make one of each side"
+        raise fail(InputError, where, "an area on one side of 180° of longitude", got, hint)
     along_rad = np.hypot(np.diff(lon_rad) * np.cos(lat_rad[0]), np.diff(lat_rad))
     ground_m = float(along_rad[0] * _EARTH_RADIUS_M)
     if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:

@@ -21,6 +21,7 @@ from mapfilter.tracks.position_shift import (
     median_apart_m,
     places_of,
 )
+from mapfilter.tracks.position_units import metres_about_middle
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.speed_shift import best_shift, shift_note, speed_agreement, speeds_of_places
 
@@ -199,7 +200,8 @@ def _disagreement(first: str, one: TimedPlaces | None, other: TimedPlaces | None
 
 
 def _moved(track: TimedPlaces) -> bool:
-    return float(np.hypot(np.ptp(track[1]), np.ptp(track[2]))) > _MOVED_M
+    east_m, north_m = metres_about_middle(*track[1:])
+    return float(np.hypot(np.ptp(east_m), np.ptp(north_m))) > _MOVED_M
 
 
 def _speed(recording: Recording) -> tuple[Floats, Floats] | None:
@@ -219,7 +221,7 @@ def _speed(recording: Recording) -> tuple[Floats, Floats] | None:
     track = places_of(recording)
     if track is None or len(track[0]) < 10:
         return None
-    return speeds_of_places(*track)
+    return speeds_of_places(track[0], *metres_about_middle(*track[1:]))
 
 
 def _rate(time_s: Floats, step_m: Floats) -> tuple[Floats, Floats]:

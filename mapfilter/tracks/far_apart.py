@@ -9,7 +9,7 @@ import pandas as pd
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.tracks.misplaced import FAR_M, UNDONE
-from mapfilter.tracks.position_units import METRES_PER_DEGREE
+from mapfilter.tracks.position_units import METRES_PER_DEGREE, continuous_deg, near_deg
 from mapfilter.tracks.readers.recording import Recording
 
 _TIMES = 10.0
@@ -49,18 +49,23 @@ def check_far_apart(recordings: Sequence[Recording]) -> None:
 def _degrees(recording: Recording) -> pd.DataFrame | None:
     for name in ("positions", "truth"):
         if name in recording.tables:
-            return recording.tables[name][["lon_deg", "lat_deg"]]
+            rows = recording.tables[name][["lon_deg", "lat_deg"]]
+            return rows.assign(lon_deg=continuous_deg(rows["lon_deg"]))
     return None
 
 
 def _middle(rows: pd.DataFrame) -> str:
-    return f"{rows['lat_deg'].median():.5f}, {rows['lon_deg'].median():.5f}"
+    lon_deg = near_deg(rows["lon_deg"].median(), 0.0)
+    return f"{rows['lat_deg'].median():.5f}, {lon_deg:.5f}"
 
 
 def _apart_m(one: pd.DataFrame, other: pd.DataFrame) -> float:
     """Return the distance of the areas of two sets of positions; 0 where they overlap."""
     if other["lat_deg"].abs().max() > 90:
         return float("inf")
+    middle_deg = float(other["lon_deg"].median())
+    turns_deg = near_deg(middle_deg, float(one["lon_deg"].median())) - middle_deg
+    other = other.assign(lon_deg=other["lon_deg"] + turns_deg)
     low, high = (np.array([rows.quantile(q) for rows in (one, other)]) for q in _MIDDLE)
     gap_deg = np.maximum(low.max(axis=0) - high.min(axis=0), 0.0)
     wide = np.cos(np.radians(one["lat_deg"].median()))

@@ -11,6 +11,7 @@ from pyproj import Transformer
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import grid_convergence_rad, project, projected_crs, utm_crs
+from mapfilter.tracks.position_units import continuous_deg, near_deg
 from mapfilter.tracks.readers.recording import Recording
 
 _LOCAL = "+proj=tmerc +lat_0={lat} +lon_0={lon} +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m +type=crs"
@@ -34,8 +35,10 @@ class Frame:
         stated = [r.crs for r in recordings if r.crs]
         self.lat_deg, self.lon_deg = float("nan"), float("nan")
         if places:
-            middle = pd.concat(places).median()
-            self.lat_deg, self.lon_deg = float(middle["lat_deg"]), float(middle["lon_deg"])
+            every = pd.concat(places)
+            middle = every.assign(lon_deg=continuous_deg(every["lon_deg"])).median()
+            self.lat_deg = float(middle["lat_deg"])
+            self.lon_deg = float(near_deg(middle["lon_deg"], 0.0))
         elif origin_deg is not None:
             self.lat_deg, self.lon_deg = origin_deg
         if origin_deg is not None:

@@ -29,11 +29,14 @@ from mapfilter.tracks.clock_steps import with_clocks_gone_on
 from mapfilter.tracks.geographic import in_metres
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import (
+    TIMES_BEGIN,
     check_clocks,
+    check_days,
     check_start,
     check_steps,
     check_turns,
     early_ends,
+    odd_start,
     truth_far_off,
     undirected_note,
 )
@@ -245,11 +248,14 @@ def make_log(
         tables[table], more = tidy_table(table, rows, name, faults, number)
         every_note += more
     check_start(start_utc_s, tables, faults, whole)
+    check_days(tables, called, faults)
     if not any(fault.where.endswith("time_s") for fault in faults.found):
         check_clocks(tables, called, faults)
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
         check_turns(tables["motion"], called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
+        if not any(TIMES_BEGIN in note for note in every_note):
+            every_note += odd_start(start_utc_s, tables, whole)
         if not faults.found and not any(FAR_APART in note for note in every_note):
             every_note += truth_far_off(str(crs), tables)
         # Of values that are refused nothing is told besides.

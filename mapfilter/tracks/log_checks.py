@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pandas as pd
 
+from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
 from mapfilter.lattice import Lattice
@@ -15,6 +16,7 @@ from mapfilter.tracks.clock_notes import week_fault
 from mapfilter.tracks.exchanged import sideways_mps2
 from mapfilter.tracks.misplaced import FAR_M, misplaced_by
 from mapfilter.tracks.moved import UNDIRECTED
+from mapfilter.tracks.readers.times import are_days
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0
@@ -23,7 +25,12 @@ _TIMES_MS = (300.0, 3000.0)
 _EARLY_S = 30.0
 _EARLY_SHARE = 0.1
 _EARLIEST_UTC_S = datetime(1, 1, 1, tzinfo=UTC).timestamp()
+_USUAL_UTC_S = tuple(datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in (1980, 2100))
+"""Logs begin between these: not before GPS."""
 _MOST_S = 1e11
+_YEAR_S = 365.2425 * DAY_S
+TIMES_BEGIN = "times begin in"
+"""Words by which notes on an odd start are known."""
 _FEW_ROWS = 10
 _MANY_ROWS = 20
 _FASTEST_MPS = 100.0
@@ -67,6 +74,18 @@ def check_clocks(
         spans = "; ".join(f"{name} {time[0]:.10g}..{time[-1]:.10g}" for name, time in times.items())
         whole = names.get("log", "log")
         faults.add(f"{whole}, time_s", "tables that overlap in time", spans, hint)
+
+
+def check_days(
+    tables: Mapping[str, pd.DataFrame], names: Mapping[str, str], faults: Faults
+) -> None:
+    """Note tables whose times are days of a spreadsheet: a walk would last milliseconds."""
+    for table, rows in tables.items():
+        time_s = rows["time_s"].to_numpy()
+        if len(rows) >= _FEW_ROWS and are_days(time_s):
+            got = f"{time_s[0]:.6f} to {time_s[-1]:.6f}"
+            hint = "days of a spreadsheet; take the first from them, and multiply by 86400"
+            faults.add(f"{names.get(table, table)}, time_s", "seconds", got, hint)
 
 
 def ends_early(before_s: float, whole_s: float) -> bool:
@@ -132,6 +151,36 @@ def check_start(
     if start_utc_s + min(first_s, 0.0) < _EARLIEST_UTC_S:
         got = f"{start_utc_s:.15g}, and times from {first_s:g} s on"
         faults.add(where, "UTC seconds, not before the year 1", got)
+
+
+def odd_start(
+    start_utc_s: float, tables: Mapping[str, pd.DataFrame], whole: str
+) -> tuple[str, ...]:
+    """Return a note on a log that begins before 1980 or after 2099, or ten years after its start.
+
+    Examples
+    --------
+    >>> odd_start(1.78e9, {"motion": pd.DataFrame({"time_s": [0.0, 1.0]})}, "log")
+    ()
+    >>> odd_start(1.78e9, {"motion": pd.DataFrame({"time_s": [1.78e9]})}, "log.json")[0]
+    'log.json, start_utc_s: times begin in 2082 (likely: time_s are Unix times already, and \
+start_utc_s is added: take it from them)'
+    """
+    first_s = min((float(rows["time_s"].min()) for rows in tables.values() if len(rows)), default=0)
+    begin_s, (low, high) = start_utc_s + first_s, _USUAL_UTC_S
+    twice = min(start_utc_s, first_s) >= low
+    if not np.isfinite(begin_s) or (low <= begin_s < high and not twice):
+        return ()
+    if twice:
+        likely = "time_s are Unix times already, and start_utc_s is added: take it from them"
+    elif begin_s < low:
+        likely = (
+            "seconds since another moment than 1970-01-01, or 0 for an unknown start: leave it out"
+        )
+    else:
+        likely = "seconds since another moment than 1970-01-01"
+    year = 1970 + begin_s // _YEAR_S
+    return (f"{whole}, start_utc_s: {TIMES_BEGIN} {year:.0f} (likely: {likely})",)
 
 
 def _milliseconds(times: Mapping[str, Floats]) -> str:

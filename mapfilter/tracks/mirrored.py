@@ -13,7 +13,7 @@ from mapfilter.tracks.headings import headings_and_courses
 from mapfilter.tracks.journey_motion import Moved
 from mapfilter.tracks.misplaced import UNDONE
 from mapfilter.tracks.motion_fault import BY_COMPASS, MIRRORED
-from mapfilter.tracks.position_units import METRES_PER_DEGREE
+from mapfilter.tracks.position_units import metres_about_middle
 from mapfilter.tracks.readers.recording import Recording
 
 _FEWEST = 20
@@ -81,10 +81,7 @@ def mirrored_by(motion: pd.DataFrame, places: pd.DataFrame) -> str:
 
 def _in_metres(places: pd.DataFrame, degrees: pd.DataFrame) -> pd.DataFrame:
     """Return positions about their middle on a plane that touches the earth there."""
-    lon, lat = degrees["lon_deg"], degrees["lat_deg"]
-    wide = np.cos(np.radians(lat.median()))
-    east_m = METRES_PER_DEGREE * wide * (lon - lon.median())
-    north_m = METRES_PER_DEGREE * (lat - lat.median())
+    east_m, north_m = metres_about_middle(degrees["lon_deg"], degrees["lat_deg"])
     return pd.DataFrame({"time_s": places["time_s"], "east_m": east_m, "north_m": north_m})
 
 

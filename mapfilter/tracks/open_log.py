@@ -79,15 +79,14 @@ def open_log(
     else:
         # Here, as a track log needs none of what reads and joins recordings.
         from mapfilter.tracks.combine import combine
-        from mapfilter.tracks.recordings import read_recordings, with_measured
+        from mapfilter.tracks.recordings import read_recordings, with_measured, with_remarks
 
         recordings, notes = read_recordings(given, options)
         wanted = with_measured(options.combine, given)
         of_files = [remark for recording in recordings for remark in recording.remarks]
         with noted((*notes, *of_files)):
             joined = combine(recordings, replace(wanted, crs=wanted.crs or crs))
-        every_note = dict.fromkeys((*notes, *of_files, *joined.log.notes))
-        log = replace(joined.log, notes=tuple(every_note))
+        log = with_remarks(joined.log, notes, recordings)
         name = given[0].name.partition(".")[0] or given[0].name
         opened = OpenedLog(name, log, joined.sensors, tuple(recordings))
     if plan is None:

@@ -7,7 +7,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.geodesy import unproject
-from mapfilter.tracks.position_units import METRES_PER_DEGREE
+from mapfilter.tracks.position_units import METRES_PER_DEGREE, continuous_deg, near_deg
 from mapfilter.tracks.readers.recording import Recording
 
 _MOST_POINTS = 400
@@ -16,11 +16,11 @@ COMMON_SHARE = 0.5
 _FINE_S = 0.1
 
 TimedPlaces = tuple[Floats, Floats, Floats]
-"""Seconds, and positions east and north."""
+"""Seconds, longitudes that go on across 180 degrees, and latitudes."""
 
 
 def places_of(recording: Recording) -> TimedPlaces | None:
-    """Return times and positions (degrees scaled to metres), or None where there are few."""
+    """Return times and positions, or None where there are few."""
     for name in ("positions", "truth"):
         if name in recording.tables and len(recording.tables[name]) >= 3:
             rows = recording.tables[name]
@@ -37,9 +37,7 @@ def _degrees(time_s: pd.Series, lon_deg: object, lat_deg: object) -> TimedPlaces
     time, first = np.unique(time_s.to_numpy(dtype=np.float64), return_index=True)
     lon = np.asarray(lon_deg, dtype=np.float64)[first]
     lat = np.asarray(lat_deg, dtype=np.float64)[first]
-    # One scale for both tracks: whole degrees of latitude give the same one nearly everywhere.
-    wide = np.cos(np.radians(np.round(np.median(lat))))
-    return time, METRES_PER_DEGREE * wide * lon, METRES_PER_DEGREE * lat
+    return time, continuous_deg(lon), lat
 
 
 def median_apart_m(one: TimedPlaces, other: TimedPlaces, shift_s: float, least: float) -> float:
@@ -49,9 +47,11 @@ def median_apart_m(one: TimedPlaces, other: TimedPlaces, shift_s: float, least: 
     inside = (time >= one[0][0]) & (time <= one[0][-1])
     if inside.sum() < 3 or inside.mean() < least:
         return float("nan")
-    east = np.interp(time[inside], one[0], one[1]) - other[1][::step][inside]
-    north = np.interp(time[inside], one[0], one[2]) - other[2][::step][inside]
-    return float(np.median(np.hypot(east, north)))
+    lon, lat = (degrees[::step][inside] for degrees in other[1:])
+    # Of differences, not of places: so scales of two tracks cannot part them.
+    east = near_deg(np.interp(time[inside], one[0], one[1]) - lon, 0.0) * np.cos(np.radians(lat))
+    north = np.interp(time[inside], one[0], one[2]) - lat
+    return METRES_PER_DEGREE * float(np.median(np.hypot(east, north)))
 
 
 def best_place_shift(one: TimedPlaces, other: TimedPlaces, shifts: Floats) -> tuple[float, float]:

@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
+from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
+from mapfilter.tracks.readers.local_times import parse_zone
 from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.readers.times import parse_zone
 from mapfilter.tracks.readers.zipped import check_zipped, files_in_zip, is_zip
 from mapfilter.tracks.store import files_in, is_log
 
@@ -66,6 +67,12 @@ def with_measured(options: CombineOptions, paths: Sequence[Path]) -> CombineOpti
     One that only lies in a folder of logs is the truth alone.
     """
     return replace(options, measured=[path for path in options.truth if path in paths])
+
+
+def with_remarks(log: TrackLog, notes: Sequence[str], recordings: Sequence[Recording]) -> TrackLog:
+    """Return a log whose notes begin with others, and with those of its recordings' files."""
+    of_files = (remark for recording in recordings for remark in recording.remarks)
+    return replace(log, notes=tuple(dict.fromkeys((*notes, *of_files, *log.notes))))
 
 
 def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:

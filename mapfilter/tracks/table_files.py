@@ -121,8 +121,9 @@ def _read_csv(table: str, path: Path) -> ReadTable:
     if blank.any():
         rows, lines = rows[~blank].reset_index(drop=True), lines[~blank]
     if separator != ",":
-        numbers = [column.name for column in SCHEMA[table] if column.kind != "text"]
-        for name in rows.columns.intersection(numbers):
+        # Also of columns that are no part of a log, but read: degrees and their accuracy.
+        texts = {column.name for column in SCHEMA[table] if column.kind == "text"}
+        for name in rows.columns[~rows.columns.isin(texts)]:
             rows[name] = rows[name].str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
     notes = [f"{path}: {zeros}"] if zeros else []
     if cut:

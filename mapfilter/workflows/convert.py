@@ -17,7 +17,7 @@ from mapfilter.tracks.combine import combine
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.recordings import read_recordings, with_measured
+from mapfilter.tracks.recordings import read_recordings, with_measured, with_remarks
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import check_log_replaceable, write_log
 
@@ -89,7 +89,8 @@ def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = 
     of_files = (remark for recording in recordings for remark in recording.remarks)
     with noted((*notes, *of_files)):
         combined = combine(recordings, with_measured(options.combine, files))
-    write_log(combined.log, out, sensors=combined.sensors)
+    # People are shown those of each file beneath it; the log has nothing but its notes.
+    write_log(with_remarks(combined.log, notes, recordings), out, sensors=combined.sensors)
     rows = {table: len(getattr(combined.log, table)) for table in TABLES}
     rows |= {f"sensors/{name}": len(table) for name, table in combined.sensors.items()}
     found = tuple(_found(recording) for recording in recordings)

@@ -9,6 +9,7 @@ from mapfilter.errors import InputError
 from mapfilter.geodesy import (
     azimuth_from_heading_deg,
     check_bbox,
+    check_scale,
     grid_convergence_rad,
     heading_from_azimuth_rad,
     project,
@@ -222,10 +223,25 @@ def test_systems_of_other_axis_order_are_taken():
         (
             "+proj=utm +zone=35 +datum=WGS84 +units=us-ft",
             "unknown (US survey foot",
-            "coordinates in feet; project them, as by gdalwarp or ogr2ogr -t_srs and a UTM zone",
+            "coordinates in feet; project them, as by gdalwarp or ogr2ogr -t_srs and the code of a "
+            "UTM zone",
         ),
-        ("EPSG:2048", "Hartebeesthoek94 / Lo19 (metre west, metre south)", ""),
-        ("EPSG:5513", "S-JTSK / Krovak (metre south, metre west)", ""),
+        (
+            "EPSG:2048",
+            "Hartebeesthoek94 / Lo19 (metre west, metre south)",
+            "coordinates to the west; project them, as by gdalwarp or ogr2ogr -t_srs EPSG:32734",
+        ),
+        (
+            "EPSG:5513",
+            "S-JTSK / Krovak (metre south, metre west)",
+            "coordinates to the west; project them, as by gdalwarp or ogr2ogr -t_srs EPSG:32633",
+        ),
+        (
+            "+proj=utm +zone=35 +datum=WGS84 +units=km",
+            "unknown (kilometre east",
+            "coordinates in kilometres; project them, as by gdalwarp or ogr2ogr -t_srs and the "
+            "code of a UTM zone",
+        ),
         ("EPSG:4978", "WGS 84 (metre", ""),
         ("EPSG:5773", "EGM96 height (metre up)", ""),
         ("nonsense", "'nonsense'", ""),
@@ -244,6 +260,18 @@ def test_systems_that_do_not_count_metres_east_and_north(spec, got, hint):
     assert fault.where == "roads.gpkg, crs"
     assert fault.got.startswith(got)
     assert fault.hint == hint
+
+
+@pytest.mark.parametrize("lat", [-17.0, 60.0])
+def test_an_area_across_180_degrees_is_named_as_that(lat):
+    east, north = project("EPSG:32660" if lat > 0 else "EPSG:32760", 180.0, lat)
+    crs = "EPSG:32660" if lat > 0 else "EPSG:32760"
+    bounds_m = (float(east) - 800, float(north) - 900, float(east) + 800, float(north) + 900)
+    with pytest.raises(InputError, match="an area on one side of 180° of longitude") as refused:
+        check_scale(crs, bounds_m, "area.crs")
+    assert "across it (likely: no maps are made across it" in str(refused.value)
+    aside_m = (bounds_m[0] - 5000, bounds_m[1], bounds_m[2] - 5000, bounds_m[3])
+    check_scale(crs, aside_m, "area.crs")
 
 
 PORTO = (-8.63, 41.13, -8.59, 41.16)

@@ -6,6 +6,7 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.store import read_log, write_log
 
 CRS = "EPSG:32629"
 
@@ -94,3 +95,35 @@ def test_starts_before_the_year_1_or_in_milliseconds_are_refused(start_utc_s, fi
         return
     with pytest.raises(InputError, match="start_utc_s: expected UTC seconds"):
         make_log(CRS, motion=steps, start_utc_s=start_utc_s)
+
+
+@pytest.mark.parametrize(
+    ("start_utc_s", "first_s", "year", "cause"),
+    [
+        (1.78e9, 1.78e9, 2082, "time_s are Unix times already"),
+        (1.78e9, 0.0, None, ""),
+        (0.0, 1.78e9, None, ""),
+        (3.2e8, 3e8, None, ""),
+        (0.0, 0.0, 1970, "0 for an unknown start: leave it out"),
+        (3e8, 10.0, 1979, "another moment than 1970-01-01, or 0"),
+        (4.2e9, 10.0, 2103, "seconds since another moment than 1970-01-01"),
+        (np.nan, 10.0, None, ""),
+    ],
+)
+def test_a_start_in_no_usual_year_is_noted(tmp_path, start_utc_s, first_s, year, cause):
+    log = make_log(CRS, motion=motion(TIME_S + first_s), start_utc_s=start_utc_s)
+    told = [note for note in log.notes if note.startswith("log, start_utc_s")]
+    assert len(told) == (year is not None)
+    assert all(f"times begin in {year} (likely: " in note and cause in note for note in told)
+    write_log(log, tmp_path / "log")
+    assert read_log(tmp_path / "log").notes == log.notes
+
+
+def test_days_of_a_spreadsheet_are_named_in_each_table():
+    days = 46_143.416667 + TIME_S / 86_400
+    with pytest.raises(InputError) as caught:
+        make_log(CRS, motion=motion(days), radio=radio(days[::2]))
+    assert [fault.where for fault in caught.value.faults] == ["motion, time_s", "radio, time_s"]
+    assert all("days of a spreadsheet" in fault.hint for fault in caught.value.faults)
+    assert caught.value.faults[0].got == "46143.416667 to 46143.418739"
+    make_log(CRS, motion=motion(46_143 + TIME_S), radio=radio(46_143 + TIME_S))

@@ -82,3 +82,53 @@ def test_fixes_far_from_the_truth_of_a_log_are_noted(moved, cause):
     assert note.startswith("gnss lies ")
     assert f"km from the truth (median) (likely: {cause}" in note
     assert not make_log("EPSG:32635", gnss=places, truth=places.assign(east_m=386_000.0)).notes
+
+
+@pytest.mark.parametrize(
+    ("lat", "lon"),
+    [(50.5, 120.0), (-35.5, 174.8), (69.5, -160.0), (65.2, 180.0), (-17.5, -179.999)],
+)
+@pytest.mark.parametrize("is_truth", [True, False])
+def test_one_journey_in_two_files_lies_together(tmp_path, lat, lon, is_truth):
+    """Middles of both files on two sides of half a degree, and of 180 degrees of longitude."""
+    north, east = lat + 1e-4 * (TIME_S - 29.5), lon + 2e-4 * (TIME_S - 29.5)
+    east = (east + 180) % 360 - 180
+    one = written(tmp_path, "one", north, east)
+    half = slice(10, None)
+    table = pd.DataFrame({"time": 1.78e9 + TIME_S, "latitude": north, "longitude": east})[half]
+    other = tmp_path / "other.csv"
+    table.to_csv(other, index=False)
+    options = OpenOptions(combine=CombineOptions(truth=[other] if is_truth else []))
+    log = open_log([one] if is_truth else [one, other], options=options).log
+    assert not [note for note in log.notes if "km from" in note]
+    assert any("agree within 0.0 m" in note for note in log.notes)
+    for rows in (log.gnss, log.truth):
+        assert len(rows) == 0 or np.ptp(rows["east_m"]) < 3000
+    # Beside the antimeridian, not at the meridian of Greenwich.
+    assert log.crs[-2:] in {"51", "60", "04", "01"}
+
+
+def test_a_zone_is_found_by_positions_on_two_sides_of_half_a_degree(tmp_path):
+    lat, lon = 50.5 + 1e-4 * (TIME_S - 29.5), 120.0 + 2e-4 * TIME_S
+    utc = written(tmp_path, "utc", lat, lon)
+    local = tmp_path / "local.csv"
+    texts = pd.to_datetime(1.78e9 + 8 * 3600 + TIME_S, unit="s").strftime("%Y-%m-%d %H:%M:%S")
+    rows = pd.DataFrame({"time": texts, "latitude": lat, "longitude": lon})[20:]
+    rows.to_csv(local, index=False)
+    notes = open_log([local, utc]).log.notes
+    assert any("local time is UTC+08:00 (by positions, median 0.0 m" in note for note in notes)
+
+
+@pytest.mark.parametrize("lon", [90.0, 90.4, -89.9])
+def test_a_lost_sign_a_quarter_around_the_earth_is_named(tmp_path, lon):
+    one = written(tmp_path, "one", LAT, LON - 25 + lon)
+    other = written(tmp_path, "other", LAT, -(LON - 25 + lon))
+    with pytest.raises(InputError, match="a lost sign of longitude"):
+        open_log([one, other])
+
+
+def test_tracks_on_two_sides_of_180_degrees_lie_as_far_apart_as_elsewhere(tmp_path):
+    one = written(tmp_path, "one", LAT, LON - 25 + 179.8)
+    other = written(tmp_path, "other", LAT, LON - 25 - 179.6)
+    (told,) = [note for note in open_log([one, other]).log.notes if "km from those" in note]
+    assert "other.csv: positions lie 33.4 km from those" in told

@@ -7,8 +7,11 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.errors import InputError
+from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.times import utc_from_week_s
 
 COUNT = 600
 UTC_S = datetime(2026, 5, 1, 10, tzinfo=UTC).timestamp()
@@ -143,3 +146,69 @@ def test_weeks_begin_anew_between_parts_of_a_file(tmp_path, monkeypatch):
     path = written(tmp_path / "fixes.csv", tow_s, **WAY)
     rows = read_recording(path, options=ReadOptions()).tables["positions"]
     assert rows["time_s"].tolist() == (WEEK_S - 100 + ELAPSED_S).tolist()
+
+
+def weeks_and_seconds(week, begin_tow_s, count, stays):
+    """Return weeks and seconds of them; the week stays so many rows after its end, or for good."""
+    total_s = begin_tow_s + np.arange(count, dtype=float)
+    over = np.flatnonzero(total_s >= WEEK_S)[0]
+    weeks = np.full(count, week)
+    weeks[over + stays if stays is not None else count :] += 1
+    return weeks, total_s % WEEK_S
+
+
+@pytest.mark.parametrize("stays", [0, 1, 37, None])
+@pytest.mark.parametrize("part_bytes", [1 << 24, 1000])
+def test_a_week_that_stays_when_its_seconds_begin_anew(tmp_path, monkeypatch, stays, part_bytes):
+    monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", part_bytes)
+    lines = 300
+    weeks, tow_s = weeks_and_seconds(2416, WEEK_S - 102, lines, stays)
+    rows = {"week": weeks, "tow": tow_s, "latitude": 60 + 1e-6 * np.arange(lines)}
+    pd.DataFrame({**rows, "longitude": 25.0}).to_csv(tmp_path / "walk.csv", index=False)
+    log = open_log([tmp_path / "walk.csv"]).log
+    np.testing.assert_array_equal(log.gnss["time_s"], np.arange(lines))
+    assert log.start_utc_s == utc_from_week_s(2416, WEEK_S - 102)
+    told = [note for note in log.notes if "week: stays where" in note]
+    assert len(told) == (stays != 0)
+    assert not any("sorted" in note for note in log.notes)
+
+
+def test_a_pause_of_a_week_stays_one(tmp_path):
+    tow_s = np.tile(np.arange(1000.0, 1100.0), 2)
+    rows = {"week": np.repeat([2416, 2417], 100), "tow": tow_s, "latitude": 60.0}
+    table = pd.DataFrame({**rows, "longitude": 25 + 1e-5 * np.arange(200)})
+    table.to_csv(tmp_path / "walk.csv", index=False)
+    log = open_log([tmp_path / "walk.csv"]).log
+    assert np.diff(log.gnss["time_s"]).max() == WEEK_S - 99
+
+
+@pytest.mark.parametrize(("fall_s", "named"), [(43_199, True), (43_200, True), (40_000, False)])
+def test_hours_of_1_to_12_without_am_and_pm_are_named(tmp_path, fall_s, named):
+    seconds = np.arange(300) + np.where(np.arange(300) < 120, 0, -fall_s)
+    times = pd.to_datetime(1_777_640_280 + seconds, unit="s").strftime("%Y-%m-%d %H:%M:%S")
+    rows = {"time": times, "latitude": 60 + 1e-6 * np.arange(300), "longitude": 25.0}
+    pd.DataFrame(rows).to_csv(tmp_path / "walk.csv", index=False)
+    notes = open_log([tmp_path / "walk.csv"]).log.notes
+    assert any("sorted" in note for note in notes)
+    assert any("hours of 1 to 12 without AM or PM" in note for note in notes) == named
+
+
+@pytest.mark.parametrize(
+    ("name", "times"), [("tow_ms", 1000), ("gps_tow_ms", 1000), ("tow [s]", 1)]
+)
+def test_seconds_of_the_week_in_another_unit(tmp_path, name, times):
+    tow_s = 468_018 + np.arange(300)
+    rows = {"gps_week": 2416, name: times * tow_s, "latitude": 60 + 1e-6 * np.arange(300)}
+    pd.DataFrame({**rows, "longitude": 25.0}).to_csv(tmp_path / "walk.csv", index=False)
+    log = open_log([tmp_path / "walk.csv"]).log
+    assert log.start_utc_s == utc_from_week_s(2416, 468_018)
+    assert log.duration_s == 299.0
+
+
+@pytest.mark.parametrize("year", [2106, 2150, 1979])
+def test_years_that_are_not_read_are_named(tmp_path, year):
+    times = [f"{year}-02-07T06:27:{second:02d}Z" for second in range(60)]
+    rows = {"time": times, "latitude": 60 + 1e-6 * np.arange(60), "longitude": 25.0}
+    pd.DataFrame(rows).to_csv(tmp_path / "walk.csv", index=False)
+    with pytest.raises(InputError, match=r"1980 (to 2099 are read|and 2100)"):
+        open_log([tmp_path / "walk.csv"])

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.errors import InputError
 from mapfilter.tracks.readers.times import parse_times
 
 TIMES = pd.Timestamp("2026-05-01 10:00:00") + pd.to_timedelta(range(60), unit="s")
@@ -74,3 +75,31 @@ def test_hours_of_half_a_day_are_those_of_the_whole(style):
 def test_hours_that_no_half_day_has_are_no_times():
     texts = np.array([f"2026-05-01 {hour:02d}:00 PM" for hour in (0, 13, 24)], object)
     assert np.isnan(parse_times(texts)[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("form", "unix"),
+    [("{:.5E}", True), ("{:.5e}", True), ("{:.4E}", False), ("{:.1f}", False), ("{:.0f}", False)],
+)
+@pytest.mark.parametrize("comma", [False, True])
+def test_times_that_a_spreadsheet_shortened_are_refused(tmp_path, form, unix, comma):
+    """All rows of a walk of minutes share one time, or two."""
+    seconds = 1_777_630_000.0 + np.arange(300)
+    numbers = seconds if unix else seconds / 86_400 + 25_569
+    texts = [form.format(number) for number in numbers]
+    rows = pd.DataFrame({"time": texts, "latitude": 60 + 1e-6 * np.arange(300), "longitude": 25.0})
+    rows["time"] = rows["time"].str.replace(".", "," if comma else ".")
+    rows.to_csv(tmp_path / "walk.csv", index=False, sep=";", decimal="," if comma else ".")
+    with pytest.raises(InputError, match="a spreadsheet that shortened numbers") as refused:
+        mf.read_log(tmp_path / "walk.csv")
+    (fault,) = refused.value.faults
+    assert fault.where == f"{tmp_path / 'walk.csv'}, time (time)"
+    assert f" in 300 rows, such as {rows['time'][0]}" in fault.got
+
+
+@pytest.mark.parametrize("form", ["{:.9E}", "{:.0f}"])
+def test_times_with_all_their_digits_are_read(tmp_path, form):
+    texts = [form.format(1_777_630_000.0 + second) for second in range(300)]
+    rows = pd.DataFrame({"time": texts, "latitude": 60 + 1e-6 * np.arange(300), "longitude": 25.0})
+    rows.to_csv(tmp_path / "walk.csv", index=False)
+    assert mf.read_log(tmp_path / "walk.csv").duration_s == 299.0

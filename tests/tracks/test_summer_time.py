@@ -12,7 +12,8 @@ from mapfilter.errors import InputError
 from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.times import parse_times, utc_from_local_s
+from mapfilter.tracks.readers.local_times import utc_from_local_s
+from mapfilter.tracks.readers.times import parse_times
 
 BERLIN = "Europe/Berlin"
 BACK_S = datetime(2026, 10, 25, 1, tzinfo=ZoneInfo("UTC")).timestamp()
@@ -171,3 +172,43 @@ def test_a_drive_on_which_the_clock_is_set_forward(journey):
     assert mf.read_log(paths, zone=BERLIN).duration_s == 2399.0
     with pytest.raises(InputError, match=r"2026-03-29 00:59:59 .*set forward for summer: zone"):
         mf.read_log(paths)
+
+
+def notes_of(path, utc_or_local_s, zone=BERLIN, suffix=""):
+    """Return the notes on times of a CSV that are written as they are."""
+    times = pd.to_datetime(utc_or_local_s, unit="s").strftime("%Y-%m-%d %H:%M:%S") + suffix
+    pd.DataFrame({"time": times, "pressure_hpa": 1000.0}).to_csv(path / "phone.csv", index=False)
+    return read_recording(path / "phone.csv", options=ReadOptions(zone=zone)).notes
+
+
+@pytest.mark.parametrize("begin_s", [-3000, 600, 1800])
+def test_a_walk_within_the_hour_that_comes_twice_is_noted(tmp_path, begin_s):
+    """Nothing tells its pass: it was an hour early without a word in the second one."""
+    (note,) = notes_of(tmp_path, local_s(BACK_S + begin_s + np.arange(300.0)))
+    assert "a clock of Europe/Berlin passes twice; taken for the first time, UTC+02:00" in note
+    assert "--zone +01:00, or times with their offset" in note
+
+
+@pytest.mark.parametrize(("begin_s", "end_s"), [(-6000, -3300), (-600, 600), (3000, 4200)])
+def test_a_walk_that_leaves_or_repeats_that_hour_is_not(tmp_path, begin_s, end_s):
+    assert not notes_of(tmp_path, local_s(BACK_S + np.arange(begin_s, end_s)))
+
+
+@pytest.mark.parametrize("begin_s", [-300, 0, 1800, 3300])
+def test_times_that_a_clock_set_forward_leaves_out_are_noted(tmp_path, begin_s):
+    times_s = FORWARD_S + 3600 + begin_s + np.arange(600.0)
+    (note,) = (one for one in notes_of(tmp_path, times_s) if "sorted" not in one)
+    count = int(np.sum((times_s >= FORWARD_S + 3600) & (times_s < FORWARD_S + 7200)))
+    assert note.startswith(f"time: {count} times are not of Europe/Berlin, from 2026-03-29 02:")
+    assert "taken for UTC+01:00 (likely: a clock that was not set, --zone +01:00" in note
+    days = times_s / 86_400 + 25_569
+    pd.DataFrame({"time": days, "pressure_hpa": 1000.0}).to_csv(tmp_path / "d.csv", index=False)
+    found = read_recording(tmp_path / "d.csv", options=ReadOptions(zone=BERLIN))
+    assert any("times are not of Europe/Berlin" in one for one in found.notes)
+
+
+@pytest.mark.parametrize("change_s", [BACK_S, FORWARD_S])
+@pytest.mark.parametrize("suffix", ["Z", "+02:00"])
+def test_times_with_their_offset_are_of_no_such_hour(tmp_path, change_s, suffix):
+    assert not notes_of(tmp_path, change_s + np.arange(5400.0), suffix=suffix)
+    assert not notes_of(tmp_path, change_s + np.arange(5400.0), zone="+01:00")

@@ -215,3 +215,29 @@ def test_of_many_rows_texts_are_kept_once():
     radio = pd.DataFrame({"time_s": np.arange(1000.0), "role": "serving", "cell": cells})
     found = make_log("EPSG:32635", radio=radio).radio["cell"]
     assert len({id(cell) for cell in found}) == 2
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("table", ["gnss", "truth"])
+@pytest.mark.parametrize("degrees", [True, False])
+def test_decimal_commas_are_read_in_places_in_metres_and_in_degrees(
+    tmp_path, separator, table, degrees
+):
+    time_s = np.arange(20.0)
+    if degrees:
+        places = {"lat_deg": 60.125 + 1e-5 * time_s, "lon_deg": -0.0625 + 1e-5 * time_s}
+        places["accuracy_m"] = 4.5
+    else:
+        places = {"east_m": 385400.25 + time_s, "north_m": 6672000.75 + time_s}
+    rows = pd.DataFrame({"time_s": time_s + 0.5, **places})
+    found = []
+    for decimal in ".,":
+        folder = tmp_path / f"log{ord(decimal)}"
+        folder.mkdir()
+        (folder / "log.json").write_text(json.dumps({"crs": "EPSG:32630"}))
+        path = folder / f"{table}.csv"
+        rows.to_csv(path, index=False, sep=separator, decimal=decimal)
+        assert ("," in path.read_text()) == (decimal == ",")
+        found.append(getattr(read_log(folder), table))
+    pd.testing.assert_frame_equal(*found)
+    assert len(found[0]) == 20

@@ -49,12 +49,27 @@ def test_every_recording_makes_a_log_that_is_read_back(name, made, tmp_path):
     rows = {table: len(getattr(log, table)) for table in tables}
     rows |= {f"sensors/{sensor}": len(table) for sensor, table in sensors.items()}
     assert {k: v for k, v in rows.items() if v} == {k: v for k, v in result.rows.items() if v}
-    assert not set(log.notes) - set(result.notes) - {n for n in log.notes if "no use" in n}
+    of_files = {f"{Path(file.file).name}: {note}" for file in result.files for note in file.notes}
+    told = {
+        f"{Path(file.file).name}: not used: {one}" for file in result.files for one in file.where
+    }
+    assert of_files | told | set(result.notes) <= set(log.notes)
+    others = set(log.notes) - set(result.notes) - of_files - told
+    assert all("no use" in note for note in others)
     again = converted(made(name), tmp_path / "again")
     assert again.rows == result.rows
     for one in sorted((tmp_path / "log").rglob("*.parquet")):
         other = tmp_path / "again" / one.relative_to(tmp_path / "log")
         assert one.read_bytes() == other.read_bytes()
+
+
+def test_a_log_keeps_what_was_sorted_of_each_recording(tmp_path):
+    time_s = np.arange(300)[::-1] + 1.78e9
+    walk = pd.DataFrame({"time": time_s, "latitude": 60 + 1e-5 * time_s % 1, "longitude": 25.0})
+    walk.to_csv(tmp_path / "walk.csv", index=False)
+    run_convert([tmp_path / "walk.csv"], tmp_path / "log")
+    note = "walk.csv: positions: times go backwards in 299 places; sorted"
+    assert note in read_log(tmp_path / "log").notes
 
 
 def test_cells_from_one_sensors_from_another_truth_from_a_third(made, tmp_path):

@@ -14,14 +14,9 @@ import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
+from mapfilter.tracks.readers.local_times import change_notes, is_beside_change, utc_from_local_s
 from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.times import (
-    LEAST_UNIX_S,
-    parse_times,
-    seconds_of_day,
-    unix_seconds,
-    utc_from_local_s,
-)
+from mapfilter.tracks.readers.times import LEAST_UNIX_S, parse_times, seconds_of_day, unix_seconds
 
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
@@ -105,7 +100,18 @@ class Columns:
     def times(
         self, *names: str, zone: str = "", layout: str = "ISO8601", after_s: float = nan
     ) -> tuple[Floats, bool]:
-        """Return UTC seconds of a column of times, see :func:`parse_times`."""
+        """Return UTC seconds of a column of times, see :func:`parse_times`; note odd local ones."""
+        time_s, zoned = self._times(names, zone, layout, after_s)
+        if zone and is_beside_change(time_s, zone):
+            one_s, other_s = (self._times(names, z, layout, nan)[0] for z in ("+00:00", "+01:00"))
+            local_s = np.where(one_s == other_s, np.nan, one_s)
+            for note in change_notes(local_s, time_s, zone, after_s):
+                self.reading.note(note)
+        return time_s, zoned
+
+    def _times(
+        self, names: Sequence[str], zone: str, layout: str, after_s: float
+    ) -> tuple[Floats, bool]:
         column = self._raw(*names)
         if column is not None and layout == "ISO8601":
             if self.decimal_comma:

@@ -12,6 +12,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "timestamp", "date time", "local time", "unix time", "epoch time"),
         *("elapsed time", "time elapsed", "seconds elapsed", "device time", "gps time", "date"),
+        *("tow", "gps tow", "time of week", "gps time of week"),
     ),
     "lat_deg": ("latitude", "lat", "gps latitude", "gps lat"),
     "lon_deg": ("longitude", "lon", "lng", "long", "gps longitude", "gps lon"),

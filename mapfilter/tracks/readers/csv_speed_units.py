@@ -7,7 +7,7 @@ import pandas as pd
 
 from mapfilter._constants import KNOT_MPS, MPH_MPS
 from mapfilter._types import Bools, Floats
-from mapfilter.tracks.position_units import METRES_PER_DEGREE
+from mapfilter.tracks.position_units import metres_about_middle
 from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.receiver_speeds import speed_unit_fault
 
@@ -43,14 +43,8 @@ def speed_unit(mapped: Mapped, column: str, time_s: Floats) -> str:
 
 def _by_places(mapped: Mapped, time_s: Floats, speed: Floats, known: Bools) -> str:
     lat, lon = (mapped.number(name) for name in ("lat_deg", "lon_deg"))
-    wide = np.cos(np.radians(np.nanmedian(lat))) if np.isfinite(lat).any() else 1.0
-    places = pd.DataFrame(
-        {
-            "time_s": time_s,
-            "east_m": METRES_PER_DEGREE * wide * lon,
-            "north_m": METRES_PER_DEGREE * lat,
-        }
-    )
+    east_m, north_m = metres_about_middle(lon, lat)
+    places = pd.DataFrame({"time_s": time_s, "east_m": east_m, "north_m": north_m})
     rows = pd.DataFrame({"time_s": time_s[known], "speed_mps": speed[known]})
     rows = rows.sort_values("time_s").drop_duplicates("time_s")
     # Ten times too fast: else the positions tell nothing.

@@ -13,23 +13,33 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
-from mapfilter.tracks.readers.csv_weeks import over_days, over_weeks, week_column, weeks_of
+from mapfilter.tracks.readers.csv_weeks import (
+    over_days,
+    over_stuck_weeks,
+    over_weeks,
+    week_column,
+    weeks_of,
+)
 from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.local_times import change_notes, utc_from_local_s
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.times import (
     LEAST_UNIX_S,
+    are_days,
+    in_days,
     parse_times,
     unix_seconds,
     utc_from_gps_s,
-    utc_from_local_s,
     utc_from_week_s,
     without_midnights,
 )
 
 _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
-_DAYS, _EPOCH_DAYS, _NEAREST_S = (36_526.0, 73_050.0), 25_569.0, 1e-3
-"""Days of the years 2000 to 2099 since 1900, those until 1970, and rows a thousand a second."""
+_EPOCH_DAYS = 25_569.0
+"""Days from 1900 to 1970, as spreadsheets count them."""
+_FEWEST_SAME = 20
+_SHORTENED = re.compile(r"\d[eE][+-]?\d", re.ASCII)
 _LEAST_DIFFERENT = 0.5
 _NUMBER = re.compile(r"\d+(?:\.\d*)?")
 _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
@@ -45,14 +55,16 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
     known = number[np.isfinite(number)]
     usual_s = abs(float(np.median(known))) if known.size else np.inf
+    _check_digits(mapped, reading, known)
     if known.size >= 0.5 * len(number) and usual_s < LEAST_UNIX_S:
-        if _is_days(known):
+        if are_days(known):
             reading.note("time: days since 1900, as a spreadsheet writes them")
             return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)
         if week := week_column(mapped):
             reading.clock = Clock("gps")
             reading.note(f"time: seconds of the GPS week in column {week}")
-            return utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
+            counted_s = utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
+            return over_stuck_weeks(reading, counted_s, week)
         reading.clock = Clock("monotonic")
         return over_days(reading, over_weeks(reading, number))
     reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
@@ -108,18 +120,34 @@ def _certainty(name: str, text: str) -> int:
     return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
 
 
-def _is_days(known: Floats) -> bool:
-    """Return whether numbers are days of this century: as seconds, rows would be too near."""
-    low, high = _DAYS
-    steps = np.diff(np.unique(known))
-    return bool(low <= known.min() and known.max() <= high and steps.size) and bool(
-        np.median(steps) < _NEAREST_S
-    )
+def _check_digits(mapped: Mapped, reading: Reading, known: Floats) -> None:
+    """Refuse numbers that a spreadsheet shortened until most rows have the same one.
+
+    Raises
+    ------
+    InputError
+        Naming one of them.
+    """
+    times = np.unique(known).size
+    if not times or known.size < _FEWEST_SAME * times:
+        return
+    text = next((one for one in mapped.texts("time").tolist() if one), "")
+    if not (_SHORTENED.search(text) or in_days(known)):
+        return
+    column = mapped.rows.find(*mapped.names("time"))
+    got = f"{number_of(times, 'time')} in {known.size} rows, such as {text[:40]}"
+    hint = "a spreadsheet that shortened numbers: show all their digits there, and export again"
+    raise fail(InputError, f"{reading.path}, time ({column})", "a time of each row", got, hint)
 
 
 def _local(reading: Reading, local_s: Floats, zone: str) -> Floats:
     reading.clock = Clock("local", zone)
-    return utc_from_local_s(local_s, zone, reading.last_s) if zone else local_s
+    if not zone:
+        return local_s
+    utc_s = utc_from_local_s(local_s, zone, reading.last_s)
+    for note in change_notes(local_s, utc_s, zone, reading.last_s):
+        reading.note(note)
+    return utc_s
 
 
 def _note_gps(reading: Reading, name: str, known: Floats) -> None:
@@ -149,6 +177,8 @@ def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
 
 def _of_time(text: str) -> str:
     """Return the likely mistake behind a text that is no time."""
+    if (year := re.match(r"(\d{4})-\d\d", text.strip())) and not 1980 <= int(year[1]) <= 2099:
+        return "a wrong year; times of 1980 to 2099 are read"
     if re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", text.strip()):
         return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
     if re.match(r"\d{1,2}:\d\d", text.strip()):

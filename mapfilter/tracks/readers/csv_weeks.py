@@ -44,6 +44,32 @@ def weeks_of(rows: Columns, name: str, reading: Reading) -> Floats:
     return week
 
 
+def over_stuck_weeks(reading: Reading, time_s: Floats, week: str) -> Floats:
+    """Return UTC seconds that go on where seconds of the week begin anew, and the week stays.
+
+    Parameters
+    ----------
+    reading : Reading
+    time_s : (N,) array
+        Of the rows' weeks and seconds.
+    week : str
+        Column of the weeks, for the note.
+    """
+    known = np.isfinite(time_s)
+    before_s = [reading.last_s] if np.isfinite(reading.last_s) else []
+    steps = np.diff(time_s[known], prepend=before_s or time_s[known][:1])
+    back, ahead = (sign * steps > WEEK_S - _NEAR_END_S for sign in (-1, 1))
+    weeks = np.cumsum(back.astype(np.int64) - ahead)
+    # A receiver may count the week later; a pause of a week is none that was missed.
+    weeks -= np.minimum(np.minimum.accumulate(weeks), 0) if weeks.size else 0
+    if not weeks.any():
+        return time_s
+    counted = time_s.copy()
+    counted[known] += WEEK_S * weeks
+    reading.note(f"{week}: stays where seconds of the GPS week begin anew: times go on")
+    return counted
+
+
 def over_weeks(reading: Reading, second: Floats) -> Floats:
     """Return seconds of the GPS week that go on where the week begins anew."""
     known = np.isfinite(second)

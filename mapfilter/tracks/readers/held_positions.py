@@ -7,7 +7,7 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.tracks.position_units import METRES_PER_DEGREE
+from mapfilter.tracks.position_units import metres_about_middle
 from mapfilter.tracks.rounded_degrees import with_rounding
 
 _FEWEST = 20
@@ -98,8 +98,5 @@ def _measured(first: Ints, length: Ints, usual: int) -> Bools:
 
 
 def _metres(rows: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
-    time_s, lat, lon = (
-        rows[name].to_numpy(dtype=np.float64) for name in ("time_s", "lat_deg", "lon_deg")
-    )
-    wide = np.cos(np.radians(np.median(lat)))
-    return time_s, METRES_PER_DEGREE * wide * lon, METRES_PER_DEGREE * lat
+    time_s = rows["time_s"].to_numpy(dtype=np.float64)
+    return time_s, *metres_about_middle(rows["lon_deg"], rows["lat_deg"])

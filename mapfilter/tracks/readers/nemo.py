@@ -41,6 +41,7 @@ from mapfilter.tracks.readers.columns import only
 from mapfilter.tracks.readers.events import Events, read_events
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
+from mapfilter.tracks.readers.local_times import change_notes, utc_from_local_s
 from mapfilter.tracks.readers.nemo_identities import (
     Identities,
     context_size,
@@ -52,7 +53,6 @@ from mapfilter.tracks.readers.nemo_identities import (
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import utc_from_local_s
 
 _BEGIN = re.compile(r"#(?:PRODUCT|FF|ID|START)[,;\t]")
 _EVENT = re.compile(r"(?:GPS|CELLMEAS|CHI|SEI|RRCSM|L3SM)([,;\t])\d{1,2}:\d\d:\d\d[.,]\d{1,3}\1")
@@ -122,7 +122,10 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         if midnight_s is not None:
             events.time_s[:] += midnight_s
             if zone:
-                events.time_s[:] = utc_from_local_s(events.time_s, zone)
+                utc_s = utc_from_local_s(events.time_s, zone)
+                for note in change_notes(events.time_s, utc_s, zone):
+                    reading.note(note)
+                events.time_s[:] = utc_s
         _add_positions(events, reading)
         known = {
             family: followed(events, family, numbers, known[family])

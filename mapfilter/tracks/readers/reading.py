@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mapfilter._constants import DAY_S, GPS_EPOCH_S, HOUR_S
+from mapfilter._constants import DAY_S, GPS_EPOCH_S
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import listed
@@ -28,6 +28,7 @@ from mapfilter.tracks.readers.recorded_values import (
     reordered,
 )
 from mapfilter.tracks.readers.recording import Clock, Recording
+from mapfilter.tracks.readers.set_back import set_back_by
 from mapfilter.tracks.readers.tables import RECORDED
 from mapfilter.tracks.readers.tallies import Tallies
 from mapfilter.tracks.readers.unusable import Unusable, nothing_usable
@@ -123,9 +124,8 @@ class Reading:
         rows = pd.DataFrame(checked, copy=False)
         steps_s = np.diff(rows["time_s"].to_numpy()) if "time_s" in rows else np.zeros(0)
         if back := int(np.sum(steps_s < 0)):
-            hour = back == 1 and -HOUR_S <= steps_s.min() < -HOUR_S / 2
-            likely = hour and self.clock == Clock("local")
-            why = " (likely: a clock that was set back by an hour: --zone)" if likely else ""
+            cause = set_back_by(-steps_s[steps_s < 0], self.clock)
+            why = f" (likely: {cause})" if cause else ""
             self.note(f"{table}: times go backwards in {number_of(back, 'place')}; sorted{why}")
         self.tables.setdefault(table, []).append(rows)
 

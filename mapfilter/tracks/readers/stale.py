@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.tracks.position_units import METRES_PER_DEGREE
+from mapfilter.tracks.position_units import metres_about_middle
 
 _LONG_S = 30.0
 _LEAST_ROWS = 3
@@ -34,8 +34,7 @@ def repeated_readings(state: Ints, time_s: Floats, lat_deg: Floats, lon_deg: Flo
         known = np.isfinite(lat) & np.isfinite(lon)
         if not known.any() or np.ptp(time_s[rows]) <= _LONG_S:
             continue
-        wide = np.cos(np.radians(np.mean(lat[known])))
-        extent_m = METRES_PER_DEGREE * np.hypot(np.ptp(lat[known]), np.ptp(lon[known]) * wide)
-        if extent_m > _FAR_M:
+        east_m, north_m = metres_about_middle(lon[known], lat[known])
+        if np.hypot(np.ptp(east_m), np.ptp(north_m)) > _FAR_M:
             repeated[first + 1 : last] = True
     return repeated

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-from datetime import datetime, timedelta, timezone, tzinfo
 from math import nan
-from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
@@ -15,14 +13,13 @@ from numpy.typing import ArrayLike
 
 from mapfilter._constants import DAY_S, GPS_EPOCH_S
 from mapfilter._types import Floats
-from mapfilter.errors import ConfigError, fail
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.orbits import LEAPS_UTC_S
+from mapfilter.tracks.readers.local_times import utc_from_local_s
 
+_DAYS, _NEAREST_S = (36_526.0, 73_050.0), 1e-3
+"""Days of the years 2000 to 2099 since 1900, and rows a thousand a second."""
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
-_QUARTER_S = 900.0
-_FAR_QUARTERS = 6e7
-"""Quarters of an hour, 1700 years from 1970; datetime ends soon after."""
 _DOTTED = re.compile(r"^\s*(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)(?!\d)", re.ASCII)
 """Day, month and year with dots, which no one writes in another order."""
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
@@ -43,7 +40,6 @@ _MILLISECONDS = re.compile(r"(?<=[ T])(\d\d:\d\d:\d\d):(\d{3})\b", re.ASCII)
 _UTC = re.compile(r"\s{0,3}\b(?:UTC|GMT)\s{0,3}$")
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
-_OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?", re.ASCII)
 
 
 def utc_from_gps_s(gps_s: ArrayLike) -> Floats:
@@ -82,6 +78,24 @@ def unix_seconds(values: ArrayLike) -> Floats:
         large = np.abs(number) > least
         number[large] /= scale
     return number
+
+
+def in_days(numbers: Floats) -> bool:
+    """Return whether numbers are in the range of a spreadsheet's days of this century."""
+    low, high = _DAYS
+    return bool(numbers.size and low <= numbers.min() and numbers.max() <= high)
+
+
+def are_days(numbers: Floats) -> bool:
+    """Return whether numbers are days of a spreadsheet: as seconds, rows would be too near.
+
+    Examples
+    --------
+    >>> are_days(46_143 + np.arange(60) / 86_400), are_days(46_143 + np.arange(60.0))
+    (True, False)
+    """
+    steps = np.diff(np.unique(numbers))
+    return in_days(numbers) and bool(steps.size and np.median(steps) < _NEAREST_S)
 
 
 def parse_times(
@@ -157,99 +171,6 @@ def _with_month_number(found: re.Match[str]) -> str:
 def _with_whole_day(found: re.Match[str]) -> str:
     hour = int(found[1]) % 12 + (12 if found[3].lower() == "p" else 0)
     return f"{hour:02d}{found[2]}"
-
-
-def utc_from_local_s(local_s: ArrayLike, zone: str, after_s: float = nan) -> Floats:
-    """Turn local times, in seconds as if their zone were UTC, into UTC seconds.
-
-    An hour that a clock set back passes twice is the first, until times fall back in it. It is the
-    second where times go on after it without a gap, and do not come from before it, or where they
-    follow on others in it.
-
-    Parameters
-    ----------
-    local_s : array_like
-        In the order of rows.
-    zone : str
-    after_s : float
-        UTC seconds of the row before them, as in an earlier part of a file.
-
-    Examples
-    --------
-    >>> from datetime import UTC
-    >>> local = [datetime(2026, 10, 25, 2, m, tzinfo=UTC).timestamp() for m in (50, 59, 0, 10)]
-    >>> (np.diff(utc_from_local_s(local, "Europe/Berlin")) / 60).tolist()
-    [9.0, 1.0, 10.0]
-    """
-    rules = parse_zone(zone)
-    local = np.asarray(local_s, dtype=np.float64)
-    # The shift is constant within an hour's quarter in every zone.
-    quarter = np.floor(np.where(np.isfinite(local), local, 0.0) / _QUARTER_S)
-    values, of = np.unique(np.clip(quarter, -_FAR_QUARTERS, _FAR_QUARTERS), return_inverse=True)
-    shift = np.empty((len(values), 2))
-    for i, value in enumerate(values.tolist()):
-        moment = datetime(1970, 1, 1) + timedelta(seconds=value * _QUARTER_S)
-        for fold in (0, 1):
-            offset = moment.replace(tzinfo=rules, fold=fold).utcoffset() or timedelta(0)
-            shift[i, fold] = offset.total_seconds()
-    first_s = np.asarray(local - shift[of, 0].reshape(local.shape))
-    later_s = np.maximum(shift[:, 0] - shift[:, 1], 0.0)
-    known = np.isfinite(local)
-    if later_s.any() and known.any():
-        behind_s = after_s - float(first_s[known][0])
-        later_s = later_s[of].reshape(local.shape)[known]
-        first_s[known] += _second_pass_s(local[known], later_s, behind_s)
-    return first_s
-
-
-def _second_pass_s(local_s: Floats, later_s: Floats, behind_s: float) -> Floats:
-    """Return the seconds to add to rows of an hour's second pass, 0 in the first.
-
-    Parameters
-    ----------
-    local_s, later_s : (N,) array
-        Times in the order of rows, and by how much the second pass is later; 0 elsewhere.
-    behind_s : float
-        By how much the first of them would be before the row before it.
-    """
-    added_s, size = np.zeros(len(local_s)), len(local_s)
-    edges = np.diff((later_s > 0).astype(np.int8), prepend=0, append=0)
-    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
-    steps = np.diff(local_s)
-    for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
-        falls = np.flatnonzero(steps[begin : end - 1] < -later_s[begin] / 2)
-        comes = begin > 0 and 0 <= steps[begin - 1] <= _QUARTER_S
-        goes_on = end < size and 0 <= steps[end - 1] <= _QUARTER_S
-        follows = begin == 0 and later_s[0] / 2 < behind_s < 2 * later_s[0]
-        if falls.size or follows or (goes_on and not comes):
-            since = begin + int(falls[0]) + 1 if falls.size and not follows else begin
-            added_s[since:end] = later_s[since:end]
-    return added_s
-
-
-def parse_zone(zone: str) -> tzinfo:
-    """Return the time zone of a name (``Europe/Brussels``, ``UTC``) or an offset (``+01:00``).
-
-    Raises
-    ------
-    ConfigError
-        There is no such zone.
-
-    Examples
-    --------
-    >>> parse_zone("+05:30")
-    datetime.timezone(datetime.timedelta(seconds=19800))
-    """
-    if found := _OFFSET.fullmatch(zone.strip()):
-        sign = -1 if found[1] == "-" else 1
-        shift = sign * timedelta(hours=int(found[2]), minutes=int(found[3] or 0))
-        if abs(shift) <= timedelta(hours=15):
-            return timezone(shift)
-    try:
-        return ZoneInfo(zone.strip())
-    except (ValueError, OSError, LookupError) as error:
-        expected = "a zone such as Europe/Brussels or +01:00"
-        raise fail(ConfigError, "--zone", expected, repr(zone)) from error
 
 
 def seconds_of_day(texts: pa.Array) -> Floats:
