@@ -47,7 +47,7 @@ class Column:
 
     Numbers are float64 (missing: NaN), integers nullable Int64, and text is None where missing.
     Columns that are ``required`` hold a value in every row; ``optional`` ones are only in tables
-    in which they were given.
+    in which they were given. Headings that wind may count on beyond a turn.
     """
 
     name: str
@@ -58,6 +58,7 @@ class Column:
     kind: Literal["number", "integer", "text"] = "number"
     required: bool = False
     optional: bool = False
+    winds: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,9 @@ TABLES: dict[str, Table] = {
         (
             _TIME,
             Column("step_m", -1e6, 1e6, "metres"),
-            Column("heading_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
+            Column(
+                *("heading_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES), winds=True
+            ),
             Column("turn_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
             Column("sampling_sd_m", 0, 1e6, "metres >= 0", optional=True),
         ),
