@@ -63,6 +63,7 @@ def column_values(column: Column, given: pd.DataFrame, found: TableFaults) -> An
         return _texts(column, values, found)
     number, readable = _numbers(values)
     missing = np.isnan(number)
+    column = replace(column, hint=column.likely(number), mistake=None)
     if column.winds:
         number, column = _unwound(number, column, found)
     bad = ~readable | np.isinf(number) | (number < column.low) | (number > column.high)

@@ -7,12 +7,18 @@ checks tables.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, nextafter, pi
 from typing import Literal
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mapfilter._types import Floats
 from mapfilter.radio.identities import NEIGHBOUR as NEIGHBOUR
 from mapfilter.radio.identities import SERVING as SERVING
+from mapfilter.radio.level_quantity import likely_of_positive
 
 Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
 """Kinds of measurements that a log may hold, each in one table of :data:`TABLES`."""
@@ -48,6 +54,7 @@ class Column:
     Numbers are float64 (missing: NaN), integers nullable Int64, and text is None where missing.
     Columns that are ``required`` hold a value in every row; ``optional`` ones are only in tables
     in which they were given. Headings that wind may count on beyond a turn.
+    ``mistake`` returns the hint where it depends on the values.
     """
 
     name: str
@@ -59,6 +66,13 @@ class Column:
     required: bool = False
     optional: bool = False
     winds: bool = False
+    mistake: Callable[[Floats], str] | None = None
+
+    def likely(self, values: ArrayLike) -> str:
+        """Return the likely mistake behind numbers out of range, by all that are given."""
+        if self.mistake is None:
+            return self.hint
+        return self.mistake(np.atleast_1d(np.asarray(values, dtype=np.float64)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +92,10 @@ class Table:
     kinds: tuple[Kind, ...]
     columns: tuple[Column, ...]
     optional: bool = False
+
+
+def _level_mistake(levels: Floats) -> str:
+    return likely_of_positive(levels) if (levels > 0).any() else ""
 
 
 def _text(name: str, expected: str, *, required: bool = False) -> Column:
@@ -113,7 +131,7 @@ TABLES: dict[str, Table] = {
             _text("cell", "a cell id"),
             _integer("arfcn", 0, 3_279_165, "a carrier number"),
             _integer("bsic", 0, 1007, "a BSIC or PCI"),
-            Column("level_dbm", -200, 0, "dBm in -200..0", "raw RXLEV given for dBm"),
+            Column("level_dbm", -200, 0, "dBm in -200..0", mistake=_level_mistake),
             _integer("censored", -1, 1, "-1, 0 or 1"),
             replace(
                 _integer("timing_advance", 0, 3846, "steps in 0..3846"), hint="metres for steps"
