@@ -207,7 +207,7 @@ def _check_number(where: str, value: Any, column: Column, faults: Faults) -> Non
         number = inf
     is_missing = isnan(number) and column.name not in _ALWAYS
     if not (is_missing or column.low <= number <= column.high):
-        faults.add(where, column.expected, shown(value), column.hint)
+        faults.add(where, column.expected, shown(value), column.likely(number))
 
 
 def _check_place(where: str, value: object, faults: Faults) -> None:

@@ -11,7 +11,7 @@ from mapfilter._types import Floats
 LARGEST_ASU = 97
 """Of GSM, UMTS and LTE: 3GPP TS 27.007, +CESQ; units of NR go up to 126, and are not judged."""
 LOST_SIGN = "a lost sign (70 for -70 dBm)"
-_LARGEST_LOSS_DB = 200
+LARGEST_LOSS_DB = 200
 UNKNOWN_ASU = (99, 255)
 """Units that mean an unknown level."""
 _STRONGEST_DBM = -50
@@ -41,7 +41,7 @@ class Signs:
         positive = levels[levels > 0]
         self.positive += positive.size
         self.below += int(np.count_nonzero(positive < -_STRONGEST_DBM))
-        above = (positive > LARGEST_ASU) & (positive <= _LARGEST_LOSS_DB)
+        above = (positive > LARGEST_ASU) & (positive <= LARGEST_LOSS_DB)
         self.above += int(np.count_nonzero(above & ~np.isin(positive, UNKNOWN_ASU)))
 
     @property
@@ -74,4 +74,4 @@ def is_above_asu(level: float) -> bool:
     >>> [is_above_asu(level) for level in (68.0, 99.0, 104.0, 2147483647.0)]
     [False, False, True, False]
     """
-    return LARGEST_ASU < level <= _LARGEST_LOSS_DB and level not in UNKNOWN_ASU
+    return LARGEST_ASU < level <= LARGEST_LOSS_DB and level not in UNKNOWN_ASU

@@ -7,12 +7,44 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.radio.asu import LARGEST_LOSS_DB, LOST_SIGN
+from mapfilter.radio.rxlev import LARGEST_RXLEV
 
 LEVELS_EXPECTED = "levels in dBm, such as RSRP in -140..-44 or RxLev in -110..-47"
 QUALITY = "a quality in dB, such as RSRQ (-20 to -3)"
 
 _BEST_DB, _WORST_DB = 0.0, -30.0
 _SHARE, _FEWEST = 0.9, 10
+_RXLEV, _OFFSET = "raw RXLEV given for dBm", "a strong level plus an offset"
+
+
+def likely_of_positive(levels: Floats) -> str:
+    """Return the likely mistake behind levels above 0 dBm, by all levels of their column.
+
+    Raw RXLEV are whole numbers in 0..63. Among negative levels positive ones are none, but levels
+    to which an offset was added.
+
+    Parameters
+    ----------
+    levels : (N,) array
+        NaN is none.
+
+    Examples
+    --------
+    >>> likely_of_positive(np.array([20.0, 35.0])), likely_of_positive(np.array([88.0, 71.0]))
+    ('raw RXLEV given for dBm', 'a lost sign (70 for -70 dBm)')
+    >>> likely_of_positive(np.array([-61.2, 3.8, -70.0]))
+    'a strong level plus an offset'
+    """
+    known = levels[np.isfinite(levels)]
+    if not known.size:
+        return ""
+    least, most = float(known.min()), float(known.max())
+    if least >= 0 and most <= LARGEST_RXLEV and (known % 1 == 0).all():
+        return _RXLEV
+    if least >= -_WORST_DB and most <= LARGEST_LOSS_DB:
+        return LOST_SIGN
+    return _OFFSET if most < -_WORST_DB else ""
 
 
 @dataclass(slots=True)

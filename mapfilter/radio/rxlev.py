@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mapfilter._types import Floats
 from mapfilter.radio.cells import CellPlan
 
-_LARGEST_RXLEV = 63
+LARGEST_RXLEV = 63
 
 
 def quantise_level_dbm(level_dbm: ArrayLike) -> tuple[Floats, NDArray[np.int8]]:
@@ -33,8 +33,8 @@ def quantise_level_dbm(level_dbm: ArrayLike) -> tuple[Floats, NDArray[np.int8]]:
     ([-110.5, -80.5, -47.5], [-1, 0, 1])
     """
     level = np.asarray(level_dbm, dtype=np.float64)
-    rxlev = np.clip(np.floor(level + 111.0), 0.0, float(_LARGEST_RXLEV))
-    censored = (rxlev == _LARGEST_RXLEV).astype(np.int8) - (rxlev == 0).astype(np.int8)
+    rxlev = np.clip(np.floor(level + 111.0), 0.0, float(LARGEST_RXLEV))
+    censored = (rxlev == LARGEST_RXLEV).astype(np.int8) - (rxlev == 0).astype(np.int8)
     return rxlev - 110.5, np.asarray(censored, dtype=np.int8)
 
 

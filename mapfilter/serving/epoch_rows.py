@@ -50,6 +50,7 @@ _PACED_ROWS, _SELDOM_S, _SOMEWHERE_M, _SLOW_MPS = 5, 50.0, 25.0, 0.04
 the speed: what gets somewhere is faster."""
 _FAST_MPS = 100.0
 """No vehicle on the ground goes so fast in the mean."""
+_LARGEST_JUDGED = 1e12
 _TIME = SCHEMA["motion"][0]
 _TABLES = tuple(name for name, table in TABLES.items() if table.kinds)
 _COLUMNS = {name: {c.name: c for c in SCHEMA[name][1:]} for name in _TABLES}
@@ -190,7 +191,11 @@ def _value(column: Column, value: object, where: str, faults: Faults) -> Any:
         faults.add(where, column.expected, shown(value), hint)
         return missing
     least, most = column.low, column.high
-    found_number = number(value, where, column.expected, faults, least, most, column.hint)
+    likely = column.hint
+    # Larger whole numbers may be no floats.
+    if isinstance(value, float | int) and abs(value) <= _LARGEST_JUDGED:
+        likely = column.likely(value)
+    found_number = number(value, where, column.expected, faults, least, most, likely)
     return missing if found_number is None else found_number
 
 

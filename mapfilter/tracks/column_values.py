@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import Faults
+from mapfilter.tracks.readers.wound import CAUSE, TURN_RAD, Winding
 from mapfilter.tracks.schema import MISSING_SIGNS, Column
 
 _SHOWN_ROWS = 3
@@ -22,11 +23,12 @@ _PLAIN_NUMBER = r"^-?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?$"
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TableFaults:
-    """A table's name and its rows' numbers in messages, and the faults found in it."""
+    """A table's name and its rows' numbers in messages, and the faults and notes of it."""
 
     where: str
     row_numbers: Ints
     faults: Faults
+    notes: list[str] = field(default_factory=list)
 
     def add(self, field: str, expected: str, got: object, hint: str = "") -> None:
         """Note a fault of the table, or of a field of it."""
@@ -61,6 +63,9 @@ def column_values(column: Column, given: pd.DataFrame, found: TableFaults) -> An
         return _texts(column, values, found)
     number, readable = _numbers(values)
     missing = np.isnan(number)
+    column = replace(column, hint=column.likely(number), mistake=None)
+    if column.winds:
+        number, column = _unwound(number, column, found)
     bad = ~readable | np.isinf(number) | (number < column.low) | (number > column.high)
     if column.kind == "integer":
         bad |= ~missing & np.isfinite(number) & (number != np.round(number))
@@ -75,6 +80,22 @@ def column_values(column: Column, given: pd.DataFrame, found: TableFaults) -> An
     if pd.api.types.is_integer_dtype(values.dtype):
         kept = values.fillna(0).to_numpy(dtype=np.int64)
     return pd.arrays.IntegerArray(kept, bad | missing)
+
+
+def _unwound(number: Floats, column: Column, found: TableFaults) -> tuple[Floats, Column]:
+    """Return headings with unwrapped ones wrapped, and their column with the likely mistake."""
+    outside = np.isfinite(number) & (np.abs(number) > column.high)
+    if not outside.any():
+        return number, column
+    winding = Winding(TURN_RAD)
+    wound = winding.unwound(number, outside)
+    beyond = outside & (np.abs(wound) > column.high)
+    if count := int(np.count_nonzero(outside & ~beyond)):
+        some = f"{number_of(count, 'value')} beyond a turn, wrapped (unwrapped)"
+        found.notes.append(f"{found.where}, {column.name}: {some}")
+    mostly = beyond.sum() > np.isfinite(number).sum() / 2
+    doubtful = mostly and winding.doubtful and winding.rows > 1 and not winding.jumps
+    return wound, replace(column, hint=CAUSE) if doubtful else column
 
 
 def _texts(column: Column, values: pd.Series, found: TableFaults) -> Any:

@@ -140,6 +140,15 @@ def compass_fault(azimuth_deg: Floats, walked_m: float) -> str:
     return f"compass_deg: all azimuths lie within {span}: radians for degrees?"
 
 
+def compass_notes(azimuth_deg: pd.Series, step_m: pd.Series) -> tuple[str, ...]:
+    """Return a note where the azimuths of rows with steps are in another unit; none else."""
+    stepped = (step_m > 0).to_numpy()
+    fault = compass_fault(
+        azimuth_deg.to_numpy(dtype=np.float64)[stepped], float(step_m[stepped].sum())
+    )
+    return (fault,) if fault else ()
+
+
 def headings_and_courses(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:
     """Return headings, and the courses of the positions within the same intervals.
 

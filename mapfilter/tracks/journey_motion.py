@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.geodesy import wrap_rad
-from mapfilter.tracks.exchanged import check_columns, check_turning
+from mapfilter.tracks.drive import drive_of, own_turning
+from mapfilter.tracks.exchanged import check_columns
 from mapfilter.tracks.frame import Frame
-from mapfilter.tracks.headings import compass_fault
+from mapfilter.tracks.headings import compass_notes
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import (
     UNDIRECTED,
@@ -23,13 +22,10 @@ from mapfilter.tracks.moved import (
     motion_from_course,
     motion_from_poses,
 )
-from mapfilter.tracks.parted_odometry import parted_odometry, with_turns
+from mapfilter.tracks.parted_odometry import parted_odometry
 from mapfilter.tracks.pdr.counted import reckon_counted
-from mapfilter.tracks.pdr.mounted import turning_of_mounted
-from mapfilter.tracks.pdr.mounted_clock import clock_shift_s
 from mapfilter.tracks.pdr.options import WalkOptions, without_effect
-from mapfilter.tracks.pdr.turns import AXES, Turning, samples
-from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
+from mapfilter.tracks.pdr.vehicle import reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.position_motion import motion_from_positions
 from mapfilter.tracks.position_sources import measured_positions
@@ -123,60 +119,27 @@ def _recorded(
             notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
         rows, source = having[0].tables[name], f"motion is that of {having[0].path.name}"
         if name == "odometry":
-            _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))
-            rows, joined = with_turns(rows, turns)
-            turning = None
-            if rows["yaw_rate_radps"].isna().all():
-                turning, of_phone = turning_of_mounted(sensors)
-                joined = (*joined, *of_phone)
-            if turning is not None:
-                turning, late = _on_the_clock_of(having[0], rows, turning, sensors, recordings)
-                joined = (*joined, *late)
-                check_turning(rows, turning, ", ".join(r.path.name for r in recordings))
-            moved, imu, words = reckon_odometry(rows, turning)
-            notes += [*joined, *words]
-            return Moved(moved, imu, vehicle=True, source=source)
+            drive, words = drive_of(having[0], turns, sensors, frame.convergence_rad, recordings)
+            notes += words
+            return Moved(drive.rows, drive.imu, None, True, source, drive.compass)
         poses, compass = name == "poses", False
         if "compass_deg" in rows and rows["compass_deg"].notna().any():
             compass = bool(rows["heading_rad"].isna().all())
             source += ", whose compass_deg counts from true north"
-            stepped = rows[rows["step_m"] > 0]
-            azimuth_deg = stepped["compass_deg"].to_numpy(dtype=np.float64)
-            fault = compass_fault(azimuth_deg, float(stepped["step_m"].sum()))
-            notes += [fault] if fault else []
+            notes += compass_notes(rows["compass_deg"], rows["step_m"])
         moved = motion_from_poses(rows) if poses else by_compass(rows, frame.convergence_rad)
         moved = moved.assign(heading_rad=wrap_rad(moved["heading_rad"]))
         # The first row turns by nothing.
-        if moved["heading_rad"].isna().all() and moved["turn_rad"].iloc[1:].isna().all():
+        directions = moved["heading_rad"], moved["turn_rad"].iloc[1:]
+        undirected = not any(known.notna().any() for known in directions)
+        if undirected and (turning := own_turning(having[0])) is not None:
+            notes.append(f"{having[0].path.name}: turns are those of {turning.source}")
+            moved = moved.assign(turn_rad=turning.between(moved["time_s"].to_numpy(np.float64)))
+        elif undirected:
             lacking = "no headings and no turns (a column compass_deg, heading_rad or turn_rad)"
             notes.append(f"motion: {lacking}: {UNDIRECTED}")
         return Moved(moved, source=source, compass=compass)
     return None
-
-
-def _on_the_clock_of(
-    wheels: Recording,
-    rows: pd.DataFrame,
-    turning: Turning,
-    sensors: Mapping[str, pd.DataFrame],
-    recordings: Sequence[Recording],
-) -> tuple[Turning, tuple[str, ...]]:
-    """Return a phone's turns on the clock of a vehicle's speeds, and a note where it is another."""
-    phones = [r.path.name for r in recordings if "gyroscope" in r.tables and r is not wheels]
-    force = samples(sensors, "accelerometer", AXES) or samples(sensors, "linear_acceleration", AXES)
-    speed = rows.dropna(subset=["speed_mps"])
-    if not phones or force is None or len(speed) < _FEWEST:
-        return turning, ()
-    speeds = speed["time_s"].to_numpy(np.float64), speed["speed_mps"].to_numpy(np.float64)
-    shift_s, best, now = clock_shift_s(speeds, force)
-    if not shift_s:
-        return turning, ()
-    note = (
-        f"{listed(phones)}: accelerations agree with the speeds of {wheels.path.name} best "
-        f"{shift_s:+.1f} s shifted (explained: {best:.2f}, not {now:.2f}); its turns are shifted, "
-        "--offset shifts all of it"
-    )
-    return replace(turning, time_s=turning.time_s + shift_s), (note,)
 
 
 def _walked(
@@ -210,29 +173,6 @@ def _compass_of(motion: pd.DataFrame) -> tuple[bool, str]:
     """Return whether a walk has headings, and so in words."""
     found = bool(motion["heading_rad"].notna().any())
     return found, "with a compass" if found else "without a compass"
-
-
-def _check_gaps(recording: Recording, time_s: Floats) -> None:
-    """Raise InputError where odometry pauses for more than an hour, as between journeys."""
-    gaps = np.flatnonzero(np.diff(time_s) > _LONGEST_GAP_S)
-    if not gaps.size:
-        return
-    row = int(gaps[0]) + 1
-    before, after = (_shown_time(recording, float(time)) for time in time_s[row - 1 : row + 1])
-    hours = (time_s[row] - time_s[row - 1]) / 3600
-    more = f"; {gaps.size} such gaps" if gaps.size > 1 else ""
-    got = f"{hours:.1f} h from {before} (row {row}) to {after} (row {row + 1}){more}"
-    where, expected = f"{recording.path}, odometry", "rows at most 1 h apart"
-    hint = "a recording of several journeys: split it there, convert each alone"
-    if recording.clock.kind == "local" and not recording.clock.zone and hours < _SUMMER_HOURS:
-        hint = f"a clock that was set forward for summer: --zone; or {hint}"
-    raise fail(InputError, where, expected, got, hint)
-
-
-def _shown_time(recording: Recording, time_s: float) -> str:
-    if recording.clock.kind == "monotonic":
-        return f"{time_s:g} s"
-    return datetime.fromtimestamp(time_s, UTC).isoformat(" ", "seconds").removesuffix("+00:00")
 
 
 def _course(

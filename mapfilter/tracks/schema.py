@@ -7,12 +7,18 @@ checks tables.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, nextafter, pi
 from typing import Literal
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mapfilter._types import Floats
 from mapfilter.radio.identities import NEIGHBOUR as NEIGHBOUR
 from mapfilter.radio.identities import SERVING as SERVING
+from mapfilter.radio.level_quantity import likely_of_positive
 
 Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
 """Kinds of measurements that a log may hold, each in one table of :data:`TABLES`."""
@@ -47,7 +53,8 @@ class Column:
 
     Numbers are float64 (missing: NaN), integers nullable Int64, and text is None where missing.
     Columns that are ``required`` hold a value in every row; ``optional`` ones are only in tables
-    in which they were given.
+    in which they were given. Headings that wind may count on beyond a turn.
+    ``mistake`` returns the hint where it depends on the values.
     """
 
     name: str
@@ -58,6 +65,14 @@ class Column:
     kind: Literal["number", "integer", "text"] = "number"
     required: bool = False
     optional: bool = False
+    winds: bool = False
+    mistake: Callable[[Floats], str] | None = None
+
+    def likely(self, values: ArrayLike) -> str:
+        """Return the likely mistake behind numbers out of range, by all that are given."""
+        if self.mistake is None:
+            return self.hint
+        return self.mistake(np.atleast_1d(np.asarray(values, dtype=np.float64)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +94,10 @@ class Table:
     optional: bool = False
 
 
+def _level_mistake(levels: Floats) -> str:
+    return likely_of_positive(levels) if (levels > 0).any() else ""
+
+
 def _text(name: str, expected: str, *, required: bool = False) -> Column:
     return Column(name, expected=expected, kind="text", required=required)
 
@@ -97,7 +116,9 @@ TABLES: dict[str, Table] = {
         (
             _TIME,
             Column("step_m", -1e6, 1e6, "metres"),
-            Column("heading_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
+            Column(
+                *("heading_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES), winds=True
+            ),
             Column("turn_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
             Column("sampling_sd_m", 0, 1e6, "metres >= 0", optional=True),
         ),
@@ -110,7 +131,7 @@ TABLES: dict[str, Table] = {
             _text("cell", "a cell id"),
             _integer("arfcn", 0, 3_279_165, "a carrier number"),
             _integer("bsic", 0, 1007, "a BSIC or PCI"),
-            Column("level_dbm", -200, 0, "dBm in -200..0", "raw RXLEV given for dBm"),
+            Column("level_dbm", -200, 0, "dBm in -200..0", mistake=_level_mistake),
             _integer("censored", -1, 1, "-1, 0 or 1"),
             replace(
                 _integer("timing_advance", 0, 3846, "steps in 0..3846"), hint="metres for steps"

@@ -80,7 +80,7 @@ def tidy_table(
     else:
         _check_degrees(tidy, found)
     _check_milliseconds(table, tidy, found)
-    return _sorted_unique(tidy, where, notes)
+    return _sorted_unique(tidy, where, (*notes, *found.notes))
 
 
 @cache

@@ -125,6 +125,9 @@ def test_epochs_with_a_fault_are_refused_with_its_place(cross, body):
         ({"epochs": [{"time_s": 1.7e12}]}, "milliseconds for s"),
         (epoch(motion=[{"step_m": 1, "heading_rad": 90}]), "degrees given for radians"),
         (epoch(radio=[{**SERVING, "level_dbm": 40}]), "raw RXLEV given for dBm"),
+        (epoch(radio=[{**SERVING, "level_dbm": 3.82}]), "a strong level plus an offset"),
+        (epoch(radio=[{**SERVING, "level_dbm": 70}]), "a lost sign"),
+        (epoch(radio=[{**SERVING, "level_dbm": 10**400}]), "level_dbm: expected dBm"),
         (epoch(radio=[{**SERVING, "timing_advance": 5000}]), "metres for steps"),
     ],
 )

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.workflows.convert import run_convert
 
@@ -78,23 +79,104 @@ def test_raw_odometry_of_a_converted_log_has_both(tmp_path):
 
 
 @pytest.mark.parametrize("field", ["heading_deg", "compass_deg", "heading_rad"])
-def test_a_heading_beside_the_speed_of_wheels_tells_how_they_turn(read, field):
-    """It was not used, and the way was spread to all sides."""
+@pytest.mark.parametrize("lengths", ["wheel_speed_mps", "odometer_m"])
+def test_headings_beside_a_vehicles_lengths_are_those_of_its_motion(read, field, lengths):
+    """Their differences were taken for a gyroscope's, with a bias of one row at standstill."""
     heading = 5.5 + TURNED_RAD
-    if field != "heading_rad":
-        heading = np.degrees(np.pi / 2 - heading) % 360
-    log = read(drive={"time": TIME_S, "wheel_speed_mps": SPEED_MPS, field: heading})
-    np.testing.assert_allclose(turned_rad(log)[2:-2], TURNED_RAD[2:-2], atol=0.03)
-    assert f"drive.csv: yaw rates are those by which {field} changes" in log.notes
+    speed = np.where(np.arange(TIME_S.size) < 8, 0.0, SPEED_MPS)
+    along = speed if lengths == "wheel_speed_mps" else 0.2 * np.cumsum(speed)
+    given = heading if field == "heading_rad" else np.degrees(np.pi / 2 - heading) % 360
+    log = read(drive={"time": TIME_S, lengths: along, field: given})
+    off = wrap_rad(log.motion["heading_rad"].to_numpy() - heading)
+    # Grid north is not true north.
+    assert np.ptp(off) < 0.04
+    assert np.abs(off).max() < (0.04 if field == "heading_rad" else 0.1)
+    assert log.motion["turn_rad"].isna().all()
+    assert log.vehicle
+    assert (log.imu.turns, log.imu.bias_sd_deg) == ("headings", 10.0)
+    assert f"drive.csv: {field}: headings of the vehicle" in log.notes
+    assert not [n for n in log.notes if "not used" in n or "unknown" in n or "bias" in n]
+
+
+def test_headings_in_rows_of_their_own(read):
+    heading = np.where(np.arange(TIME_S.size) % 2, np.nan, 1.0 + TURNED_RAD)
+    speed = np.where(np.arange(TIME_S.size) % 2, SPEED_MPS, np.nan)
+    log = read(drive={"time": TIME_S, "wheel_speed_mps": speed, "heading_rad": heading})
+    off = wrap_rad(log.motion["heading_rad"].to_numpy() - 1.0 - TURNED_RAD[1::2])
+    assert np.abs(off).max() < 0.05
+    assert not log.motion["step_m"].isna().any()
+
+
+def test_beside_headings_yaw_rates_of_another_file_are_not_used(read):
+    drive = {"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "heading_rad": 1.0 + TURNED_RAD}
+    log = read(drive=drive, gyro={"time": TIME_S, "yaw_rate_radps": -RATE_RADPS})
+    off = wrap_rad(log.motion["heading_rad"].to_numpy() - 1.0 - TURNED_RAD)
+    assert np.abs(off).max() < 0.05
+    assert "gyro.csv: yaw rates not used, the speeds have headings" in log.notes
+
+
+def test_the_scatter_of_headings_is_their_error(read):
+    rng = np.random.default_rng(4)
+    noisy = 1.0 + TURNED_RAD + np.radians(6.0) * rng.standard_normal(TURNED_RAD.size)
+    log = read(drive={"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "heading_rad": noisy})
+    assert log.imu.sigma_orient_deg == pytest.approx(6.0, rel=0.2)
+
+
+def test_azimuths_of_a_vehicle_in_radians_are_noted(read):
+    azimuth = (np.pi / 2 - 40 * TURNED_RAD / np.ptp(TURNED_RAD)) % (2 * np.pi)
+    log = read(drive={"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "compass_deg": azimuth})
+    assert any("radians for degrees?" in note for note in log.notes)
+
+
+def test_headings_seconds_apart_are_used(read):
+    heading = np.degrees(np.pi / 2 - TURNED_RAD[::25]) % 360
+    log = read(drive={"time": TIME_S[::25], "wheel_speed_mps": 8.0, "heading_deg": heading})
+    assert log.motion["heading_rad"].notna().all()
+
+
+@pytest.mark.parametrize("field", ["turn_rad", "turn_deg"])
+@pytest.mark.parametrize("lengths", ["wheel_speed_mps", "odometer_m"])
+def test_turns_from_row_to_row_beside_a_vehicles_lengths(read, field, lengths):
+    """They were not used, and the way was spread to all sides."""
+    turn = np.diff(TURNED_RAD, prepend=0.0)
+    along = SPEED_MPS if lengths == "wheel_speed_mps" else 0.2 * np.cumsum(SPEED_MPS)
+    given = turn if field == "turn_rad" else np.degrees(turn)
+    log = read(drive={"time": TIME_S, lengths: along, field: given})
+    np.testing.assert_allclose(turned_rad(log), TURNED_RAD, atol=1e-6)
+    assert "drive.csv: turns are those from row to row" in log.notes
+    assert not [n for n in log.notes if "not used" in n or "unknown" in n or "no yaw rates" in n]
+
+
+@pytest.mark.parametrize("field", ["yaw_rate_radps", "yaw_rate_degps"])
+def test_yaw_rates_beside_steps_of_known_lengths_are_their_turns(read, field):
+    """They were not used, and the way was spread to all sides."""
+    rate = RATE_RADPS if field == "yaw_rate_radps" else np.degrees(RATE_RADPS)
+    log = read(walk={"time": TIME_S, "step_m": 0.3, field: rate})
+    np.testing.assert_allclose(turned_rad(log), TURNED_RAD, atol=1e-6)
+    assert "walk.csv: turns are those of a yaw rate" in log.notes
     assert not [note for note in log.notes if "not used" in note or "unknown" in note]
 
 
-def test_headings_too_far_apart_tell_no_turns(read):
-    heading = np.degrees(np.pi / 2 - TURNED_RAD[::25]) % 360
-    log = read(drive={"time": TIME_S[::25], "wheel_speed_mps": 8.0, "heading_deg": heading})
-    assert log.motion["turn_rad"].isna()[1:].all()
-    assert any("heading_deg: no two values within 2 s" in note for note in log.notes)
-    assert not any("yaw rates are those" in note for note in log.notes)
+def test_headings_of_steps_go_before_their_yaw_rates(read):
+    given = {"step_m": 0.3, "heading_rad": 1.0 + TURNED_RAD, "yaw_rate_radps": RATE_RADPS}
+    log = read(walk={"time": TIME_S, **given})
+    assert log.motion["turn_rad"].isna().all()
+    assert any("columns not used: yaw_rate_radps" in note for note in log.notes)
+
+
+@pytest.mark.parametrize(("stood", "learnt"), [(1, False), (4, False), (60, True)])
+def test_a_bias_is_learnt_of_enough_rows_at_standstill(read, stood, learnt):
+    """One row gave it with an error of 0.04 deg/s."""
+    # The last row of a standstill does not count.
+    speed = np.where(np.arange(TIME_S.size) < stood + 1, 0.0, SPEED_MPS)
+    rng = np.random.default_rng(2)
+    rate = np.where(speed > 0, RATE_RADPS, 0.0) + 0.02 + rng.normal(0.0, 0.01, speed.size)
+    log = read(drive={"time": TIME_S, "wheel_speed_mps": speed, "yaw_rate_radps": rate})
+    bias_radps = np.nansum(log.motion["turn_rad"]) - np.sum(rate[1:] + rate[:-1]) * 0.1
+    assert (abs(bias_radps) > 3.0) == learnt
+    words = "at standstill" if learnt else "too few to learn the bias"
+    assert any(words in note for note in log.notes)
+    assert (log.imu.gyro_bias_deg_per_s < 0.2) == learnt
 
 
 def test_a_heading_beside_positions_may_be_their_course(read):
@@ -110,6 +192,6 @@ def test_over_rows_of_headings_far_apart_nothing_is_known(read):
     heading[700:760] = np.nan
     log = read(drive={"time": TIME_S, "wheel_speed_mps": SPEED_MPS, "heading_deg": heading})
     blind = log.motion["step_m"].isna().to_numpy()
-    assert blind[705:755].all()
+    assert blind[706:755].all()
     assert not blind[:690].any()
     assert not blind[770:].any()

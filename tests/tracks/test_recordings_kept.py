@@ -140,7 +140,34 @@ def test_unwrapped_headings_are_wrapped(drive, monkeypatch):
     assert found.tables["motion"]["heading_rad"].isna().sum() == 2
     found = drive(heading_rad=12.0 + heading)
     assert found.tables["motion"]["heading_rad"].isna().all()
-    assert any("values are not radians" in note for note in found.ignored)
+    told = "likely: unwrapped headings that begin beyond a turn, or degrees given for radians"
+    assert all("values are not radians" in note and told in note for note in found.ignored)
+    assert found.ignored
+
+
+@pytest.mark.parametrize("begin", [-3000.0, -100.0, 0.0, 939.05])
+@pytest.mark.parametrize("part_bytes", [1 << 24, 700])
+def test_unwrapped_azimuths_are_wrapped(begin, part_bytes, drive, monkeypatch):
+    """Such columns were refused."""
+    azimuth = begin + np.linspace(0.0, 500.3, 60)
+    monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", part_bytes)
+    found = drive(compass_deg=azimuth)
+    kept = found.tables["motion"]["compass_deg"].to_numpy()
+    np.testing.assert_allclose(np.exp(1j * np.radians(kept - azimuth)), 1.0)
+    assert (np.abs(kept) <= 360).all()
+    assert any("beyond a turn, wrapped (unwrapped)" in note for note in found.notes)
+    assert not found.ignored
+
+
+@pytest.mark.parametrize("step", [0.5, 170.0])
+def test_azimuths_too_large_to_be_unwrapped_are_refused(step, drive):
+    with pytest.raises(InputError, match=r"compass_deg: expected degrees in -180\.\.360"):
+        drive(compass_deg=3700.25 + step * ROW)
+
+
+def test_azimuths_that_jump_beyond_a_turn_are_refused(drive):
+    with pytest.raises(InputError, match=r"compass_deg: expected degrees in -180\.\.360"):
+        drive(compass_deg=400.5 + 200 * (ROW % 2))
 
 
 @pytest.mark.parametrize(

@@ -136,6 +136,35 @@ def test_all_faults_of_all_tables_are_told_together():
         assert part in message
 
 
+def long_motion(heading_rad):
+    time_s = np.arange(float(len(heading_rad)))
+    return pd.DataFrame({"time_s": time_s, "step_m": 1.4, "heading_rad": heading_rad})
+
+
+@given(
+    first=st.floats(-6.2, 6.2),
+    changes=st.lists(st.floats(-0.5, 3.0), min_size=3, max_size=20),
+)
+def test_unwrapped_headings_are_read(first, changes):
+    heading = first + np.cumsum([0.0, *changes])
+    log = make_log("EPSG:32635", motion=long_motion(heading))
+    off = np.exp(1j * (log.motion["heading_rad"].to_numpy() - heading))
+    np.testing.assert_allclose(off, 1.0, atol=1e-9)
+    beyond = bool((np.abs(heading) > 2 * np.pi + 1e-9).any())
+    assert any("beyond a turn, wrapped (unwrapped)" in note for note in log.notes) == beyond
+
+
+def test_headings_that_may_be_unwrapped_or_degrees_are_refused_as_either():
+    heading = 10.28 + 0.9 * np.sin(np.arange(40) / 5)
+    assert "unwrapped headings that begin beyond a turn, or degrees given" in faults_of(
+        motion=long_motion(heading)
+    )
+    # Those that jump are degrees.
+    message = faults_of(motion=long_motion((350.3 + 7.1 * np.arange(40)) % 360))
+    assert "(likely: degrees given for radians)" in message
+    assert "unwrapped" not in message
+
+
 def test_many_bad_rows_are_counted():
     message = faults_of(truth=truth(east_m=[np.nan] * 3).loc[[0, 1, 2, 0, 1]])
     assert message.count("truth row") == 3

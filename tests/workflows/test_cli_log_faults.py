@@ -35,7 +35,9 @@ def test_a_log_made_by_hand_is_replayed(log, replay, tmp_path):
         ("truth", {"east_m": put("inf")}, "row 3, east_m: expected metres east, found inf"),
         ("truth", {"north_m": put("nan")}, "row 3, north_m: expected metres north, found nan"),
         ("motion", {"heading_rad": lambda h: h * 180 / np.pi}, "degrees given for radians"),
-        ("radio", {"level_dbm": lambda v: -v}, "raw RXLEV given for dBm"),
+        ("radio", {"level_dbm": lambda v: -v}, "likely: a lost sign (70 for -70 dBm)"),
+        ("radio", {"level_dbm": lambda v: np.round(v + 110)}, "raw RXLEV given for dBm"),
+        ("radio", {"level_dbm": lambda v: v + 60}, "likely: a strong level plus an offset"),
         ("radio", {"role": put("servng")}, "row 3, role: expected serving or neighbour"),
     ],
 )

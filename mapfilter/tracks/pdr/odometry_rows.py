@@ -7,6 +7,7 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import odometry_gaps
 
 _JUMP_MPS, _JUMP_MPS2 = 15.0, 30.0
@@ -14,6 +15,8 @@ _JUMP_MPS, _JUMP_MPS2 = 15.0, 30.0
 _FULL_SCALE_MPS = 55.0
 """Marks are the ends of scales (255 km/h, 65 m/s): other speeds between zeros are good ones."""
 _NEAR_S = 1.0
+_SPEED_SD_MPS, _SCALE = 0.05, 0.02
+"""Errors of speeds of wheels: white, where a recording states none, and a lasting share."""
 _CORNER_RAD = np.pi / 4
 """Turn of a vehicle between two rests that has moved in between."""
 
@@ -66,6 +69,46 @@ def usable_rows(rows: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
         rows = rows.assign(yaw_rate_radps=joined)
     kept = _telling(time_s, rows["speed_mps"].to_numpy(dtype=np.float64), joined)
     return rows if kept.all() else rows[kept].reset_index(drop=True), notes
+
+
+def gap_notes(time_s: Floats, speed: Floats, turn: Floats) -> tuple[str, ...]:
+    """Return notes on gaps, by whether turns are known over them.
+
+    Parameters
+    ----------
+    time_s, speed, turn : (N,) array
+        Rising times, speeds and turns of each interval; NaN where unknown.
+    """
+    known = np.flatnonzero(np.isfinite(speed))
+    # Rows without a speed are those of a gap.
+    is_gap = odometry_gaps(time_s[known], speed[known])
+    is_gap[1:] |= np.diff(known) > 1
+    gaps = np.flatnonzero(is_gap)
+    if not gaps.size:
+        return ()
+    first, last = known[gaps - 1], known[gaps]
+    unknown = np.concatenate([[0], np.cumsum(np.isnan(turn))])
+    turned = unknown[last + 1] == unknown[first + 1]
+    notes: tuple[str, ...] = ()
+    for of, what in ((~turned, "motion is not known"), (turned, "turns alone are known")):
+        if of.any():
+            longest_s = float((time_s[last] - time_s[first])[of].max())
+            words = number_of(int(of.sum()), "gap")
+            notes += (f"odometry: {words} (longest {longest_s:.1f} s), over which {what}",)
+    return notes
+
+
+def usual_s(time_s: Floats) -> float:
+    """Return the median time between rows; a second for a single one."""
+    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+
+
+def speed_errors(rows: pd.DataFrame) -> ImuNoise:
+    """Return the errors of steps by the speeds of rows; those of directions are any."""
+    period_s = usual_s(rows["time_s"].to_numpy(dtype=np.float64))
+    stated = float(rows["speed_sd_mps"].median()) if "speed_sd_mps" in rows else np.nan
+    sd_mps = stated if np.isfinite(stated) else _SPEED_SD_MPS
+    return ImuNoise(period_s=period_s, sigma_trans_m=sd_mps * period_s, scale=_SCALE)
 
 
 def _telling(time_s: Floats, speed: Floats, rate: Floats) -> Bools:

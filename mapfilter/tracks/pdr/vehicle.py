@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry, odometry_gaps
+from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.gyroscope import (
     MOST_BIAS_RADPS,
@@ -21,18 +22,19 @@ from mapfilter.tracks.pdr.gyroscope import (
     shown_bias,
 )
 from mapfilter.tracks.pdr.heading import Compass, YawOffset, yaw_offset
-from mapfilter.tracks.pdr.odometry_rows import usable_rows
+from mapfilter.tracks.pdr.odometry_rows import gap_notes, speed_errors, usable_rows, usual_s
 from mapfilter.tracks.pdr.signals import inertial_signals
 from mapfilter.tracks.pdr.turns import ORIENTATION, Turning, turning_of_rate
 
 _STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
 _SETTLING_S = 0.4
+_FEWEST_STANDING, _LEAST_STANDING_S = 5, 1.0
+"""Rows at standstill that show a bias, and how long they last together: the scatter of fewer says
+nothing of their error."""
 _APART_RADPS, _DEVIATIONS = 0.05, 4.0
 """How far a rate at standstill may be from the usual one, also in deviations of its noise."""
 _LEAST_RATE_SD_RADPS = 5e-4
 _COURSE_MPS = 2.0
-_SPEED_SD_MPS = 0.05
-_SCALE = 0.02
 _COURSE_BIAS_DEG = 2.0
 _MOST_SPANS = 50_000
 _DENSE = 1.5
@@ -70,12 +72,13 @@ def reckon_odometry(
     motion = motion_from_odometry(rows)
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     speed = rows["speed_mps"].to_numpy(dtype=np.float64)
-    rate, averaged_s = rows["yaw_rate_radps"].to_numpy(dtype=np.float64), _usual_s(time_s)
+    rate, averaged_s = rows["yaw_rate_radps"].to_numpy(dtype=np.float64), usual_s(time_s)
     if turning is not None:
         # Each rate is a mean over two intervals.
         motion, rate = _turned(motion, turning)
         averaged_s *= 2
-    standing = _settled(time_s, np.abs(speed) < _STANDING_MPS)
+    stood = _settled(time_s, np.abs(speed) < _STANDING_MPS) & np.isfinite(rate)
+    standing = _enough(time_s, stood)
     found, walk_rad = _bias(time_s, rate, standing, None, averaged_s)
     if turning is not None and not standing.any():
         walk_rad = max(walk_rad, turning.walk_rad_per_sqrt_s)
@@ -85,19 +88,17 @@ def reckon_odometry(
     biased = np.where(rested, 0.0, np.diff(correction, prepend=correction[0]))
     turn = motion["turn_rad"].to_numpy() + biased
     has_rate = bool(np.isfinite(rate).any())
-    notes = unusable + _notes(found, int(np.sum(standing & np.isfinite(rate))), has_rate=has_rate)
+    notes = unusable + _notes(found, stood, standing, has_rate=has_rate)
     # Which way it went meanwhile is as little known as over a gap.
     blind = has_rate & np.isnan(turn) & (np.abs(motion["step_m"].to_numpy()) > 0)
     if blind.any():
         blind_s = float(np.diff(time_s, prepend=time_s[0])[blind].sum())
         notes += (f"odometry: no yaw rate over {blind_s:.1f} s of driving: motion is not known",)
         motion = motion.assign(step_m=motion["step_m"].where(~blind))
-    speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
     by_gyroscope = turning is None or turning.source != ORIENTATION
     notes += error_notes(walk_rad, of="yaw rate") if by_gyroscope else ()
-    speed_sd_mps = float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS
-    imu = _noise(time_s, found, walk_rad, speed_sd_mps)
-    notes += _gap_notes(time_s, speed, turn)
+    imu = _noise(found, walk_rad, speed_errors(rows))
+    notes += gap_notes(time_s, speed, turn)
     if rested.any():
         longest_s = float(np.diff(time_s, prepend=time_s[0])[rested].max())
         words = number_of(int(rested.sum()), "pause")
@@ -139,11 +140,12 @@ def reckon_velocity(
     course = rows["heading_rad"].to_numpy(dtype=np.float64)
     yaw = np.interp(time_s, signals.time_s, attitude(signals).yaw_rad)
     rate = np.gradient(yaw, time_s)
-    standing = _settled(time_s, speed < _GNSS_STANDING_MPS)
+    stood = _settled(time_s, speed < _GNSS_STANDING_MPS)
+    standing = _enough(time_s, stood)
     driving = (speed > _COURSE_MPS) & np.isfinite(course)
     # Each rate is a mean over two intervals.
     course_offset = np.where(driving, course - yaw, np.nan)
-    found, walk_rad = _bias(time_s, rate, standing, course_offset, 2 * _usual_s(time_s))
+    found, walk_rad = _bias(time_s, rate, standing, course_offset, 2 * usual_s(time_s))
     heading = yaw + np.interp(time_s, found.time_s, found.offset_rad)
     lasted_s = np.diff(time_s)
     step = np.concatenate([[0.0], lasted_s * (speed[1:] + speed[:-1]) / 2])
@@ -156,8 +158,8 @@ def reckon_velocity(
             "turn_rad": wrap_rad(np.diff(heading, prepend=heading[0])),
         }
     )
-    notes = (*_notes(found, int(standing.sum()), has_rate=True), *error_notes(walk_rad))
-    return motion, _noise(time_s, found, walk_rad, _SPEED_SD_MPS), notes
+    notes = (*_notes(found, stood, standing, has_rate=True), *error_notes(walk_rad))
+    return motion, _noise(found, walk_rad, speed_errors(rows[["time_s"]])), notes
 
 
 def _dense_turning(rows: pd.DataFrame) -> Turning | None:
@@ -186,27 +188,6 @@ def _turned(motion: pd.DataFrame, turning: Turning) -> tuple[pd.DataFrame, Float
     return motion.assign(turn_rad=turn), rate
 
 
-def _gap_notes(time_s: Floats, speed: Floats, turn: Floats) -> tuple[str, ...]:
-    """Return what is said of gaps, by whether turns are known over them."""
-    known = np.flatnonzero(np.isfinite(speed))
-    # Rows without a speed are those of a gap.
-    is_gap = odometry_gaps(time_s[known], speed[known])
-    is_gap[1:] |= np.diff(known) > 1
-    gaps = np.flatnonzero(is_gap)
-    if not gaps.size:
-        return ()
-    first, last = known[gaps - 1], known[gaps]
-    unknown = np.concatenate([[0], np.cumsum(np.isnan(turn))])
-    turned = unknown[last + 1] == unknown[first + 1]
-    notes: tuple[str, ...] = ()
-    for of, what in ((~turned, "motion is not known"), (turned, "turns alone are known")):
-        if of.any():
-            longest_s = float((time_s[last] - time_s[first])[of].max())
-            words = number_of(int(of.sum()), "gap")
-            notes += (f"odometry: {words} (longest {longest_s:.1f} s), over which {what}",)
-    return notes
-
-
 def _settled(time_s: Floats, standing: Bools) -> Bools:
     """Return where a vehicle has stood for 0.4 s and still stands: its body has come to rest."""
     moving_s = np.where(standing, -np.inf, time_s)
@@ -215,8 +196,10 @@ def _settled(time_s: Floats, standing: Bools) -> Bools:
     return settled
 
 
-def _usual_s(time_s: Floats) -> float:
-    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+def _enough(time_s: Floats, stood: Bools) -> Bools:
+    """Return the rows at standstill, none where they are too few to show how they scatter."""
+    few = stood.sum() < _FEWEST_STANDING or stood.sum() * usual_s(time_s) < _LEAST_STANDING_S
+    return np.zeros_like(stood) if few else stood
 
 
 def _bias(
@@ -263,7 +246,7 @@ def _bias(
     return found, walk_rad
 
 
-def _notes(found: YawOffset, stood: int, *, has_rate: bool) -> tuple[str, ...]:
+def _notes(found: YawOffset, stood: Bools, standing: Bools, *, has_rate: bool) -> tuple[str, ...]:
     """Return what was learnt of the gyroscope's bias."""
     if not has_rate:
         return (
@@ -271,23 +254,25 @@ def _notes(found: YawOffset, stood: int, *, has_rate: bool) -> tuple[str, ...]:
             f"{UNDIRECTED}; a phone's gyroscope and accelerometer show them, too",
         )
     bias = f"{np.degrees(found.rate_radps):+.3f} ± {np.degrees(found.rate_sd_radps):.3f} deg/s"
-    if not stood:
+    if not stood.any():
         return ("yaw rate: the vehicle never stands, so that the bias could not be learnt",)
-    return (f"yaw rate: bias {bias}, of {stood} rows at standstill",)
+    some = number_of(int(stood.sum()), "row")
+    if not standing.any():
+        needed = f"{_FEWEST_STANDING} rows and {_LEAST_STANDING_S:g} s"
+        return (f"yaw rate: {some} at standstill, too few to learn the bias (of {needed})",)
+    return (f"yaw rate: bias {bias}, of {some} at standstill",)
 
 
-def _noise(time_s: Floats, found: YawOffset, walk_rad: float, speed_sd_mps: float) -> ImuNoise:
-    period_s, walk = _usual_s(time_s), float(np.degrees(walk_rad))
+def _noise(found: YawOffset, walk_rad: float, of_steps: ImuNoise) -> ImuNoise:
+    walk = float(np.degrees(walk_rad))
     bias = float(np.hypot(np.degrees(found.rate_sd_radps), _UNSEEN_BIAS_DEG_PER_S))
     with_course = bool(found.sd_rad[0] < np.pi)
     lasting = float(np.degrees(np.sqrt(np.mean(found.sd_rad**2)))) if with_course else 0.0
-    return ImuNoise(
-        period_s=period_s,
-        sigma_trans_m=speed_sd_mps * period_s,
+    return replace(
+        of_steps,
         sigma_orient_deg=1.0,
         bias_sd_deg=min(lasting + _COURSE_BIAS_DEG, 180.0) if with_course else 0.0,
         drift_deg_per_sqrt_s=walk if with_course else 0.0,
-        scale=_SCALE,
         turns="headings" if with_course else "gyro",
         gyro_noise_deg_per_sqrt_s=0.0 if with_course else walk,
         gyro_bias_deg_per_s=0.0 if with_course else bias,

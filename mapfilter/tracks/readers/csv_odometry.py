@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mapfilter._constants import KMH_MPS
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.odometer_counts import counted_way
@@ -18,6 +17,7 @@ _NEAR_S, _COARSE_M, _COURSE_MPS = 1.0, 0.5, 1.0
 _SPEEDS = ("speed_mps", "speed_kmh")
 _WHEELS, _ODOMETERS = ("wheel_speed_mps", "wheel_speed_kmh"), ("odometer_m", "odometer_km")
 _OF_PHONES = ("steps", "step_m", "level_dbm", "bars", "cell", "ci", "cgi", "acc_x")
+_TURNS = ("turn_rad", "turn_deg")
 _FEWEST_ALONE, _ALONE_SHARE = 10, 0.1
 
 
@@ -51,7 +51,7 @@ def turns_alone(mapped: Mapped) -> bool:
 
 
 def heading_of_wheels(mapped: Mapped) -> str:
-    """Return the field of headings by which a vehicle without a yaw rate turns; "" for none.
+    """Return the field of the headings of a vehicle without a yaw rate; "" for none.
 
     Beside positions a heading may be the course of their receiver, which ends with them, and beside
     steps it is a walker's. A course that is alone with a speed goes on as that does.
@@ -62,6 +62,30 @@ def heading_of_wheels(mapped: Mapped) -> str:
     if any(map(mapped.has, others)):
         return ""
     return next(filter(mapped.has, ("heading_rad", "compass_deg", "course_deg")), "")
+
+
+def has_turns_of_wheels(mapped: Mapped) -> bool:
+    """Return whether a vehicle with neither a yaw rate nor headings has turns from row to row."""
+    directed = _is_turned(mapped) or heading_of_wheels(mapped)
+    return has_odometry(mapped) and not directed and any(map(mapped.has, _TURNS))
+
+
+def has_rates_of_steps(mapped: Mapped) -> bool:
+    """Return whether steps of known lengths have a yaw rate, and no other direction."""
+    others = ("heading_rad", "compass_deg", *_TURNS)
+    return mapped.has("step_m") and _is_turned(mapped) and not any(map(mapped.has, others))
+
+
+def add_turns(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
+    """Add the turns of a vehicle or of steps that are in neither of their own tables."""
+    if has_turns_of_wheels(mapped):
+        column, values = "turn_rad", mapped.radians("turn")
+    elif has_rates_of_steps(mapped):
+        column, values = "yaw_rate_radps", mapped.radians("yaw_rate", "ps")
+    else:
+        return
+    columns = {"time_s": time_s, column: values}
+    add_rows(reading, "turns", columns, mapped.rows, np.isfinite(values))
 
 
 def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
@@ -78,22 +102,22 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     _note_units(mapped, reading)
     speed, speed_sd_mps = _speeds(mapped, reading, time_s)
     rates = mapped.radians("yaw_rate", "ps")
-    if heading := heading_of_wheels(mapped):
-        # Of a receiver that stands the course is noise.
-        known = np.abs(speed) >= _COURSE_MPS if heading == "course_deg" else None
-        rates = _rates_of(mapped, heading, time_s, known)
-        column = mapped.rows.find(*mapped.names(heading))
-        if np.isfinite(rates).any():
-            reading.note(f"yaw rates are those by which {column} changes")
-        else:
-            reading.ignore(f"{column}: no two values within {2 * _NEAR_S:g} s, turns are unknown")
     yaw = _at_speeds(reading, time_s, speed, rates)
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
     columns["speed_sd_mps"] = np.full(len(speed), speed_sd_mps)
+    headed = np.zeros(len(speed), dtype=np.bool_)
+    if heading := heading_of_wheels(mapped):
+        given = mapped.number(heading)
+        if heading == "course_deg":
+            # Of a receiver that stands the course is noise.
+            given = np.where(np.abs(speed) >= _COURSE_MPS, given, np.nan)
+        columns["heading_rad" if heading == "heading_rad" else "compass_deg"] = given
+        headed = np.isfinite(given)
+        reading.note(f"{mapped.rows.find(*mapped.names(heading))}: headings of the vehicle")
     if not np.isfinite(speed).any():
         return
     turns = np.isfinite(yaw) & (np.isfinite(speed) | (np.abs(yaw) <= FASTEST_TURN_RADPS))
-    add_rows(reading, "odometry", columns, mapped.rows, np.isfinite(speed) | turns)
+    add_rows(reading, "odometry", columns, mapped.rows, np.isfinite(speed) | turns | headed)
 
 
 def _speeds(mapped: Mapped, reading: Reading, time_s: Floats) -> tuple[Floats, float]:
@@ -167,29 +191,6 @@ def _note_speeds(mapped: Mapped, reading: Reading) -> None:
     if (count := int(alone.sum())) >= max(_FEWEST_ALONE, _ALONE_SHARE * measured.sum()):
         some = f"{count} of {number_of(int(measured.sum()), 'speed')}"
         reading.ignore(f"{column}: {some} without a position in the row, not used; {option}")
-
-
-def _rates_of(mapped: Mapped, field: str, time_s: Floats, known: Bools | None) -> Floats:
-    """Return the rates by which headings turn, counter-clockwise; NaN after rows far apart.
-
-    ``known`` says in which rows a heading counts; in all of them if None.
-    """
-    given = mapped.number(field)
-    given = given if known is None else np.where(known, given, np.nan)
-    heading = given if field == "heading_rad" else -np.radians(given)
-    rates = np.full(len(heading), np.nan)
-    rows = np.flatnonzero(np.isfinite(heading) & np.isfinite(time_s))
-    rows = rows[np.argsort(time_s[rows], kind="stable")]
-    lasted_s = np.diff(time_s[rows])
-    turned = wrap_rad(np.diff(heading[rows]))
-    good = (lasted_s > 0) & (lasted_s <= 2 * _NEAR_S)
-    # The rate of an interval is taken for its middle: at a row it is the mean of both.
-    both = np.full((2, rows.size), np.nan)
-    both[0, 1:][good] = both[1, :-1][good] = turned[good] / lasted_s[good]
-    there = np.isfinite(both)
-    mean = np.where(there, both, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
-    rates[rows] = np.where(there.any(axis=0), mean, np.nan)
-    return rates
 
 
 def _at_speeds(reading: Reading, time_s: Floats, speed: Floats, yaw: Floats) -> Floats:

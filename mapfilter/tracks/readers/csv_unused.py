@@ -12,6 +12,8 @@ from mapfilter.tracks.readers.csv_headers import likely_fields
 from mapfilter.tracks.readers.csv_mapped import Mapped
 from mapfilter.tracks.readers.csv_odometry import (
     has_odometry,
+    has_rates_of_steps,
+    has_turns_of_wheels,
     has_unused_odometry,
     heading_of_wheels,
     turns_alone,
@@ -19,10 +21,11 @@ from mapfilter.tracks.readers.csv_odometry import (
 from mapfilter.tracks.readers.csv_speed_units import speed_unit
 
 _OF_PLACES = ("altitude_m", "accuracy_m", "hdop", "course_deg", "speed_mps", "speed_kmh")
-_OF_ODOMETRY = ("speed_mps", "speed_kmh", "yaw_rate_radps", "yaw_rate_degps")
+_OF_TURNS, _OF_RATES = ("turn_rad", "turn_deg"), ("yaw_rate_radps", "yaw_rate_degps")
+_OF_ODOMETRY = ("speed_mps", "speed_kmh", *_OF_RATES)
 OF_WHEELS = {"speed_mps": "wheel_speed_mps", "speed_kmh": "wheel_speed_kmh"}
-_OF_STEPS = ("compass_deg", "turn_rad", "turn_deg")
-_OF_COUNTED_STEPS = (*_OF_STEPS, "yaw_rate_radps", "yaw_rate_degps")
+_OF_STEPS = ("compass_deg", *_OF_TURNS)
+_OF_COUNTED_STEPS = (*_OF_STEPS, *_OF_RATES)
 _LATE_GUESSES = ("altitude_m", "odometer_m")
 _OF_SPEEDS = {"": "", "m/s": "_mps", "km/h": "_kmh"}
 """Endings of fields of speeds by unit; of an unknown one of all."""
@@ -108,6 +111,10 @@ def _useful(mapped: Mapped) -> set[str]:
         useful.update(("heading_rad", *_OF_STEPS))
     if has_odometry(mapped) or has_unused_odometry(mapped) or turns_alone(mapped):
         useful.update(_OF_ODOMETRY)
+    if has_turns_of_wheels(mapped):
+        useful.update(_OF_TURNS)
+    if has_rates_of_steps(mapped):
+        useful.update(_OF_RATES)
     if heading := heading_of_wheels(mapped):
         useful.add(heading)
     if mapped.has("steps") and not mapped.has("step_m"):

@@ -16,7 +16,7 @@ from mapfilter.tracks.readers.csv_cells import add_cells
 from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
 from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows, mapped_columns, with_dates
-from mapfilter.tracks.readers.csv_odometry import add_odometry
+from mapfilter.tracks.readers.csv_odometry import add_odometry, add_turns
 from mapfilter.tracks.readers.csv_places import add_places, hemisphere_columns
 from mapfilter.tracks.readers.csv_times import times_of
 from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
@@ -107,6 +107,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
         there = np.isfinite(columns["step_m"])
         add_rows(reading, "motion", {"time_s": time_s, **columns}, rows, there)
     add_odometry(mapped, reading, time_s)
+    add_turns(mapped, reading, time_s)
     _add_sensors(mapped, reading, time_s)
     add_cells(mapped, reading, time_s)
     reading.fields = tuple(field for field in FIELDS if mapped.has(field))

@@ -32,6 +32,7 @@ from mapfilter.tracks.readers.set_back import set_back_by
 from mapfilter.tracks.readers.tables import RECORDED
 from mapfilter.tracks.readers.tallies import Tallies
 from mapfilter.tracks.readers.unusable import Unusable, nothing_usable
+from mapfilter.tracks.readers.wound import CAUSE
 from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import NEIGHBOUR
 
@@ -144,7 +145,7 @@ class Reading:
                 self.note(f"{table}, {known.name}: {some}, taken for {known.low:g}")
                 values = checked[known.name] = np.where(noise, known.low, values)
             outside = ~missing & ~((values >= known.low) & (values <= known.high))
-            if known.winds and not missing.all():
+            if known.turn and not missing.all():
                 values, outside = self._unwound(table, known, values, outside)
                 checked[known.name] = values
             if known.vital:
@@ -164,6 +165,7 @@ class Reading:
             some = number_of(int(ignored.sum()), "value is", "values are")
             # Elsewhere few bad values say nothing of their cause.
             hint = known.mistake(float(np.abs(values[ignored]).max())) if known.marks > 1 else ""
+            hint = hint or self._doubt(table, known, int(ignored.sum()), line.size)
             where = f"first in line {first}" + (f"; likely: {hint}" if hint else "")
             given = int(np.count_nonzero(good & ~missing))
             if known.is_another(values[ignored], given):
@@ -185,6 +187,12 @@ class Reading:
             some = number_of(count, "value")
             self.note(f"{table}, {known.name}: {some} beyond a turn, wrapped (unwrapped)")
         return values, left
+
+    def _doubt(self, table: str, known: Field, ignored: int, rows: int) -> str:
+        """Return what headings may be that mostly are out of range, but do not jump; else ""."""
+        if not known.turn or ignored <= rows / 2:
+            return ""
+        return CAUSE if self.tallies.winding(table, known).doubtful else ""
 
     def _in_era(self, time_s: Floats, line: Ints, good: Bools) -> Bools:
         """Refuse times that are no dates, and few rows that lie days away from all others."""

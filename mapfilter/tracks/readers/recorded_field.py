@@ -32,8 +32,8 @@ class Field:
         Likely mistakes behind values within these intervals.
     vital : bool
         Whether a file is refused most of whose values are out of range, as a log needs them.
-    winds : bool
-        Whether values are headings in radians, which may be unwrapped.
+    turn : float
+        Of headings, which may be unwrapped, a turn in their unit, 2π or 360; else 0.
     marks : int
         Up to so many different values out of range are marks of missing ones, and no reason to
         refuse a file.
@@ -52,7 +52,7 @@ class Field:
     text: bool = False
     hints: tuple[tuple[float, float, str], ...] = ()
     vital: bool = False
-    winds: bool = False
+    turn: float = 0.0
     marks: int = 1
     mostly: float = 0.5
     noise: float = 0.0

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapfilter.tracks.readers.recorded_field import Field
+from mapfilter.tracks.readers.wound import TURN_DEG, TURN_RAD
 
 
 def _axes(unit: str, most: float, expected: str) -> tuple[Field, ...]:
@@ -55,6 +56,10 @@ FASTEST_VEHICLE_MPS, FASTEST_TURN_RADPS = 120.0, 3.5
 """No road vehicle or usual train exceeds 432 km/h, none turns by 200 degrees in a second; the yaw
 rates of a vehicle's bus end at 3.92 rad/s (SAE J1939), above which they are marks."""
 _NO_VALUE = "what a bus sends where it has no value, such as"
+_HEADING = Field(
+    *("heading_rad", -6.3, 6.3, "radians in -2π..2π"), hints=_DEGREES, vital=True, turn=TURN_RAD
+)
+_COMPASS = Field("compass_deg", -180, 360, "degrees in -180..360", vital=True, turn=TURN_DEG)
 _TURN = Field(
     *("turn_rad", -6.3, 6.3, "radians in -2π..2π"),
     hints=_DEGREES,
@@ -130,14 +135,9 @@ RECORDED: dict[str, tuple[Field, ...]] = {
     "motion": (
         _TIME,
         Field("step_m", -1e6, 1e6, _METRES, vital=True),
-        Field(
-            *("heading_rad", -6.3, 6.3, "radians in -2π..2π"),
-            hints=_DEGREES,
-            vital=True,
-            winds=True,
-        ),
+        _HEADING,
         _TURN,
-        Field("compass_deg", -180, 360, "degrees in -180..360", vital=True),
+        _COMPASS,
     ),
     "odometry": (
         _TIME,
@@ -158,6 +158,8 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         ),
         Field("speed_sd_mps", 0, 100, "m/s >= 0"),
         Field("yaw_rate_sd_radps", 0, 10, "rad/s >= 0"),
+        _HEADING,
+        _COMPASS,
     ),
     "poses": (
         _TIME,
@@ -201,6 +203,7 @@ RECORDED: dict[str, tuple[Field, ...]] = {
             required=True,
             hints=((360.0, np.inf, "a step counter: the columns of steps and it are exchanged"),),
             vital=True,
+            turn=TURN_DEG,
         ),
     ),
     "turns": (

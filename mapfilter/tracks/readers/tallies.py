@@ -93,7 +93,7 @@ class Tallies:
 
     def winding(self, table: str, known: Field) -> Winding:
         """Return what is known so far of the headings of a column."""
-        return self._windings.setdefault((table, known.name), Winding())
+        return self._windings.setdefault((table, known.name), Winding(known.turn))
 
     def add_texts(
         self, column: str, part: int, given: int, bad: int = 0, examples: Sequence[str] = ()
@@ -148,7 +148,7 @@ class Tallies:
     def _sure(self, table: str, name: str) -> bool:
         """Return whether values out of range can be no good ones."""
         winding = self._windings.get((table, name))
-        return winding is None or winding.degrees
+        return winding is None or not winding.doubtful
 
     def _where(self, path: Path, name: str) -> str:
         column = self.columns.get(name, name)
