@@ -49,7 +49,7 @@ def utc_from_gps_s(gps_s: ArrayLike) -> Floats:
 
     Examples
     --------
-    >>> from datetime import UTC
+    >>> from datetime import UTC, datetime
     >>> float(utc_from_gps_s(1930 * WEEK_S + 18.0)) - datetime(2017, 1, 1, tzinfo=UTC).timestamp()
     0.0
     """
