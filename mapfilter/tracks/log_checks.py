@@ -156,7 +156,7 @@ def check_start(
 def odd_start(
     start_utc_s: float, tables: Mapping[str, pd.DataFrame], whole: str
 ) -> tuple[str, ...]:
-    """Return a note on a log that begins before 1980 or after 2099, or ten years after its start.
+    """Return a note on a log that begins before 1980 or after 2099, or counts Unix time twice.
 
     Examples
     --------

@@ -305,10 +305,10 @@ def test_a_known_start_is_left_by_steps_without_directions(town):
     assert output.fix.status not in FOUND
 
 
-def paced(pace_mps, fix_sd_m, lasts_s):
+def paced(pace_mps, fix_sd_m, lasts_s, seed=3):
     """A way with a fix each second, and lengths alone."""
-    path_m = drive(TOWN, 3, lasts_s * pace_mps)
-    rng = np.random.default_rng(7)
+    path_m = drive(TOWN, seed, lasts_s * pace_mps)
+    rng = np.random.default_rng(seed + 4)
     count = int(len(path_m) * STEP_M / pace_mps)
     at = pace_mps * np.arange(count) / STEP_M
     east_m, north_m = (np.interp(at, np.arange(len(path_m)), axis) for axis in path_m.T)
@@ -324,17 +324,20 @@ def paced(pace_mps, fix_sd_m, lasts_s):
     return make_log(CRS, motion=motion, gnss=fixes, truth=places)
 
 
-@pytest.mark.parametrize(("fix_sd_m", "held"), [(5.0, 0.8), (10.0, 0.75)])
-def test_a_walk_of_lengths_alone_is_followed_by_its_fixes(town, fix_sd_m, held):
+@pytest.mark.parametrize("fix_sd_m", [5.0, 10.0])
+def test_a_walk_of_lengths_alone_is_followed_by_its_fixes(town, fix_sd_m):
     """Fixes a step apart were all ahead, and then rejected: hundreds of metres off."""
-    log = paced(1.4, fix_sd_m, 500.0)
-    track = mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW))
-    score = mf.score(track, log.truth)
-    assert score.error_mean_m < 2.5 * fix_sd_m
-    assert score.within_95 > held
-    assert any("of way apart only the first is used" in note for note in track.log.notes)
-    left_out = [one for one in track.estimate.unused if one.reason is Reason.NOT_MOVED_ENOUGH]
-    assert len(left_out) > 300
+    within_95 = []
+    for seed in range(3, 7):
+        log = paced(1.4, fix_sd_m, 500.0, seed)
+        track = mf.locate(log, town, filter=BayesFilter(vehicle=False, **FEW))
+        score = mf.score(track, log.truth)
+        assert score.error_mean_m < 2.5 * fix_sd_m
+        within_95.append(score.within_95)
+        assert any("of way apart only the first is used" in note for note in track.log.notes)
+        left_out = [one for one in track.estimate.unused if one.reason is Reason.NOT_MOVED_ENOUGH]
+        assert len(left_out) > 300
+    assert np.mean(within_95) > 0.8
 
 
 @pytest.mark.parametrize("wrong", [1, 3, 20])

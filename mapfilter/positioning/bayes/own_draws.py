@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, unique
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 _MILLISECONDS, _SEEDS = 1000.0, 2**32
 
 
+@unique
 class Purpose(IntEnum):
     """What draws are for: each has a generator of its own in an epoch."""
 

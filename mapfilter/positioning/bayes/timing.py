@@ -22,14 +22,15 @@ from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.bayes.timing_errors import DifferenceErrors, DifferenceTerm
+from mapfilter.positioning.bayes.timing_errors import (
+    NULL_FACTOR,
+    DifferenceErrors,
+    DifferenceTerm,
+)
 from mapfilter.positioning.epochs import Difference, Epoch
 from mapfilter.positioning.gnss.options import TimingOptions
 from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.schema import Kind
-
-_NULL_FACTOR = 1.5
-"""Log-likelihood under the null hypothesis, as a multiple of what is expected of the belief."""
 
 
 class TimingState(NamedTuple):
@@ -74,7 +75,7 @@ class TimingTerm:
     @property
     def under_null(self) -> float:
         """Log-likelihood under the null hypothesis, from what is expected at the true position."""
-        return -0.5 * _NULL_FACTOR * self.weight * self.reading_m.size
+        return -0.5 * NULL_FACTOR * self.weight * self.reading_m.size
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ FAULT = 0.2
 _FAULT_M, _FAULT_NATS = 10_000.0, 0.6
 """Deviation of the time of a station at fault, as a distance, with which it says nothing; what each
 reading costs, more than the half nat by which its best place fits better without a station."""
-_NULL_FACTOR = 1.5
+NULL_FACTOR = 1.5
 """Log-likelihood under the null hypothesis, as a multiple of what is expected of the belief."""
 _CHANGES, _LEAST, _RARE, _SUREST = 0.02, 1e-300, 1e-4, 0.999
 """How often errors become any others between independent readings; least likelihood; probability
@@ -68,20 +68,16 @@ class DifferenceErrors(NamedTuple):
         return known
 
     def _found(self, term: DifferenceTerm, probability: Floats) -> DifferenceErrors:
-        """Return it by the cases of a term; a little of it is forgotten."""
+        """Return it by the probabilities of a term's cases; a little of it is forgotten."""
         shares, faults = dict.fromkeys(FACTORS, 0.0), dict.fromkeys(term.stations, 0.0)
-        for case, share in zip(term.cases, probability.tolist(), strict=True):
-            shares[case.factor] += share
+        for case, odds in zip(term.cases, probability.tolist(), strict=True):
+            shares[case.factor] += odds
             if case.at_fault is not None:
-                faults[term.stations[case.at_fault]] += share
+                faults[term.stations[case.at_fault]] += odds
         new = _CHANGES * term.weight
-        return DifferenceErrors(
-            tuple((1 - new) * shares[f] + new * p for f, p in zip(FACTORS, PRIOR, strict=True)),
-            tuple(
-                (dict(self.faults) | {s: (1 - new) * q + new * FAULT for s, q in faults.items()})
-                .items()
-            ),
-        )  # fmt: skip
+        known = [(1 - new) * shares[f] + new * p for f, p in zip(FACTORS, PRIOR, strict=True)]
+        learnt = {name: (1 - new) * odds + new * FAULT for name, odds in faults.items()}
+        return DifferenceErrors(tuple(known), tuple({**dict(self.faults), **learnt}.items()))
 
 
 class Case(NamedTuple):
@@ -173,5 +169,5 @@ class DifferenceTerm:
     def under_null(self) -> float:
         """Log-likelihood under the null hypothesis, from what is expected at the true position."""
         scaled = [log(case.probability) + case.log_scale for case in self.cases]
-        expected = -0.5 * _NULL_FACTOR * self.reading_m.size
+        expected = -0.5 * NULL_FACTOR * self.reading_m.size
         return float(self.weight * (expected + np.logaddexp.reduce(scaled)))
