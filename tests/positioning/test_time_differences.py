@@ -196,6 +196,14 @@ def test_readings_tell_the_errors_by_all_places_of_a_belief():
     assert (found.fault_of("Z"), found.fault_of("Y")) == (0.4, 0.2)
 
 
+def test_readings_with_two_references_tell_as_much_as_one_after_the_other():
+    belief, off_m = Cloud([(100.0, 200.0), (400.0, 450.0)], [0.75, 0.25]), (40.0, -30.0)
+    at_once = NONE.after([term(off_m), term(off_m)], belief)
+    first = NONE.after([term(off_m)], belief)
+    assert at_once == first.after([term(off_m, errors=first)], belief)
+    assert at_once != first
+
+
 FIVE = [*STATIONS_M, [500.0, 500.0, 30.0], [-300.0, 200.0, 30.0]]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mapfilter.positioning.bayes.area_frame import AreaFrame
     from mapfilter.positioning.bayes.filter import BayesPositioner
 
 _OF_OPTIONS = ("model", "carriageways", "maker")
@@ -43,3 +44,9 @@ class Maker:
             if name not in _OF_OPTIONS and getattr(bound, name) != getattr(before, name)
         }
         return replace(self.make(options), **replaced)
+
+
+def made_over_area(area: AreaFrame, options: Any) -> BayesPositioner:
+    """Return the filter of options over an area."""
+    made: BayesPositioner = options.over_area(area)
+    return made

@@ -12,7 +12,6 @@ from annotated_types import Ge, Gt, Le
 
 from mapfilter._device import DeviceName, open_device
 from mapfilter._threads import Threads
-from mapfilter.database.measured import MeasuredParts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.filters.particle import ParticleOptions
@@ -27,14 +26,14 @@ from mapfilter.positioning.bayes.carriageways import carriageway_filters
 from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
-from mapfilter.positioning.bayes.maker import Maker
+from mapfilter.positioning.bayes.maker import Maker, made_over_area
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.over_survey import (
     SURVEYED,
     SURVEYED_WAYS,
     filled_field,
-    over_survey,
+    over_measured,
 )
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
@@ -195,14 +194,14 @@ class BayesFilter(Options):
         usual = {**SURVEYED, **(SURVEYED_WAYS if tracks else {})}
         field = filled_field(database.field(), measured)
         area = AreaMap.of_field(field, database.plan, database.floor_dbm)
-        return _over_measured(area, usual, database, measured, self)
+        return over_measured(area, usual, database, measured, self)
 
     @property
     def resolved(self) -> BayesFilter:
         """Options with the defaults of vehicles in place of those of walkers, where asked for."""
-        return self._with(VEHICLE) if self.vehicle else self
+        return self.with_usual(VEHICLE) if self.vehicle else self
 
-    def _with(self, usual: Mapping[str, float]) -> BayesFilter:
+    def with_usual(self, usual: Mapping[str, float]) -> BayesFilter:
         """Return options in which other defaults are taken for those that have theirs."""
         default = {one.name: one.default for one in fields(self)}
         taken: dict[str, Any] = {
@@ -212,7 +211,7 @@ class BayesFilter(Options):
 
     def over_area(self, area: AreaFrame) -> BayesPositioner:
         """Return the filter over an area."""
-        maker = Maker(self, partial(_over_area, area))
+        maker = Maker(self, partial(made_over_area, area))
         return replace(self.resolved._over_area(area), maker=maker)
 
     def _over_area(self, area: AreaFrame) -> BayesPositioner:
@@ -322,20 +321,3 @@ class GridFilter(BayesFilter):
         device = open_device(self.device, "filter.grid.device")
         # Without arguments super() does not work in a dataclass with slots.
         return replace(BayesFilter._over_area(self, area), device=device)
-
-
-def _over_area(area: AreaFrame, options: BayesFilter) -> BayesPositioner:
-    return options.over_area(area)
-
-
-def _over_measured(
-    area: AreaMap,
-    usual: Mapping[str, float],
-    database: RadioRouteDatabase,
-    measured: MeasuredParts,
-    options: BayesFilter,
-) -> BayesPositioner:
-    """Return the filter over what a survey measured, with other usual values for defaults."""
-    bound = over_survey(options._with(usual).over_area(area), database, measured)
-    make = partial(_over_measured, area, usual, database, measured)
-    return replace(bound, maker=Maker(options, make))

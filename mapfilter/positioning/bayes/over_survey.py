@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from math import hypot
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, Serv
 from mapfilter.options import NotNegative, Options, Positive
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.maker import Maker
 from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
 from mapfilter.radio.cells import Cell
 
@@ -145,3 +148,27 @@ def _statistics(
     names = [site_of(database.plan[cell_id]) for cell_id in area.cell_ids]
     sites: Ints = np.unique(names, return_inverse=True)[1]
     return ServingStatistics.of_rows(rows, area.lattice, sites, options or MeasuredMapOptions())
+
+
+def over_measured(
+    area: AreaMap,
+    usual: Mapping[str, float],
+    database: RadioRouteDatabase,
+    measured: MeasuredParts,
+    options: Any,
+) -> BayesPositioner:
+    """Return the filter over what a survey measured, which can be made again of other options.
+
+    Parameters
+    ----------
+    area : AreaMap
+        Of the database.
+    usual : mapping of str to float
+        Options that take the place of those that have their defaults.
+    database : RadioRouteDatabase
+    measured : MeasuredParts
+    options : BayesFilter
+    """
+    bound = over_survey(options.with_usual(usual).over_area(area), database, measured)
+    make = partial(over_measured, area, usual, database, measured)
+    return replace(bound, maker=Maker(options, make))

@@ -10,7 +10,7 @@ of its likelihood over the belief.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import log
@@ -60,7 +60,9 @@ class DifferenceErrors(NamedTuple):
         """Return it after readings, whose place is as probable as a belief has it."""
         known, state = self, belief.state
         weight = belief.weight.astype(np.float64)
-        for term in terms:
+        for one in terms:
+            # What the readings before have shown of the errors is known to the next.
+            term = replace(one, errors=known)
             likely = np.exp(term.log_densities(state)) @ weight + _LEAST
             odds = np.log([case.probability for case in term.cases]) + term.weight * np.log(likely)
             found = np.exp(odds - odds.max())
