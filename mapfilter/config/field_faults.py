@@ -81,6 +81,8 @@ def _names_in(model: type[BaseModel], within: str = "") -> Iterator[str]:
 def _elsewhere(keys: Sequence[str]) -> list[str]:
     """Return the nearest known names that end like an unknown one, or none where these are many."""
     every = [name.split(".") for name in _names_in(Config)]
+    # A section that the key stands in is no mistake for it.
+    every = [name for name in every if list(keys[: len(name)]) != name]
     ends = sorted({name[-1] for name in every})
     near = difflib.get_close_matches(keys[-1], ends, n=1, cutoff=0.8)
     shared = {".".join(name): _shared(keys, name) for name in every if name[-1] in near}

@@ -134,6 +134,11 @@ def test_wrong_values(text, told, write):
         ("database.seed=5", "setting database.seed: expected a known key, found 'seed'\n"),
         ("bayes.levels=false", "expected a known section, found 'bayes' (likely: 'filter.bayes'"),
         ("filter.qqq=1", "setting filter.qqq: expected a known key, found 'qqq'\n"),
+        # The section itself is no hint.
+        (
+            "journeys.journeys=2",
+            "setting journeys.journeys: expected a known key, found 'journeys'\n",
+        ),
         (
             "cells.sites=many",
             "setting cells.sites: expected a whole number in 1..1000, found 'many'",
