@@ -7,7 +7,6 @@ and grid north is the grid convergence.
 
 from __future__ import annotations
 
-import re
 from functools import lru_cache
 from math import pi
 from typing import Any
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
+from mapfilter._crs_words import meant_crs
 from mapfilter._inputs import named_file, shown
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
@@ -92,7 +92,7 @@ def grid_convergence_rad(crs: str, lon_deg: float, lat_deg: float) -> float:
     InputError
         The projection has no such place.
     """
-    convergence_deg = float(_projection(crs).get_factors(lon_deg, lat_deg).meridian_convergence)
+    convergence_deg = float(projection(crs).get_factors(lon_deg, lat_deg).meridian_convergence)
     if not np.isfinite(convergence_deg):
         raise fail(InputError, "place", f"a longitude and latitude of {crs}", (lon_deg, lat_deg))
     return float(np.radians(convergence_deg))
@@ -118,8 +118,23 @@ def known_crs(spec: Any, where: str = "crs") -> CRS:
     raise fail(InputError, where, "a CRS without files", shown(found), hint)
 
 
+def horizontal_part(crs: CRS) -> CRS:
+    """Return the part of a CRS that counts no heights.
+
+    Examples
+    --------
+    >>> horizontal_part(CRS("EPSG:25832+7837")).to_epsg()
+    25832
+    """
+    if crs.is_compound:
+        return crs.sub_crs_list[0]
+    return crs.to_2d() if len(crs.axis_info) == 3 else crs
+
+
 def projected_crs(spec: Any, where: str = "crs") -> str:
     """Return the canonical text of a projected CRS in metres ("EPSG:32629", else WKT).
+
+    Of a compound CRS it is the horizontal part: heights are not used.
 
     Raises
     ------
@@ -129,9 +144,9 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     if spec is None or spec == "":
         raise fail(InputError, where, "a projected CRS in metres", "none", "CRS left out on export")
     try:
-        crs = known_crs(spec, where)
+        crs = horizontal_part(known_crs(spec, where))
     except (CRSError, TypeError, ValueError) as error:
-        expected, hint = "a CRS such as EPSG:32629", _meant_crs(str(spec))
+        expected, hint = "a CRS such as EPSG:32629", meant_crs(str(spec))
         raise fail(InputError, where, expected, repr(spec), hint) from error
     if crs.is_geographic:
         hint = "degrees given for metres"
@@ -157,39 +172,19 @@ def _metres_about(crs: CRS, axes: str) -> str:
     return f"coordinates {given}; project them, as by gdalwarp or ogr2ogr -t_srs {target}"
 
 
-_LONGEST_MEANT = 40
-
-
-def _meant_crs(text: str) -> str:
-    """Return what a text that is no CRS most likely means, or "".
-
-    Examples
-    --------
-    >>> _meant_crs("UTM35"), _meant_crs("epsg 32635"), _meant_crs("utm zone 34 S"), _meant_crs("x")
-    ('EPSG:32635, or EPSG:32735 south of the equator', 'EPSG:32635', 'EPSG:32734', '')
-    """
-    if len(text) > _LONGEST_MEANT:
-        return ""
-    if code := re.fullmatch(r"(?:epsg)?[\s:_-]{0,3}([0-9]{4,6})", text.strip(), re.IGNORECASE):
-        meant = f"EPSG:{code[1]}"
-        return meant if meant != text.strip().upper() else ""
-    utm = r"\bUTM[\s_-]{0,3}(?:zone)?[\s_-]{0,3}([0-9]{1,2})[\s_-]{0,3}(N|S|north|south)?\s{0,3}"
-    zone = re.search(rf"{utm}$", text, re.IGNORECASE)
-    if zone is None or not 1 <= int(zone[1]) <= 60:
-        return ""
-    north, south = f"EPSG:326{int(zone[1]):02}", f"EPSG:327{int(zone[1]):02}"
-    known = {"N": north, "S": south}
-    return known.get((zone[2] or "")[:1].upper(), f"{north}, or {south} south of the equator")
-
-
 def short_crs(crs: str) -> str:
     """Return a CRS as people call it: its code, or the name in its WKT."""
     return crs if len(crs) <= _SHORT else str(CRS.from_user_input(crs).name)
 
 
+def shown_crs(crs: str) -> str:
+    """Return a CRS as messages show it: its code or name; the beginning of a text without."""
+    return shown(crs) if short_crs(crs) == "unknown" else short_crs(crs)
+
+
 def same_crs(a: str, b: str) -> bool:
     """Return whether two CRS texts mean the same system."""
-    return a == b or bool(CRS.from_user_input(a).equals(CRS.from_user_input(b)))
+    return a == b or bool(_horizontal(a).equals(_horizontal(b)))
 
 
 def utm_zone(lon_deg: float, lat_deg: float) -> int:
@@ -295,6 +290,11 @@ def _from_lonlat(crs: str) -> Transformer:
         raise fail(InputError, "crs", "a CRS such as EPSG:32629", repr(crs)) from error
 
 
+def _horizontal(crs: str) -> CRS:
+    return horizontal_part(CRS.from_user_input(crs))
+
+
 @lru_cache(maxsize=16)
-def _projection(crs: str) -> Proj:
+def projection(crs: str) -> Proj:
+    """Return the projection of a CRS, for its factors at a place."""
     return Proj(CRS.from_user_input(crs))

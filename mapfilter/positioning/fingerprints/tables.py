@@ -15,12 +15,13 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._arguments import Setting, check_arguments, path_argument
+from mapfilter._crs_reach import project_within, zone_hint
 from mapfilter._inputs import read_input
 from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
-from mapfilter.geodesy import project, projected_crs, utm_crs
+from mapfilter.geodesy import projected_crs, short_crs, utm_crs
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 
 NOT_RECEIVED_DBM = 100.0
@@ -170,7 +171,9 @@ def _projected(
         lon_deg, lat_deg = places.T
         middle = np.median(places[finite], axis=0)
         found = projected_crs(crs or utm_crs(float(middle[0]), float(middle[1])))
-        return found, np.column_stack(project(found, lon_deg, lat_deg))
+        east_m, north_m, beyond = project_within(found, lon_deg, lat_deg)
+        _check_covered(path, found, places, beyond & finite)
+        return found, np.column_stack([east_m, north_m])
     if crs is None and degrees:
         crs = _MERCATOR
     if crs is None:
@@ -180,3 +183,14 @@ def _projected(
         )
         raise fail(InputError, f"{path}, positions", "a CRS of the metres", "none", hint)
     return projected_crs(crs, "crs"), places
+
+
+def _check_covered(path: Path, crs: str, places: Floats, beyond: Bools) -> None:
+    """Check that a CRS covers the positions in degrees of a table."""
+    if not beyond.any():
+        return
+    row = int(np.argmax(beyond))
+    lon_deg, lat_deg = places[row]
+    where, expected = f"{path}, row {row + 1}", f"a position that {short_crs(crs)} covers"
+    got = f"{lat_deg:.6g}, {lon_deg:.6g}"
+    raise fail(InputError, where, expected, got, zone_hint(lon_deg, lat_deg))

@@ -1,0 +1,70 @@
+"""Places at which the coordinates of a projected CRS mean nothing: far outside of its area."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pyproj import CRS
+
+from mapfilter._types import Bools, Floats
+from mapfilter.geodesy import project, projection, utm_crs
+
+_SCALE_TOLERANCE = 0.05
+_FARTHEST_DEG = 60.0
+"""Beyond, a transverse Mercator projection comes back to lengths that are right."""
+
+
+@lru_cache(maxsize=16)
+def area_of_use(crs: str) -> Any:
+    """Return the area that a CRS is made for, west, south, east and north; None if it has none."""
+    return CRS.from_user_input(crs).area_of_use
+
+
+def project_within(
+    crs: str, lon_deg: ArrayLike, lat_deg: ArrayLike
+) -> tuple[Floats, Floats, Bools]:
+    """Turn longitudes and latitudes into east and north metres, and tell which are beyond a CRS.
+
+    Beyond are places without coordinates in it, and those outside of its area where its lengths
+    are off by more than 5 %, or that are 60 degrees of longitude away.
+
+    Examples
+    --------
+    >>> project_within("EPSG:2393", [25.0, 90.0, 207.0], [60.0, 60.0, 60.0])[2].tolist()
+    [False, True, True]
+    """
+    lon, lat = np.atleast_1d(np.asarray(lon_deg, float)), np.atleast_1d(np.asarray(lat_deg, float))
+    east_m, north_m = project(crs, lon, lat)
+    beyond = ~(np.isfinite(east_m) & np.isfinite(north_m))
+    # Of whole degrees, as those of a journey are few.
+    degrees = np.floor(np.where(beyond, np.nan, lon)) + 1j * np.floor(lat)
+    known = np.unique(degrees[~beyond])
+    absurd = [one for one in known.tolist() if _is_absurd(crs, int(one.real), int(one.imag))]
+    return east_m, north_m, beyond | np.isin(degrees, absurd)
+
+
+def zone_hint(lon_deg: float, lat_deg: float) -> str:
+    """Return the likely mistake of a place beyond a CRS, with the zone that is used there."""
+    if not (abs(lat_deg) <= 90 and np.isfinite(lon_deg)):
+        return "a position of another place"
+    zone = utm_crs((lon_deg + 180) % 360 - 180, lat_deg)
+    return f"a wrong position, or a CRS of another region: at that place it is {zone}"
+
+
+@lru_cache(maxsize=4096)
+def _is_absurd(crs: str, west_deg: int, south_deg: int) -> bool:
+    """Return whether coordinates in a square of one degree mean nothing."""
+    lon, lat, area = west_deg + 0.5, min(south_deg + 0.5, 90.0), area_of_use(crs)
+    if area is not None:
+        half = ((area.east - area.west) % 360) / 2 or 180.0
+        outside = abs((lon - area.west - half + 180) % 360 - 180) - half
+        if outside <= 1 and area.south - 1 <= lat <= area.north + 1:
+            return False
+        if outside > _FARTHEST_DEG:
+            return True
+    factors = projection(crs).get_factors(lon, lat)
+    scales = np.array([factors.meridional_scale, factors.parallel_scale])
+    return not bool(np.all(np.abs(scales - 1) <= _SCALE_TOLERANCE))
