@@ -16,6 +16,7 @@ import pandas as pd
 
 from mapfilter._arguments import Setting, check_arguments, path_argument
 from mapfilter._crs_reach import project_within, zone_hint
+from mapfilter._cut_ends import without_cut_end
 from mapfilter._inputs import read_input
 from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools, Floats
@@ -108,7 +109,9 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
 
 def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     expected = "a table with a header line"
-    text = read_input(path, _LARGEST_BYTES, "a table").decode("utf-8-sig", "replace")
+    data = read_input(path, _LARGEST_BYTES, "a table")
+    data, notes = without_cut_end(data, _SEPARATORS, path.name)
+    text = data.decode("utf-8-sig", "replace")
     lines = [line for line in without_separator_line(text).splitlines() if line.strip()]
     if not lines:
         raise fail(InputError, str(path), expected, "an empty file", "cut off")
@@ -119,10 +122,9 @@ def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
         raise fail(InputError, f"{path}, header", "each column once", listed(twice))
     # Rows that are too short end in empty fields; which field of one too long is which is unknown.
     kept = [line for line in lines[1:] if len(_fields(line, separator)) <= len(named)]
-    notes = []
     if len(kept) < len(lines) - 1:
         count = len(lines) - 1 - len(kept)
-        notes = [f"{path.name}: {number_of(count, 'row')} left out: too many fields"]
+        notes.append(f"{path.name}: {number_of(count, 'row')} left out: too many fields")
     if not kept:
         raise fail(InputError, str(path), f"{expected} and rows", "no rows", "cut off")
     try:
