@@ -23,9 +23,10 @@ from mapfilter.errors import Faults, InputError, fail
 
 _SHORT = 20
 _LEAST_UTM_DEG, _MOST_UTM_DEG = -80.0, 84.0
-_EARTH_RADIUS_M = 6_371_000.0
-_SHORT_M = 100.0
-_SCALE_TOLERANCE = 0.03
+_WIDEST_DEG = 90.0
+"""Of an area's box across 180° of longitude; a wider one has exchanged corners."""
+ONE_SIDE = "an area on one side of 180° of longitude"
+NO_MAPS = "no maps are made across it: make an area of each side"
 
 
 def wrap_rad(angle_rad: ArrayLike) -> Floats:
@@ -249,6 +250,8 @@ def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> 
     faults = Faults()
     if not all(np.isfinite(bbox)):
         faults.add(where, "four finite numbers", bbox)
+    elif (across := _across_180(bbox)) is not None:
+        faults.add(where, *across)
     elif max(abs(west), abs(east)) > 180 or max(abs(south), abs(north)) > 180:
         faults.add(where, "degrees: west, south, east, north", bbox, "metres given for degrees")
     elif max(abs(south), abs(north)) > 90:
@@ -258,28 +261,22 @@ def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> 
     faults.raise_if_any(InputError)
 
 
-def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
-    """Check that metres of a CRS are metres on the ground in the middle of an area.
-
-    Raises
-    ------
-    InputError
-        They differ by more than 3 %: the CRS is made for another region or is Web Mercator.
-    """
-    west, south, east, north = bounds_m
-    middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
-    ends_m = middle_m + np.array([[0.0, _SHORT_M], [0.0, 0.0]])
-    lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
-    if abs(lon_rad[1] - lon_rad[0]) > np.pi:
-        got = f"{crs}, {west:.0f}..{east:.0f} m east, across it"
-        hint = "no maps are made across it: cut rasters and area there, and make one of each side"
-        raise fail(InputError, where, "an area on one side of 180° of longitude", got, hint)
-    along_rad = np.hypot(np.diff(lon_rad) * np.cos(lat_rad[0]), np.diff(lat_rad))
-    ground_m = float(along_rad[0] * _EARTH_RADIUS_M)
-    if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:
-        expected = "a CRS whose metres are metres on the ground in this area"
-        got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
-        raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
+def _across_180(bbox: tuple[float, float, float, float]) -> tuple[str, str, str] | None:
+    """Return (expected, found, what to do) for a box across 180° of longitude, else None."""
+    west, south, east, north = bbox
+    # West of 0..180 and east of -180..0, or one of them counted on.
+    turned = -180 <= east < 0 < west <= 180
+    beyond = -360 <= west < east <= 360 and (west < -180 or east > 180)
+    narrow = max(abs(south), abs(north)) <= 90 and (east - west) % 360 < _WIDEST_DEG
+    if not (narrow and (turned or beyond)):
+        return None
+    left, right = ((side + 180) % 360 - 180 for side in (west, east))
+    if left < right:
+        numbers = ",".join(f"{side:g}" for side in (left, south, right, north))
+        return "longitudes of -180 to 180", f"{bbox}", f"longitudes of 0 to 360; write {numbers}"
+    sides = (left, south, 180.0, north), (-180.0, south, right, north)
+    two = " and ".join(",".join(f"{side:g}" for side in one) for one in sides)
+    return ONE_SIDE, f"{bbox}, across it", f"{NO_MAPS}: {two}"
 
 
 @lru_cache(maxsize=16)

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from mapfilter._area_scale import check_scale
 from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import check_scale, projected_crs, same_crs, short_crs, shown_crs, unproject
+from mapfilter.geodesy import projected_crs, same_crs, short_crs, shown_crs, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
