@@ -13,6 +13,8 @@ from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import project, projection, utm_crs
 
 _SCALE_TOLERANCE = 0.05
+_ROW, _NO_SQUARE = 1000, 1 << 40
+"""Squares of one degree are numbered by 1000 times their western side plus their southern one."""
 _FARTHEST_DEG = 60.0
 """Beyond, a transverse Mercator projection comes back to lengths that are right."""
 
@@ -40,10 +42,12 @@ def project_within(
     east_m, north_m = project(crs, lon, lat)
     beyond = ~(np.isfinite(east_m) & np.isfinite(north_m))
     # Of whole degrees, as those of a journey are few.
-    degrees = np.floor(np.where(beyond, np.nan, lon)) + 1j * np.floor(lat)
-    known = np.unique(degrees[~beyond])
-    absurd = [one for one in known.tolist() if _is_absurd(crs, int(one.real), int(one.imag))]
-    return east_m, north_m, beyond | np.isin(degrees, absurd)
+    square = np.full(lon.shape, _NO_SQUARE, dtype=np.int64)
+    known = ~beyond
+    square[known] = np.floor(lon[known]) * _ROW + np.floor(lat[known])
+    found = np.unique(square[known]).tolist()
+    absurd = [one for one in found if _is_absurd(crs, *_corner_deg(one))]
+    return east_m, north_m, beyond | np.isin(square, absurd) if absurd else beyond
 
 
 def zone_hint(lon_deg: float, lat_deg: float) -> str:
@@ -52,6 +56,11 @@ def zone_hint(lon_deg: float, lat_deg: float) -> str:
         return "a position of another place"
     zone = utm_crs((lon_deg + 180) % 360 - 180, lat_deg)
     return f"a wrong position, or a CRS of another region: at that place it is {zone}"
+
+
+def _corner_deg(square: int) -> tuple[int, int]:
+    west = round(square / _ROW)
+    return west, square - west * _ROW
 
 
 @lru_cache(maxsize=4096)

@@ -10,11 +10,10 @@ from typing import Literal
 
 import numpy as np
 
-from mapfilter._crs_reach import project_within
 from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter._words import counted, number_of
 from mapfilter.errors import Fault, InputError, fail, listed
-from mapfilter.geodesy import projected_crs, utm_crs
+from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.survey.antennas_log import read_antennas_log
 from mapfilter.survey.measurement_files import (
     DIALECTS,
@@ -206,7 +205,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
     cell = [np.array([places[c] for c in t.cells], dtype=np.int32)[t.cell] for t in tables]
     columns = np.ascontiguousarray(np.concatenate([table.columns for table in tables], axis=1))
     time_s, lat_deg, lon_deg, level_dbm, accuracy_m, timing_advance, role = columns
-    east_m, north_m, beyond = project_within(crs, lon_deg, lat_deg)
+    east_m, north_m = project(crs, lon_deg, lat_deg)
     of_session = np.concatenate(session)
     joined = Measurements(
         crs,
@@ -226,14 +225,15 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         most_frequent(table.technologies for table in tables),
         most_frequent(table.codes for table in tables),
     )
-    if beyond.any():
-        count = int(beyond.sum())
-        if count == len(beyond):
+    placed = np.isfinite(east_m) & np.isfinite(north_m)
+    if not placed.all():
+        count = int((~placed).sum())
+        if count == len(placed):
             got = f"{lat_deg[0]:g}, {lon_deg[0]:g} and {count - 1} more"
             hint = "latitude and longitude swapped, or another area"
             raise fail(InputError, "measurements", f"places where {crs} is used", got, hint)
         joined = joined.where(
-            ~beyond, f"{number_of(count, 'row')} left out: {crs} has no such places"
+            placed, f"{number_of(count, 'row')} left out: {crs} has no such places"
         )
     return _once(joined)
 
