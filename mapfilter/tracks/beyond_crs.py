@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapfilter._crs_reach import project_within, zone_hint
+from mapfilter._crs_reach import likely_mistake, project_within
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
@@ -28,7 +28,7 @@ def without_beyond(
 ) -> str:
     """Return the note on positions beyond a CRS that are left out, "" without any.
 
-    Half of the positions and more are a fault: the CRS is of another region.
+    All of them are a fault: wrong degrees, or a CRS of another region.
 
     Parameters
     ----------
@@ -44,10 +44,10 @@ def without_beyond(
     row, count = int(np.argmax(beyond)), int(beyond.sum())
     place = f"position {row + 1}" if row_numbers is None else f"row {row_numbers[row]}"
     found = f"{lat_deg[row]:.6g}, {lon_deg[row]:.6g} ({place})"
-    if 2 * count >= beyond.size:
+    if count == beyond.size:
         found += f" and {count - 1} more" if count > 1 else ""
         expected = f"positions that {short_crs(crs)} covers"
-        faults.add(where, expected, found, zone_hint(lon_deg[row], lat_deg[row]))
+        faults.add(where, expected, found, likely_mistake(crs, lon_deg[row], lat_deg[row]))
         return ""
     some = number_of(count, "position")
     return f"{where}: {some} left out: {short_crs(crs)} has no such places; first {found}"
@@ -68,7 +68,7 @@ def within_crs(
     Raises
     ------
     InputError
-        It covers hardly any of the positions of a file.
+        It covers none of the positions of a file.
     """
     faults, notes, kept = Faults(), list[str](), list[Recording]()
     for recording in recordings:

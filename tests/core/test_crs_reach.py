@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pyproj import CRS
 
-from mapfilter._crs_reach import project_within, zone_hint
+from mapfilter._crs_reach import likely_mistake, project_within, zone_hint
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project, projected_crs, same_crs, shown_crs
 
@@ -62,6 +62,25 @@ def test_the_own_hemisphere_is_no_matter_and_infinity_is():
     east_m, north_m, beyond = project_within("EPSG:32633", [15.0, 105.0, np.nan], [-10.0, 0.0, 0.0])
     assert beyond.tolist() == [False, True, True]
     assert (east_m[0], north_m[0]) == project("EPSG:32633", 15.0, -10.0)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32635", "+proj=tmerc +lon_0=27 +datum=WGS84"])
+@pytest.mark.parametrize(
+    ("lon_deg", "lat_deg", "mistake"),
+    [
+        (60.2, 25.0, "latitude and longitude swapped"),
+        (-25.0, 60.2, "a lost sign of longitude"),
+        (-100.0, 20.0, "at that place it is EPSG:32614"),
+    ],
+)
+def test_the_mistake_that_puts_a_place_beyond_is_named(crs, lon_deg, lat_deg, mistake):
+    assert likely_mistake(crs, lon_deg, lat_deg).endswith(mistake)
+
+
+def test_one_hemisphere_of_a_zone_tells_a_lost_sign():
+    swapped = "latitude and longitude swapped"
+    assert likely_mistake("EPSG:32635", -60.2, 25.0) == f"{swapped}, with a lost sign"
+    assert likely_mistake("EPSG:32735", -60.2, 25.0) == swapped
 
 
 def test_the_hint_names_the_zone_of_the_place():

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._arguments import Setting, check_arguments, path_argument
-from mapfilter._crs_reach import project_within, zone_hint
+from mapfilter._crs_reach import likely_mistake, project_within
 from mapfilter._cut_ends import without_cut_end
 from mapfilter._inputs import read_input
 from mapfilter._separator_line import without_separator_line
@@ -195,4 +195,4 @@ def _check_covered(path: Path, crs: str, places: Floats, beyond: Bools) -> None:
     lon_deg, lat_deg = places[row]
     where, expected = f"{path}, row {row + 1}", f"a position that {short_crs(crs)} covers"
     got = f"{lat_deg:.6g}, {lon_deg:.6g}"
-    raise fail(InputError, where, expected, got, zone_hint(lon_deg, lat_deg))
+    raise fail(InputError, where, expected, got, likely_mistake(crs, lon_deg, lat_deg))
