@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from mapfilter._words import number_of
 
-_TAIL_BYTES = 1 << 16
+_TAIL_BYTES = _HEAD_BYTES = 1 << 16
 _LINE_ENDS = (b"\n", b"\r")
 _NUMBER = re.compile(rb"\s*([-+]?\d*(?:[.,](\d*))?(?:[eE][-+]?\d+)?)\s*")
 _FEW_ROWS, _MANY_ROWS = 5, 20
@@ -79,6 +79,42 @@ def without_cut_row(data: bytes, separator: str, first: int = 0) -> tuple[bytes,
         return data, ""
     shown = number.decode("ascii", "replace").strip() or "nothing"
     return data[:start], f"cut off within its last number ({shown}, without a line end)"
+
+
+def header_end(data: bytes, separators: Sequence[str]) -> tuple[str, int]:
+    r"""Return the separator of a table's header, and where the rows below it begin.
+
+    The header is the first line that is neither blank nor Excel's ``sep=;``.
+
+    Examples
+    --------
+    >>> header_end(b"sep=;\n\na;b\n1;2", (",", ";"))
+    (';', 11)
+    """
+    at = 0
+    for line in data.splitlines(keepends=True):
+        at += len(line)
+        if line.strip() and not line.lstrip(b'\xef\xbb\xbf"').lower().startswith(b"sep="):
+            return max(separators, key=lambda mark: line.count(mark.encode())), at
+    return separators[0], at
+
+
+def without_cut_end(data: bytes, separators: Sequence[str], where: str) -> tuple[bytes, list[str]]:
+    """Return a table without zero bytes at its end and a row that was cut off, with notes.
+
+    Parameters
+    ----------
+    where : str
+        Name of the file in notes.
+    """
+    data, zeros = without_zero_end(data)
+    notes = [f"{where}: {zeros}"] if zeros else []
+    separator, begin = header_end(data[:_HEAD_BYTES], separators)
+    data, cut = without_cut_row(data, separator, begin)
+    if cut:
+        ends = data.count(b"\n") or data.count(b"\r")
+        notes.append(f"{where} row {ends + 1}: {cut}, left out")
+    return data, notes
 
 
 def _last_line(data: bytes) -> int:

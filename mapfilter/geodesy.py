@@ -7,7 +7,6 @@ and grid north is the grid convergence.
 
 from __future__ import annotations
 
-import re
 from functools import lru_cache
 from math import pi
 from typing import Any
@@ -17,15 +16,17 @@ from numpy.typing import ArrayLike
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
+from mapfilter._crs_words import meant_crs
 from mapfilter._inputs import named_file, shown
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 
 _SHORT = 20
 _LEAST_UTM_DEG, _MOST_UTM_DEG = -80.0, 84.0
-_EARTH_RADIUS_M = 6_371_000.0
-_SHORT_M = 100.0
-_SCALE_TOLERANCE = 0.03
+_WIDEST_DEG = 90.0
+"""Of an area's box across 180° of longitude; a wider one has exchanged corners."""
+ONE_SIDE = "an area on one side of 180° of longitude"
+NO_MAPS = "no maps are made across it: make an area of each side"
 
 
 def wrap_rad(angle_rad: ArrayLike) -> Floats:
@@ -92,7 +93,7 @@ def grid_convergence_rad(crs: str, lon_deg: float, lat_deg: float) -> float:
     InputError
         The projection has no such place.
     """
-    convergence_deg = float(_projection(crs).get_factors(lon_deg, lat_deg).meridian_convergence)
+    convergence_deg = float(projection(crs).get_factors(lon_deg, lat_deg).meridian_convergence)
     if not np.isfinite(convergence_deg):
         raise fail(InputError, "place", f"a longitude and latitude of {crs}", (lon_deg, lat_deg))
     return float(np.radians(convergence_deg))
@@ -118,8 +119,23 @@ def known_crs(spec: Any, where: str = "crs") -> CRS:
     raise fail(InputError, where, "a CRS without files", shown(found), hint)
 
 
+def horizontal_part(crs: CRS) -> CRS:
+    """Return the part of a CRS that counts no heights.
+
+    Examples
+    --------
+    >>> horizontal_part(CRS("EPSG:25832+7837")).to_epsg()
+    25832
+    """
+    if crs.is_compound:
+        return crs.sub_crs_list[0]
+    return crs.to_2d() if len(crs.axis_info) == 3 else crs
+
+
 def projected_crs(spec: Any, where: str = "crs") -> str:
     """Return the canonical text of a projected CRS in metres ("EPSG:32629", else WKT).
+
+    Of a compound CRS it is the horizontal part: heights are not used.
 
     Raises
     ------
@@ -129,9 +145,9 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     if spec is None or spec == "":
         raise fail(InputError, where, "a projected CRS in metres", "none", "CRS left out on export")
     try:
-        crs = known_crs(spec, where)
+        crs = horizontal_part(known_crs(spec, where))
     except (CRSError, TypeError, ValueError) as error:
-        expected, hint = "a CRS such as EPSG:32629", _meant_crs(str(spec))
+        expected, hint = "a CRS such as EPSG:32629", meant_crs(str(spec))
         raise fail(InputError, where, expected, repr(spec), hint) from error
     if crs.is_geographic:
         hint = "degrees given for metres"
@@ -157,39 +173,19 @@ def _metres_about(crs: CRS, axes: str) -> str:
     return f"coordinates {given}; project them, as by gdalwarp or ogr2ogr -t_srs {target}"
 
 
-_LONGEST_MEANT = 40
-
-
-def _meant_crs(text: str) -> str:
-    """Return what a text that is no CRS most likely means, or "".
-
-    Examples
-    --------
-    >>> _meant_crs("UTM35"), _meant_crs("epsg 32635"), _meant_crs("utm zone 34 S"), _meant_crs("x")
-    ('EPSG:32635, or EPSG:32735 south of the equator', 'EPSG:32635', 'EPSG:32734', '')
-    """
-    if len(text) > _LONGEST_MEANT:
-        return ""
-    if code := re.fullmatch(r"(?:epsg)?[\s:_-]{0,3}([0-9]{4,6})", text.strip(), re.IGNORECASE):
-        meant = f"EPSG:{code[1]}"
-        return meant if meant != text.strip().upper() else ""
-    utm = r"\bUTM[\s_-]{0,3}(?:zone)?[\s_-]{0,3}([0-9]{1,2})[\s_-]{0,3}(N|S|north|south)?\s{0,3}"
-    zone = re.search(rf"{utm}$", text, re.IGNORECASE)
-    if zone is None or not 1 <= int(zone[1]) <= 60:
-        return ""
-    north, south = f"EPSG:326{int(zone[1]):02}", f"EPSG:327{int(zone[1]):02}"
-    known = {"N": north, "S": south}
-    return known.get((zone[2] or "")[:1].upper(), f"{north}, or {south} south of the equator")
-
-
 def short_crs(crs: str) -> str:
     """Return a CRS as people call it: its code, or the name in its WKT."""
     return crs if len(crs) <= _SHORT else str(CRS.from_user_input(crs).name)
 
 
+def shown_crs(crs: str) -> str:
+    """Return a CRS as messages show it: its code or name; the beginning of a text without."""
+    return shown(crs) if short_crs(crs) == "unknown" else short_crs(crs)
+
+
 def same_crs(a: str, b: str) -> bool:
     """Return whether two CRS texts mean the same system."""
-    return a == b or bool(CRS.from_user_input(a).equals(CRS.from_user_input(b)))
+    return a == b or bool(_horizontal(a).equals(_horizontal(b)))
 
 
 def utm_zone(lon_deg: float, lat_deg: float) -> int:
@@ -254,6 +250,8 @@ def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> 
     faults = Faults()
     if not all(np.isfinite(bbox)):
         faults.add(where, "four finite numbers", bbox)
+    elif (across := _across_180(bbox)) is not None:
+        faults.add(where, *across)
     elif max(abs(west), abs(east)) > 180 or max(abs(south), abs(north)) > 180:
         faults.add(where, "degrees: west, south, east, north", bbox, "metres given for degrees")
     elif max(abs(south), abs(north)) > 90:
@@ -263,28 +261,22 @@ def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> 
     faults.raise_if_any(InputError)
 
 
-def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
-    """Check that metres of a CRS are metres on the ground in the middle of an area.
-
-    Raises
-    ------
-    InputError
-        They differ by more than 3 %: the CRS is made for another region or is Web Mercator.
-    """
-    west, south, east, north = bounds_m
-    middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
-    ends_m = middle_m + np.array([[0.0, _SHORT_M], [0.0, 0.0]])
-    lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
-    if abs(lon_rad[1] - lon_rad[0]) > np.pi:
-        got = f"{crs}, {west:.0f}..{east:.0f} m east, across it"
-        hint = "no maps are made across it: cut rasters and area there, and make one of each side"
-        raise fail(InputError, where, "an area on one side of 180° of longitude", got, hint)
-    along_rad = np.hypot(np.diff(lon_rad) * np.cos(lat_rad[0]), np.diff(lat_rad))
-    ground_m = float(along_rad[0] * _EARTH_RADIUS_M)
-    if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:
-        expected = "a CRS whose metres are metres on the ground in this area"
-        got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
-        raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
+def _across_180(bbox: tuple[float, float, float, float]) -> tuple[str, str, str] | None:
+    """Return (expected, found, what to do) for a box across 180° of longitude, else None."""
+    west, south, east, north = bbox
+    # West of 0..180 and east of -180..0, or one of them counted on.
+    turned = -180 <= east < 0 < west <= 180
+    beyond = -360 <= west < east <= 360 and (west < -180 or east > 180)
+    narrow = max(abs(south), abs(north)) <= 90 and (east - west) % 360 < _WIDEST_DEG
+    if not (narrow and (turned or beyond)):
+        return None
+    left, right = ((side + 180) % 360 - 180 for side in (west, east))
+    if left < right:
+        numbers = ",".join(f"{side:g}" for side in (left, south, right, north))
+        return "longitudes of -180 to 180", f"{bbox}", f"longitudes of 0 to 360; write {numbers}"
+    sides = (left, south, 180.0, north), (-180.0, south, right, north)
+    two = " and ".join(",".join(f"{side:g}" for side in one) for one in sides)
+    return ONE_SIDE, f"{bbox}, across it", f"{NO_MAPS}: {two}"
 
 
 @lru_cache(maxsize=16)
@@ -295,6 +287,11 @@ def _from_lonlat(crs: str) -> Transformer:
         raise fail(InputError, "crs", "a CRS such as EPSG:32629", repr(crs)) from error
 
 
+def _horizontal(crs: str) -> CRS:
+    return horizontal_part(CRS.from_user_input(crs))
+
+
 @lru_cache(maxsize=16)
-def _projection(crs: str) -> Proj:
+def projection(crs: str) -> Proj:
+    """Return the projection of a CRS, for its factors at a place."""
     return Proj(CRS.from_user_input(crs))

@@ -7,12 +7,15 @@ from collections.abc import Iterable, Mapping
 from numbers import Real
 from pathlib import Path
 
+import numpy as np
+
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments, shown
 from mapfilter.api.python_words import python_log
 from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.tracks import log as tables
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import check_factors
+from mapfilter.tracks.named_files import check_origin, offsets_by_path
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.options import WalkOptions
@@ -29,7 +32,10 @@ def read_log(
     *,
     crs: str = "",
     truth: str | Path | Iterable[str | Path] = (),
+    format: str = "",  # noqa: A002
     zone: str = "",
+    offsets_s: Mapping[str, float] | None = None,
+    origin_deg: tuple[float, float] | None = None,
     columns: Mapping[str, str] | None = None,
     course_motion: bool = False,
     walk: WalkOptions | None = _WALK,
@@ -47,8 +53,14 @@ def read_log(
         positions.
     truth : path, or several
         Recordings whose positions are the truth, and no measurements.
+    format : str
+        Name of the format of all recordings, such as ``csv``; "" to find it by their content.
     zone : str
         Zone of local times that state none, such as ``Europe/Brussels``.
+    offsets_s : mapping of str to float, optional
+        Seconds to add to the times of a recording, by its name: ``{"imu.csv": -18.0}``.
+    origin_deg : (float, float), optional
+        Latitude and longitude at which positions in metres of a local frame have their origin.
     columns : mapping of str to str, optional
         For plain CSV: column of each field, such as ``{"time": "Zeit"}``.
     course_motion : bool
@@ -77,24 +89,47 @@ def read_log(
         Argument("crs", crs, str, "a CRS such as database.lattice.crs"),
         Argument("truth", truth, PATH | Iterable, _FILES),
         keywords=[
+            Setting("format", format, str),
             Setting("zone", zone, str),
+            Entries("offsets_s", offsets_s, Real, "seconds", "the seconds to add to each file"),
             Entries("columns", columns, str, "a column's name", "the column of each field"),
             Setting("course_motion", course_motion, bool),
             Argument("walk", walk, WalkOptions | None, "WalkOptions"),
             Entries("factors", factors, Real, "a number", "the factor of each column of motion"),
         ],
     )
-    faults = Faults()
-    check_factors(factors or {}, "factors", faults)
-    faults.raise_if_any(ConfigError)
     given, true = _several("paths", paths), _several("truth", truth)
     if not given:
         raise fail(ConfigError, "read_log, paths", _FILES, "none", "a pattern that no file matches")
+    faults = Faults()
+    check_factors(factors or {}, "factors", faults)
+    place = _origin(origin_deg, faults)
+    shifts = offsets_by_path(offsets_s or {}, [*given, *true], "read_log, offsets_s", faults)
+    faults.raise_if_any(ConfigError)
     combine = CombineOptions(
-        truth=true, course_motion=course_motion, walk=walk, factors=factors or {}
+        origin_deg=place,
+        truth=true,
+        offsets_s=shifts,
+        course_motion=course_motion,
+        walk=walk,
+        factors=factors or {},
     )
-    options = OpenOptions(zone=zone, columns=columns or {}, combine=combine)
+    options = OpenOptions(format=format, zone=zone, columns=columns or {}, combine=combine)
     return open_log(given, crs=crs, options=options).log
+
+
+def _origin(given: object, faults: Faults) -> tuple[float, float] | None:
+    """Return the origin of a local frame; None without one, or with faults."""
+    if given is None:
+        return None
+    where = "read_log, origin_deg"
+    pair = given if isinstance(given, tuple | list | np.ndarray) else ()
+    if len(pair) != 2 or not all(isinstance(one, Real) for one in pair):
+        faults.add(where, "a latitude and a longitude in degrees", shown(given))
+        return None
+    place = float(pair[0]), float(pair[1])
+    check_origin(place, where, faults)
+    return place
 
 
 def _several(name: str, paths: object) -> list[Path]:

@@ -21,20 +21,22 @@ _OPTION = re.compile(
     r"(?: (?P<key>[\w.-]+)=(?P<value>[^'\s,;)]+))?"
 )
 _QUOTED = re.compile(r"--column '(\w+)=([^']+)'")
-_MAPPINGS = {"column": "columns", "factor": "factors"}
+_MAPPINGS = {"column": "columns", "factor": "factors", "offset": "offsets_s"}
 _ARGUMENTS = {
-    **{name: name for name in ("crs", "zone", "truth")},
+    **{name: name for name in ("crs", "format", "zone", "truth")},
     "course-motion": "course_motion",
     "db": "database",
     "filter": "filter",
     "log": "paths",
+    "origin": "origin_deg",
     "pose": "walk=WalkOptions(pose=…)",
     "declination": "walk=WalkOptions(declination_deg=…)",
     "step-length": "walk=WalkOptions(step_m=…)",
 }
-_WITH_VALUE = re.compile(r"(?<![\w-])--(crs|filter|truth) (EPSG:\w+|ekf|\S+\.\w+)")
-_CONVERT = ("offset", "origin", "format")
-"""Options that no argument of Python has."""
+_WITH_VALUE = re.compile(
+    r"(?<![\w-])--(crs|filter|truth|format) (EPSG:\w+|ekf|\S+\.\w+|[a-z]+(?=, or none))"
+)
+_PLACE = re.compile(r"(?<![\w-])--origin LAT,LON")
 
 
 def in_python(text: str) -> str:
@@ -45,11 +47,13 @@ def in_python(text: str) -> str:
     >>> in_python("turns run clockwise (--factor turn_rad=-1 mends it)")
     'turns run clockwise (factors={"turn_rad": -1} mends it)'
     >>> in_python("give --zone or --offset; --column 'speed_mps=v [m/s]'")
-    'give zone or mapfilter convert --offset; columns={"speed_mps": "v [m/s]"}'
+    'give zone or offsets_s; columns={"speed_mps": "v [m/s]"}'
     >>> in_python("mapfilter convert --crs EPSG:CODE; --crs EPSG:CODE")
     'mapfilter convert --crs EPSG:CODE; crs="EPSG:CODE"'
     """
-    parts = _COMMAND.split(text.replace("--zone of convert and replay", "zone of mf.read_log"))
+    text = text.replace("--zone of convert and replay", "zone of mf.read_log")
+    # Of commands `convert` alone has it.
+    parts = _COMMAND.split(text.replace("mapfilter convert --offset", "--offset"))
     return "".join(part if n % 2 else _without_options(part) for n, part in enumerate(parts))
 
 
@@ -88,6 +92,7 @@ def python_log(make: Callable[P, TrackLog]) -> Callable[P, TrackLog]:
 
 def _without_options(text: str) -> str:
     text = _QUOTED.sub(r'columns={"\1": "\2"}', text)
+    text = _PLACE.sub("origin_deg=(LAT, LON)", text)
     text = _WITH_VALUE.sub(lambda found: f'{_ARGUMENTS[found[1]]}="{found[2]}"', text)
     return _OPTION.sub(_argument, text)
 
@@ -98,8 +103,6 @@ def _argument(found: re.Match[str]) -> str:
     if name in _MAPPINGS:
         if key is None:
             return _MAPPINGS[name]
-        shown = value if name == "factor" else f'"{value}"'
+        shown = f'"{value}"' if name == "column" else value
         return f'{_MAPPINGS[name]}={{"{key}": {shown}}}'
-    if name in _CONVERT:
-        return f"mapfilter convert --{name}{given}"
     return _ARGUMENTS.get(name, f"--{name}") + given

@@ -21,7 +21,7 @@ from mapfilter.cli.options import (
     refuse,
     walk_changes,
 )
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, Faults
 from mapfilter.workflows.terminal import print_result, print_text
 
 if TYPE_CHECKING:
@@ -84,6 +84,7 @@ def convert(
     as_json: JsonOption = False,
 ) -> None:
     """Convert recordings of other programs to a track log."""
+    from mapfilter.tracks.named_files import check_origin, offsets_by_path
     from mapfilter.tracks.open_options import CombineOptions, OpenOptions
     from mapfilter.workflows.convert import parse_pairs, report_lines, run_convert
 
@@ -97,8 +98,15 @@ def convert(
             "--step-length": step_length,
         }
         refuse(given_beside, "--no-steps")
-    if place is not None and not (abs(place[0]) <= 90 and abs(place[1]) <= 180):
-        raise fail(ConfigError, "--origin", "a latitude and a longitude in degrees", repr(origin))
+    shifts = {
+        name: (numbers(text, 1, f"--offset {name}") or [0.0])[0]
+        for name, text in parse_pairs(offset or (), "--offset").items()
+    }
+    faults = Faults()
+    if place is not None:
+        check_origin((place[0], place[1]), "--origin", faults)
+    offsets_s = offsets_by_path(shifts, [*given, *true], "--offset", faults)
+    faults.raise_if_any(ConfigError)
     options = OpenOptions(
         format=form or "",
         zone=zone or "",
@@ -107,7 +115,7 @@ def convert(
             crs=crs or "",
             origin_deg=None if place is None else (place[0], place[1]),
             truth=true,
-            offsets_s=_offsets(parse_pairs(offset or (), "--offset"), [*given, *true]),
+            offsets_s=offsets_s,
             course_motion=course_motion,
             walk=None if no_steps else _walk(pose, declination, step_length),
             factors=motion_factors(factor),
@@ -129,16 +137,3 @@ def _walk(
 
     options = replace(WalkOptions(), **walk_changes(declination_deg, step_m))
     return options if pose is None else replace(options, pose=pose)
-
-
-def _offsets(pairs: dict[str, str], files: list[Path]) -> dict[Path, float]:
-    """Return the offset of each file, named by its path or its name alone."""
-    found: dict[Path, float] = {}
-    for name, text in pairs.items():
-        named = [path for path in files if str(path) == name or path.name == name]
-        seconds = (numbers(text, 1, "--offset") or [0.0])[0]
-        if not named or not abs(seconds) <= 1e10:
-            got = repr(f"{name}={text}")
-            raise fail(ConfigError, "--offset", "FILE=SECONDS of one of the recordings", got)
-        found.update(dict.fromkeys(named, seconds))
-    return found

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
+from mapfilter._area_scale import check_scale
 from mapfilter._parallel import SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.database.parquet import Window
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, cut_by_tile, overlap
 from mapfilter.database.tiles import TileRows, TileTask, grouped, read_tiles, tile_windows
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.far_cells import check_cells_near

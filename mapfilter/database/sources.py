@@ -16,7 +16,7 @@ from shapely import STRtree
 
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import same_crs
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.lattice import Lattice
 from mapfilter.roads.index import WayIndex
 from mapfilter.roads.lattice import RouteLattice
@@ -162,7 +162,9 @@ def note_misaligned(a: Lattice, b: Lattice, where: str, hint: str, faults: Fault
     down, right = (a.north_m - b.north_m) / a.resolution_m, (b.west_m - a.west_m) / a.resolution_m
     off_px = right - round(right), down - round(down)
     if not same_crs(a.crs, b.crs):
-        faults.add(where, f"one CRS ({a.crs})", b.crs, "files of different zones")
+        faults.add(
+            where, f"one CRS ({shown_crs(a.crs)})", shown_crs(b.crs), "files of different zones"
+        )
     elif abs(a.resolution_m - b.resolution_m) > 1e-6 * a.resolution_m:
         got = f"{a.resolution_m:g} m and {b.resolution_m:g} m"
         faults.add(where, "one resolution", got, hint)

@@ -15,7 +15,7 @@ from mapfilter._inputs import read_input, toml_values
 from mapfilter._io import atomic_file
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Fault, Faults, InputError, fail
-from mapfilter.geodesy import same_crs
+from mapfilter.geodesy import same_crs, shown_crs
 
 FORMAT = "mapfilter patch"
 VERSION = 1
@@ -215,8 +215,8 @@ def check_patch(patch: Patch, database: RadioRouteDatabase, where: str) -> None:
     """Raise InputError where a patch is of another CRS, or names cells that a database lacks."""
     faults = Faults()
     if not same_crs(patch.crs, database.lattice.crs):
-        expected = f"{database.lattice.crs}, the database's"
-        faults.add(f"{where}, crs", expected, patch.crs, "a patch of another area")
+        expected = f"{shown_crs(database.lattice.crs)}, the database's"
+        faults.add(f"{where}, crs", expected, shown_crs(patch.crs), "a patch of another area")
     for number, change in enumerate(patch.changes, start=1):
         for cell in change.cells:
             if cell not in database.plan:

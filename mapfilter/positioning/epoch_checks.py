@@ -20,11 +20,16 @@ _COLUMNS = {table: {column.name: column for column in columns} for table, column
 _TIME = SCHEMA["motion"][0]
 _SPREAD = Column("spread_m", 0, inf, "metres >= 0")
 _TURNED = Column("turned_sd_rad", 0, 1e6, "radians >= 0")
+_OF_HEADINGS = (
+    "degrees given for radians, or headings that count on beyond a turn; "
+    "mapfilter.geodesy.wrap_one_rad wraps one"
+)
 _ROLES = (SERVING, NEIGHBOUR)
 _FIELDS: dict[type, dict[str, Column]] = {
     MotionStep: {
         "step_m": _COLUMNS["motion"]["step_m"],
-        "heading_rad": _COLUMNS["motion"]["heading_rad"],
+        # Of one epoch it is not known whether its headings count on.
+        "heading_rad": replace(_COLUMNS["motion"]["heading_rad"], hint=_OF_HEADINGS),
         "turn_rad": _COLUMNS["motion"]["turn_rad"],
         "spread_m": _SPREAD,
         "sampling_sd_m": _COLUMNS["motion"]["sampling_sd_m"],

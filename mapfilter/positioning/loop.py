@@ -13,7 +13,7 @@ import numpy as np
 
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.geodesy import same_crs
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_columns import EstimateColumns
@@ -74,7 +74,7 @@ def locate(
     check_risk(risk)
     if not same_crs(log.crs, filter_.crs):
         hint = "log of another area or zone"
-        raise fail(InputError, "log, crs", filter_.crs, log.crs, hint)
+        raise fail(InputError, "log, crs", shown_crs(filter_.crs), shown_crs(log.crs), hint)
     log, unused = usable_part(log, filter_)
     merged = epochs(log)
     filter_.warm_up(merged)

@@ -17,7 +17,7 @@ from rasterio.windows import Window as RasterioWindow
 from mapfilter._gdal import open_raster, reason_of
 from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
-from mapfilter.geodesy import projected_crs, same_crs
+from mapfilter.geodesy import projected_crs, same_crs, shown_crs
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, without_nodata
@@ -120,7 +120,8 @@ def _lattice(
         text = source.crs.to_wkt() if source.crs else declared
         crs = projected_crs(text, f"{where}, CRS")
         if declared is not None and not same_crs(crs, declared):
-            faults.add(f"{where}, CRS", f"{declared}, as declared", crs, "two systems mixed up")
+            expected = f"{shown_crs(declared)}, as declared"
+            faults.add(f"{where}, CRS", expected, shown_crs(crs), "two systems mixed up")
     except InputError as error:
         faults.found.extend(error.faults)
     t = source.transform

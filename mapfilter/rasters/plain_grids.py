@@ -24,15 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pyproj.exceptions import CRSError
 
-from mapfilter._inputs import read_input
+from mapfilter._inputs import open_input, read_input
 from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import known_crs, projected_crs, same_crs
+from mapfilter.geodesy import known_crs, projected_crs, same_crs, shown_crs
 from mapfilter.lattice import Lattice
 from mapfilter.radio.tables import number
 from mapfilter.rasters.files import RasterFile, Window, without_nodata
 
 _LARGEST_HEADER_BYTES = 1 << 16
+_SHOWN_BYTES = 30
 _LONGEST_VALUE = 60
 _MOST_PX = 10_000_000
 _FARTHEST_M = 1e8
@@ -168,15 +169,24 @@ def grid_crs(path: Path, declared: str | None) -> str:
     except (CRSError, UnicodeDecodeError, OSError, ValueError) as error:
         if declared is not None:
             return declared
-        expected = "a CRS as well-known text"
-        raise fail(InputError, str(found), expected, "none that is known", "set crs") from error
+        expected, got = "a CRS as well-known text", "an empty file"
+        if head := _head(found):
+            got = f"a file that begins with {head!r}"
+        hint = "cut off, or of another program; set crs in [rasters], which then counts instead"
+        raise fail(InputError, str(found), expected, got, hint) from error
     # The dialect of these files names datums in its own way, so that nothing matches exactly.
     code = stated.to_epsg(min_confidence=70)
     crs = projected_crs(code or stated, str(found))
     if declared is not None and not same_crs(crs, declared):
-        hint = "two systems mixed up"
-        raise fail(InputError, str(found), f"{declared}, as declared", crs, hint)
+        hint, expected = "two systems mixed up", f"{shown_crs(declared)}, as declared"
+        raise fail(InputError, str(found), expected, shown_crs(crs), hint)
     return declared or crs
+
+
+def _head(path: Path) -> str:
+    """Return how a text file begins, as messages show it."""
+    with open_input(path) as stream:
+        return stream.read(_SHOWN_BYTES).decode("latin-1").strip()
 
 
 @dataclass(frozen=True, slots=True)

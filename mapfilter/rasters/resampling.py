@@ -10,7 +10,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail, listed
-from mapfilter.geodesy import same_crs, short_crs
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.files import RasterFile, Window
 
@@ -34,8 +34,8 @@ def common_lattice(
     first = lattices[0]
     for file in files:
         if not same_crs(file.lattice.crs, first.crs):
-            expected = f"{short_crs(first.crs)}, as in {files[0].path.name}"
-            found = short_crs(file.lattice.crs)
+            expected = f"{shown_crs(first.crs)}, as in {files[0].path.name}"
+            found = shown_crs(file.lattice.crs)
             faults.add(f"{file.path}, CRS", expected, found, "two systems mixed up")
     faults.raise_if_any(InputError)
     wanted_m = resolution_m or min(lattice.resolution_m for lattice in lattices)

@@ -23,7 +23,7 @@ from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import projected_crs, same_crs
+from mapfilter.geodesy import projected_crs, same_crs, shown_crs
 from mapfilter.lattice import Lattice
 
 _COLOUR = ("r", "g", "b")
@@ -248,7 +248,7 @@ def _check_raster(source: Any, path: Path, lattice: Lattice, colour: bool) -> No
     faults = Faults()
     crs = projected_crs(source.crs.to_wkt() if source.crs else None, f"{path}, crs")
     if not same_crs(crs, lattice.crs):
-        faults.add(f"{path}, crs", lattice.crs, crs, "raster of another zone")
+        faults.add(f"{path}, crs", shown_crs(lattice.crs), shown_crs(crs), "raster of another zone")
     wanted = (3, 4) if colour else (1,)
     if source.count not in wanted:
         expected = "three colour bands" if colour else "one band of values"

@@ -22,7 +22,7 @@ from rasterio.windows import Window
 from mapfilter._gdal import open_raster
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import projected_crs, same_crs
+from mapfilter.geodesy import projected_crs, same_crs, shown_crs
 from mapfilter.lattice import Lattice
 from mapfilter.roads.ways import Bounds, Ways
 
@@ -160,7 +160,7 @@ def _check(source: Any, path: Path, crs: str, classes: Mapping[str, int]) -> Non
     if not classes:
         faults.add("roads.raster_classes", "the value of at least one class", "none")
     if not same_crs(found, crs):
-        faults.add(f"{path}, crs", crs, found, "raster of another zone")
+        faults.add(f"{path}, crs", shown_crs(crs), shown_crs(found), "raster of another zone")
     if source.count != 1:
         faults.add(f"{path}, bands", "one band of values", source.count, "a picture")
     elif not np.issubdtype(np.dtype(source.dtypes[0]), np.integer):

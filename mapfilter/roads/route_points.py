@@ -13,7 +13,7 @@ from shapely import STRtree
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import same_crs
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import burn
 from mapfilter.roads.index import HALF_WIDTH_M, WayIndex, note_half_widths
@@ -65,7 +65,8 @@ class RouteSource:
         layers = {"ways": ways, "squares": squares, "buildings": buildings, "water": water}
         for name, layer in layers.items():
             if layer is not None and not same_crs(layer.crs, crs):
-                faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
+                got = shown_crs(layer.crs)
+                faults.add(f"{name}, crs", shown_crs(crs), got, "layers of different CRS")
         note_half_widths(faults, half_width_m, half_width_by_class_m or {})
         faults.raise_if_any(InputError)
         index = WayIndex.of(ways, half_width_m, half_width_by_class_m)

@@ -23,12 +23,12 @@ from pyproj.exceptions import CRSError, ProjError
 from shapely.errors import GEOSException
 
 from mapfilter._arrow import arrow_file, open_parquet
-from mapfilter._inputs import open_input
+from mapfilter._inputs import open_input, shown
 from mapfilter._ogr import PARQUET, VectorSource, sealed_gdal, vector_source
 from mapfilter._types import Ints
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.geodesy import known_crs, same_crs, utm_zone, utm_zone_crs
+from mapfilter.geodesy import horizontal_part, known_crs, same_crs, utm_zone, utm_zone_crs
 from mapfilter.roads.maps import box_deg, boxes_overlap
 from mapfilter.roads.ways import Bounds, Geometries, on_earth
 
@@ -110,7 +110,7 @@ def read_layer(
             with open_input(path) as stream:
                 frame = _guarded(name, lambda: _parquet_frame(stream))
         elif path.suffix.lower() == ".shp":
-            hint = "the .prj file was left behind"
+            hint = _of_prj(path)
     if frame is not None:
         known = [str(column) for column in frame.columns if column != frame.active_geometry_name]
         _check_columns(name, known, columns)
@@ -122,12 +122,13 @@ def read_layer(
         source_crs, covered = about["crs"], about["total_bounds"]
     if source_crs is None:
         raise fail(InputError, f"{name}, crs", "a layer with a CRS", "none", hint)
-    _guarded(name, lambda: known_crs(source_crs, f"{name}, crs"))
+    source_crs = _horizontal_crs(name, source_crs)
     box = _box(name, crs, bounds_m, source_crs)
     if frame is None:
         settings: dict[str, Any] = {"columns": columns, "bbox": box, **place.options}
         settings |= {"layer": layer, "fid_as_index": True, "force_2d": True}
         frame = _guarded(name, lambda: pyogrio.read_dataframe(place.path, **settings))
+    frame = frame.set_crs(source_crs, allow_override=True)
     found = _features(name, frame, crs, bounds_m, columns)
     if not (found.number.size or may_be_empty):
         raise _nothing_there(name, crs, bounds_m, source_crs, covered)
@@ -195,6 +196,25 @@ def _box(name: str, crs: str, bounds_m: Bounds, source_crs: Any) -> tuple[float,
     return tuple(float(side) for side in box)
 
 
+def _horizontal_crs(name: str, source_crs: Any) -> pyproj.CRS:
+    """Return the horizontal part of a layer's CRS."""
+    try:
+        return horizontal_part(known_crs(source_crs, f"{name}, crs"))
+    except (CRSError, TypeError, ValueError) as error:
+        hint = "a damaged .prj file, or one of another program"
+        got = shown(str(source_crs))
+        raise fail(InputError, f"{name}, crs", "a CRS that is known", got, hint) from error
+
+
+def _of_prj(path: Path) -> str:
+    """Return why a shapefile has no CRS."""
+    found = next((p for p in (path.with_suffix(s) for s in (".prj", ".PRJ")) if p.is_file()), None)
+    if found is None:
+        return "the .prj file was left behind"
+    what = "is empty" if not found.stat().st_size else "holds none that is known"
+    return f"{found.name} {what}: copy it again, or write that of the CRS"
+
+
 def _guarded(name: str, read: Callable[[], T]) -> T:
     try:
         with sealed_gdal(), warnings.catch_warnings():
@@ -202,6 +222,9 @@ def _guarded(name: str, read: Callable[[], T]) -> T:
             warnings.simplefilter("ignore", RuntimeWarning)
             warnings.simplefilter("ignore", UserWarning)
             return read()
+    except pyogrio.errors.CRSError as error:
+        hint = "a .prj file that was cut off; copy it again"
+        raise fail(InputError, f"{name}, crs", "a CRS that is known", error, hint) from error
     except _DAMAGES as error:
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         hint = "cut off, or another format under this name"

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.errors import ConfigError, Faults, InputError, fail
-from mapfilter.geodesy import same_crs
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
@@ -114,7 +114,8 @@ def simulate_journeys(
     """
     settings = settings or SimulationSettings()
     if not same_crs(plan.crs, network.crs):
-        raise fail(InputError, "cell plan, crs", f"the streets' {network.crs}", plan.crs)
+        expected = f"the streets' {shown_crs(network.crs)}"
+        raise fail(InputError, "cell plan, crs", expected, shown_crs(plan.crs))
     if isinstance(levels, RxLevRasters):
         levels = level_sampler(levels, plan.ids, plan=plan)
     walk, leg_m = settings.journey, settings.journey.leg_m

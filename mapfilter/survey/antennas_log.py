@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 from mapfilter.survey.measurement_lines import lines_of
@@ -66,7 +66,10 @@ def _add_logged(
 def _iso(time: str) -> str:
     """Return a time such as ``2014-09-24 19:21:42:61 GMT+05:30`` in ISO 8601, else as it is."""
     text = re.sub(r":(\d{1,3}) GMT", lambda found: f".{found[1]:0>3} ", time)
+    plain = text.replace(":60.", ":59.")
     try:
-        return datetime.strptime(text, "%Y-%m-%d %H:%M:%S.%f %z").isoformat()
+        moment = datetime.strptime(plain, "%Y-%m-%d %H:%M:%S.%f %z")
     except ValueError:
         return time
+    # A leap second is the first one of the next minute.
+    return (moment + timedelta(seconds=plain != text)).isoformat()

@@ -24,7 +24,14 @@ from mapfilter.radio.cell_layouts import ALIASES, OF_CARRIERS
 from mapfilter.radio.identities import IDENTITY, technology
 from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
 from mapfilter.radio.tables import number
-from mapfilter.survey.measurement_lines import LONGEST_LINE, is_windows, lines_of
+from mapfilter.survey.measurement_lines import (
+    LONGEST_LINE,
+    SEPARATORS,
+    cut_end,
+    is_windows,
+    lines_of,
+    without_last,
+)
 from mapfilter.survey.measurement_rows import FIELDS, REQUIRED, Rows
 
 _UNAVAILABLE = 1e9
@@ -102,7 +109,8 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
     stating = [at for at, name in enumerate(header) if name in OF_CARRIERS]
     families = {OF_CARRIERS[header[at]] for at in stating}
     usual = families.pop() if len(families) == 1 else None
-    for line, text in lines:
+    cut, last = cut_end(path), list[int]()
+    for line, text in without_last(lines, last) if cut else lines:
         if text is not None and not text.strip():
             continue
         rows.read += 1
@@ -135,6 +143,9 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
             rows.aside["levels given as ASU (turned into dBm)"] += 1
             found["level_dbm"] = repr(dbm)
         rows.add(line, cell, found)
+    if last:
+        rows.read += 1
+        rows.refuse(last[0], "line", "a whole row", f"one {cut}")
     column = "".join(header[at] for at in places["level_dbm"][:1])
     signs.check(f"{path}, column {column}")
     return rows
@@ -193,7 +204,7 @@ def may_hold_measurements(path: Path) -> bool:
 def _header(lines: Iterator[tuple[int, str | None]]) -> tuple[str, list[str]]:
     """Return the separator and the names of the first line that is not blank."""
     text = next((text for _, text in lines if text is not None and text.strip()), "")
-    separator = max(",;\t", key=text.count)
+    separator = max(SEPARATORS, key=text.count)
     return separator, [name.strip().lower() for name in _split(text, separator)] if text else []
 
 

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from mapfilter._cut_ends import header_end, without_cut_row
 from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import InputError, fail
 
+SEPARATORS = (",", ";", "\t")
 LONGEST_LINE = _HEAD_BYTES = 1 << 16
 """Characters of a line, and bytes of a file's beginning."""
+_TAIL_BYTES = 1 << 18
+Lines = Iterator[tuple[int, str | None]]
+"""Line numbers and texts; None for a line too long to be one."""
 
 
-def lines_of(path: Path) -> Iterator[tuple[int, str | None]]:
+def lines_of(path: Path) -> Lines:
     """Yield line numbers and texts; None for a line too long to be one."""
     with _open_text(path) as stream:
         line = 0
@@ -28,6 +34,29 @@ def lines_of(path: Path) -> Iterator[tuple[int, str | None]]:
             while (more := stream.readline(LONGEST_LINE)) and not more.endswith("\n"):
                 pass
             yield line, None
+
+
+def cut_end(path: Path) -> str:
+    """Return how the last row of a file was cut off, "" where it is whole; zero bytes are none."""
+    with open_input(path) as stream:
+        separator, begin = header_end(stream.read(_HEAD_BYTES), SEPARATORS)
+        size = stream.seek(0, os.SEEK_END)
+        start = max(size - _TAIL_BYTES, 0)
+        stream.seek(start)
+        data = stream.read()
+    return without_cut_row(data, separator, max(begin - start, 0))[1]
+
+
+def without_last(lines: Lines, last: list[int]) -> Lines:
+    """Yield all lines but the last one that is not blank, whose number is put into ``last``."""
+    before = None
+    for one in lines:
+        if one[1] is not None and not one[1].strip():
+            continue
+        if before is not None:
+            yield before
+        before = one
+    last += [before[0]] if before is not None else []
 
 
 def _open_text(path: Path) -> TextIO:

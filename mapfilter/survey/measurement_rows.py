@@ -45,6 +45,8 @@ NO_CODE = "carriers or codes that are not possible (levels kept)"
 _TIMES = "expected ISO 8601 (2026-05-01T10:00:00+02:00), 31.12.2026 10:00:00 or Unix s, ms or µs"
 _DOTTED = re.compile(r"(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)[ T]+(\d\d?):(.*)", re.ASCII)
 """Day, month and year with dots, which no one writes in another order, and a time."""
+_LEAP = re.compile(r"(?:(?<=\d:[0-5]\d:)|(?<=\dT\d{4}))60(?=\D|$)", re.ASCII)
+"""Second 60 of a time of day."""
 
 
 class NotMeasurementsError(InputError):
@@ -214,7 +216,8 @@ def most_frequent(counts: Iterable[Counter[tuple[str, _ToldT]]]) -> dict[str, _T
 def unix_seconds(text: str) -> float:
     """Return Unix seconds of a time (UTC by default) or of s, ms or µs; else NaN.
 
-    Times are ISO 8601, or begin with day, month and year with dots.
+    Times are ISO 8601, or begin with day, month and year with dots; a leap second (``:60``) is the
+    first second of the next minute.
 
     Examples
     --------
@@ -230,11 +233,14 @@ def unix_seconds(text: str) -> float:
         if dotted := _DOTTED.fullmatch(text.strip()):
             day, month, year, hour, rest = dotted.groups()
             text = f"{year}-{int(month):02d}-{int(day):02d}T{int(hour):02d}:{rest.strip()}"
+        leap = _LEAP.search(text)
+        text = _LEAP.sub("59", text, count=1) if leap else text
         try:
             moment = datetime.fromisoformat(text)
             seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
         except (ValueError, OverflowError):
             return math.nan
+        seconds += 1 if leap else 0
     return seconds if 0 < seconds < _LATEST_S else math.nan
 
 

@@ -13,6 +13,7 @@ from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.alignment import Alignment, align
+from mapfilter.tracks.beyond_crs import within_crs
 from mapfilter.tracks.far_apart import check_far_apart
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.gps_dates import later
@@ -69,7 +70,8 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         for recording, offset in zip(journey, alignment.offsets_s, strict=True)
     ]
     frame = Frame(shifted, options.crs, options.origin_deg)
-    notes = [*alignment.notes, *frame.notes]
+    shifted, beyond = within_crs(shifted, frame.crs, frame.local)
+    notes = [*alignment.notes, *frame.notes, *beyond]
     for one in shifted:
         if (rows := one.tables.get("positions")) is not None and "speed_mps" in rows:
             notes += check_speeds(one, *frame.east_north(rows, one.crs))

@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from mapfilter._crs_reach import project_within
 from mapfilter._types import Ints
 from mapfilter.errors import Faults
-from mapfilter.geodesy import project
+from mapfilter.tracks.beyond_crs import without_beyond
 from mapfilter.tracks.column_values import TableFaults, column_values
 from mapfilter.tracks.no_fix import first_row, no_fix_note, rows_without_fix
 from mapfilter.tracks.position_units import RADIUS_68
@@ -45,7 +46,7 @@ def in_metres(
 
     Rows without a position, as receivers write them while they have no fix, are left out: both
     degrees are missing, or both are 0. Degrees of three decimals or fewer have at least the error
-    of rounding.
+    of rounding. Positions at which the CRS means nothing are left out, too.
 
     Parameters
     ----------
@@ -81,16 +82,12 @@ def in_metres(
         return PlacedTable(rest.assign(east_m=0.0, north_m=0.0), numbers, notes)
     places, rounded = with_rounding(places, where)
     notes += (rounded,) if rounded else ()
-    east_m, north_m = project(crs, lon_deg, lat_deg)
-    beyond = ~(np.isfinite(east_m) & np.isfinite(north_m))
-    found.add_rows(
-        beyond,
-        "lat_deg",
-        f"a place that {crs} covers",
-        lambda row: f"{lat_deg[row]:g}, {lon_deg[row]:g}",
-        lambda _: "",
-    )
-    placed = rest.assign(east_m=np.where(beyond, 0, east_m), north_m=np.where(beyond, 0, north_m))
+    east_m, north_m, beyond = project_within(crs, lon_deg, lat_deg)
+    note = without_beyond(where, crs, lon_deg, lat_deg, beyond, faults, numbers)
+    notes += (note,) if note else ()
+    kept = ~beyond
+    rest, places, numbers = rest[kept], places[kept], numbers[kept]
+    placed = rest.assign(east_m=east_m[kept], north_m=north_m[kept])
     if table != "gnss" or stated or "accuracy_m" not in places:
         return PlacedTable(placed, numbers, notes)
     accuracy_m = places["accuracy_m"].to_numpy(dtype=np.float64)

@@ -18,7 +18,7 @@ from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.pdr.options import without_effect
 from mapfilter.tracks.readers.zipped import zip_of
 from mapfilter.tracks.schema import TABLES
-from mapfilter.tracks.sensors import read_sensors
+from mapfilter.tracks.sensors import sensors_of
 from mapfilter.tracks.store import HEAD, files_in, is_log, list_logs, read_log
 
 if TYPE_CHECKING:
@@ -74,8 +74,9 @@ def open_log(
         log = scaled_log(read_log(given[0]), options.combine.factors, str(given[0]))
         walk = options.combine.walk
         unused = () if walk is None else without_effect(walk, (), _READY)
-        log = replace(log, notes=(*log.notes, *unused)) if unused else log
-        opened = OpenedLog(given[0].name, log, read_sensors(given[0]))
+        sensors, cut = sensors_of(given[0])
+        log = replace(log, notes=(*log.notes, *unused, *cut)) if unused or cut else log
+        opened = OpenedLog(given[0].name, log, sensors)
     else:
         # Here, as a track log needs none of what reads and joins recordings.
         from mapfilter.tracks.combine import combine

@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from mapfilter._arrow import open_parquet
+from mapfilter._cut_ends import without_cut_end
 from mapfilter._inputs import open_input
 from mapfilter._io import sha256_file, sha256_of
 from mapfilter._json_files import read_json
@@ -82,6 +83,8 @@ def write_sensors(
 def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
     """Read the sensor tables of a log, by name; none where it has no folder ``sensors``.
 
+    A last row that was cut off, and zero bytes at the end, are left out.
+
     Raises
     ------
     InputError
@@ -89,7 +92,12 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
     StoreError
         A table was cut off or changed since ``mapfilter convert`` wrote it.
     """
-    folder = Path(log)
+    return sensors_of(log)[0]
+
+
+def sensors_of(log: str | Path) -> tuple[dict[str, pd.DataFrame], tuple[str, ...]]:
+    """Return what :func:`read_sensors` returns, and notes on what was left out; same errors."""
+    folder, notes = Path(log), list[str]()
     paths = {
         name: path
         for name in SENSOR_COLUMNS
@@ -111,7 +119,8 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
                     hint = "changed or cut off"
                     raise fail(StoreError, str(path), f"SHA-256 {known}", "another", hint)
                 if path.suffix == ".csv":
-                    rows = _csv_rows(stream.read())
+                    data, ends = without_cut_end(stream.read(), SEPARATORS, str(path))
+                    rows, notes = _csv_rows(data), notes + ends
                 else:
                     with open_parquet(stream) as source:
                         rows = as_frame(source.read())
@@ -129,7 +138,7 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
                 faults.add(f"{path}, {column}", "numbers", "others", "text among them")
         tables[name] = rows
     faults.raise_if_any(InputError)
-    return tables
+    return tables, tuple(notes)
 
 
 def _csv_rows(data: bytes) -> pd.DataFrame:

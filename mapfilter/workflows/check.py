@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from rasterio.errors import RasterioError
 
+from mapfilter._area_scale import check_scale
 from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
 from mapfilter.check.band_law import check_bands
@@ -30,7 +31,6 @@ from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
 from mapfilter.database.floor import floor_of
 from mapfilter.errors import InputError, MapfilterError, listed
-from mapfilter.geodesy import check_scale
 from mapfilter.lattice import Lattice
 from mapfilter.propagation.remarks import high_antennas, off_frequency, upward_tilts
 from mapfilter.radio.arrange_cells import UNUSED_COLUMNS

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mapfilter._area_scale import check_scale
 from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, InputError, fail, listed
-from mapfilter.geodesy import check_scale, projected_crs
+from mapfilter.geodesy import projected_crs
 from mapfilter.lattice import Lattice, outside_m
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.far_cells import check_cells_near

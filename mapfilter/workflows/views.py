@@ -15,7 +15,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.evaluation.map_bound import BANDS
-from mapfilter.geodesy import same_crs, short_crs
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.lattice import Lattice
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.viewing.bundle import database_bundle
@@ -103,7 +103,7 @@ def _bounded(bundle: Mapping[str, Any], path: Path) -> dict[str, Any]:
         raise fail(InputError, where, "a whole GeoTIFF", f"{error}", "cut off") from error
     if not same_crs(crs, frame.crs):
         hint = "the bound of another database"
-        raise fail(InputError, where, frame.crs, short_crs(crs), hint)
+        raise fail(InputError, where, shown_crs(frame.crs), shown_crs(crs), hint)
     rows, cols = next(iter(values.values())).shape
     lattice = Lattice(frame.crs, top.left, top.top, side, rows, cols)
     layers = {label: ("m", values[name]) for name, label in _BOUND_LAYERS.items()}

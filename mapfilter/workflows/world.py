@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from mapfilter._area_scale import check_scale
 from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import check_scale, projected_crs, same_crs, short_crs, unproject
+from mapfilter.geodesy import projected_crs, same_crs, short_crs, shown_crs, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
@@ -91,9 +92,9 @@ def check_crs_of_area(area: Area, rasters: RxLevRasters) -> None:
         return
     wanted, found = projected_crs(area.crs, "area.crs"), rasters.lattice.crs
     if not same_crs(wanted, found):
-        expected = f"{wanted}, the CRS of the area"
+        expected = f"{shown_crs(wanted)}, the CRS of the area"
         hint = f'another zone or datum: set area.crs = "{short_crs(found)}"'
-        raise fail(InputError, f"{rasters.path}, CRS", expected, found, hint)
+        raise fail(InputError, f"{rasters.path}, CRS", expected, shown_crs(found), hint)
 
 
 def covered_lattice(area: Area, rasters: RxLevRasters) -> Lattice:

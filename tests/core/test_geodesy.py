@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapfilter._area_scale import check_scale
 from mapfilter.errors import InputError
 from mapfilter.geodesy import (
     azimuth_from_heading_deg,
     check_bbox,
-    check_scale,
     grid_convergence_rad,
     heading_from_azimuth_rad,
     project,

@@ -100,3 +100,10 @@ def test_a_table_cut_off_at_any_byte_is_read_or_refused(tmp_path):
             assert len(read(tmp_path, data[:end])) <= 3
         except InputError:
             assert end < 140
+
+
+def test_degrees_far_outside_of_a_crs_are_named_with_their_row(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("lon,lat,AP1\n25.0,60.2,-70\n-100.0,60.2,-71\n")
+    with pytest.raises(InputError, match=r"a\.csv, row 2: expected a position that .* covers"):
+        read_fingerprint_table(path, "EPSG:3067")

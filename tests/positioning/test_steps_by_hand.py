@@ -38,6 +38,14 @@ def refused(epoch):
     return [str(fault) for fault in caught.value.faults]
 
 
+@pytest.mark.parametrize("rad", [90.0, -300.0, 6.5])
+def test_directions_beyond_a_turn_are_no_radians(rad):
+    found = "\n".join(refused(Epoch(0.0, motion=(MotionStep(1.4, 0.1), MotionStep(1.4, rad, rad)))))
+    expected = f"expected radians in -2π..2π, found {rad} (likely: degrees given for radians"
+    assert f"epoch, motion[1].heading_rad: {expected}, or headings that count on" in found
+    assert f"epoch, motion[1].turn_rad: {expected})" in found
+
+
 def test_what_was_not_measured_is_nan_and_no_fault():
     row = ReportRow("neighbour", None, 600, None, nan, 0)
     step = MotionStep(nan, nan)

@@ -117,8 +117,21 @@ def test_the_crs_lies_beside_the_grid(tmp_path: Path) -> None:
     assert "degrees given for metres" in _complaint(path)
     prj.write_text("Projection UTM\nZone 35")
     assert _open(path).lattice == LATTICE
-    with pytest.raises(InputError, match=r"a\.prj: expected a CRS"):
+    with pytest.raises(InputError, match=r"a\.prj: expected a CRS as well.*, found a file"):
         open_rasters(path, "level")
+    prj.write_text(pyproj.CRS("EPSG:3067").to_wkt())
+    with pytest.raises(InputError, match="found EPSG:3067"):
+        open_rasters(path, "level", crs=CRS)
+    prj.write_bytes(b"")
+    with pytest.raises(InputError, match=r"found an empty file \(likely: .*set crs in \[rasters\]"):
+        open_rasters(path, "level")
+
+
+def test_heights_of_a_compound_crs_are_left_out(tmp_path: Path) -> None:
+    path = write_ascii(tmp_path / "a.asc", LATTICE, LEVEL)
+    path.with_suffix(".prj").write_text(pyproj.CRS(f"{CRS}+5773").to_wkt())
+    assert open_rasters(path, "level").lattice == LATTICE
+    assert _open(path).lattice == LATTICE
 
 
 @pytest.mark.parametrize(

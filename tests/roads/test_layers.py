@@ -1,5 +1,6 @@
 """Roads, buildings and water from vector files, in the formats that GDAL and geopandas write."""
 
+import re
 import zipfile
 
 import geopandas
@@ -231,6 +232,36 @@ def test_files_of_other_places_are_told_with_the_likely_mistake(tmp_path):
         with pytest.raises(InputError, match=message) as caught:
             read_layer_roads(path, *AREA)
         assert name in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("prj", "told"),
+    [
+        (b"", "a.prj is empty: copy it again"),
+        (b"not found", "a.prj holds none that is known: copy it again"),
+        (b"\xff\xfe\0", "a.prj holds none that is known: copy it again"),
+        (None, r"expected a CRS that is known, found .* \(likely: a .prj file that was cut off"),
+    ],
+)
+def test_a_prj_that_is_damaged_is_named(tmp_path, prj, told):
+    path = write(ROADS, tmp_path / "a.shp")
+    beside = path.with_suffix(".prj")
+    beside.write_bytes(beside.read_bytes()[:100] if prj is None else prj)
+    with pytest.raises(InputError, match=r"a\.shp, crs: ") as refused:
+        read_layer_roads(path, *AREA)
+    assert re.search(told, str(refused.value))
+
+
+@pytest.mark.parametrize("name", ["a.gpkg", "a.parquet"])
+@pytest.mark.parametrize("heights", ["+5773", "+3900"])
+def test_heights_of_a_layer_are_left_out(tmp_path, name, heights):
+    flat = ROADS.to_crs("EPSG:4326")
+    expected = read_layer_roads(write(flat, tmp_path / "b.gpkg"), *AREA)
+    tall = flat.set_crs(f"EPSG:4326{heights}", allow_override=True)
+    found = read_layer_roads(write(tall, tmp_path / name), *AREA)
+    pairs = zip(found.ways.geometry, expected.ways.geometry, strict=True)
+    assert all(shapely.equals_exact(one, other, 1e-6) for one, other in pairs)
+    assert len(found.ways.geometry)
 
 
 @pytest.mark.parametrize("name", ["a.shp", "a.gpkg", "a.geojson", "a.fgb", "a.parquet", "a.gml"])

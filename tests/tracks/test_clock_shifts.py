@@ -73,7 +73,6 @@ def test_a_common_clock_and_a_steady_speed_say_nothing(notes, seed):
 def test_a_receiver_whose_week_number_began_anew(notes):
     assert notes(-WEEKS_S) == []
     # Nothing is mended that does not overlap.
-    with pytest.raises(
-        InputError, match=f"week number began anew: mapfilter convert --offset FILE={WEEKS_S}"
-    ):
+    told = rf'week number began anew: offsets_s={{"FILE": {WEEKS_S}}}'
+    with pytest.raises(InputError, match=told):
         notes(-WEEKS_S - 2 * COUNT)

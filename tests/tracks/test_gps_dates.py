@@ -69,7 +69,7 @@ def test_the_name_of_a_file_contradicts_its_dates(tmp_path):
         path = written(tmp_path / "drive_2026-05-01.csv", UTC_S - early_s + ELAPSED_S, **WAY)
         (note,) = mf.read_log(path).notes
         assert f"times are of {days}, but 2026-05-01 by its name" in note
-        assert f"--offset {path.name}={early_s:.0f} for 2026-05-01)" in note
+        assert f'offsets_s={{"{path.name}": {early_s:.0f}}} for 2026-05-01)' in note
     assert mf.read_log(written(path, UTC_S + ELAPSED_S, **WAY)).notes == ()
     # Another day is no mistake of GPS.
     other = written(tmp_path / "drive_20250501.csv", UTC_S - ERA_S + ELAPSED_S, **WAY)
@@ -90,7 +90,7 @@ def test_no_phone_used_a_network_before_it_was_opened(tmp_path, technology, time
     notes = [note for note in mf.read_log(path).notes if "times are of" in note]
     assert len(notes) == bool(offsets)
     for offset in offsets:
-        assert f"--offset cells.csv={offset}" in notes[0]
+        assert f'offsets_s={{"cells.csv": {offset.replace(" for", "} for")}' in notes[0]
 
 
 def test_seconds_of_the_week_get_the_week_of_the_other_file(tmp_path):

@@ -81,7 +81,8 @@ def test_metres_at_the_origin_are_a_place():
 def test_a_folder_names_its_file_and_first_line(tmp_path, form):
     (tmp_path / "log.json").write_text(json.dumps({"crs": CRS}))
     path, degrees = tmp_path / f"gnss.{form}", [np.nan, LAT, 0.0, LAT]
-    rows = pd.DataFrame({"time_s": np.arange(4.0), "lat_deg": degrees, "lon_deg": degrees})
+    of_lon = [LON if one == LAT else one for one in degrees]
+    rows = pd.DataFrame({"time_s": np.arange(4.0), "lat_deg": degrees, "lon_deg": of_lon})
     rows = rows.assign(accuracy_m=[np.nan, 5.0, -1.0, 5.0])
     if form == "csv":
         rows.to_csv(path, index=False)

@@ -44,7 +44,7 @@ def test_options_are_checked(walk):
         (("--origin", "100,20"), "a latitude and a longitude"),
         (("--column", "time"), "NAME=VALUE"),
         (("--column", "time=Uhr"), "a column Uhr for time"),
-        (("--offset", "walk.txt=5"), "FILE=SECONDS"),
+        (("--offset", "walk.txt=5"), "the name of one of the recordings (drive.csv)"),
         (("--offset", "drive.csv=five"), "1 numbers"),
         (("--zone", "Mars"), "Europe/Brussels"),
         (("--format", "kml"), "one of gnettrack"),

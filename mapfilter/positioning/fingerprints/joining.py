@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import same_crs
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 
 _COUNTED = re.compile(r"(\d{1,18}) ((?:readings|reports|rows) left out: .*)", re.DOTALL)
@@ -26,8 +26,10 @@ def joined_reports(parts: Sequence[Reports]) -> Reports:
         raise fail(InputError, "reports", "at least one log", "none")
     for part in parts:
         if not same_crs(part.crs, parts[0].crs):
-            expected = f"all reports in {parts[0].crs}"
-            raise fail(InputError, "reports, crs", expected, part.crs, "logs of several zones")
+            expected = f"all reports in {shown_crs(parts[0].crs)}"
+            raise fail(
+                InputError, "reports, crs", expected, shown_crs(part.crs), "logs of several zones"
+            )
     offset, base = 0, 0
     report, cell, blocks, serving = [], [], [], []
     for part in parts:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.geodesy import same_crs
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.positioning.fingerprints.censoring import OPEN, Bounds, bounded, bounds_of
 from mapfilter.positioning.fingerprints.cross_validation import (
     MOST_VALIDATED,
@@ -190,8 +190,9 @@ def locate_by(fitted: ReportLocator, reports: Reports) -> LocatedReports:
     """
     database = fitted.database
     if not same_crs(reports.crs, database.crs):
-        expected = f"{database.crs}, the database's"
-        raise fail(InputError, "log, crs", expected, reports.crs, "log of another area or zone")
+        expected = f"{shown_crs(database.crs)}, the database's"
+        hint = "log of another area or zone"
+        raise fail(InputError, "log, crs", expected, shown_crs(reports.crs), hint)
     received = np.diff(reports.first)
     named, unknown = reports.named_as(database.cell_ids)
     positions, located = positions_of(fitted.locator, named, np.arange(len(reports)))

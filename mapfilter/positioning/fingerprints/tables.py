@@ -15,12 +15,14 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._arguments import Setting, check_arguments, path_argument
+from mapfilter._crs_reach import likely_mistake, project_within
+from mapfilter._cut_ends import without_cut_end
 from mapfilter._inputs import read_input
 from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
-from mapfilter.geodesy import project, projected_crs, utm_crs
+from mapfilter.geodesy import projected_crs, short_crs, utm_crs
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 
 NOT_RECEIVED_DBM = 100.0
@@ -107,7 +109,9 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
 
 def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     expected = "a table with a header line"
-    text = read_input(path, _LARGEST_BYTES, "a table").decode("utf-8-sig", "replace")
+    data = read_input(path, _LARGEST_BYTES, "a table")
+    data, notes = without_cut_end(data, _SEPARATORS, path.name)
+    text = data.decode("utf-8-sig", "replace")
     lines = [line for line in without_separator_line(text).splitlines() if line.strip()]
     if not lines:
         raise fail(InputError, str(path), expected, "an empty file", "cut off")
@@ -118,10 +122,9 @@ def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
         raise fail(InputError, f"{path}, header", "each column once", listed(twice))
     # Rows that are too short end in empty fields; which field of one too long is which is unknown.
     kept = [line for line in lines[1:] if len(_fields(line, separator)) <= len(named)]
-    notes = []
     if len(kept) < len(lines) - 1:
         count = len(lines) - 1 - len(kept)
-        notes = [f"{path.name}: {number_of(count, 'row')} left out: too many fields"]
+        notes.append(f"{path.name}: {number_of(count, 'row')} left out: too many fields")
     if not kept:
         raise fail(InputError, str(path), f"{expected} and rows", "no rows", "cut off")
     try:
@@ -170,7 +173,9 @@ def _projected(
         lon_deg, lat_deg = places.T
         middle = np.median(places[finite], axis=0)
         found = projected_crs(crs or utm_crs(float(middle[0]), float(middle[1])))
-        return found, np.column_stack(project(found, lon_deg, lat_deg))
+        east_m, north_m, beyond = project_within(found, lon_deg, lat_deg)
+        _check_covered(path, found, places, beyond & finite)
+        return found, np.column_stack([east_m, north_m])
     if crs is None and degrees:
         crs = _MERCATOR
     if crs is None:
@@ -180,3 +185,14 @@ def _projected(
         )
         raise fail(InputError, f"{path}, positions", "a CRS of the metres", "none", hint)
     return projected_crs(crs, "crs"), places
+
+
+def _check_covered(path: Path, crs: str, places: Floats, beyond: Bools) -> None:
+    """Check that a CRS covers the positions in degrees of a table."""
+    if not beyond.any():
+        return
+    row = int(np.argmax(beyond))
+    lon_deg, lat_deg = places[row]
+    where, expected = f"{path}, row {row + 1}", f"a position that {short_crs(crs)} covers"
+    got = f"{lat_deg:.6g}, {lon_deg:.6g}"
+    raise fail(InputError, where, expected, got, likely_mistake(crs, lon_deg, lat_deg))

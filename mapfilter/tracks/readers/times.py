@@ -37,6 +37,9 @@ LEAST_UNIX_S = 1e8
 """Seconds above are Unix times (since March 1973), below those from an unknown start."""
 _MILLISECONDS = re.compile(r"(?<=[ T])(\d\d:\d\d:\d\d):(\d{3})\b", re.ASCII)
 """A time of day whose milliseconds follow a colon."""
+_LEAP = r"(?:\d:[0-5]\d:|_\d\d\.[0-5]\d\.|\dT\d\d[0-5]\d)60(?:\D|$)"
+_LEAP_60 = re.compile(r"(?:(?<=\d:[0-5]\d:)|(?<=_\d\d\.\d\d\.)|(?<=\dT\d{4}))60(?=\D|$)")
+"""Second 60 of a time of day: hours and minutes before it."""
 _UTC = re.compile(r"\s{0,3}\b(?:UTC|GMT)\s{0,3}$")
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
@@ -134,8 +137,8 @@ def parse_times(
     rest = given[~is_number]
     if rest.empty:
         return time_s, True
-    leap = rest.str.contains(r":60(?:\D|$)|_\d\d\.\d\d\.60$", regex=True).to_numpy()
-    plain = rest.str.replace(r"([:.])60(?=\D|$)", r"\g<1>59", regex=True) if leap.any() else rest
+    leap = rest.str.contains(_LEAP, regex=True).to_numpy()
+    plain = rest.str.replace(_LEAP_60, "59", regex=True) if leap.any() else rest
     plain = plain.str.replace(_UTC, "Z", regex=True) if layout == "ISO8601" else plain
     aware = plain.str.contains(r"(?:Z|z|[+-]\d\d:?\d\d)\s*$", regex=True).to_numpy()
     # Other years are beyond the range of timestamps, or no dates.

@@ -1,0 +1,64 @@
+"""Positions far outside of the region of a CRS: left out with a note, or refused."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mapfilter as mf
+
+LAT_DEG = np.full(30, 60.2)
+LON_DEG = 25 + 1e-5 * np.arange(30)
+FAR = np.where(np.arange(30) == 7, 130.0, LON_DEG)
+
+
+def recording(folder, lon_deg, header="time,lat_deg,lon_deg,accuracy_m"):
+    path = folder / "walk.csv"
+    rows = (f"{1_700_000_000 + i},60.2,{lon:.6f},5" for i, lon in enumerate(lon_deg))
+    path.write_text("\n".join([header, *rows, ""]))
+    return path
+
+
+def table(lon_deg):
+    return pd.DataFrame({"time_s": np.arange(30.0), "lat_deg": LAT_DEG, "lon_deg": lon_deg})
+
+
+@pytest.mark.parametrize("crs", ["", "EPSG:2393", "EPSG:3067"])
+@pytest.mark.parametrize("role", ["gnss", "truth"])
+def test_one_position_of_a_recording(tmp_path, crs, role):
+    path = recording(tmp_path, FAR)
+    log = mf.read_log(path, crs=crs, truth=path if role == "truth" else ())
+    rows = getattr(log, role)
+    assert len(rows) == 29
+    assert np.ptp(rows["east_m"]) < 20
+    name = crs or "EPSG:32635"
+    note = f"walk.csv: 1 position left out: {name} has no such places; first 60.2, 130 (position 8)"
+    assert note in log.notes
+
+
+@pytest.mark.parametrize("role", ["gnss", "truth"])
+def test_one_position_of_a_table(role):
+    given = table(FAR).assign(accuracy_m=5.0) if role == "gnss" else table(FAR)
+    log = mf.make_log("EPSG:2393", **{role: given})
+    assert len(getattr(log, role)) == 29
+    note = f"{role}: 1 position left out: EPSG:2393 has no such places; first 60.2, 130 (row 8)"
+    assert note in log.notes
+
+
+def test_a_crs_of_another_region_is_refused_with_the_zone_of_the_place(tmp_path):
+    told = "expected positions that EPSG:32601 covers, found 60.2, 25 "
+    hint = "a CRS of another region: at that place it is EPSG:32635"
+    with pytest.raises(mf.MapfilterError) as refused:
+        mf.read_log(recording(tmp_path, LON_DEG), crs="EPSG:32601")
+    assert f"walk.csv: {told}(position 1) and 29 more" in str(refused.value)
+    assert hint in str(refused.value)
+    with pytest.raises(mf.MapfilterError) as refused:
+        mf.make_log("EPSG:32601", gnss=table(LON_DEG))
+    assert f"gnss: {told}(row 1) and 29 more" in str(refused.value)
+    assert hint in str(refused.value)
+
+
+def test_a_compound_crs_is_that_of_its_horizontal_part(tmp_path):
+    log = mf.read_log(recording(tmp_path, LON_DEG), crs="EPSG:3067+3900")
+    assert log.crs == "EPSG:3067"
+    flat = mf.read_log(recording(tmp_path, LON_DEG), crs="EPSG:3067")
+    assert log.gnss.equals(flat.gnss)
