@@ -96,7 +96,7 @@ def _iterated(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> 
     noise_factor = noise_lanes(problem, present)
     seen, r = np.zeros((m, n, count)), np.zeros((m, count))
     information, half = np.empty((n, n, count)), np.empty((n, count))
-    z, trial, target = np.zeros((n, count)), np.zeros((n, count)), np.zeros((n, count))
+    z, trial = np.zeros((n, count)), np.zeros((n, count))
     best, length = np.full(count, np.inf), np.ones(count)
     converged = np.zeros(count, dtype=np.bool_)
     for _ in range(problem.iterations):

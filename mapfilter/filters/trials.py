@@ -145,7 +145,7 @@ def problem_of(
         noise,
         not np.any(noise - np.diag(np.diagonal(noise))),
         method.iterations if sigma is None else 1,
-        1.0 if sigma is None else sigma.spread(transition.shape[0]),
+        1.0 if sigma is None else sigma.spread(len(transition)),
         0.0 if sigma is None else sigma.bend_weight,
         np.ascontiguousarray(row),
         np.ascontiguousarray(col),

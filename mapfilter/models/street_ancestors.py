@@ -140,7 +140,7 @@ def draw_ancestors(
             goal, accept = np.float64(one) * (mass + jumped * total), np.float64(other)
             # Also where a weight is no number.
             if not goal < mass:
-                chosen[j] = min(np.searchsorted(passed, accept * total), count - 1)
+                chosen[j] = np.searchsorted(passed, accept * total)
                 break
             i, most_likely = _drawn(near, before, goal)
             log_led = _log_led(place, led, i, per)

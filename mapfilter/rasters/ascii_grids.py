@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from codecs import BOM_UTF8
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import lru_cache
 from itertools import takewhile
 from pathlib import Path
@@ -31,7 +31,8 @@ _LONGEST_NUMBER = 64
 class AsciiGrid(PlainGrid):
     """One grid of numbers written as text; the first row begins after ``header_bytes``."""
 
-    header_bytes: int = 0
+    _: KW_ONLY
+    header_bytes: int
 
     def _pixels(self, row: int, col: int, rows: int, cols: int) -> NDArray[Any]:
         changed_ns = self.path.stat().st_mtime_ns

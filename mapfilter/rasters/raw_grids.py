@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,9 +35,10 @@ class RawGrid(PlainGrid):
         What lies before the first row, and from each row to the next.
     """
 
-    dtype: str = "<i2"
-    skip_bytes: int = 0
-    row_bytes: int = 0
+    _: KW_ONLY
+    dtype: str
+    skip_bytes: int
+    row_bytes: int
 
     def _pixels(self, row: int, col: int, rows: int, cols: int) -> NDArray[Any]:
         shape = self.lattice.rows, self.lattice.cols

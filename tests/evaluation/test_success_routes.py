@@ -8,8 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
-from mapfilter.evaluation.success_cells import COORDINATES, success_cells
+from mapfilter.evaluation.success import (
+    independent_runs,
+    wilson_interval,
+    wilson_interval_of_routes,
+)
+from mapfilter.evaluation.success_cells import COORDINATES, axes_of, success_cells
 
 
 def test_one_run_a_route_is_almost_the_plain_interval():
@@ -32,6 +36,13 @@ def test_ends_and_a_single_route():
     assert wilson_interval_of_routes([10] * 5, [10] * 5) == wilson_interval(5, 5)
     assert wilson_interval_of_routes([0] * 5, [10] * 5) == wilson_interval(0, 5)
     assert all(isnan(end) for end in wilson_interval_of_routes([7], [10]))
+
+
+def test_routes_tell_as_much_as_one_run_at_least_and_all_runs_at_most():
+    """Two routes of ten runs: the mean's variance is 2 * 2 d² / 20² where they are d off it."""
+    for good, independent in (([10, 0], 1.0), ([9, 1], 0.25 / 0.16), ([6, 4], 20.0)):
+        assert independent_runs(good, [10, 10], 0.25) == pytest.approx(independent)
+    assert independent_runs([10, 0], [10, 10], 0.1) == 1.0
 
 
 @given(st.lists(st.tuples(st.integers(0, 10), st.just(10)), min_size=2, max_size=60))
@@ -86,6 +97,36 @@ def test_cells_by_hand():
     assert (first.claimed, second.claimed) == (0.0, 0.0)
     assert isnan(first.coverage_95)
     assert isnan(first.radius_95_median_m)
+
+
+def cells_at(*places):
+    """One cell for each place of a grid."""
+    one = runs_of(3.0, (0, True, True, 10.0, 100.0))
+    return success_cells(pd.concat([one.assign(**place) for place in places]))
+
+
+def test_a_varied_option_stands_for_its_own_column_but_for_headings():
+    cells = cells_at(
+        {"bias_sd_deg": 1.0, "errors.bias_sd_deg": 1.0, "scale": 1.0},
+        {"bias_sd_deg": 2.0, "errors.bias_sd_deg": 2.0, "scale": 1.0},
+    )
+    assert axes_of(cells) == ["errors.bias_sd_deg"]
+    cells = cells_at(
+        {"sigma_orient_deg": 3.0, "errors.sigma_orient_deg": 5.0},
+        {"sigma_orient_deg": 6.0, "errors.sigma_orient_deg": 7.0},
+    )
+    assert axes_of(cells) == ["sigma_orient_deg", "errors.sigma_orient_deg"]
+    assert axes_of(cells[:1]) == axes_of([]) == []
+
+
+def test_what_all_cells_of_a_reading_have_in_common_is_left_out():
+    cells = cells_at(
+        {"reading": "a", "scale": 1.0, "bias_sd_deg": 1.0},
+        {"reading": "a", "scale": 1.0, "bias_sd_deg": 2.0},
+        {"reading": "b", "scale": 2.0, "bias_sd_deg": 1.0},
+    )
+    assert axes_of(cells) == ["reading", "bias_sd_deg", "scale"]
+    assert axes_of(cells, by_reading=True) == ["reading", "bias_sd_deg"]
 
 
 def test_coverage_by_hand():

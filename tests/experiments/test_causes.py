@@ -126,3 +126,12 @@ def test_turns_are_summed_over_legs():
     north = np.concatenate([np.zeros(40), np.arange(0.0, 200.0, 5)])
     table = pd.DataFrame({"time_s": np.arange(80.0), "east_m": east, "north_m": north})
     assert turning_deg(truth_of(table), np.array([0.0, 79.0])) == pytest.approx(90.0, abs=1.0)
+
+
+def test_two_legs_have_a_turn_and_one_has_none():
+    """20 m east and 40 m north at 10 m/s; the times end after 60, 40, 20 and 0 m."""
+    table = line(6)
+    table["east_m"] = np.minimum(table["east_m"], 20.0)
+    table["north_m"] = np.maximum(10.0 * table["time_s"] - 20.0, 0.0)
+    turned = [turning_deg(truth_of(table), np.array([0.0, last_s])) for last_s in (6, 4, 2, 0)]
+    np.testing.assert_allclose(turned, [90.0, 0.0, 0.0, 0.0], atol=1e-9)

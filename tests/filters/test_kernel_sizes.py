@@ -103,6 +103,13 @@ def test_singular_matrices_have_factors_and_negative_ones_none():
         assert np.isnan(given[1, 1, lane]), "clearly negative"
 
 
+def test_what_is_known_exactly_has_a_factor_of_zeros():
+    """The first of three has no variance, and no covariance with the others."""
+    given = np.array([[0.0, 0.0, 0.0], [0.0, 4.0, 6.0], [0.0, 6.0, 25.0]])[..., None].copy()
+    cholesky_lanes(given)
+    np.testing.assert_array_equal(np.tril(given[..., 0]), [[0, 0, 0], [0, 2, 0], [0, 3, 4]])
+
+
 def test_smoothed_covariances_are_symmetric_to_the_last_digit():
     rng = np.random.default_rng(2)
     root = rng.normal(size=(2, 6, 3, 3))

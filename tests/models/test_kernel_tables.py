@@ -147,6 +147,17 @@ def test_a_bound_is_looked_up_at_the_nearest_thirty_second():
         np.testing.assert_allclose(np.exp(found), places + 1, rtol=1e-5)
 
 
+def test_a_bound_is_weighed_at_its_own_hypotheses_only():
+    """Of a block of 256 and 44 more; what lies beside them in memory belongs to others."""
+    level, pixel = np.zeros(2, dtype=np.float32), np.zeros(600, dtype=np.int32)
+    found, table = np.full(600, 7.0), np.zeros(513, dtype=np.float32)
+    bound = BoundReading(np.array([0, 1], dtype=np.int32), 9.0, 0, 3.0, 0.5)
+    fingerprint.weigh_by_bound(pixel[:300], level, 2, bound, table, found[:300])
+    # Three deviations away, at half the weight.
+    np.testing.assert_allclose(found[:300], 7.0 - 0.5 * 4.5, rtol=1e-5)
+    np.testing.assert_array_equal(found[300:], 7.0)
+
+
 def test_corners_of_a_raster_have_their_own_pixels():
     places = np.array(
         [[0.5, 29.5], [49.5, 29.5], [0.5, 0.5], [49.5, 0.5], [-99, 99], [99, -99], [10.5, 19.5]]

@@ -44,6 +44,8 @@ ROOMS = {
         (
             "tests/experiments/test_ottawa*.py", "tests/experiments/test_satellite_cases.py",
             "tests/experiments/test_benchmark*.py", "tests/experiments/test_missing_ways.py",
+            "tests/experiments/test_causes.py", "tests/experiments/test_single_reports.py",
+            "tests/experiments/test_world_cases.py", "tests/experiments/test_worst_run.py",
         ),
     ),
 }  # fmt: skip

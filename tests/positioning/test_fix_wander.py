@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.positioning.gnss.state import GnssState
-from mapfilter.positioning.gnss.wander import FixWander, FoundErrors, Way
+from mapfilter.positioning.gnss.wander import FixWander, FoundErrors, Way, _times_stated
 
 COUNT = 200
 
@@ -213,3 +213,17 @@ def test_what_either_shows_counts():
     assert known.understated == 4.0
     assert replace(known, excess=5.0).understated == 5.0
     assert replace(state, wander=FixWander(now=FoundErrors(1.0, 3.0))).understated == 1.0
+
+
+def test_coordinates_of_a_country_lose_no_digits():
+    """Places in 1024ths of a metre, which 7000 km from the origin still are exact."""
+    rng = np.random.default_rng(5)
+    rows = np.zeros((40, 7))
+    rows[:, 0], rows[:, 6] = 2.0 * np.arange(40), 4.0
+    rows[:, 1:3] = np.cumsum(np.round(1024 * rng.normal(1.0, 1.0, (40, 2))) / 1024, axis=0)
+    rows[:, 4:6] = rows[:, 1:3] + np.round(1024 * rng.normal(0.0, 3.0, (40, 2))) / 1024
+    far = rows.copy()
+    far[:, 4:6] += 500_000.0, 7_000_000.0
+    near = _times_stated(rows, 0.0, 0.0)
+    assert near[0] > 0
+    assert _times_stated(far, 0.0, 0.0) == near

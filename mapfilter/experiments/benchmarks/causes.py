@@ -234,7 +234,5 @@ def turning_deg(truth: Truth, time_s: Floats) -> float:
     first_m, last_m = truth.distance_at([time_s[0], time_s[-1]])
     at_s = np.interp(np.arange(first_m, last_m, _LEG_M), gone_m, truth.time_s)
     east, north = truth.at(at_s)
-    if len(east) < 3:
-        return 0.0
     heading = np.arctan2(np.diff(north), np.diff(east))
     return float(np.degrees(np.nansum(np.abs(wrap_rad(np.diff(heading))))))

@@ -1,0 +1,52 @@
+"""Numbers that mean no data though a file does not state it."""
+
+import numpy as np
+import pytest
+
+from mapfilter.rasters.undeclared import nodata_taken_as_level
+
+
+def test_zero_beside_levels_near_zero_is_a_level():
+    near = np.float32([*np.linspace(-1, 0, 50), -40])
+    assert nodata_taken_as_level(near) is None
+    assert nodata_taken_as_level(np.zeros(5, np.float32)) == (0.0, 1.0)
+    assert nodata_taken_as_level(np.float32([120, 0, 95, 0])) == (0.0, 0.5)
+
+
+def test_the_largest_number_of_a_type_far_above_all_others_means_no_data():
+    losses = np.arange(70, 150, dtype=np.float32)
+    for top in (255, 32767, 65535):
+        found = nodata_taken_as_level(np.append(losses, np.float32([top] * 20)))
+        assert found == (top, 0.2)
+    tenths = np.float32(0.1) * np.append(10 * losses, np.float32([65535] * 20))
+    assert nodata_taken_as_level(tenths, 0.1) == (pytest.approx(6553.5), 0.2)
+    # Among numbers with decimals it is one that hardly a loss reaches, as any other.
+    decimals = np.append(losses + 0.25, np.float32([255] * 20))
+    assert nodata_taken_as_level(decimals) == (255, 0.2)
+    # Cut off at 255, too few, or no limit of a type.
+    cut_off = np.minimum(np.arange(70, 300, dtype=np.float32), 255)
+    few = np.append(losses.repeat(10), np.float32([255]))
+    other = np.append(losses, np.float32([200] * 20))
+    for values in (cut_off, few, other):
+        assert nodata_taken_as_level(values) is None
+
+
+def test_a_number_that_hardly_a_level_reaches_means_no_data_far_from_all_others():
+    levels = np.linspace(-130, -45, 400, dtype=np.float32)
+    for number in (-1, 5, -200):
+        found = nodata_taken_as_level(np.append(levels, np.float32([number] * 100)))
+        assert found == (number, 0.2)
+    # A hole of a few streets in a raster of a town.
+    town = np.linspace(-130, -45, 40_000, dtype=np.float32)
+    for number in (0, -1, -200):
+        found = nodata_taken_as_level(np.append(town, np.float32([number] * 36)))
+        assert found == (number, pytest.approx(36 / 40_036))
+    lost = np.append(70 - town, np.float32([0] * 36))
+    assert nodata_taken_as_level(lost) == (0, pytest.approx(36 / 40_036))
+    # Too few, one that levels reach, near others, and cut off.
+    few = np.append(levels, np.float32([-1] * 4))
+    usual = np.append(levels, np.float32([-25] * 100))
+    near = np.append(np.linspace(-130, -10, 400, dtype=np.float32), np.float32([-1] * 100))
+    cut_off = np.minimum(np.linspace(-130, 20, 400, dtype=np.float32), -1)
+    for values in (few, usual, near, cut_off):
+        assert nodata_taken_as_level(values) is None
