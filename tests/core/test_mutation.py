@@ -261,6 +261,19 @@ def test_samples_are_the_same_for_a_seed_and_grow(toy):
     ]
 
 
+def test_a_sample_of_some_files_has_mutants_of_these_alone(toy):
+    (toy / "toy" / "more.py").write_text("def more(a):\n    return a + 1\n")
+
+    def files(*patterns):
+        tasks = judge.plan(toy, "toy", None, 1, rooms=ROOM, files=patterns)
+        return {task.mutant.file for task in tasks}
+
+    assert files() == {"toy/sums.py", "toy/more.py"}
+    assert files("more.py") == files("toy/m*.py") == {"toy/more.py"}
+    assert files("more.py", "sums.py") == files()
+    assert files("ore.py") == set()
+
+
 def test_equivalents_are_matched_by_line_and_change(toy):
     entry = record.Reviewed("toy/sums.py", "return a - b", "- → +", "an example")
     tasks = judge.plan(toy, "toy", None, 1, [entry], rooms=ROOM)
