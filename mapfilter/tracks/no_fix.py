@@ -64,12 +64,10 @@ def _kinds(values: pd.Series) -> Any:
         return np.where(np.isnan(numbers), "missing", np.where(numbers == 0, "zero", ""))
     if not isinstance(values.dtype, pd.StringDtype):
         return np.array([_kind(value) for value in values], dtype=object)
-    texts = pa.array(values, type=pa.string(), from_pandas=True)
+    texts = pc.fill_null(pa.array(values, type=pa.string()), "")
     missing, zero = (
-        pc.fill_null(pc.match_substring_regex(texts, rf"^(?:{pattern})$"), of_none).to_numpy(
-            zero_copy_only=False
-        )
-        for pattern, of_none in ((_MISSING, True), (_ZERO, False))
+        pc.match_substring_regex(texts, rf"^(?:{pattern})$").to_numpy(zero_copy_only=False)
+        for pattern in (_MISSING, _ZERO)
     )
     return np.where(missing, "missing", np.where(zero, "zero", ""))
 
