@@ -238,6 +238,19 @@ def test_tests_that_fail_anyway_are_an_error(toy):
         judged(toy)
 
 
+def test_examples_that_fail_are_not_shrunk(toy):
+    (toy / "tests" / "conftest.py").write_text(
+        "from hypothesis import settings\n\n"
+        "settings.register_profile('own', deadline=None)\nsettings.load_profile('own')\n"
+    )
+    (toy / "tests" / "test_more.py").write_text(
+        "from hypothesis import Phase, settings\n\n\ndef test_phases():\n"
+        "    assert Phase.generate in settings.default.phases\n"
+        "    assert Phase.shrink not in settings.default.phases\n"
+    )
+    assert judged(toy)
+
+
 def test_two_runs_never_share_a_copy(toy):
     with (
         Workshop(toy, toy / "out", "toy"),
