@@ -145,3 +145,30 @@ def test_places_beyond_all_errors_change_nothing_for_good():
 def test_a_session_keeps_what_is_known_of_the_errors():
     known = TimingState(3.0, 4.0, DifferenceErrors((0.1, 0.2, 0.3, 0.2, 0.1, 0.1), (("C", 0.7),)))
     assert decode(encode({"timing": known}), "here")["timing"] == known
+
+
+def test_many_differences_that_fit_nothing_tell_no_less():
+    """Densities of 120 of them are far below what a number can be."""
+    angle = np.linspace(0.0, 6.0, 121)
+    stations_m = np.column_stack([900 * np.cos(angle), 900 * np.sin(angle), np.full(121, 30.0)])
+    names, sigma_m = tuple(f"S{k}" for k in range(121)), np.full(121, 10.0)
+    model = range_differences(LAYOUT, stations_m.tolist(), sigma_m)
+    off_m = np.where(np.arange(120) % 2, 1e6, -1e6)
+    reading_m = model.mean(np.array([[100.0, 200.0]]))[0] + off_m
+    one = DifferenceTerm(model, reading_m, names, sigma_m, 1.0, 3.0, NONE)
+    found = NONE.after([one], Cloud([(100.0, 200.0)], [1.0]))
+    # All of them count as 3 deviations off: stated errors are the most probable.
+    assert found.shares[0] > 0.9
+    assert sum(found.shares) == pytest.approx(1.0)
+
+
+def test_stations_that_were_all_at_fault_leave_some_cases():
+    """No case with but one of them at fault is as probable as one in ten thousand."""
+    known = DifferenceErrors(faults=tuple((name, 0.999) for name in NAMES))
+    one = term((3.0, -4.0), errors=known)
+    # The likely factors, and each station alone.
+    assert {(case.at_fault, case.factor) for case in one.cases} == {
+        (station, factor) for station in range(3) for factor in (1.0, 2.0, 4.0, 8.0)
+    }
+    assert np.isfinite(one.log_likelihood(Cloud([(100.0, 200.0)], [1.0]).state)).all()
+    assert np.isfinite(one.under_null)

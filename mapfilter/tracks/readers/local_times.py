@@ -101,7 +101,7 @@ def change_notes(local_s: Floats, utc_s: Floats, zone: str, after_s: float = nan
 
 
 def is_beside_change(utc_s: Floats, zone: str) -> bool:
-    """Return whether any of some times is within an hour of a change of a zone's clock."""
+    """Return whether some times are within an hour, or on both sides, of a zone's clock change."""
     rules = parse_zone(zone)
     quarters = np.unique(np.floor(utc_s[np.isfinite(utc_s)] / _QUARTER_S))
     near = np.unique(np.clip(quarters[:, None] + [-4, 4], -_FAR_QUARTERS, _FAR_QUARTERS))
