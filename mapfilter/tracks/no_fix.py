@@ -35,8 +35,8 @@ def holds_no_fix(lat_deg: object, lon_deg: object) -> bool:
 
 def rows_without_fix(lat_deg: pd.Series, lon_deg: pd.Series) -> Bools:
     """Return which rows hold no position, shape (N,); values are numbers or texts."""
-    kinds = [_kinds(values) for values in (lat_deg, lon_deg)]
-    return np.asarray((kinds[0] == kinds[1]) & (kinds[0] != ""), dtype=np.bool_)
+    of_lat, of_lon = _kinds(lat_deg), _kinds(lon_deg)
+    return np.asarray((of_lat == of_lon) & (of_lat != ""), dtype=np.bool_)
 
 
 def no_fix_note(where: str, count: int, first: str) -> str:
