@@ -25,6 +25,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
 from mapfilter.positioning.bayes.held import HeldOtherwise
 from mapfilter.positioning.bayes.hold import Hold
+from mapfilter.positioning.bayes.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.rivals import Rivals
 from mapfilter.positioning.bayes.weighing import Weighing, weighed_by
 from mapfilter.positioning.epochs import Epoch, ReportRow
@@ -193,3 +194,24 @@ def test_the_terms_of_an_alternative_are_its_own():
     assert weighed_by(belief(), updates, measured=True).terms == (TERM,)
     assert weighed_by(belief(), updates, measured=True, alternative=True).terms == (own,)
     assert weighed_by(belief(), [EvidenceUpdate(None)], measured=True) is None
+
+
+@pytest.mark.parametrize("proven", [True, False])
+def test_on_carriageways_a_belief_converges_once_it_is_ahead_of_its_twin(proven):
+    asked = []
+
+    def is_proven(*given):
+        asked.append(given)
+        return proven
+
+    lanes = SimpleNamespace(mirror=SimpleNamespace(proven=is_proven), places=17)
+    beliefs, searching = Beliefs(lanes=lanes), belief(SEARCHING)
+    twin = MirroredTwin(belief(SEARCHING), -3.0)
+    weighed(beliefs, replace(STATE, belief=searching, twin=twin))
+    assert asked == [(searching, twin, STATE.path.turned_rad, 17)]
+    assert beliefs.filter.readings[0].doubted is not proven
+
+
+def test_without_carriageways_there_is_no_twin():
+    assert weighed(state=replace(STATE, twin=MirroredTwin(belief(), -3.0)))[0].twin is None
+    assert weighed()[0].twin is None
