@@ -83,12 +83,25 @@ def test_a_second_of_which_less_than_half_is_known_counts_for_nothing():
     parts = {}
     for missing in (25, 26):
         signals = still(60, field=NORTH)
-        signals.field_ut[30 * HZ : 30 * HZ + missing] = nan
+        signals.field_ut[30 * HZ : 30 * HZ + missing, 0] = nan
         parts[missing] = covariance(bias_while_carried([signals]))
     assert parts[25] == pytest.approx(whole, rel=1e-3, abs=1e-6)
     # Three means and their pairs, before and after.
     information = PRIOR + known(43) + known(43 - 6)
     assert parts[26][0, 0] == pytest.approx(1 / information, rel=1e-3)
+
+
+def test_pairs_that_are_off_count_less():
+    """Gravity leans by 4.5 degrees for a second: by 1.5 in three means, of six pairs.
+
+    That is three times their error: they count for a half, where the others count twice.
+    """
+    signals = still(60, (0.0, 0.0, 0.0))
+    lean = np.radians(4.5)
+    signals.force_mps2[30 * HZ : 31 * HZ] = 9.8 * np.array([np.sin(lean), 0.0, np.cos(lean)])
+    found = bias_while_carried([signals])
+    assert covariance(found)[0, 0] == pytest.approx(1 / (PRIOR + known(37 + 6 / 4)), rel=2e-3)
+    assert np.degrees(found.bias_radps) == pytest.approx(np.zeros(3), abs=1e-3)
 
 
 def test_large_biases_are_found_as_well():
@@ -120,6 +133,24 @@ def test_what_turns_is_followed():
                       pose.inv().apply(np.tile(NORTH, (count, 1))))  # fmt: skip
     found = bias_while_carried([signals])
     assert np.degrees(found.bias_radps) == pytest.approx(BIAS_DEGPS, abs=0.01)
+
+
+def test_a_bias_acts_by_the_attitude_in_the_middle_of_each_sample():
+    """Of a phone that swings about its right: the sums of its attitude over 15 s, by loops."""
+    rate = np.where(np.arange(60 * HZ) // (2 * HZ) % 2, -20.0, 20.0)
+    middle = np.radians(np.cumsum(rate) - rate / 2) / HZ
+    nothing = 0 * middle
+    pose = Rotation.from_rotvec(np.column_stack([middle, nothing, nothing]))
+    signals = still(60, (0.0, 0.0, 0.0))
+    signals.rate_radps[:, 0] = np.radians(rate)
+    signals.force_mps2[:] = pose.inv().apply(UP)
+    information, crossed_up = PRIOR * np.eye(3), np.array([[0, -1, 0], [1, 0, 0], [0, 0, 0]])
+    for first in range(1, 44):
+        summed = pose[first * HZ : (first + 15) * HZ].as_matrix().sum(axis=0) / HZ
+        effect = crossed_up @ summed
+        information += effect.T @ effect * 2 / 0.5**2 / 18
+    found = bias_while_carried([signals])
+    assert covariance(found) == pytest.approx(np.linalg.inv(information), rel=2e-3, abs=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -65,8 +65,18 @@ def test_rows_follow_those_of_an_earlier_part():
     assert utc_of("2:10", "2:20", after="2:10") == ["00:10", "00:20"]
     # All of them, also where times fall by much.
     assert utc_of("2:50", "2:05", after="1:45") == ["01:50", "01:05"]
+    # One alone does, too, and the last of its hour.
+    assert utc_of("2:10", after="0:45") == ["01:10"]
+    assert utc_of("2:50", "3:10", after="1:45") == ["01:50", "02:10"]
     # Only the first of them follows.
     assert utc_of("1:50", "2:10", "2:20", after="0:30") == ["23:50", "00:10", "00:20"]
+
+
+def test_rows_may_come_several_times_a_second():
+    local_s = seconds(BACK, "3:00") + np.array([-0.4, -0.2, 0.0, 0.2])
+    assert (local_s - utc_from_local_s(local_s, BERLIN)).tolist() == [3600.0] * 4
+    local_s -= 3600.0
+    assert (local_s - utc_from_local_s(local_s, BERLIN)).tolist() == [7200.0] * 4
 
 
 def test_half_an_hour_that_comes_twice():
