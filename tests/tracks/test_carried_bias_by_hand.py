@@ -183,6 +183,8 @@ def test_what_is_parted_has_mean_attitudes_turned_back_by_the_yaw():
     section = np.repeat([0, 1, 2], [700, 2400, 800])
     yaw = 0.001 * np.arange(3900.0)
     lies = np.where(np.arange(3900) < 1900, 0.5, -1.0)
+    # Two samples of each second count.
+    lies[np.arange(3900) % 25 != 0] = 0.9
     about = np.zeros(3900)
     to_level = Rotation.from_rotvec(np.column_stack([about, about, yaw])) * Rotation.from_rotvec(
         np.column_stack([lies, about, about])
@@ -216,6 +218,7 @@ def jumps_of(*parts, walking=None, weight=None):
         (((500, 0.0), (499, 61.0)), []),
         (((500, 0.0), (500, 59.0)), []),
         (((500, 0.0), (500, -61.0)), [500]),
+        (((500, 90.0), (500, 150.05)), [500]),
         (((600, 170.0), (600, -120.0)), [600]),
         (((600, 0.0), (700, 90.0), (600, 0.0)), [600, 1300]),
         (((600, 0.0), (600, 90.0), (600, 180.0), (600, 270.0)), [600, 1200, 1800]),
@@ -235,7 +238,7 @@ def test_only_walks_count():
     assert jumps_of((900, 0.0), (1100, 90.0), walking=walking).size == 0
 
 
-@pytest.mark.parametrize(("other", "cut"), [(0.19, True), (0.21, False)])
+@pytest.mark.parametrize(("other", "cut"), [(0.19, True), (0.2, False), (0.21, False)])
 def test_six_tenths_of_accelerations_have_one_direction(other, cut):
     """A share of them points backward: of 1 - 2 s of all is left."""
     weight = np.where(np.arange(1000) % 100 < 100 * other, -1.0, 1.0)
@@ -294,10 +297,17 @@ def test_swings_are_from_the_mean_of_three_seconds():
     assert found.shape == (3,)
 
 
+def test_a_slow_sway_is_no_swing():
+    """Of 6 s: of a mean over half of it one is a half away, in the median."""
+    lean = np.where(np.arange(6000) // 150 % 2, 0.2, -0.2)
+    turned = attitude_of(Rotation.from_rotvec(np.outer(lean, [0, 1.0, 0])), np.zeros(6000, int))
+    assert swings_rad(turned, np.ones(6000, bool)) == pytest.approx([np.sin(0.2) / 2], rel=0.03)
+
+
 def test_a_posture_swings_as_it_does_while_walking():
     lean = np.where(np.arange(3000) % HZ < HZ // 2, 0.2, -0.2)
     walking = np.arange(3000) < 800
     quiet = np.where(walking, lean, 0.0)
-    turned = attitude_of(Rotation.from_rotvec(np.outer(quiet, [1.0, 0, 0])), np.zeros(3000, int))
+    turned = attitude_of(Rotation.from_rotvec(np.outer(quiet, [0, 1.0, 0])), np.zeros(3000, int))
     assert swings_rad(turned, walking) == pytest.approx([np.sin(0.2)], rel=1e-3)
     assert pi > swings_rad(turned, ~walking)[0] == pytest.approx(0.0, abs=1e-9)
