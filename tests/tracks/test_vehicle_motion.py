@@ -90,6 +90,10 @@ def test_turns_from_row_to_row_come_before_those_of_a_phone():
     found, notes = drive_by(odometry(TIMES_S, yaw=0.1), own=TURNS)
     assert found.rows["turn_rad"].iloc[1:].tolist() == pytest.approx([0.1] * 29)
     assert notes == (NO_BIAS,)
+    some = np.full(30, 0.1)
+    some[3] = nan
+    _, notes = drive_by(odometry(TIMES_S, yaw=some), own=TURNS)
+    assert not any("turns are those" in note for note in notes)
     assert own_turning(recording(odometry=odometry(TIMES_S))) is None
 
 
