@@ -1,5 +1,6 @@
 """What time differences say of a place and of their own errors, with numbers by hand."""
 
+from dataclasses import replace
 from math import exp
 
 import numpy as np
@@ -57,7 +58,7 @@ def by_hand(off_m, at_fault, factor):
     return exp(-0.5 * min(square, 18.0) - cost) / factor**2
 
 
-@pytest.mark.parametrize("off_m", [(3.0, -4.0), (60.0, 10.0), (900.0, -900.0)])
+@pytest.mark.parametrize("off_m", [(3.0, -4.0), (60.0, 10.0), (900.0, -900.0), (9e3, 9e3)])
 def test_what_a_difference_says_is_a_mixture_over_its_errors(off_m):
     here = Cloud([(100.0, 200.0)], [1.0]).state
     for errors in (NONE, DifferenceErrors((0.05, 0.05, 0.6, 0.1, 0.1, 0.1), (("C", 0.7),))):
@@ -69,6 +70,30 @@ def test_what_a_difference_says_is_a_mixture_over_its_errors(off_m):
             np.testing.assert_allclose(found, weight * np.log(mixed), rtol=2e-3)
             expected = weight * (np.log(null) - 0.75 * 2)
             assert one.under_null == pytest.approx(expected, rel=2e-3)
+
+
+def test_each_hypothesis_has_its_own_mixture_however_far_cases_are_apart():
+    """A density of stated errors is nothing beside that of 32 times as large ones."""
+    one = replace(term((450.0, -450.0)), clip_sd=30.0)
+    state = Cloud([(100.0, 200.0), (400.0, 450.0)], [0.5, 0.5]).state
+    found = one.log_likelihood(state)
+    alone = [one.log_likelihood(state[:, [k]])[0] for k in range(2)]
+    assert found.tolist() == pytest.approx(alone)
+    assert -12.0 < found[0] < -6.0
+
+
+def test_cases_below_one_in_ten_thousand_are_left_out():
+    for share, kept in ((3e-4, True), (1.9e-4, False)):
+        known = DifferenceErrors((0.3, 0.25, 0.2, 0.12, 0.13 - share, share))
+        cases_of = {(case.at_fault, case.factor) for case in term((0.0, 0.0), errors=known).cases}
+        # Of 0.8³ without a fault.
+        assert ((None, 32.0) in cases_of) is kept
+
+
+def test_no_fault_is_certain():
+    found = term((0.0, 0.0), errors=DifferenceErrors(faults=(("A", 1.0),))).cases
+    (sure,) = [case for case in found if (case.at_fault, case.factor) == (0, 1.0)]
+    assert sure.probability == pytest.approx(0.999 * 0.8**2 * 0.3)
 
 
 def test_readings_tell_the_errors_by_all_places_of_a_belief():
@@ -115,7 +140,7 @@ def learnt(factor, late_m, rng):
     return known
 
 
-@pytest.mark.parametrize("factor", [1.0, 4.0, 16.0])
+@pytest.mark.parametrize("factor", [1.0, 4.0, 16.0, 32.0])
 def test_after_some_readings_the_factor_is_known(factor):
     known = learnt(factor, 0.0, np.random.default_rng(3))
     shares = dict(zip(FACTORS, known.shares, strict=True))
