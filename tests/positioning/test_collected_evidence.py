@@ -26,6 +26,7 @@ from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
 from mapfilter.positioning.bayes.held import HeldOtherwise
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.rivals import Rivals
 from mapfilter.positioning.bayes.weighing import Weighing, weighed_by
 from mapfilter.positioning.epochs import Epoch, ReportRow
@@ -183,7 +184,15 @@ class Half(Area):
         return False
 
 
+class Whole(Area):
+    """An area that is asked for all places alone."""
+
+    def holds(self, *_):
+        return False
+
+
 def test_most_of_a_belief_in_the_area_is_enough():
+    assert weighed(Beliefs(area=Whole()))[0].status is TRACKING
     assert weighed(Beliefs(area=Half()))[0].status is TRACKING
     assert weighed(Beliefs(area=Half(inside=False)))[0].status is Status.OUTSIDE
 
@@ -210,8 +219,24 @@ def test_on_carriageways_a_belief_converges_once_it_is_ahead_of_its_twin(proven)
     weighed(beliefs, replace(STATE, belief=searching, twin=twin))
     assert asked == [(searching, twin, STATE.path.turned_rad, 17)]
     assert beliefs.filter.readings[0].doubted is not proven
+    # One is asked for where there is none yet.
+    with patch.object(NewBeliefs, "twin", return_value=twin):
+        assert weighed(Beliefs(lanes=lanes), replace(STATE, belief=searching))[0].twin is twin
 
 
 def test_without_carriageways_there_is_no_twin():
     assert weighed(state=replace(STATE, twin=MirroredTwin(belief(), -3.0)))[0].twin is None
     assert weighed()[0].twin is None
+
+
+def test_an_alternative_starts_with_what_contradicts_the_belief():
+    way, seen = object(), []
+
+    def noted(_, state, main, epoch, contradiction, rng):  # noqa: ARG001
+        seen.append((main.log_evidence, epoch.time_s, contradiction))
+
+    disputed = UPDATES[0]._replace(disputed=True)
+    with patch.object(NewBeliefs, "alternative", noted):
+        weighed(updates=[disputed, EvidenceUpdate(None, contradiction=way)])
+        weighed(updates=[disputed])
+    assert seen == [(-12.0, 9.0, way), (-12.0, 9.0, None)]
