@@ -35,8 +35,8 @@ def holds_no_fix(lat_deg: object, lon_deg: object) -> bool:
 
 def rows_without_fix(lat_deg: pd.Series, lon_deg: pd.Series) -> Bools:
     """Return which rows hold no position, shape (N,); values are numbers or texts."""
-    kinds = [_kinds(values) for values in (lat_deg, lon_deg)]
-    return np.asarray((kinds[0] == kinds[1]) & (kinds[0] != ""), dtype=np.bool_)
+    of_lat, of_lon = _kinds(lat_deg), _kinds(lon_deg)
+    return np.asarray((of_lat == of_lon) & (of_lat != ""), dtype=np.bool_)
 
 
 def no_fix_note(where: str, count: int, first: str) -> str:
@@ -64,12 +64,10 @@ def _kinds(values: pd.Series) -> Any:
         return np.where(np.isnan(numbers), "missing", np.where(numbers == 0, "zero", ""))
     if not isinstance(values.dtype, pd.StringDtype):
         return np.array([_kind(value) for value in values], dtype=object)
-    texts = pa.array(values, type=pa.string(), from_pandas=True)
+    texts = pc.fill_null(pa.array(values, type=pa.string()), "")
     missing, zero = (
-        pc.fill_null(pc.match_substring_regex(texts, rf"^(?:{pattern})$"), of_none).to_numpy(
-            zero_copy_only=False
-        )
-        for pattern, of_none in ((_MISSING, True), (_ZERO, False))
+        pc.match_substring_regex(texts, rf"^(?:{pattern})$").to_numpy(zero_copy_only=False)
+        for pattern in (_MISSING, _ZERO)
     )
     return np.where(missing, "missing", np.where(zero, "zero", ""))
 

@@ -238,6 +238,19 @@ def test_tests_that_fail_anyway_are_an_error(toy):
         judged(toy)
 
 
+def test_examples_that_fail_are_not_shrunk(toy):
+    (toy / "tests" / "conftest.py").write_text(
+        "from hypothesis import settings\n\n"
+        "settings.register_profile('own', deadline=None)\nsettings.load_profile('own')\n"
+    )
+    (toy / "tests" / "test_more.py").write_text(
+        "from hypothesis import Phase, settings\n\n\ndef test_phases():\n"
+        "    assert Phase.generate in settings.default.phases\n"
+        "    assert Phase.shrink not in settings.default.phases\n"
+    )
+    assert judged(toy)
+
+
 def test_two_runs_never_share_a_copy(toy):
     with (
         Workshop(toy, toy / "out", "toy"),
@@ -259,6 +272,19 @@ def test_samples_are_the_same_for_a_seed_and_grow(toy):
     assert [name.split(":")[-1] for name in sample(None, 1)] == [
         name.split(":")[-1] for name in before
     ]
+
+
+def test_a_sample_of_some_files_has_mutants_of_these_alone(toy):
+    (toy / "toy" / "more.py").write_text("def more(a):\n    return a + 1\n")
+
+    def files(*patterns):
+        tasks = judge.plan(toy, "toy", None, 1, rooms=ROOM, files=patterns)
+        return {task.mutant.file for task in tasks}
+
+    assert files() == {"toy/sums.py", "toy/more.py"}
+    assert files("more.py") == files("toy/m*.py") == {"toy/more.py"}
+    assert files("more.py", "sums.py") == files()
+    assert files("ore.py") == set()
 
 
 def test_equivalents_are_matched_by_line_and_change(toy):

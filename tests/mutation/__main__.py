@@ -4,6 +4,7 @@
     python -m tests.mutation --room models --room filters    some rooms
     python -m tests.mutation --room models --list            what would be planted
     python -m tests.mutation --room models --near 5          by the five nearest files of tests
+    python -m tests.mutation --room models --file way_spread.py --all      those of some files alone
 
 Verdicts go to ``out/mutants/verdicts.jsonl``; what was judged already is not judged again.
 """
@@ -27,6 +28,13 @@ def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser("tests.mutation", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--room", action="append", choices=ROOMS, help="a room; all by default")
+    parser.add_argument(
+        "--file",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="only files whose path ends so, as bayes/timing.py or 'bayes/*.py'; all by default",
+    )
     parser.add_argument("--sample", type=int, default=40, help="mutants of each room (40)")
     parser.add_argument("--seed", type=int, default=1, help="which ones (1)")
     parser.add_argument("--all", action="store_true", help="all mutants of each room")
@@ -49,7 +57,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     tasks = [
         task
         for room in rooms
-        for task in plan(ROOT, room, count, options.seed, entries, near=options.near)
+        for task in plan(
+            ROOT, room, count, options.seed, entries, near=options.near, files=options.file
+        )
     ]
     if options.list:
         for task in tasks:

@@ -47,16 +47,23 @@ def plan(
     rooms: Rooms = ROOMS,
     near: int | None = None,
     package: str = "mapfilter",
+    files: Sequence[str] = (),
 ) -> list[Task]:
     """Return a random sample of a room's mutants, or all of them.
 
     The order is that of a checksum of seed and mutant: a larger sample begins with a smaller one,
     and a change of one line leaves the mutants of others where they were. With ``near`` only so
     many files of tests judge a mutant, those nearest to its file (:meth:`.rooms.Imports.nearest`).
+    With ``files`` the sample is drawn from the room's files whose path ends with one of these
+    patterns (:meth:`pathlib.PurePath.match`).
     """
     imports, tests = Imports(root, package), tuple(rooms[room].test_files(root))
     nearest: dict[str, tuple[Path, ...]] = {}
-    texts = {file: (root / file).read_text() for file in rooms[room].sources(root)}
+    texts = {
+        file: (root / file).read_text()
+        for file in rooms[room].sources(root)
+        if not files or any(file.match(pattern) for pattern in files)
+    }
     found = [m for file, text in texts.items() for m in mutants(text, file.as_posix())]
     found.sort(key=lambda m: hashlib.sha256(f"{seed}:{m.stable}".encode()).digest())
     chosen: list[Task] = []

@@ -32,6 +32,7 @@ ROOMS = {
     # models call them without one.
     "models": Room(("mapfilter/models/*.py",), ("tests/models/test_*.py",)),
     "positioning": Room(("mapfilter/positioning/**/*.py",), ("tests/positioning/test_*.py",)),
+    "tracks": Room(("mapfilter/tracks/**/*.py",), ("tests/tracks/test_*.py",)),
     "database": Room(("mapfilter/database/*.py",), ("tests/database/test_*.py",)),
     "rasters": Room(
         ("mapfilter/rasters/*.py",),

@@ -86,6 +86,15 @@ class Watch:
         self._files_s: dict[str, float] = defaultdict(float)
         self._failed = ""
 
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_load_initial_conftests(self) -> None:
+        from hypothesis import Phase, settings
+
+        # That an example fails is enough; to find the smallest one takes longer than all tests.
+        phases = (Phase.explicit, Phase.reuse, Phase.generate)
+        settings.register_profile("mutants", phases=phases)
+        settings.load_profile("mutants")
+
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         limit_s = self._request.limits_s.get(nodeid.partition("::")[0], self._request.limit_s)
         # Their default actions end the process even within a compiled kernel. Processor time is

@@ -12,7 +12,7 @@ import pytest
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.models.street_motion import EAST, NORTH, STATES
+from mapfilter.models.street_motion import BIAS, EAST, NORTH, STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.held import HeldOtherwise
 from mapfilter.positioning.bayes.hold import Hold
@@ -411,3 +411,29 @@ def test_the_rest_of_the_state_stays():
         assert getattr(found, name) is value, name
     assert found.status is Status.LOST
     assert isnan(move(walking(walking_rad=inf, stepped_s=1.0))[0].walking_rad)
+
+
+def test_a_compass_tells_where_a_phone_that_was_turned_points_afterwards():
+    turned = MotionStep(2.0, nan, nan, 5.0, turned_sd_rad=0.3)
+    for compass, sd_rad in ((True, 0.0), (False, 0.3)):
+        (read,) = steps_of(move(walking(compass=compass), turned)[2])
+        assert (read.step_m, read.turned_sd_rad) == (2.0, sd_rad)
+
+
+def test_what_followed_the_ways_counts_from_the_first_heading_of_a_compass():
+    """Courses along ways, from a heading of 0, are errors of the headings from then on."""
+    other = AlternativeHypothesis(belief(SEARCHING, name=5), 0.0, 0.0)
+    state = walking(alternative=other, held=(turned_phone(),), unaided=(turned_phone(),))
+    by_ways = Beliefs()
+    by_ways.followed_ways = lambda _: True
+    found, _, _ = move(state, STEP, replace(STEP, heading_rad=0.9), beliefs=by_ways)
+    for one in (found.belief, found.alternative.belief):
+        assert one.state[BIAS].tolist() == pytest.approx([-0.5] * 20)
+        assert one.state[EAST].tolist() == [4.0] * 20
+    assert (found.held, found.unaided) == ((), ())
+    # Without a heading there is nothing to count from, nor is there before a belief.
+    along, _, _ = move(state, MotionStep(2.0, nan, nan, 5.0), beliefs=by_ways)
+    assert along.belief.state[BIAS].tolist() == [0.0] * 20
+    assert len(along.held) == 1
+    assert move(BayesState(), STEP, beliefs=by_ways)[0].belief is None
+    assert move(walking(), STEP)[0].belief.state[BIAS].tolist() == [0.0] * 20

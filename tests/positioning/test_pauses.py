@@ -171,3 +171,15 @@ def test_a_turn_that_was_measured_is_known(turn_rad, sd_rad):
     _, seen, (why, _) = watched(watch, Epoch(101.0, (MotionStep(nan, nan, turn_rad),)))
     assert why is Reason.NO_STEP
     assert seen.motion[-1].turned_sd_rad == pytest.approx(sd_rad)
+
+
+def test_of_a_pause_that_is_filled_up_the_rest_is_added():
+    """Rows are missing for 20.5 s, of which 20 are in the belief, and the last tells of 0.1 s."""
+    pace = replace(ALWAYS, interval_s=0.1)
+    watch = SensorWatch(pace, 100.0, 120.0, unmeasured_s=20.0, moved_m=4.0)
+    watch, seen, (why, _) = watched(watch, Epoch(120.5, (MotionStep(0.14, 0.0),)))
+    missed, step = seen.motion
+    assert (why, step.step_m) == (Reason.MOTION_MISSING, 0.14)
+    assert missed.step_m == pytest.approx(1.4 * 0.4)
+    # Both are of the way since the last report.
+    assert watch.moved_m == pytest.approx(4.0 + 0.14 + 1.4 * 0.4)

@@ -78,6 +78,9 @@ def test_advances_of_one_report_are_one_term_beside_rows_without_any(area):
     assert term.weight == pytest.approx(1 - np.exp(-2 * 10.0 / 50.0))
     # Two readings: half as bad again as is expected at the true position.
     assert update.under_null == pytest.approx(-0.5 * 1.5 * 2 * term.weight)
+    # As far off as 3 deviations each, and no more.
+    far = term.log_likelihood(state((5000.0, 5000.0)))
+    np.testing.assert_allclose(far, -0.5 * 2 * 9.0 * term.weight)
     assert TimingSource(area, LTE).first(epoch).state == TimingState(0.0)
     # A measured map of timing advances stands in for distances.
     without = TimingSource(area, LTE, advances=False).read(TimingState(), epoch, 20.0)

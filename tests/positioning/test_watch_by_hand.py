@@ -7,7 +7,7 @@ from math import exp, isnan, nan, sqrt
 import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.repeats import MotionRepeats
 from mapfilter.positioning.sensors.rest import Rest
@@ -399,3 +399,42 @@ def test_eight_nats_make_a_radio_stale(before, stale):
     # Without a report nothing is stale.
     _, seen, (_, why) = watched(watch._replace(repeated_nats=99.0), epoch(2.0))
     assert why is Reason.USED
+
+
+def placed(watch, *times_s, mps=10.0, step_m=0.0, begin_s=0.0):
+    """Follow a phone that positions show on its way to the east, whatever its counter does."""
+    for time_s in times_s:
+        fix = GnssFix(mps * (time_s - begin_s), 0.0)
+        row = Epoch(time_s, (MotionStep(step_m, 0.01 * time_s),), fix=fix)
+        watch, seen, (why, _) = watched(watch, row)
+    return watch, seen, why
+
+
+def test_positions_that_go_on_show_where_the_ride_began():
+    """Four intervals and eight seconds; the counter misses most of it."""
+    usual = begun(rows=100, interval_s=1.0, speed_mps=1.4)
+    watch, _, why = placed(usual, 2.0, 4.0, 6.0, 8.0, step_m=0.1)
+    assert (why, watch.moving_s, watch.rest.is_carried) == (Reason.USED, 0.0, False)
+    assert watch.rest.measured_m == pytest.approx(0.4)
+    watch, seen, why = placed(watch, 10.0, step_m=0.1)
+    # Before the first of them the way is measured.
+    assert (why, watch.moving_s, watch.rest.since_s) == (Reason.MOTION_STUCK, 2.0, 2.0)
+    assert (watch.rest.carried_mps, watch.rest.measured_m) == (pytest.approx(10.0), 0.0)
+    assert (watch.known_s, watch.unmeasured_s) == (10.0, 8.0)
+    assert seen.motion[-1].step_m == pytest.approx(80.0)
+    assert len(watch.places.rows) == 5
+
+
+def test_a_ride_that_levels_have_shown_has_its_speed_from_positions():
+    usual = begun(rows=100, interval_s=1.0, speed_mps=1.4)
+    carried = usual._replace(rest=Rest(0.0, carried_nats=6.0, pace_mps=1.4))
+    watch, seen, _ = placed(carried, 2.0, 4.0, 6.0, 8.0, 10.0)
+    # Since the last usual step; the speed of the last two seconds alone is new.
+    assert (watch.moving_s, watch.rest.since_s) == (0.0, 0.0)
+    assert watch.rest.carried_mps == pytest.approx(10.0)
+    assert (watch.known_s, watch.unmeasured_s) == (10.0, 10.0)
+    assert seen.motion[-1].step_m == pytest.approx(20.0)
+
+
+def test_no_report_is_one_after_a_ride():
+    assert not after(epoch(3.0), epoch(4.0, 1.0)).rode_unheard

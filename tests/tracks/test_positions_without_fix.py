@@ -116,6 +116,21 @@ def test_columns_are_judged_as_single_values_are(pairs):
         assert rows_without_fix(lat.astype(texts), lon.astype(texts)).tolist() == expected
 
 
+@pytest.mark.parametrize("kind", ["python", "pyarrow"])
+@pytest.mark.parametrize("missing", [np.nan, pd.NA], ids=["nan", "NA"])
+def test_a_missing_text_is_no_number_in_every_type_of_column(kind, missing):
+    texts = pd.StringDtype(kind, na_value=missing)
+    lat = pd.Series([None, None, "", None, "0"], dtype=texts)
+    lon = pd.Series([None, "nan", None, "0", "8.6"], dtype=texts)
+    assert rows_without_fix(lat, lon).tolist() == [True, True, True, False, False]
+
+
+def test_only_numbers_and_texts_are_zeros():
+    assert not holds_no_fix(False, False)
+    assert not holds_no_fix([0.0], [0.0])
+    assert holds_no_fix(np.int64(0), 0)
+
+
 @settings(deadline=None)
 @given(st.lists(st.text(alphabet="0.-+eEnaulNUL 1", max_size=6), min_size=1, max_size=8))
 def test_texts_are_judged_alike_in_every_type_of_column(texts):

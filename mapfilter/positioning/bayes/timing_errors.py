@@ -36,6 +36,9 @@ NULL_FACTOR = 1.5
 _CHANGES, _LEAST, _RARE, _SUREST = 0.02, 1e-300, 1e-4, 0.999
 """How often errors become any others between independent readings; least likelihood; probability
 below which a case is left out; largest one of a fault."""
+_KEPT = 0.3
+"""Share of the most probable case from which on none is left out: of dozens of stations none is at
+fault but rarely, nor one alone."""
 
 
 class DifferenceErrors(NamedTuple):
@@ -134,10 +137,12 @@ class DifferenceTerm:
         at_fault: list[tuple[int | None, float]] = [(None, none)]
         at_fault += [(k, none * odds / (1 - odds)) for k, odds in enumerate(faults)]
         found, count = [], self.reading_m.size
+        most = max(odds for _, odds in at_fault) * max(errors.shares)
+        least = min(_RARE, _KEPT * most)
         for (station, odds), (factor, share) in product(
             at_fault, zip(FACTORS, errors.shares, strict=True)
         ):
-            if odds * share < _RARE:
+            if odds * share < least:
                 continue
             sigma_m = factor * self.sigma_m
             log_scale = -count * log(factor)

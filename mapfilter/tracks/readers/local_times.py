@@ -101,7 +101,7 @@ def change_notes(local_s: Floats, utc_s: Floats, zone: str, after_s: float = nan
 
 
 def is_beside_change(utc_s: Floats, zone: str) -> bool:
-    """Return whether any of some times is within an hour of a change of a zone's clock."""
+    """Return whether some times are within an hour, or on both sides, of a zone's clock change."""
     rules = parse_zone(zone)
     quarters = np.unique(np.floor(utc_s[np.isfinite(utc_s)] / _QUARTER_S))
     near = np.unique(np.clip(quarters[:, None] + [-4, 4], -_FAR_QUARTERS, _FAR_QUARTERS))
@@ -160,10 +160,11 @@ def _second_pass_s(local_s: Floats, later_s: Floats, behind_s: float) -> Floats:
     edges = np.diff((later_s > 0).astype(np.int8), prepend=0, append=0)
     begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
     steps = np.diff(local_s)
+    near = (steps >= 0) & (steps <= _QUARTER_S)
     for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
         falls = np.flatnonzero(steps[begin : end - 1] < -later_s[begin] / 2)
-        comes = begin > 0 and 0 <= steps[begin - 1] <= _QUARTER_S
-        goes_on = end < size and 0 <= steps[end - 1] <= _QUARTER_S
+        comes = begin > 0 and near[begin - 1]
+        goes_on = end < size and near[end - 1]
         follows = begin == 0 and later_s[0] / 2 < behind_s < 2 * later_s[0]
         if falls.size or follows or (goes_on and not comes):
             since = begin + int(falls[0]) + 1 if falls.size and not follows else begin
