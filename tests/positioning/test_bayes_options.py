@@ -12,6 +12,7 @@ from small_area import FLOOR_DBM, LATTICE, make_area
 from mapfilter.errors import ConfigError
 from mapfilter.positioning.bayes import opened_area
 from mapfilter.positioning.bayes import options as tested
+from mapfilter.positioning.bayes import over_survey as surveys
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.radio.cells import CellPlan
@@ -243,7 +244,7 @@ def test_options_that_are_not_given_are_those_of_surveys_over_one(monkeypatch, r
     monkeypatch.setattr(tested, "AreaMap", held)
     asked = []
     over_survey = lambda bound, *given: (asked.append(given), bound)[1]  # noqa: E731
-    monkeypatch.setattr(tested, "over_survey", over_survey)
+    monkeypatch.setattr(surveys, "over_survey", over_survey)
     database = Surveyed(*roles)
     bound = BayesFilter(level_weight=0.8).over(database)
     assert asked == [(database, "measured")]
