@@ -27,6 +27,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     part_rows,
     read_left_out,
     session_rows,
+    worst_session,
     write_left_out,
 )
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -53,6 +54,19 @@ def run(session, method="bayes", errors=(10.0, 30.0), **changed):
 
 
 CENTROID_M = {"a": np.array([100.0, 200.0, 300.0]), "b": np.array([400.0])}
+
+
+def test_the_worst_run_is_a_wrong_claim_before_a_large_error():
+    """A run that never converged claims nothing, so it is none."""
+
+    def of(name, filtered, error_m):
+        return LeftOut(name, CENTROID_M["a"], (filtered, run(name, "smoothed", [error_m])))
+
+    never = of("a", run("a", converged=False, success=False), 30.0)
+    right, wrong = of("b", run("b"), 60.0), of("c", run("c", success=False), 40.0)
+    assert worst_session([never, right]) == (1, 0)
+    assert worst_session([never, right, wrong]) == (2, 0)
+    assert worst_session([]) is None
 
 
 def test_a_row_of_a_part_by_hand():

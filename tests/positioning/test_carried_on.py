@@ -65,6 +65,14 @@ def test_a_jump_is_none(east_m):
     assert places(east_m).carried is None
 
 
+def test_positions_that_go_back_and_forth_are_no_way():
+    """They end 100 m away, but the middles of both halves are 5 m apart: of a way 40 m and more."""
+    wandering = (0.0, 50.0, 95.0, 50.0, 10.0, 50.0, 100.0)
+    assert places(wandering, every_s=3.0).carried is None
+    steady = tuple(np.linspace(0.0, 100.0, 7))
+    assert places(steady, every_s=3.0).carried is not None
+
+
 def test_positions_too_near_in_time_held_or_old_do_not_count():
     held = Places()
     for time_s in np.arange(0.0, 60.0, 2.0):
