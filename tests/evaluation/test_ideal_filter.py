@@ -275,6 +275,18 @@ def test_straight_on_is_likeliest_in_the_open_and_lengths_are_those_of_the_steps
     assert gone_m[-2] < 150 <= gone_m[-1]
 
 
+def test_to_the_north_a_hypothesis_at_the_start_is_near_the_truth():
+    level_dbm = np.full((*SHAPE, 1), -70.0, dtype=np.float32)
+    levels = Levels(
+        np.ones(SHAPE, dtype=bool), level_dbm, level_dbm, np.zeros(1, int), np.zeros(1, int),
+        FLOOR_DBM, 0.0,
+    )  # fmt: skip
+    rows, cols, gone_m = np.array([9, 6, 4]), np.array([3, 3, 3]), np.array([0.0, 15.0, 25.0])
+    start = rows[:1].astype(np.int32), cols[:1].astype(np.int32)
+    found = judged_by_cells(rows, cols, gone_m, *start, levels, 0.5, 10.0)
+    assert found == (0.0, 0.0)
+
+
 def test_where_no_cell_is_received_hypotheses_are_only_moved():
     """Levels below the floor on a part of the way: nothing is told there."""
     world = World(0)
