@@ -10,6 +10,7 @@ from small_world import CRS, LATTICE, make_database, make_world
 
 from mapfilter._json_files import sealed
 from mapfilter.database.build import check_parameters
+from mapfilter.database.defaults import MARGIN_DB, TILE_PX
 from mapfilter.database.field import fill_field
 from mapfilter.database.manifest import (
     InputFile,
@@ -156,6 +157,10 @@ def test_tiles_along_the_curve():
     assert tile_windows(lattice, 3) == [
         (0, 0, 3, 3), (0, 3, 3, 3), (3, 0, 2, 3), (3, 3, 2, 3), (0, 6, 3, 1), (3, 6, 2, 1),
     ]  # fmt: skip
+
+
+def test_what_a_build_takes_where_nothing_is_given():
+    assert (MARGIN_DB, TILE_PX) == (6.0, 256)
 
 
 @pytest.mark.parametrize(

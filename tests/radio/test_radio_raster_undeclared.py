@@ -13,6 +13,12 @@ def test_zero_beside_levels_near_zero_is_a_level():
     assert nodata_taken_as_level(np.float32([120, 0, 95, 0])) == (0.0, 0.5)
 
 
+def test_a_number_at_the_bound_of_levels_is_none_that_means_no_data():
+    assert nodata_taken_as_level(np.float32([-9999, 120, 95])) == (-9999.0, pytest.approx(1 / 3))
+    # Among losses there is none of -300 dB.
+    assert nodata_taken_as_level(np.float32([-9999, -300, 120, 95])) is None
+
+
 def test_the_largest_number_of_a_type_far_above_all_others_means_no_data():
     losses = np.arange(70, 150, dtype=np.float32)
     for top in (255, 32767, 65535):
