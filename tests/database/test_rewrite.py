@@ -99,8 +99,10 @@ def test_other_levels_and_fewer_cells(database, tmp_path):
     level_dbm[1, 1::2] = np.nan
     level_dbm[1] -= np.arange(count, dtype=np.float32) / 100
     level_dbm[:, 5:9] = np.nan
+    level_dbm[:, 10:13] = FLOOR_DBM - 1
     found = rewritten(database, tmp_path / "other", plan=plan, level_dbm=level_dbm)
     kept = np.delete(np.arange(count), np.arange(5, 9))
+    assert count > 13
     kept = kept[
         np.nanmax(np.where(level_dbm >= FLOOR_DBM, level_dbm, -np.inf), axis=0)[kept] > -np.inf
     ]
