@@ -202,7 +202,13 @@ class BayesFilter(Options):
         return self.with_usual(VEHICLE) if self.vehicle else self
 
     def with_usual(self, usual: Mapping[str, float]) -> BayesFilter:
-        """Return options in which other defaults are taken for those that have theirs."""
+        """Return options in which other values are taken for those that have their defaults.
+
+        Parameters
+        ----------
+        usual : mapping of str to float
+            By the names of options.
+        """
         default = {one.name: one.default for one in fields(self)}
         taken: dict[str, Any] = {
             name: value for name, value in usual.items() if getattr(self, name) == default[name]
