@@ -73,7 +73,8 @@ def open_log(
     if len(given) == 1 and _is_own(given[0]):
         log = scaled_log(read_log(given[0]), options.combine.factors, str(given[0]))
         walk = options.combine.walk
-        unused = () if walk is None else without_effect(walk, (), _READY)
+        unused = options.unused_by_log()
+        unused += () if walk is None else without_effect(walk, (), _READY)
         sensors, cut = sensors_of(given[0])
         log = replace(log, notes=(*log.notes, *unused, *cut)) if unused or cut else log
         opened = OpenedLog(given[0].name, log, sensors)

@@ -64,3 +64,28 @@ class OpenOptions:
     zone: str = ""
     columns: Mapping[str, str] = field(default_factory=dict)
     combine: CombineOptions = field(default_factory=CombineOptions)
+
+    def unused_by_log(self) -> tuple[str, ...]:
+        """Return a note on the options that are given though a track log does not use them.
+
+        Examples
+        --------
+        >>> OpenOptions(zone="+01:00").unused_by_log()
+        ('--zone has no effect: a track log is read as it is, only recordings with it',)
+        """
+        combine = self.combine
+        given = {
+            "--format": self.format,
+            "--zone": self.zone,
+            "--column": self.columns,
+            "--origin": combine.origin_deg,
+            "--truth": combine.truth,
+            "--offset": combine.offsets_s,
+            "--course-motion": combine.course_motion,
+        }
+        names = [name for name, value in given.items() if value]
+        if not names:
+            return ()
+        verb, them = ("has", "it") if len(names) == 1 else ("have", "them")
+        why = f"a track log is read as it is, only recordings with {them}"
+        return (f"{', '.join(names)} {verb} no effect: {why}",)
