@@ -4,7 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.moved import course_errors, motion_from_course
+from mapfilter.tracks.pdr.vehicle import reckon_velocity
 from mapfilter.tracks.position_motion import motion_from_positions
 
 
@@ -133,3 +135,27 @@ def test_of_positions_renewed_by_time_a_short_way_over_a_gap_is_one_step():
     time_s, east_m = np.r_[0.0, np.cumsum(lasted_s)], np.r_[0.0, np.cumsum(way_m)]
     motion, _ = motion_from_positions(time_s, east_m, np.zeros_like(east_m))
     assert np.diff(motion["time_s"]).max() == pytest.approx(60.0)
+
+
+@pytest.mark.parametrize("stands_s", [60, 600])
+def test_a_course_after_a_long_rest_gives_the_headings_of_a_gyroscope(stands_s):
+    """With a course in a fifth of the time or less they counted from an arbitrary direction."""
+    rng = np.random.default_rng(0)
+    time_s = np.arange(0.0, stands_s + 100.0, 0.02)
+    turning = (time_s > stands_s + 40) & (time_s < stands_s + 50)
+    rate = rng.normal(0, 0.001, (len(time_s), 3)) + np.outer(turning, [0, 0, np.pi / 20])
+    force = rng.normal([0.0, 0.0, 9.81], 0.01, (len(time_s), 3))
+    sensors = {
+        "gyroscope": pd.DataFrame(rate, columns=["x_radps", "y_radps", "z_radps"]),
+        "accelerometer": pd.DataFrame(force, columns=["x_mps2", "y_mps2", "z_mps2"]),
+    }
+    sensors = {name: rows.assign(time_s=time_s) for name, rows in sensors.items()}
+    second = np.arange(1.0, stands_s + 99.0)
+    drives = second > stands_s
+    heading = np.pi / 2 + np.clip(second - stands_s - 40, 0, 10) * np.pi / 20
+    course = {"speed_mps": 10.0 * drives, "heading_rad": np.where(drives, heading, np.nan)}
+    sensors["velocity"] = pd.DataFrame({"time_s": second, **course})
+    motion, errors, _ = reckon_velocity(sensors)
+    apart = wrap_rad(motion["heading_rad"].to_numpy()[1:] - (heading[1:] + heading[:-1]) / 2)
+    assert np.degrees(np.abs(apart[drives[:-1]])).max() < 3
+    assert errors.turns == "headings"

@@ -147,7 +147,7 @@ def yaw_offset(
     good = ~compass.disturbed & use_compass
     # Where the field is disturbed nearly everywhere, a disturbed compass is better than none.
     if use_compass and good.sum() < 0.2 * len(good):
-        good = np.isfinite(compass.north_rad) & (compass.size_ut > 0)
+        good |= np.isfinite(compass.north_rad) & (compass.size_ut > 0)
     first_sd_radps = RATE_SD_RADPS if good.any() else alone_sd_radps
     if good.any() and not np.isfinite(rates).any():
         usual_radps, first_sd_radps = _rate_by_compass(compass, good)
