@@ -1,4 +1,6 @@
-"""RINEX observations: years; of version 2 many satellites and types, events, damaged epochs."""
+"""RINEX observations: years, time systems; of version 2 many satellites and types, events, damaged epochs."""
+
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -126,3 +128,32 @@ def test_a_year_of_another_age_loses_its_epoch_alone(tmp_path, year):
     path.write_text(text.replace("> 2026", f"> {year}", 1))
     rows = read_recording(path).tables["satellites"]
     assert rows["time_s"].nunique() == epochs - 1
+
+
+@pytest.mark.parametrize(
+    ("constellation", "system", "ahead_s"),
+    [("G", "GPS", 18), ("M", "GLO", 0), ("C", "BDT", 4), ("M", "BDT", 4), ("C", "GPS", 18)]
+    + [("G", "   ", 18), ("R", "   ", 0), ("C", "   ", 4), ("E", "   ", 18)],
+)
+@pytest.mark.parametrize("version", [2, 3])
+def test_times_are_those_of_the_time_system(tmp_path, version, constellation, system, ahead_s):
+    """GPS time is 18 s ahead of UTC, BeiDou's 4 s; files of one constellation need not name it."""
+    letter = "G" if constellation == "M" else constellation
+    code = "C2I" if letter == "C" else "C1C"
+    types = [f"{letter}    1 {code}", "SYS / # / OBS TYPES"]
+    lines = [f"> 2026 05 01 10 00 {30 + ahead_s:10.7f}  0  1", f"{letter}07  22000000.000"]
+    if version == 2:
+        types = ["     1    C1" if letter != "C" else "     1    C2I", "# / TYPES OF OBSERV"]
+        lines = [f" 26  5  1 10  0 {30 + ahead_s:10.7f}  0  1{letter}07", "  22000000.000"]
+    first = f"  2026     5     1    10     0   {30 + ahead_s:10.7f}     {system}"
+    kind = f"     {version}.00           OBSERVATION DATA    {constellation}"
+    head = [[kind, "RINEX VERSION / TYPE"], types, [first, "TIME OF FIRST OBS"]]
+    head += [["", "END OF HEADER"]]
+    path = tmp_path / "made.26o"
+    path.write_text("\n".join([*(f"{a:<60}{b}" for a, b in head), *lines]) + "\n")
+    recording = read_recording(path)
+    assert recording.tables["satellites"]["time_s"].tolist() == [
+        datetime(2026, 5, 1, 10, 0, 30, tzinfo=UTC).timestamp()
+    ]
+    utc = system == "GLO" or (constellation, system.strip()) == ("R", "")
+    assert recording.clock.kind == ("utc" if utc else "gps")

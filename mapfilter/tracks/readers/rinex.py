@@ -21,7 +21,9 @@ from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import utc_from_gps_s
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eEdD][-+]?\d+)?")
-_SYSTEMS = {"GPS": 0.0, "GAL": 0.0, "QZS": 0.0, "IRN": 0.0, "BDT": 14.0}
+_BEIDOU_BEHIND_S = 14.0
+_OWN_TIMES = {"R": "GLO", "C": "BDT"}
+"""Time systems of files of one constellation that name none."""
 _CODES = {
     **dict.fromkeys("GJS", ("C1C", "C1P", "C1W", "C1X", "C1")),
     "R": ("C1C", "C1P", "C1"),
@@ -102,8 +104,10 @@ def _read_observation(text: Text, reading: Reading, options: ReadOptions) -> Non
     end = text.data.find(b"\n", at) + 1 if at >= 0 else 0
     lines = Lines(text.data[:end] if end else text.data)
     header = read_header(lines, reading)
-    version = fixed_number(header.get("RINEX VERSION / TYPE", [""])[0][:9])
-    system = header.get("TIME OF FIRST OBS", [""])[0][48:51].strip() or "GPS"
+    kind = header.get("RINEX VERSION / TYPE", [""])[0]
+    version = fixed_number(kind[:9])
+    stated = header.get("TIME OF FIRST OBS", [""])[0][48:51].strip()
+    system = stated or _OWN_TIMES.get(kind[40:41].upper(), "GPS")
     reading.clock = Clock("utc" if system in ("GLO", "UTC") else "gps")
     body, first_line = memoryview(text.data)[end or len(text.data) :], lines.at + 1
     found: Iterable[Observations]
@@ -114,7 +118,7 @@ def _read_observation(text: Text, reading: Reading, options: ReadOptions) -> Non
         wanted = Wanted(dict.fromkeys(_CODES, types), _CODES)
         found = read_epochs2(body, first_line, types, wanted, reading)
     for some in found:
-        elapsed = some.gps_s - _SYSTEMS.get(system, 0.0)
+        elapsed = some.gps_s + (_BEIDOU_BEHIND_S if system == "BDT" else 0.0)
         utc = elapsed + GPS_EPOCH_S if reading.clock.kind == "utc" else utc_from_gps_s(elapsed)
         columns = {
             "time_s": utc,
