@@ -33,6 +33,15 @@ def read(tmp_path, lines):
     return read_recording(path)
 
 
+def test_sentences_without_a_time_pass_no_midnight(tmp_path):
+    """In the afternoon, where nothing has a date: all times after them were a day late."""
+    lost = [sentence("GPGGA,,,,,,0,,,,,,,,")] * 2
+    start_s = NOON_S + 11.9 * 3600
+    lines = [gga(start_s + 60 * k, k) for k in range(20)]
+    rows = read(tmp_path, [*lost, *lines[:3], *lost, *lines[3:], *lost]).tables["positions"]
+    np.testing.assert_allclose(rows["time_s"], 23.9 * 3600 + 60 * np.arange(20.0))
+
+
 @pytest.mark.parametrize(
     "before",
     [

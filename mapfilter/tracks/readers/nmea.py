@@ -221,8 +221,11 @@ def _utc(rows: Columns, dates: pd.DataFrame) -> Floats:
     """Return UTC seconds by the date of the nearest line that has one."""
     of_day = _of_day(rows.texts("time"))
     if dates.empty:
-        turns = np.cumsum(np.diff(np.nan_to_num(of_day), prepend=0.0) < -DAY_S / 2)
-        return np.asarray(of_day + DAY_S * turns)
+        # A receiver that has no time yet, or none any more, passes no midnight.
+        known = np.flatnonzero(np.isfinite(of_day))
+        falls = np.diff(of_day[known], prepend=of_day[known][:1]) < -DAY_S / 2
+        of_day[known] += DAY_S * np.cumsum(falls)
+        return of_day
     lines = dates["line"].to_numpy()
     at = np.clip(np.searchsorted(lines, rows.line), 1, max(len(lines) - 1, 1))
     before = np.clip(at - 1, 0, len(lines) - 1)
