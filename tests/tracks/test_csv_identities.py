@@ -37,6 +37,18 @@ def test_hexadecimal_numbers_without_a_mark(read):
     assert "ci: taken for hexadecimal numbers" in notes
 
 
+@pytest.mark.parametrize("mark", ["", "0x", "0X"])
+def test_hexadecimal_numbers_beside_rows_without_one(read, mark):
+    """As of neighbours: all of them were lost, and their cells were no serving ones."""
+    serves = np.arange(COUNT) % 4 == 0
+    ci = numbers(4096, 1 << 28)
+    texts = np.where(serves, [f"{mark}{one:X}" for one in ci], "")
+    radio, notes = read(mcc=244, mnc=91, lac=np.where(serves, f"{mark}AB", ""), ci=texts)
+    cells = [f"244-91-171-{one}" for one in ci[serves]]
+    assert radio.loc[radio["role"] == "serving", "cell"].tolist() == cells
+    assert "no numbers" not in notes
+
+
 def test_hexadecimal_numbers_of_a_later_part_without_letters(read, monkeypatch):
     """Where one stays in a cell for long: it was another one, of a decimal number."""
     monkeypatch.setattr(text, "_PART_BYTES", 1 << 9)

@@ -1,4 +1,4 @@
-"""RINEX observations: years, time systems; of version 2 many satellites and types, events, damaged epochs."""
+"""RINEX observations: years and times; of version 2 many satellites, events, damaged epochs."""
 
 from datetime import UTC, datetime
 

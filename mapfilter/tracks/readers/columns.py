@@ -23,7 +23,7 @@ _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 _FIRST_ROWS = 1000
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
-_WHOLE = r"^[-+]?(\d{1,18}|[0-8]\d{18})$"
+_WHOLE = r"^(?:[-+]?(\d{1,18}|[0-8]\d{18})|0[xX][0-9a-fA-F]{1,15})$"
 _MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
 
 
@@ -213,7 +213,10 @@ class Columns:
         return np.asarray(numbers.to_numpy(), dtype=np.float64)
 
     def whole(self, *names: str) -> tuple[Ints, Bools]:
-        """Return whole numbers exactly (0 where missing), and which of them are there."""
+        """Return whole numbers exactly (0 where missing), and which of them are there.
+
+        Those that begin with 0x are hexadecimal.
+        """
         column = self._raw(*names)
         if column is None:
             return np.zeros(len(self), dtype=np.int64), np.zeros(len(self), dtype=bool)
