@@ -132,8 +132,10 @@ def test_a_year_of_another_age_loses_its_epoch_alone(tmp_path, year):
 
 @pytest.mark.parametrize(
     ("constellation", "system", "ahead_s"),
-    [("G", "GPS", 18), ("M", "GLO", 0), ("C", "BDT", 4), ("M", "BDT", 4), ("C", "GPS", 18)]
-    + [("G", "   ", 18), ("R", "   ", 0), ("C", "   ", 4), ("E", "   ", 18)],
+    [
+        *(("G", "GPS", 18), ("M", "GLO", 0), ("C", "BDT", 4), ("M", "BDT", 4), ("C", "GPS", 18)),
+        *(("G", "   ", 18), ("R", "   ", 0), ("C", "   ", 4), ("E", "   ", 18)),
+    ],
 )
 @pytest.mark.parametrize("version", [2, 3])
 def test_times_are_those_of_the_time_system(tmp_path, version, constellation, system, ahead_s):
