@@ -11,6 +11,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail, listed
+from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.exchanged import check_turning
 from mapfilter.tracks.headings import compass_notes
 from mapfilter.tracks.imu_noise import ImuNoise
@@ -67,14 +68,14 @@ def drive_of(
     InputError
         Odometry pauses for more than an hour, or a phone's turns are too fast for the vehicle.
     """
-    rows = wheels.tables["odometry"]
+    rows = joined_times(wheels.tables["odometry"])
     _check_gaps(wheels, rows["time_s"].to_numpy(dtype=np.float64))
     headed = by_compass(rows, convergence_rad)
     if has_headings(headed):
         unused = "yaw rates not used, the speeds have headings"
         notes = tuple(f"{one.path.name}: {unused}" for one in turns)
         moved, imu, words = reckon_headings(headed)
-        azimuth_deg = rows.drop_duplicates("time_s").set_index("time_s")["compass_deg"]
+        azimuth_deg = rows.set_index("time_s")["compass_deg"]
         at_rows = azimuth_deg.reindex(moved["time_s"]).reset_index(drop=True)
         notes = (*notes, *words, *compass_notes(at_rows, moved["step_m"]))
         return Drive(moved, imu, compass=bool(rows["heading_rad"].isna().all())), notes

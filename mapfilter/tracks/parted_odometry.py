@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.readers.recording import Recording
 
 
@@ -40,8 +41,8 @@ def with_turns(
         own = "yaw rates not used, the speeds have their own"
         return rows, tuple(f"{name}: {own}" for name in names)
     first, *others = turning
-    by_time = rows.drop_duplicates("time_s").set_index("time_s")
-    rates = first.tables["odometry"].drop_duplicates("time_s").set_index("time_s")
+    by_time = joined_times(rows).set_index("time_s")
+    rates = joined_times(first.tables["odometry"]).set_index("time_s")
     joined = by_time.combine_first(rates[["yaw_rate_radps"]]).sort_index().reset_index()
     notes = [f"odometry: yaw rates are those of {first.path.name}"]
     notes += [f"{one.path.name}: yaw rates not used, {names[0]} has them, too" for one in others]

@@ -52,6 +52,17 @@ def test_turns_beside_counted_steps_are_motion():
     assert not any("declination" in note for note in notes)
 
 
+@pytest.mark.parametrize("late", ["steps", "rate"])
+def test_yaw_rates_in_rows_of_their_own_at_the_times_of_steps_are_joined(late):
+    """Those that came second were lost, and with them the motion."""
+    empty, rates = turns(), turns(rate=0.1)
+    both = pd.concat([empty, rates] if late == "rate" else [rates, empty])
+    motion, _, _ = reckon_counted(
+        {"steps": STEPS, "turns": both.sort_values("time_s", kind="stable")}
+    )
+    np.testing.assert_allclose(motion["turn_rad"][1:], 0.1)
+
+
 @pytest.mark.parametrize(
     ("head", "value"),
     [

@@ -40,6 +40,36 @@ def test_speeds_and_yaw_rates_in_rows_of_their_own_are_joined(tmp_path):
     assert any("300 yaw rates taken from rows beside" in note for note in log.notes)
 
 
+@pytest.mark.parametrize("late", ["speed", "direction"])
+@pytest.mark.parametrize("field", ["yaw_rate_radps", "compass_deg"])
+def test_rows_of_their_own_at_the_same_time_are_joined(tmp_path, field, late):
+    """Of those that came second all was lost, or reading failed."""
+    value = RATE_RADPS if field == "yaw_rate_radps" else 90.0 + np.degrees(RATE_RADPS)
+    whole = pd.DataFrame({"time": TIME_S, "wheel_speed_mps": SPEED_MPS, field: value})
+    speeds, others = whole.drop(columns=field), whole.drop(columns="wheel_speed_mps")
+    order = [speeds, others] if late == "direction" else [others, speeds]
+    apart = pd.concat(order).sort_values("time", kind="stable")
+    read = {
+        name: open_log([written(tmp_path / f"{name}.csv", rows)], options=UTM).log.motion
+        for name, rows in (("whole", whole), ("apart", apart[whole.columns]))
+    }
+    assert np.nansum(read["whole"]["step_m"]) == pytest.approx(8.0 * 60, rel=0.05)
+    pd.testing.assert_frame_equal(read["apart"], read["whole"])
+
+
+def test_a_course_in_rows_of_its_own_gives_headings_but_at_rest(tmp_path):
+    speed = np.where(TIME_S < 10, 0.0, SPEED_MPS)
+    apart = {
+        "time": np.concatenate([TIME_S, TIME_S + 0.05]),
+        "speed_mps": np.concatenate([speed, np.full(TIME_S.size, np.nan)]),
+        "course_deg": np.concatenate([np.full(TIME_S.size, np.nan), np.full(TIME_S.size, 90.0)]),
+    }
+    motion = open_log([written(tmp_path / "bus.csv", apart)], options=UTM).log.motion
+    drives = motion["time_s"].between(10.5, 59.5)
+    np.testing.assert_allclose(motion.loc[drives, "heading_rad"], 0.0, atol=0.1)
+    assert motion.loc[motion["time_s"] < 8, "heading_rad"].isna().all()
+
+
 def test_yaw_rates_far_from_speeds_are_not_taken(tmp_path):
     early = TIME_S < 20.0
     rows = {

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
+from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.pdr.gyroscope import WALK_RAD_PER_SQRT_S, sample_noise
 
 AXES = ("x_mps2", "y_mps2", "z_mps2")
@@ -113,7 +114,7 @@ def samples(
     """Return times that grow, and the columns; None where there are not two rows."""
     if name not in sensors:
         return None
-    rows = sensors[name].sort_values("time_s", kind="stable").drop_duplicates("time_s")
+    rows = joined_times(sensors[name].sort_values("time_s", kind="stable"))
     if len(rows) < 2:
         return None
     values = rows[list(columns)].to_numpy(dtype=np.float64)

@@ -12,6 +12,7 @@ from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry
 from mapfilter.tracks.pdr.attitude import attitude
@@ -66,7 +67,7 @@ def reckon_odometry(
     imu : ImuNoise
     notes : tuple of str
     """
-    rows = rows.drop_duplicates("time_s")
+    rows = joined_times(rows)
     turning = _dense_turning(rows) if turning is None else turning
     rows, unusable = usable_rows(rows)
     motion = motion_from_odometry(rows)

@@ -9,6 +9,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import motion_from_odometry
 from mapfilter.tracks.pdr.gyroscope import sample_noise
@@ -52,7 +53,7 @@ def reckon_headings(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[s
     >>> motion["heading_rad"].abs().round(3).tolist(), imu.turns, notes
     ([3.1, 3.1, 3.142], 'headings', ())
     """
-    rows = rows.drop_duplicates("time_s")
+    rows = joined_times(rows)
     measured = rows.dropna(subset=["heading_rad"])
     rows, notes = usable_rows(rows.assign(yaw_rate_radps=np.nan))
     motion = motion_from_odometry(rows)

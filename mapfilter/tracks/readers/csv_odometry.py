@@ -110,7 +110,8 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         given = mapped.number(heading)
         if heading == "course_deg":
             # Of a receiver that stands the course is noise.
-            given = np.where(np.abs(speed) >= _COURSE_MPS, given, np.nan)
+            moving_mps = np.abs(_between_rows(time_s, speed))
+            given = np.where(moving_mps >= _COURSE_MPS, given, np.nan)
         columns["heading_rad" if heading == "heading_rad" else "compass_deg"] = given
         headed = np.isfinite(given)
         reading.note(f"{mapped.rows.find(*mapped.names(heading))}: headings of the vehicle")
@@ -118,6 +119,15 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         return
     turns = np.isfinite(yaw) & (np.isfinite(speed) | (np.abs(yaw) <= FASTEST_TURN_RADPS))
     add_rows(reading, "odometry", columns, mapped.rows, np.isfinite(speed) | turns | headed)
+
+
+def _between_rows(time_s: Floats, speed: Floats) -> Floats:
+    """Return speeds with those between the rows that have one; NaN where there is none at all."""
+    known = np.flatnonzero(np.isfinite(speed) & np.isfinite(time_s))
+    if not known.size:
+        return speed
+    known = known[np.argsort(time_s[known], kind="stable")]
+    return np.where(np.isfinite(speed), speed, np.interp(time_s, time_s[known], speed[known]))
 
 
 def _speeds(mapped: Mapped, reading: Reading, time_s: Floats) -> tuple[Floats, float]:
