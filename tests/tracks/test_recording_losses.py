@@ -8,6 +8,7 @@ from made_recordings import MADE
 import mapfilter as mf
 from mapfilter.errors import InputError
 from mapfilter.geodesy import azimuth_from_heading_deg, unproject
+from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.formats import read_recording
 
 START_UTC_S = 1_777_629_600
@@ -205,3 +206,28 @@ def test_levels_above_the_largest_asu_have_lost_their_sign(tmp_path):
 def write(folder, text):
     (folder / "true.csv").write_text(text)
     return "true.csv"
+
+
+def test_what_an_early_part_of_a_large_file_lacks_is_told(walk, read, monkeypatch):
+    """Beside dates, notes on it were dropped with the part after it."""
+    monkeypatch.setattr(text, "_PART_BYTES", 1 << 11)
+    walk["time"] = pd.to_datetime(walk["time"], unit="s", utc=True).dt.strftime("%FT%TZ")
+    walk["level_dbm"] = walk["level_dbm"].astype(str)
+    walk.loc[3, "level_dbm"] = "-7x"
+    walk.loc[150, "lac"] = np.nan
+    notes = read(walk).notes
+    told = "level_dbm: 1 value is no number, taken as missing (first '-7x' in line 5)"
+    assert sum(told in note for note in notes) == 1
+    assert not any("time: " in note and "missing" in note for note in notes)
+
+
+@pytest.mark.parametrize("separator", ["\t", ","])
+def test_a_first_column_without_a_name_stays_one_in_parts(walk, tmp_path, monkeypatch, separator):
+    """Its tab was taken for a blank before the header, and every row had a field too many."""
+    walk.to_csv(tmp_path / "phone.csv", sep=separator)
+    whole = read_recording(tmp_path / "phone.csv")
+    monkeypatch.setattr(text, "_PART_BYTES", 1 << 11)
+    parts = read_recording(tmp_path / "phone.csv")
+    assert parts.unusable == whole.unusable == ()
+    for table, rows in whole.tables.items():
+        assert parts.tables[table].equals(rows), table

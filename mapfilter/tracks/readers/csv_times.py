@@ -51,6 +51,8 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
 
     Of several columns of times one in UTC goes first, then one of local times.
     """
+    # Dates are no numbers; notes on them may be of the columns that are looked at, too.
+    as_numbers = tuple(f"{name}: " for name in mapped.names("time"))
     mapped = _best_column(mapped, reading)
     number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
     known = number[np.isfinite(number)]
@@ -67,7 +69,11 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             return over_stuck_weeks(reading, counted_s, week)
         reading.clock = Clock("monotonic")
         return over_days(reading, over_weeks(reading, number))
-    reading.notes[:] = [note for note in reading.notes if "taken as missing" not in note]
+    reading.notes[:] = [
+        note
+        for note in reading.notes
+        if not (note.startswith(as_numbers) and "taken as missing" in note)
+    ]
     names = mapped.names("time")
     # A zone that is given is that of the local times of all files.
     rows, name = mapped.rows, mapped.rows.find(*names) or ""
