@@ -81,7 +81,9 @@ def parts_of(text: Text) -> Iterator[Text]:
     if len(text.data) <= _PART_BYTES:
         yield text
         return
-    begin = len(text.data) - len(text.data.lstrip(b"\n \t"))
+    filled = len(text.data) - len(text.data.lstrip(b"\n \t"))
+    # A first column without a name may begin the line with a separator.
+    begin = text.data.rfind(b"\n", 0, filled) + 1
     end = text.data.find(b"\n", begin)
     header, at = text.data[begin : end + 1], end + 1
     line = text.line + text.data[:begin].count(b"\n")
