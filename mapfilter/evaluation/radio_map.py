@@ -71,7 +71,8 @@ class RadioMap:
         Number of the site of each cell, and of its layer (:func:`mapfilter.radio.layers.layers_of`)
         from 0.
     level_dbm : numpy.ndarray of float32, shape (rows, cols, C)
-        Off the points, those of the nearest; ``floor_dbm`` where a cell is not received.
+        Off the points, those of the nearest; ``floor_dbm`` where a cell is not received, and more
+        where it is.
     floor_dbm, margin_db : float
         Of the database.
     on_way : numpy.ndarray of bool, shape (rows, cols)
@@ -145,7 +146,10 @@ def radio_map(database: RadioRouteDatabase) -> RadioMap:
         hint = "a smaller area: build a database of a part"
         raise fail(InputError, str(database.path), f"at most {MOST_LEVELS:.0e} levels", got, hint)
     field = database.field()
-    level = np.where(np.isnan(field.level_dbm), np.float32(database.floor_dbm), field.level_dbm)
+    # A database holds levels from the floor on, which kernels compare in double precision.
+    floor_dbm = np.float32(database.floor_dbm)
+    least_dbm = np.nextafter(floor_dbm, np.float32(np.inf))
+    level = np.where(np.isnan(field.level_dbm), floor_dbm, np.maximum(field.level_dbm, least_dbm))
     row, col = np.nonzero(field.on_way)
     away_px = distance_transform_edt(~field.on_way)
     sites = [database.plan[cell_id].site for cell_id in field.cell_ids]
@@ -155,7 +159,7 @@ def radio_map(database: RadioRouteDatabase) -> RadioMap:
         np.unique(sites, return_inverse=True)[1].astype(np.int64),
         np.array(layers_of(database.plan, field.cell_ids), dtype=np.int64),
         level,
-        database.floor_dbm,
+        float(floor_dbm),
         database.margin_db,
         field.on_way,
         away_px <= _TOLERANCE_PX,

@@ -150,7 +150,7 @@ def _swap(patterns: Patterns, cells: list[Cell], level: Floats32, first: int, se
         return
     level[first] = patterns.level_dbm[:, second]
     level[second] = patterns.level_dbm[:, first]
-    identity = ("id", "mcc", "mnc", "lac", "ci", "arfcn", "bsic")
+    identity = ("id", "mcc", "mnc", "lac", "ci", "arfcn", "bsic", "technology", "frequency_mhz")
     cells[first] = replace(b, **{name: getattr(a, name) for name in identity})
     cells[second] = replace(a, **{name: getattr(b, name) for name in identity})
 

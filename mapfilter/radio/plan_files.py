@@ -88,9 +88,11 @@ def read_cell_plan(
     whole = [row for row in rows if not row.faulty]
     if layout == "opencellid" and whole:
         if faults.found:
-            notes += (
-                f"{number_of(len(faults.found), 'faulty row')} left out, such as {faults.found[0]}",
-            )
+            # A row may have several faults.
+            start = f"{path} row "
+            lines = {fault.where.removeprefix(start).partition(",")[0] for fault in faults.found}
+            some = number_of(len(lines), "faulty row")
+            notes += (f"{some} left out, such as {faults.found[0]}",)
             faults = Faults()
         first = {row.values["id"]: row for row in reversed(whole)}
         repeated = len(whole) - len(first)

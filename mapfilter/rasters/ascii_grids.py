@@ -25,6 +25,7 @@ _LARGEST_ASCII_HEADER_BYTES = 4096
 _MOST_HEADER_LINES = 12
 _MOST_COLS = 1_000_000
 _LONGEST_NUMBER = 64
+_NO_WORDS = (b"nan", b"inf", b"infinity")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,15 +76,15 @@ def open_ascii_grid(path: Path, cell_id: str, declared: Declared) -> AsciiGrid:
         head = stream.read(_LARGEST_ASCII_HEADER_BYTES)
     mark = BOM_UTF8 if head.startswith(BOM_UTF8) else b""
     lines = head[len(mark) :].splitlines(keepends=True)[:_MOST_HEADER_LINES]
-    lines = list(takewhile(lambda line: line.strip()[:1].isalpha(), lines))
+    lines = list(takewhile(_has_key, lines))
     header, header_bytes = GridHeader.of(str(path), lines), len(mark) + sum(map(len, lines))
     if "NCOLS" not in header.values or "NROWS" not in header.values:
         raise fail(InputError, str(path), "lines NCOLS and NROWS first", "none", "no ASCII grid")
     crs, faults = grid_crs(path, declared.crs), header.faults
     rows, cols = header.whole("NROWS", low=1), header.whole("NCOLS", low=1)
     lattice = header.lattice(crs, rows, cols)
-    key = header.first("NODATA_VALUE", "NODATA")
-    own = NODATA if key is None else header.number(key) or 0.0
+    own = header.nodata("NODATA_VALUE", "NODATA")
+    own = NODATA if own is None else own
     if cols is not None and cols > _MOST_COLS:
         faults.add(f"{path}, NCOLS", f"at most {_MOST_COLS}", cols)
     found_bytes = path.stat().st_size - header_bytes
@@ -96,6 +97,12 @@ def open_ascii_grid(path: Path, cell_id: str, declared: Declared) -> AsciiGrid:
     parts = tuple(filter(None, (path, file_beside(path, ".prj", ".PRJ"))))
     place = cast(Lattice, lattice)
     return AsciiGrid(path, (cell_id,), place, nodata, parts, header_bytes=header_bytes)
+
+
+def _has_key(line: bytes) -> bool:
+    """Return whether a line begins with a word, which NaN and infinity are not."""
+    word, *_ = line.split(None, 1) or [b""]
+    return word[:1].isalpha() and word.lower() not in _NO_WORDS
 
 
 @lru_cache(maxsize=1024)

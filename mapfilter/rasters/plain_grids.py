@@ -14,6 +14,7 @@ Esri, "BIL, BIP, and BSQ raster files" and "ASCII raster file format" (ArcGIS he
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -87,6 +88,13 @@ class GridHeader:
         if value is None:
             self.faults.add(f"{self.where}, {key}", "a number", repr(text[:_LONGEST_VALUE]))
         return value
+
+    def nodata(self, *keys: str) -> float | None:
+        """Return the number that means no data, NaN for "nan"; None without a line or valid one."""
+        key = self.first(*keys)
+        if key is None:
+            return None
+        return math.nan if self.values[key].lower() == "nan" else self.number(key)
 
     def whole(
         self, key: str, default: int | None = None, *, low: int = 0, high: int = _MOST_PX

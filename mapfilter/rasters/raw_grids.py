@@ -74,8 +74,7 @@ def open_raw_grid(path: Path, cell_id: str, declared: Declared) -> RawGrid:
     if (bands := header.whole("NBANDS", 1)) not in (1, None):
         faults.add(header.where, "one band per file", f"NBANDS {bands}")
     dtype = _dtype(path, header)
-    key = header.first("NODATA", "NODATA_VALUE")
-    nodata = declared.nodata, header.number(key) if key else None
+    nodata = declared.nodata, header.nodata("NODATA", "NODATA_VALUE")
     skip_bytes = header.whole("SKIPBYTES", 0)
     if skip_bytes is not None and skip_bytes > _LARGEST_SKIP_BYTES:
         faults.add(f"{header.where}, SKIPBYTES", f"at most {_LARGEST_SKIP_BYTES}", skip_bytes)

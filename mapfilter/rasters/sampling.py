@@ -64,12 +64,14 @@ def levels_at(places: Sequence[Places]) -> list[Floats32]:
         As :meth:`mapfilter.rasters.raster_set.RxLevRasters.read_levels_dbm`.
     """
     found = [np.full((len(one.cells), one.row.size), np.nan, np.float32) for one in places]
-    of_file: dict[Path, tuple[RasterFile, list[int]]] = {}
+    # An index may name one file for several cells.
+    of_file: dict[tuple[Path, tuple[str, ...]], tuple[RasterFile, list[int]]] = {}
     for number, one in enumerate(places):
         if one.row.size and one.cells:
             one.rasters.check_holds_levels()
             for file in one.rasters.files:
-                of_file.setdefault(file.path, (file, []))[1].append(number)
+                own = of_file.setdefault((file.path, file.cell_ids), (file, []))
+                own[1].append(number)
     rows = [{cell: n for n, cell in enumerate(one.cells)} for one in places]
     for file, numbers in of_file.values():
         bands = [n for n, cell in enumerate(file.cell_ids) if any(cell in rows[i] for i in numbers)]

@@ -11,6 +11,7 @@ from collections.abc import Collection, Container
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from mapfilter._types import Ints
@@ -210,7 +211,8 @@ def _text(value: object) -> str:
 def _classes(values: NDArray[np.object_] | None, count: int) -> NDArray[np.object_]:
     words = np.full(count, ROAD_CLASS, dtype=object)
     for i, value in enumerate(values if values is not None else ()):
-        if value is not None and value == value and (text := _text(value).strip()):
+        known = value is not None and value is not pd.NA and value == value
+        if known and (text := _text(value).strip()):
             words[i] = text
     return words
 

@@ -206,13 +206,13 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
     columns = np.ascontiguousarray(np.concatenate([table.columns for table in tables], axis=1))
     time_s, lat_deg, lon_deg, level_dbm, accuracy_m, timing_advance, role = columns
     east_m, north_m = project(crs, lon_deg, lat_deg)
-    of_session = np.concatenate(session)
+    of_session, of_cell = np.concatenate(session), np.concatenate(cell)
     joined = Measurements(
         crs,
         cells,
         {cell: identity for table in tables for cell, identity in table.identities.items()},
         tuple(names),
-        np.concatenate(cell),
+        of_cell,
         of_session,
         time_s,
         east_m,
@@ -220,7 +220,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         level_dbm,
         accuracy_m,
         _notes(tables),
-        np.where(np.isnan(role), _alone(of_session, time_s), role > 0).astype(np.bool_),
+        np.where(np.isnan(role), _alone(of_session, time_s, of_cell), role > 0).astype(np.bool_),
         timing_advance,
         most_frequent(table.technologies for table in tables),
         most_frequent(table.codes for table in tables),
@@ -238,13 +238,15 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
     return _once(joined)
 
 
-def _alone(session: Ints32, time_s: Floats) -> Bools:
-    """Return which rows are the only ones of their session and time."""
+def _alone(session: Ints32, time_s: Floats, cell: Ints32) -> Bools:
+    """Return which rows are of the only cell of their session and time."""
     known = np.isfinite(time_s)
     keys = np.column_stack([session[known], time_s[known]])
-    _, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    which = np.unique(keys, axis=0, return_inverse=True)[1]
+    # A cell may be given twice, or read twice in a second.
+    cells = np.unique(np.column_stack([which, cell[known]]), axis=0)[:, 0]
     found = np.zeros(len(time_s), dtype=np.bool_)
-    found[known] = count[which] == 1
+    found[known] = np.bincount(cells)[which] == 1
     return found
 
 

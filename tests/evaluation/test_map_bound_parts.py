@@ -11,7 +11,7 @@ from radio_maps import FLOOR_DBM, made_map
 from mapfilter.errors import ConfigError
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix, starts
 from mapfilter.evaluation.map_bound import BANDS, MapBound, on_lattice, write_bound
-from mapfilter.evaluation.radio_map import ErrorModel, radio_map
+from mapfilter.evaluation.radio_map import ErrorModel, radio_map, received_cells
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 
@@ -49,6 +49,21 @@ def test_a_database_in_memory():
     assert radio.level_dbm[0, 0].tolist() == [-80.0, FLOOR_DBM]
     # Beside a point means by one pixel, not across a corner.
     assert radio.near_way.tolist() == [[True, True, True, True], [True, False, True, True]]
+
+
+@pytest.mark.parametrize("floor_dbm", [-80.0, -80.1, -104.1])
+def test_cells_are_received_from_the_floor_on(floor_dbm):
+    database = fake_database()
+    held = SimpleNamespace(**vars(database) | {"floor_dbm": floor_dbm})
+    radio = radio_map(held)
+    found, part = np.empty(7, dtype=np.int64), np.empty(7)
+    kernel = radio.floor_dbm, radio.site, radio.layer, 0.5, found, part
+    # Where a cell alone is received, be it at the floor, and where there are two.
+    counts = [received_cells(radio.level_dbm[0, col], *kernel) for col in (0, 2)]
+    assert counts == [1, 2]
+    assert radio.level_dbm[0, 0, 0] == pytest.approx(-80.0, abs=1e-4)
+    first, point = radio.points_by_cell()
+    assert (first.tolist(), point.tolist()) == ([0, 1, 3], [0, 1, 2])
 
 
 @pytest.mark.parametrize(

@@ -182,6 +182,21 @@ def test_turned_cells_have_the_levels_of_a_database_that_was_built_right(databas
         assert np.abs(difference_db(anew, other, cell)).max() < 0.1
 
 
+def test_cells_of_two_technologies_that_are_each_other_s_keep_their_carriers(tmp_path):
+    own = {
+        "S1B": {"technology": "LTE", "arfcn": 6300, "bsic": 400, "frequency_mhz": 806.0},
+        "S2C": {"technology": "GSM", "arfcn": 20, "bsic": 12, "frequency_mhz": 939.0},
+    }
+    plan = plan_of()
+    plan = replace(plan, cells=tuple(replace(c, **own.get(c.id, {})) for c in plan.cells))
+    database = database_of(plan, tmp_path / "a")
+    other = patched(database, tmp_path, Change("swapped", ("S1B", "S2C")))
+    for name, planned in (("S1B", "S2C"), ("S2C", "S1B")):
+        cell, before = other.plan[name], database.plan[planned]
+        assert {key: getattr(cell, key) for key in own[name]} == own[name]
+        assert (cell.east_m, cell.azimuth_deg) == (before.east_m, before.azimuth_deg)
+
+
 def test_a_moved_cell_is_predicted_by_distance(database, tmp_path):
     cell = database.plan["I1"]
     east, north = cell.east_m - 400.0, cell.north_m + 200.0

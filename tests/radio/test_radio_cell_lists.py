@@ -163,7 +163,9 @@ def test_public_cell_lists(tmp_path: Path, text: str) -> None:
 
 
 def test_bad_rows_of_public_lists_are_told_and_lose_nothing_else(tmp_path: Path) -> None:
-    bad = "GSM,244,91,801,x,,24.9,60.1,1,1,1,1,1,0\nGSM,244,91\nGSM,1,1,1,1,,24.9,120,1,1,1,1,1,0\n"
+    bad = (
+        "GSM,244,91,801,x,,24.9,north,1,1,1,1,1,0\nGSM,244,91\nGSM,1,1,1,1,,24.9,120,1,1,1,1,1,0\n"
+    )
     again = MLS.splitlines()[1] + "\n"
     plan = _read(tmp_path, MLS + bad + again, layout="opencellid")
     assert plan.ids == ("244-91-801-1001", "244-5-33-70657")

@@ -101,6 +101,13 @@ def test_numbers_of_text_that_mean_no_data(tmp_path, line, declared, nodata):
     assert grid(tmp_path, HEAD + line + ROWS, nodata=declared).nodata == nodata
 
 
+@pytest.mark.parametrize("line", ["", "NODATA_value nan\n"])
+@pytest.mark.parametrize("word", ["nan", "NaN", "inf"])
+def test_a_first_row_may_begin_with_no_data_in_words(tmp_path, line, word):
+    found = values(tmp_path, HEAD + line + f"{word} -81\n-82 -83\n")
+    np.testing.assert_array_equal(found, [[np.nan, -81], [-82, -83]])
+
+
 def test_a_number_for_no_data_that_is_none(tmp_path):
     fault = fault_of(grid, tmp_path, HEAD + "nodata " + "y" * 70 + "\n" + ROWS)
     assert fault.where.endswith("a.asc, NODATA")

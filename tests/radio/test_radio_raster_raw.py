@@ -95,6 +95,8 @@ def test_numbers_that_mean_no_data_are_the_given_one_and_the_header_s(tmp_path):
     assert np.flatnonzero(np.isnan(found)).tolist() == [1, 3]
     assert raw(tmp_path, data, "NODATA_VALUE 62\n").nodata == (62.0,)
     assert raw(tmp_path, data, "", nodata=0.0).nodata == (0.0,)
+    of_nan = raw(tmp_path, data, "NODATA nan\n", nodata=61.0).read([0], (0, 0, 3, 4))[0]
+    assert np.flatnonzero(np.isnan(of_nan)).tolist() == [1]
     assert faults(tmp_path, data, "NODATA x\n")[0][:2] == ("a.hdr, NODATA", "a number")
 
 

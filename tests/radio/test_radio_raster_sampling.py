@@ -1,6 +1,6 @@
 """Levels at points of windows: which pixels they are, and how often a file is read for them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -215,3 +215,13 @@ def test_pixels_of_the_windows_are_checked_and_none_between_them(place, told):
     else:
         levels_at(asked)
     assert [window for _, window in file.reads] == [(0, 0, 2, 5)]
+
+
+def test_cells_that_an_index_gives_one_file_have_its_levels_both():
+    first = made("1", "A")
+    second = InMemory(first.path, ("B",), first.values)
+    held = rasters(first, second, quantity="level")
+    held = replace(held, factor=-1.0)
+    (found,) = levels_at([places(held, "AB", (2, 3, 4, 5), [(0, 0), (3, 4)])])
+    np.testing.assert_array_equal(found, -first.values[[0, 0]][:, [2, 5], [3, 7]])
+    np.testing.assert_array_equal(found, held.read((2, 3, 4, 5), "AB")[:, [0, 3], [0, 4]])

@@ -193,6 +193,18 @@ def test_equal_rows_without_a_time_are_two_readings(tmp_path):
     assert len(read_measurements([write(tmp_path, text)])) == 3
 
 
+def test_the_only_cell_of_its_time_serves_however_often_it_is_given(tmp_path):
+    once = PLAIN.splitlines(keepends=True)
+    second = once[2].replace("-71", "-75")
+    neighbour = once[3].replace("A,", "B,").replace("-72", "-90")
+    path = write(tmp_path, "".join([*once, second, *once[1:4], neighbour]))
+    found = read_measurements([path])
+    assert found.notes == ("3 rows left out: given twice",)
+    at = found.time_s - found.time_s[0]
+    np.testing.assert_array_equal(found.serving, at != 10)
+    assert ((at == 5).sum(), (at == 10).sum()) == (2, 2)
+
+
 def test_files_gaps_and_folders_make_sessions(tmp_path):
     late = PLAIN + "A,60.18,24.95,-80,1600009000,10\n"
     write(tmp_path, late, "a.csv")

@@ -5,6 +5,7 @@ import zipfile
 
 import geopandas
 import numpy as np
+import pandas as pd
 import pytest
 import shapely
 from made_maps import AREA, CRS, ORIGIN, write_pbf
@@ -101,6 +102,16 @@ def test_classes_are_words_or_numbers(tmp_path):
     )
     assert read_layer_roads(path, *AREA, class_column="word").ways.class_names == ("lane", "road")
     assert read_layer_roads(path, *AREA, class_column="lanes").ways.class_names == ("1", "2", "4")
+
+
+@pytest.mark.parametrize(("words", "kind"), [([1, None, 2, 1], "Int64"), ([*"1N21"], "string")])
+def test_classes_may_lack_in_tables_of_nullable_types(tmp_path, words, kind):
+    code = pd.array([None if word == "N" else word for word in words], dtype=kind)
+    frame = ROADS.assign(code=code)
+    path = write(frame, tmp_path / "a.parquet")
+    for source in (frame, path):
+        ways = read_layer_roads(source, *AREA, class_column="code").ways
+        assert ways.class_names == ("1", "2", "road")
 
 
 def test_half_widths_go_by_class(tmp_path):
