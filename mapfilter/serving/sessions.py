@@ -190,11 +190,18 @@ class Sessions:
 
     async def end_idle(self) -> int:
         """End sessions that nobody has used for long; return how many."""
-        least_s = time.monotonic() - self.limits.idle_s
-        idle = [s for s in self.all.values() if s.used_s < least_s and not s.channel.listeners]
-        for one in idle:
-            await self.end(one, "idle")
-        return len(idle)
+        ended = 0
+        for one in list(self.all.values()):
+            # Asked of each when its turn comes: it may have been used while others were ended.
+            if self._is_idle(one):
+                await self.end(one, "idle")
+                ended += 1
+        return ended
+
+    def _is_idle(self, session: Session) -> bool:
+        idle_s = time.monotonic() - session.used_s
+        unused = idle_s > self.limits.idle_s and not session.waiting
+        return unused and not session.channel.listeners and not session.ended
 
     def forget_details(self) -> None:
         """Drop what pages were shown of sessions that nobody watches any more."""

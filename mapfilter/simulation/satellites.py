@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from annotated_types import Ge, Gt, Lt
 
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.almanacs import Almanac
@@ -148,9 +148,7 @@ def receive(
     tow_s = second + (tick_s - tick_s[0])
     east_m, north_m = place[count // 2].tolist()
     frame = GridFrame(crs, east_m, north_m, float(model.height_m))
-    # An hour apart, from the middle on to both sides: a short journey has one moment.
-    hour = max(int(3600 / model.period_s), 1)
-    usable = _over_horizon(almanac.usable(), week, tow_s[count // 2 % hour :: hour], frame, model)
+    usable = _over_horizon(almanac.usable(), week, tow_s[_moments(count, model)], frame, model)
     clock_m = _clock_m(count, model, rng)
     every = range(len(usable.names))
     white = rng.standard_normal((count, len(every)))
@@ -190,6 +188,16 @@ def receive(
             **dict(zip(PLACE, satellites[row, column].T, strict=True)),
         }
     )
+
+
+def _moments(count: int, model: ReceptionModel) -> Ints:
+    """Return epochs to look at the sky: at most an hour apart, none farther than half an hour.
+
+    A journey of an hour or less has one, in its middle.
+    """
+    hour = max(int(3600 / model.period_s), 1)
+    found = np.arange(count // 2 % hour, count, hour)
+    return found if count <= hour else np.union1d(found, [0, count - 1])
 
 
 def _over_horizon(

@@ -74,8 +74,10 @@ def align(recordings: Sequence[Recording], given_s: Mapping[Path, float]) -> Ali
             offsets.append(given_s[recording.path])
             notes.append(f"{recording.path.name}: {given_s[recording.path]:+g} s, as given")
             continue
-        offset_s, note = (0.0, "") if recording is first else _offset(recording, first)
-        offsets.append(dated_s + offset_s + given_s.get(first.path, 0.0))
+        offset_s, note = 0.0, ""
+        if recording is not first:
+            offset_s, note = _offset(recording, first, given_s.get(first.path, 0.0))
+        offsets.append(dated_s + offset_s)
         if note:
             notes.append(f"{recording.path.name}: {note}")
     if not first.clock.absolute:
@@ -96,8 +98,12 @@ def _reference(recordings: Sequence[Recording]) -> int:
     return min(range(len(recordings)), key=lambda i: rank(recordings[i]))
 
 
-def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
-    """Return the seconds to add to a recording's times, and a note."""
+def _offset(recording: Recording, given: Recording, late_s: float) -> tuple[float, str]:
+    """Return the seconds to add to a recording's times, and a note.
+
+    Those of the first one, as it was given, are ``late_s`` later; the clock of others is not.
+    """
+    first = later(given, late_s)
     one, other = places_of(first), places_of(recording)
     clock = recording.clock
     same = clock.kind == first.clock.kind and clock.kind != "utc"
@@ -107,7 +113,7 @@ def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
         return 0.0, _disagreement(first.path.name, one, other)
     if clock.kind == "local":
         return _zone(recording, first, one, other)
-    if same and _common(recording, first) >= COMMON_SHARE:
+    if same and _common(recording, given) >= COMMON_SHARE:
         far = one is not None and other is not None and median_apart_m(one, other, 0.0, 0.1) > FAR_M
         return 0.0, _disagreement(first.path.name, one, other) if far else ""
     if one is not None and other is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 from typing import Any
 
@@ -23,7 +24,8 @@ from mapfilter.viewing.arrays import cell_numbers, packed, places, starts
 from mapfilter.viewing.streets import middle_lines
 
 LEVEL_DB = 0.3
-"""Step of levels; 254 of them reach from below the floor to beside an antenna."""
+"""Least step of levels. 254 of them reach from below the floor up to the strongest level."""
+_MOST_STEPS = 254
 
 _MOST_LEVELS = 1_500_000
 _MOST_BEST_PX, _MOST_POINTS, _MOST_PX = 512, 400_000, 12_000_000
@@ -192,17 +194,20 @@ def level_fields(
     layer = np.array(layers_of(plan, field.cell_ids), dtype=np.int64)
     layers, layer_of = np.unique(layer[chosen], return_inverse=True)
     best, second = _two_strongest(level[some], layer, layers, quiet)
+    span_db = float(level[some].max(initial=quiet)) - quiet_dbm
+    step_db = max(LEVEL_DB, round(span_db / _MOST_STEPS + 5e-4, 3))
+    levels = partial(packed, code="u1", scale=step_db, offset=quiet_dbm, none=255)
     found = {
         "grid": frame.grid(
             west_m, north_m, step * field.lattice.resolution_m, level[some].shape[:2]
         ),
         "cells": [plan.index(field.cell_ids[i]) for i in chosen],
         "layer": layer_of.tolist(),
-        "level": _levels(np.moveaxis(field.level_dbm[some][..., chosen], 2, 0), quiet_dbm),
+        "level": levels(np.moveaxis(field.level_dbm[some][..., chosen], 2, 0)),
         "rough": packed(np.moveaxis(rough[some][..., chosen], 2, 0), "u1", scale=0.25),
         "quiet_dbm": quiet_dbm,
-        "best": _levels(best, quiet_dbm),
-        "second": _levels(second, quiet_dbm),
+        "best": levels(best),
+        "second": levels(second),
         "distance": packed(
             np.maximum(field.distance_to_way_m - field.half_width_m, 0)[some], "u1", none=255
         ),
@@ -230,7 +235,3 @@ def _step(field: RadioField, cells: int) -> int:
     pixels = field.distance_to_way_m.size * max(cells, 1)
     fits = (step for step in _STEPS if pixels / step**2 <= _MOST_LEVELS)
     return next(fits, _STEPS[-1])
-
-
-def _levels(level_dbm: Floats32, quiet_dbm: float) -> dict[str, Any]:
-    return packed(level_dbm, "u1", scale=LEVEL_DB, offset=quiet_dbm, none=255)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from mapfilter.errors import Faults, InputError
@@ -14,7 +15,7 @@ def side_by_side(views: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, An
     """Return a view with the runs of all.
 
     Levels are those of the first view that has them; names that occur twice get the number of their
-    view.
+    view, or the next number with which they are unlike all others.
 
     Parameters
     ----------
@@ -43,15 +44,21 @@ def side_by_side(views: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, An
     runs: list[dict[str, Any]] = []
     for number, (_, view) in enumerate(views, start=1):
         for run in view["runs"]:
-            name = str(run["name"])
-            if name in names:
-                name = f"{name} ({number})"
+            name = _unlike(str(run["name"]), names, number)
             names.add(name)
             runs.append({**run, "name": name})
     found["runs"] = runs
     found["title"] = " | ".join(dict.fromkeys(str(view["title"]) for _, view in views))
     found["notes"] = list(dict.fromkeys(note for _, view in views for note in view["notes"]))
     return found
+
+
+def _unlike(name: str, others: Collection[str], number: int) -> str:
+    """Return a name that none of the others is: with a number behind it where it has to be."""
+    if name not in others:
+        return name
+    numbered = (f"{name} ({one})" for one in itertools.count(number))
+    return next(one for one in numbered if one not in others)
 
 
 def _reach(view: Mapping[str, Any]) -> tuple[bool, float]:

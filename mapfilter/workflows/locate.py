@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mapfilter._io import atomic_file, ensure_writable_folder
+from mapfilter._io import atomic_file, ensure_writable_folder, replaced_files
 from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
@@ -35,9 +36,14 @@ from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.placeless import is_local_frame
 from mapfilter.workflows.fingerprints import WITHOUT_STEPS, read_database, read_reports
 from mapfilter.workflows.result_text import to_jsonable
-from mapfilter.workflows.results import FIGURES, POSITIONS, check_figures_of_reports
+from mapfilter.workflows.results import (
+    FIGURES,
+    PICTURE_OF_REPORTS,
+    POSITIONS,
+    check_figures_of_reports,
+    older_reports,
+)
 
-PICTURE = "errors.png"
 _SHARE = 0.95
 _AREA_M = 100.0
 
@@ -128,23 +134,24 @@ def run_locate(
         fitted = locator_for(reports, known, method, rng, progress=progress)
         located = locate_by(fitted, reports)
     baseline_m = _centroid_errors_m(fitted, reports)
-    figures = figures_of(located)
-    outputs = [_write_positions(located, names, reports, out / POSITIONS)]
-    if np.isfinite(located.error_m).any():
-        outputs.append(_draw(located, baseline_m, out / PICTURE))
-    scored = baseline_m[np.isfinite(baseline_m)]
-    notes = tuple(dict.fromkeys((*fitted.database.notes, *located.notes, *_advice(fitted))))
-    result = LocateResult(
-        len(fitted.database),
-        len(fitted.database.cell_ids),
-        figures,
-        mean_of(scored),
-        float(np.median(scored)) if scored.size else float("nan"),
-        notes,
-        round(time.perf_counter() - began_s, 3),
-        (*outputs, out / FIGURES),
-    )
-    write_json(out / FIGURES, to_jsonable(result.shown))
+    # A picture of an older run does not stay beside the table of this one.
+    with replaced_files(out, partial(older_reports, out)) as new:
+        outputs = [_write_positions(located, names, reports, new / POSITIONS)]
+        if np.isfinite(located.error_m).any():
+            outputs.append(_draw(located, baseline_m, new / PICTURE_OF_REPORTS))
+        scored = baseline_m[np.isfinite(baseline_m)]
+        notes = tuple(dict.fromkeys((*fitted.database.notes, *located.notes, *_advice(fitted))))
+        result = LocateResult(
+            len(fitted.database),
+            len(fitted.database.cell_ids),
+            figures_of(located),
+            mean_of(scored),
+            float(np.median(scored)) if scored.size else float("nan"),
+            notes,
+            round(time.perf_counter() - began_s, 3),
+            tuple(out / name for name in (*outputs, FIGURES)),
+        )
+        write_json(new / FIGURES, to_jsonable(result.shown))
     return result
 
 
@@ -199,7 +206,7 @@ def _centroid_errors_m(fitted: ReportLocator, reports: Reports) -> Floats:
 
 def _write_positions(
     located: LocatedReports, names: Sequence[str], reports: Reports, path: Path
-) -> Path:
+) -> str:
     table = located.to_dataframe()
     if len(names) > 1:
         table.insert(0, "log", [names[block] for block in reports.block.tolist()])
@@ -207,10 +214,10 @@ def _write_positions(
     table = table.round({"lon_deg": 8, "lat_deg": 8})
     with atomic_file(path) as temporary:
         table.to_csv(temporary, index=False, lineterminator="\n")
-    return path
+    return path.name
 
 
-def _draw(located: LocatedReports, baseline_m: Floats, path: Path) -> Path:
+def _draw(located: LocatedReports, baseline_m: Floats, path: Path) -> str:
     curves = []
     given = ((method_name(located.method), located.error_m, BLUE), ("centroid", baseline_m, GREY))
     for name, error_m, colour in given:
@@ -220,7 +227,7 @@ def _draw(located: LocatedReports, baseline_m: Floats, path: Path) -> Path:
             curves.append(Distribution(label, known_m, colour))
     title, most_m = "Errors of single reports, without motion", axis_end_m(curves)
     drawn = plot_cumulative(curves, title=title, most_m=most_m, share=_SHARE, of="reports")
-    return save(drawn, path)
+    return save(drawn, path).name
 
 
 def _advice(fitted: ReportLocator) -> list[str]:

@@ -218,8 +218,9 @@ def _shared_notes(logs: Sequence[ReplayedLog]) -> list[str]:
     for log in logs:
         for note in log.notes:
             # A note begins with the file that it is of; logs differ in its folder.
-            _, _, rest = note.rpartition(f"{log.name}/")
-            owners.setdefault(rest, []).append(log.name)
+            where, colon, told = note.partition(": ")
+            _, _, rest = where.rpartition(f"{log.name}/")
+            owners.setdefault(rest + colon + told, []).append(log.name)
     return [f"{note} (in {_named(names)})" for note, names in owners.items()]
 
 

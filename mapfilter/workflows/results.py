@@ -13,7 +13,7 @@ ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")
 FIGURES = "figures.json"
 REPLAY_HTML = "replay.html"
 SUMMARY = "summary.json"
-POSITIONS = "positions.csv"
+POSITIONS, PICTURE_OF_REPORTS = "positions.csv", "errors.png"
 """Of single reports."""
 
 PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
@@ -73,6 +73,14 @@ def _check_figures(
             got = "those of mapfilter locate"
         hint = "results of one command each; give another folder by --out"
         raise fail(OutputError, str(figures), f"figures of {whose}, or nothing yet", got, hint)
+
+
+def older_reports(out: Path) -> list[Path]:
+    """Return the files that an older ``locate`` wrote in a folder."""
+    if not (out / FIGURES).is_file():
+        return []
+    found = (out / name for name in (FIGURES, POSITIONS, PICTURE_OF_REPORTS))
+    return [path for path in found if path.is_file()]
 
 
 def older_results(out: Path) -> list[Path]:

@@ -250,6 +250,29 @@ def test_sessions_end_when_deleted_or_idle_and_leave_nothing(positioner, cross, 
     assert [path.name for path in tmp_path.iterdir()] == [LOCK]
 
 
+def test_a_session_used_while_another_ends_is_not_idle(positioner, cross, monkeypatch):
+    with service(positioner, cross.plan, idle_s=60.0) as made:
+        end = made.sessions.end
+
+        async def run():
+            app = made.app()
+            one, other = await begin(app), await begin(app)
+
+            async def slowly(session, reason):
+                await end(session, reason)
+                if other in made.sessions.all:
+                    await post(app, other, documents(1)[0])
+
+            monkeypatch.setattr(made.sessions, "end", slowly)
+            for session in made.sessions.all.values():
+                session.used_s -= 100.0
+            assert await made.sessions.end_idle() == 1
+            assert list(made.sessions.all) == [other]
+            assert (await ask(app, "GET", f"/sessions/{one}")).code == 404
+
+        asyncio.run(run())
+
+
 def test_sessions_of_another_database_are_refused(positioner, cross, tmp_path):
     with service(positioner, cross.plan, tmp_path) as made:
         asyncio.run(begin(made.app()))

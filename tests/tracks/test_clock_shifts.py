@@ -76,3 +76,24 @@ def test_a_receiver_whose_week_number_began_anew(notes):
     told = rf'week number began anew: offsets_s={{"FILE": {WEEKS_S}}}'
     with pytest.raises(InputError, match=told):
         notes(-WEEKS_S - 2 * COUNT)
+
+
+@pytest.mark.parametrize("of", ["utc", "local"])
+@pytest.mark.parametrize("name", ["fixes.csv", "odometry.csv"])
+def test_an_offset_moves_that_recording_alone(tmp_path, of, name):
+    """Also where its clock is the one that others are compared with."""
+    seconds = np.arange(60.0)
+    times = TIME_S[:60]
+    if of == "local":
+        times = [f"{time:%Y-%m-%d %H:%M:%S}" for time in pd.to_datetime(times, unit="s")]
+    tables = {
+        "fixes.csv": {"lat": 60 + seconds / 1e4, "lon": 25.0},
+        "odometry.csv": {"wheel_speed_mps": 11.0, "yaw_rate_radps": 0.0},
+    }
+    for file, rows in tables.items():
+        pd.DataFrame({"time": times, **rows}).to_csv(tmp_path / file, index=False)
+    paths = [tmp_path / file for file in tables]
+    log = mf.read_log(paths, offsets_s={name: 5.0})
+    late_s = log.gnss["time_s"].iloc[0] - log.motion["time_s"].iloc[0]
+    assert late_s == (5.0 if name == "fixes.csv" else -5.0)
+    assert [note for note in log.notes if "speeds" in note] == []

@@ -74,6 +74,16 @@ def test_cells_that_are_left_out_still_compare_with_those_of_their_layer(level_d
     compare(levels, [0, 1], [by_hand(level_dbm, some) for some in ([1, 3], [4])])
 
 
+def test_levels_beside_an_antenna_are_held_as_they_are(level_dbm):
+    near = level_dbm + np.float32(45.0)
+    levels, _ = level_fields(database(near), FRAME, None)
+    found = np.moveaxis(unpacked(levels["level"]), 0, 2)
+    assert np.array_equal(np.isnan(found), np.isnan(near))
+    assert found == pytest.approx(near, abs=0.25, nan_ok=True)
+    strongest = [by_hand(near, some)[0] for some in ([0, 2, 5], [1, 3], [4])]
+    assert unpacked(levels["best"]) == pytest.approx(np.array(strongest), abs=0.25)
+
+
 def test_one_layer_is_held_once(level_dbm):
     levels, _ = level_fields(database(level_dbm, [None] * len(NAMES)), FRAME, None)
     assert unpacked(levels["best"]).shape == (1, ROWS, COLS)

@@ -130,6 +130,8 @@ def test_side_by_side_names_and_databases():
     both = side_by_side([("a", first), ("b", second)])
     assert [run["name"] for run in both["runs"]] == ["walk", "walk (2)"]
     assert (both["title"], both["notes"]) == ("A | B", ["n", "m"])
+    more = side_by_side([("a b", both), ("a", first)])
+    assert [run["name"] for run in more["runs"]] == ["walk", "walk (2)", "walk (3)"]
     assert (both["levels"], both["why"]) == (levels, {"weight": 1})
     faults = [("c", view_of(database="other")), ("d", view_of(kind="database"))]
     with pytest.raises(InputError) as raised:

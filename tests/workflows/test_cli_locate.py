@@ -96,6 +96,19 @@ def test_without_truth_there_is_no_score_and_no_picture(folder, tmp_path):
     assert not (tmp_path / "errors.png").exists()
 
 
+def test_a_picture_of_an_older_run_does_not_stay(folder, tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    given = ["--db", folder / "surveys", "--out", tmp_path, "--method", "centroid", "--json"]
+    for log, files in (
+        ("walk", ["errors.png", "figures.json", "mine.txt", "positions.csv"]),
+        ("blind", ["figures.json", "mine.txt", "positions.csv"]),
+    ):
+        outcome = assert_done(mapfilter("locate", *given, "--log", folder / log))
+        assert sorted(path.name for path in tmp_path.iterdir()) == files
+        told = {path.rpartition("/")[2] for path in outcome.json["outputs"]}
+        assert told == {*files} - {"mine.txt"}
+
+
 def test_several_logs_are_told_apart(folder, tmp_path):
     assert_done(
         mapfilter(
