@@ -52,6 +52,14 @@ def test_turns_beside_counted_steps_are_motion():
     assert not any("declination" in note for note in notes)
 
 
+def test_turns_of_one_time_add_up():
+    """Of two in each second the second one was lost."""
+    turn = 0.1 + 0.001 * np.arange(60.0)
+    rows = turns(turn, time_s=np.repeat(SECONDS, 2)).sample(frac=1.0, random_state=1)
+    motion, _, _ = reckon_counted({"steps": STEPS, "turns": rows})
+    np.testing.assert_allclose(motion["turn_rad"][1:], turn.reshape(30, 2).sum(axis=1)[1:])
+
+
 @pytest.mark.parametrize("late", ["steps", "rate"])
 def test_yaw_rates_in_rows_of_their_own_at_the_times_of_steps_are_joined(late):
     """Those that came second were lost, and with them the motion."""

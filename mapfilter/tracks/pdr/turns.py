@@ -84,6 +84,8 @@ def turning_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Turning | None, str
     reason : str
         "" with turns, and where no such sensor is there.
     """
+    if "turns" in sensors:
+        sensors = {**sensors, "turns": _added(sensors["turns"])}
     if (rows := samples(sensors, "turns", ("turn_rad", "yaw_rate_radps"))) is not None:
         turn, rate = rows[1].T
         # A single turn says less than a rate in every row.
@@ -98,6 +100,12 @@ def turning_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Turning | None, str
     if up is None:
         return None, NO_VERTICAL
     return turning_of_rate(gyroscope[0], np.sum(gyroscope[1] * up, axis=1), "a gyroscope"), ""
+
+
+def _added(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return rows in which the turns of one time, such as a whole second, are their sum."""
+    turn = rows["turn_rad"].groupby(rows["time_s"]).transform("sum", min_count=1)
+    return rows.assign(turn_rad=turn)
 
 
 def force_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats, str] | None:
