@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from mapfilter.tracks.combine import combine
 from mapfilter.tracks.open_options import CombineOptions
 from mapfilter.tracks.pdr.counted import reckon_counted
+from mapfilter.tracks.pdr.mounted import turning_of_mounted
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.turns import Turning, turning_of
 from mapfilter.tracks.readers.formats import read_recording
@@ -50,6 +51,18 @@ def test_turns_beside_counted_steps_are_motion():
     assert "with turns" in notes[0]
     assert any("heading at the start is unknown" in note for note in notes)
     assert not any("declination" in note for note in notes)
+
+
+def test_a_gyroscope_of_zeros_alone_is_none():
+    """As logs with fixed columns have of a phone without one: it was a straight way."""
+    still = {f"{axis}_radps": 0.0 for axis in "xyz"}
+    force = {"x_mps2": 0.0, "y_mps2": 0.0, "z_mps2": GRAVITY}
+    sensors = {name: pd.DataFrame({"time_s": SECONDS, **columns})
+               for name, columns in (("gyroscope", still), ("gravity", force))}  # fmt: skip
+    assert turning_of(sensors) == (None, "")
+    assert turning_of_mounted(sensors) == (None, ())
+    sensors["gyroscope"].loc[7, "x_radps"] = 1e-3
+    assert turning_of(sensors)[0] is not None
 
 
 def test_turns_of_one_time_add_up():

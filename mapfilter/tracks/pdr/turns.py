@@ -119,13 +119,18 @@ def force_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats, str] 
 def samples(
     sensors: Mapping[str, pd.DataFrame], name: str, columns: tuple[str, ...]
 ) -> tuple[Floats, Floats] | None:
-    """Return times that grow, and the columns; None where there are not two rows."""
+    """Return times that grow, and the columns; None where there are not two rows.
+
+    Nor are there any of a gyroscope all of whose rates are 0, as where a phone has none.
+    """
     if name not in sensors:
         return None
     rows = joined_times(sensors[name].sort_values("time_s", kind="stable"))
     if len(rows) < 2:
         return None
     values = rows[list(columns)].to_numpy(dtype=np.float64)
+    if name == "gyroscope" and not values.any():
+        return None
     return rows["time_s"].to_numpy(dtype=np.float64), values
 
 
