@@ -180,6 +180,17 @@ def test_a_turn_that_is_missing_is_unknown_and_told():
     assert any("no turn known in 1 row with steps" in note for note in notes)
 
 
+def test_turns_in_rows_of_their_own_between_steps_are_known(tmp_path):
+    """They were taken for missing ones, and there was no motion."""
+    path = tmp_path / "phone.csv"
+    rows = [f"{k},{2 * k},\n{k + 0.3:.1f},,{6 if k == 9 else 0}" for k in range(30)]
+    path.write_text("\n".join(["time,steps,turn_deg", *rows]) + "\n")
+    motion = combine([read_recording(path)], CombineOptions(walk=WalkOptions())).log.motion
+    assert motion["step_m"].sum() == pytest.approx(29 * 2 * 0.7)
+    assert np.degrees(motion["turn_rad"].sum()) == pytest.approx(6.0)
+    assert motion["turn_rad"].isna().sum() == 2
+
+
 def test_rows_of_reports_between_rows_of_motion_have_no_turn(tmp_path):
     # Every third row is a report alone.
     rows = [f"{2 * k},{0.1},," if k % 3 else ",,-80,7" for k in range(30)]
