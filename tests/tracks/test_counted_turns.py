@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from mapfilter.tracks.combine import combine
 from mapfilter.tracks.open_options import CombineOptions
 from mapfilter.tracks.pdr.counted import reckon_counted
+from mapfilter.tracks.pdr.mounted import turning_of_mounted
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.turns import Turning, turning_of
 from mapfilter.tracks.readers.formats import read_recording
@@ -50,6 +51,26 @@ def test_turns_beside_counted_steps_are_motion():
     assert "with turns" in notes[0]
     assert any("heading at the start is unknown" in note for note in notes)
     assert not any("declination" in note for note in notes)
+
+
+def test_a_gyroscope_of_zeros_alone_is_none():
+    """As logs with fixed columns have of a phone without one: it was a straight way."""
+    still = {f"{axis}_radps": 0.0 for axis in "xyz"}
+    force = {"x_mps2": 0.0, "y_mps2": 0.0, "z_mps2": GRAVITY}
+    sensors = {name: pd.DataFrame({"time_s": SECONDS, **columns})
+               for name, columns in (("gyroscope", still), ("gravity", force))}  # fmt: skip
+    assert turning_of(sensors) == (None, "")
+    assert turning_of_mounted(sensors) == (None, ())
+    sensors["gyroscope"].loc[7, "x_radps"] = 1e-3
+    assert turning_of(sensors)[0] is not None
+
+
+def test_turns_of_one_time_add_up():
+    """Of two in each second the second one was lost."""
+    turn = 0.1 + 0.001 * np.arange(60.0)
+    rows = turns(turn, time_s=np.repeat(SECONDS, 2)).sample(frac=1.0, random_state=1)
+    motion, _, _ = reckon_counted({"steps": STEPS, "turns": rows})
+    np.testing.assert_allclose(motion["turn_rad"][1:], turn.reshape(30, 2).sum(axis=1)[1:])
 
 
 @pytest.mark.parametrize("late", ["steps", "rate"])
@@ -157,6 +178,17 @@ def test_a_turn_that_is_missing_is_unknown_and_told():
     motion, _, notes = reckon_counted({"steps": STEPS, "turns": turns(turn)})
     assert np.flatnonzero(motion["turn_rad"].isna()).tolist() == [0, 9]
     assert any("no turn known in 1 row with steps" in note for note in notes)
+
+
+def test_turns_in_rows_of_their_own_between_steps_are_known(tmp_path):
+    """They were taken for missing ones, and there was no motion."""
+    path = tmp_path / "phone.csv"
+    rows = [f"{k},{2 * k},\n{k + 0.3:.1f},,{6 if k == 9 else 0}" for k in range(30)]
+    path.write_text("\n".join(["time,steps,turn_deg", *rows]) + "\n")
+    motion = combine([read_recording(path)], CombineOptions(walk=WalkOptions())).log.motion
+    assert motion["step_m"].sum() == pytest.approx(29 * 2 * 0.7)
+    assert np.degrees(motion["turn_rad"].sum()) == pytest.approx(6.0)
+    assert motion["turn_rad"].isna().sum() == 2
 
 
 def test_rows_of_reports_between_rows_of_motion_have_no_turn(tmp_path):

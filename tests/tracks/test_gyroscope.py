@@ -130,3 +130,14 @@ def test_a_noisy_yaw_rate_has_its_bias_removed_and_its_noise_stated(bias_degps):
     assert abs(drift_degps) < 0.3
     assert imu.gyro_noise_deg_per_sqrt_s == pytest.approx(np.hypot(0.15, 4 / 10**0.5), rel=0.1)
     assert any("noise by which headings drift 1." in note for note in notes)
+
+
+@pytest.mark.parametrize("name", ["gyroscope", "magnetometer"])
+def test_sensors_of_zeros_are_none(name):
+    """As logs with fixed columns have of a phone without them: its walks went anywhere."""
+    sensors, _, _ = walk_sensors((Leg(20, 0.3, 3), Leg(15, 1.8)), Phone())
+    zeros = sensors[name].assign(**dict.fromkeys(sensors[name].columns.drop("time_s"), 0.0))
+    found, _ = reckon_walk({**sensors, name: zeros})
+    without, _ = reckon_walk({one: rows for one, rows in sensors.items() if one != name})
+    pd.testing.assert_frame_equal(found.motion, without.motion)
+    assert (found.imu, found.notes) == (without.imu, without.notes)

@@ -137,25 +137,52 @@ def test_of_positions_renewed_by_time_a_short_way_over_a_gap_is_one_step():
     assert np.diff(motion["time_s"]).max() == pytest.approx(60.0)
 
 
-@pytest.mark.parametrize("stands_s", [60, 600])
-def test_a_course_after_a_long_rest_gives_the_headings_of_a_gyroscope(stands_s):
-    """With a course in a fifth of the time or less they counted from an arbitrary direction."""
+def receiver_and_gyroscope(time_s, rate_radps, second, **velocity):
+    """Tables of sensors: a phone that lies flat, without what is not at ``time_s``."""
     rng = np.random.default_rng(0)
-    time_s = np.arange(0.0, stands_s + 100.0, 0.02)
-    turning = (time_s > stands_s + 40) & (time_s < stands_s + 50)
-    rate = rng.normal(0, 0.001, (len(time_s), 3)) + np.outer(turning, [0, 0, np.pi / 20])
+    rate = rng.normal(0, 0.001, (len(time_s), 3)) + np.outer(rate_radps, [0, 0, 1])
     force = rng.normal([0.0, 0.0, 9.81], 0.01, (len(time_s), 3))
     sensors = {
         "gyroscope": pd.DataFrame(rate, columns=["x_radps", "y_radps", "z_radps"]),
         "accelerometer": pd.DataFrame(force, columns=["x_mps2", "y_mps2", "z_mps2"]),
     }
     sensors = {name: rows.assign(time_s=time_s) for name, rows in sensors.items()}
+    return sensors | {"velocity": pd.DataFrame({"time_s": second, **velocity})}
+
+
+@pytest.mark.parametrize("stands_s", [60, 600])
+def test_a_course_after_a_long_rest_gives_the_headings_of_a_gyroscope(stands_s):
+    """With a course in a fifth of the time or less they counted from an arbitrary direction."""
+    time_s = np.arange(0.0, stands_s + 100.0, 0.02)
+    turning = (time_s > stands_s + 40) & (time_s < stands_s + 50)
     second = np.arange(1.0, stands_s + 99.0)
     drives = second > stands_s
     heading = np.pi / 2 + np.clip(second - stands_s - 40, 0, 10) * np.pi / 20
     course = {"speed_mps": 10.0 * drives, "heading_rad": np.where(drives, heading, np.nan)}
-    sensors["velocity"] = pd.DataFrame({"time_s": second, **course})
+    sensors = receiver_and_gyroscope(time_s, turning * np.pi / 20, second, **course)
     motion, errors, _ = reckon_velocity(sensors)
     apart = wrap_rad(motion["heading_rad"].to_numpy()[1:] - (heading[1:] + heading[:-1]) / 2)
     assert np.degrees(np.abs(apart[drives[:-1]])).max() < 3
     assert errors.turns == "headings"
+
+
+def test_a_gap_of_the_sensors_loses_no_motion_but_its_own():
+    """All but the longest part between two gaps was lost."""
+    time_s = np.arange(0.0, 300.0, 0.02)
+    rate, second = 0.1 * np.sin(time_s / 20), np.arange(1.0, 299.0)
+    heading = np.interp(second, time_s, np.cumsum(rate) * 0.02)
+    known = ~((time_s > 99.5) & (time_s < 101.5)) & ~((time_s > 219.9) & (time_s < 221.1))
+    course = {"speed_mps": 10.0, "heading_rad": heading}
+    motion, errors, notes = reckon_velocity(
+        receiver_and_gyroscope(time_s[known], rate[known], second, **course)
+    )
+    assert motion["time_s"].tolist() == [t for t in second if t not in (100, 101, 220, 221)]
+    unknown = motion["step_m"].isna()
+    assert motion.loc[unknown, "time_s"].tolist() == [102.0, 222.0]
+    assert motion["turn_rad"].isna().equals(unknown)
+    assert motion["step_m"].sum() == pytest.approx(10.0 * (297 - 6))
+    middle = np.interp(motion["time_s"] - 0.5, second, heading)
+    apart = wrap_rad(motion["heading_rad"].to_numpy() - middle)
+    assert np.degrees(np.abs(apart)).max() < 6
+    assert errors.turns == "headings"
+    assert notes[-1] == "2 gaps of the sensors, over which motion is not known"

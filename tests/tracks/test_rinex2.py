@@ -82,9 +82,14 @@ def test_lines_of_satellites_and_values_go_on(read, monkeypatch, block_bytes):
     ]
 
 
-def test_events_are_skipped_with_their_lines(read):
+@pytest.mark.parametrize("time", [" 26  5  1 10  0  1.5000000", " " * 26])
+@pytest.mark.parametrize("flag", [4, 6])
+def test_events_are_skipped_with_their_lines(read, time, flag):
+    """Lines of those without a time, and of slips, were refused as epochs."""
     names, values = made(2)
-    event = [" 26  5  1 10  0  1.5000000  4  2", f"{'moved':<60}COMMENT", f"{'again':<60}COMMENT"]
+    event = [f"{time}  4  2", f"{'moved':<60}COMMENT", f"{'again':<60}COMMENT"]
+    if flag == 6:
+        event = [f"{time}  6  2{''.join(names)}", *epoch(0, names, values[2])[1:]]
     lines = [*header(), *epoch(0, names, values[0]), *event, *epoch(2, names, values[1])]
     recording = read(lines)
     assert len(recording.tables["satellites"]) == 4

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.tracks.readers.formats import read_recording
 
 COUNT = 400
 TIME_S = 1_777_629_600 + np.arange(float(COUNT))
@@ -69,6 +70,14 @@ def test_a_column_of_hdop_gives_the_accuracy(tmp_path):
     log = mf.read_log(positions(tmp_path / "a.csv", 3.0, 1, hdop=hdop(1)))
     assert log.gnss["var_east_m2"].notna().all()
     assert log.notes == ()
+
+
+def test_hdop_serves_where_an_accuracy_is_missing(tmp_path):
+    """As in GPX; beside a column of accuracies, even an empty one, HDOP was not used at all."""
+    given_m = np.where(np.arange(COUNT) % 2, 5.0, np.nan)
+    path = positions(tmp_path / "a.csv", 3.0, 1, accuracy=given_m, hdop=2.0)
+    stated_m = np.where(np.arange(COUNT) % 2, 5.0, 4.0 * 2.0)
+    assert read_recording(path).tables["positions"]["accuracy_m"].tolist() == stated_m.tolist()
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -9,7 +9,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
-from mapfilter.tracks.readers import text
+from mapfilter.tracks.readers import gpx, lines, text
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.local_times import utc_from_local_s
@@ -100,6 +100,37 @@ def test_parts_of_large_drive_tests_follow_each_other(tmp_path, monkeypatch, nam
     assert found.format == name
     for table in ("positions", "radio"):
         np.testing.assert_array_equal(found.tables[table]["time_s"].unique(), utc_s)
+
+
+def written_in_blocks(name, utc_s):
+    """A recording whose text is read block by block, in local times."""
+    moments = pd.to_datetime(local_s(utc_s), unit="s")
+    if name == "nemo":
+        lines = ['#START,00:00:00.000,,"25.10.2026"']
+        times = moments.strftime("%H:%M:%S.000")
+        return lines + [
+            f"GPS,{time},,13.4,{52 + k * 1e-5:.5f},40,0,1,8,30" for k, time in enumerate(times)
+        ]
+    stamps = moments.strftime("%Y-%m-%dT%H:%M:%S")
+    points = [
+        f'<trkpt lat="{52 + k * 1e-5:.5f}" lon="13.4"><time>{stamp}</time></trkpt>'
+        for k, stamp in enumerate(stamps)
+    ]
+    return ['<gpx version="1.1"><trk><trkseg>', *points, "</trkseg></trk></gpx>"]
+
+
+@pytest.mark.parametrize("name", ["nemo", "gpx"])
+@pytest.mark.parametrize(("begin_s", "end_s"), [(-1800, 600), (-1800, 3000), (-6000, 9000)])
+def test_blocks_of_a_large_file_follow_each_other(tmp_path, monkeypatch, name, begin_s, end_s):
+    """Blocks within the second pass were an hour early."""
+    monkeypatch.setattr(lines, "_BLOCK_BYTES", 1 << 14)
+    monkeypatch.setattr(gpx, "_PART_BYTES", 1 << 14)
+    utc_s = BACK_S + np.arange(begin_s, end_s)
+    path = tmp_path / f"drive.{name}"
+    path.write_text("\n".join(written_in_blocks(name, utc_s)) + "\n")
+    found = read_recording(path, options=ReadOptions(zone=BERLIN))
+    assert found.format == name
+    np.testing.assert_array_equal(found.tables["positions"]["time_s"], utc_s)
 
 
 def test_times_with_a_zone_among_local_ones_are_no_fall():

@@ -77,7 +77,7 @@ def inertial_signals(
     gyroscope = gyroscope_samples(sensors)
     if gyroscope is not None and (fault := _rate_fault(gyroscope[1])):
         return [], (fault,)
-    field = _table(sensors, "magnetometer", _FIELD)
+    field = _field_samples(sensors)
     notes = () if gyroscope is not None else ("no gyroscope: headings by the compass alone",)
     every = [_stretches(time_s)]
     if gyroscope is not None:
@@ -101,8 +101,21 @@ def inertial_signals(
 
 
 def gyroscope_samples(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats] | None:
-    """Return times that grow and rates as they were measured; None where there are not two."""
-    return _table(sensors, "gyroscope", _RATE)
+    """Return times that grow and rates as they were measured; None where there are not two.
+
+    All are 0 in tables of phones without a gyroscope.
+    """
+    found = _table(sensors, "gyroscope", _RATE)
+    return found if found is not None and found[1].any() else None
+
+
+def _field_samples(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats] | None:
+    """Return times that grow and fields but those of 0, which mean that there is none."""
+    found = _table(sensors, "magnetometer", _FIELD)
+    if found is None:
+        return None
+    there = found[1].any(axis=1)
+    return (found[0][there], found[1][there]) if there.sum() > 1 else None
 
 
 def _rate_fault(rate: Floats) -> str:

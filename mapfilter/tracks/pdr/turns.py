@@ -84,6 +84,8 @@ def turning_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Turning | None, str
     reason : str
         "" with turns, and where no such sensor is there.
     """
+    if "turns" in sensors:
+        sensors = {**sensors, "turns": _added(sensors["turns"])}
     if (rows := samples(sensors, "turns", ("turn_rad", "yaw_rate_radps"))) is not None:
         turn, rate = rows[1].T
         # A single turn says less than a rate in every row.
@@ -100,6 +102,12 @@ def turning_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Turning | None, str
     return turning_of_rate(gyroscope[0], np.sum(gyroscope[1] * up, axis=1), "a gyroscope"), ""
 
 
+def _added(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return rows in which the turns of one time, such as a whole second, are their sum."""
+    turn = rows["turn_rad"].groupby(rows["time_s"]).transform("sum", min_count=1)
+    return rows.assign(turn_rad=turn)
+
+
 def force_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats, str] | None:
     """Return times, the (N, 3) force of gravity or the accelerometer, and which; None without."""
     for name in ("gravity", "accelerometer"):
@@ -111,13 +119,18 @@ def force_of(sensors: Mapping[str, pd.DataFrame]) -> tuple[Floats, Floats, str] 
 def samples(
     sensors: Mapping[str, pd.DataFrame], name: str, columns: tuple[str, ...]
 ) -> tuple[Floats, Floats] | None:
-    """Return times that grow, and the columns; None where there are not two rows."""
+    """Return times that grow, and the columns; None where there are not two rows.
+
+    Nor are there any of a gyroscope all of whose rates are 0, as where a phone has none.
+    """
     if name not in sensors:
         return None
     rows = joined_times(sensors[name].sort_values("time_s", kind="stable"))
     if len(rows) < 2:
         return None
     values = rows[list(columns)].to_numpy(dtype=np.float64)
+    if name == "gyroscope" and not values.any():
+        return None
     return rows["time_s"].to_numpy(dtype=np.float64), values
 
 

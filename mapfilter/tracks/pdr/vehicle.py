@@ -24,7 +24,7 @@ from mapfilter.tracks.pdr.gyroscope import (
 )
 from mapfilter.tracks.pdr.heading import Compass, YawOffset, yaw_offset
 from mapfilter.tracks.pdr.odometry_rows import gap_notes, speed_errors, usable_rows, usual_s
-from mapfilter.tracks.pdr.signals import inertial_signals
+from mapfilter.tracks.pdr.signals import Signals, inertial_signals
 from mapfilter.tracks.pdr.turns import ORIENTATION, Turning, turning_of_rate
 
 _STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
@@ -113,7 +113,8 @@ def reckon_velocity(
     """Return the motion of a vehicle by the speed of a receiver and a gyroscope in any pose.
 
     Headings are the gyroscope's; the receiver's course, where it drives faster than 2 m/s, gives
-    their offset, and standing the gyroscope's bias.
+    their offset, and standing the gyroscope's bias. Over gaps of the sensors motion is not known;
+    its errors are those of the longest part between them.
 
     Parameters
     ----------
@@ -131,11 +132,22 @@ def reckon_velocity(
     rows = sensors.get("velocity")
     if rows is None or not stretches or stretches[0].rate_radps is None:
         return None
-    signals = max(stretches, key=lambda part: len(part.time_s))
     rows = rows.dropna(subset=["speed_mps"]).drop_duplicates("time_s").sort_values("time_s")
-    rows = rows[rows["time_s"].between(signals.time_s[0], signals.time_s[-1])]
-    if len(rows) < 2:
+    covered = ((part, rows["time_s"].between(*part.time_s[[0, -1]])) for part in stretches)
+    parts = [_driven(part, rows[inside]) for part, inside in covered if inside.sum() > 1]
+    if not parts:
         return None
+    motion, imu, notes = max(parts, key=lambda part: len(part[0]))
+    if gaps := len(parts) - 1:
+        for later, _, _ in parts[1:]:
+            later.loc[0, ["step_m", "turn_rad"]] = np.nan
+        motion = pd.concat([part[0] for part in parts], ignore_index=True)
+        notes += (f"{number_of(gaps, 'gap')} of the sensors, over which motion is not known",)
+    return motion, imu, notes
+
+
+def _driven(signals: Signals, rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[str, ...]]:
+    """Return the motion over the time of sensors without gaps, by two speeds or more."""
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     speed = rows["speed_mps"].to_numpy(dtype=np.float64)
     course = rows["heading_rad"].to_numpy(dtype=np.float64)

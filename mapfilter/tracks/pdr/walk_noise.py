@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from mapfilter._words import number_of
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.gyroscope import Gyroscope
 from mapfilter.tracks.pdr.heading import YawOffset
@@ -74,7 +75,7 @@ def walk_notes(
             "positions or a map tell it"
         )
     if gaps:
-        words.append(f"{gaps} gaps of the sensors: motion unknown there")
+        words.append(f"{number_of(gaps, 'gap')} of the sensors: motion unknown there")
     for climb in found:
         words.append(f"{climb.kind}: {climb.rise_m:+.1f} m in {climb.end_s - climb.begin_s:.0f} s")
     return words

@@ -102,7 +102,7 @@ def _records(
         stamp = pc.replace_substring_regex(stamp, f":({digits}) GMT", rf".{zeros}\1")
     rows = Columns(reading, ("time",), number[at])
     rows._columns[0] = pa.chunked_array([pc.replace_substring(stamp, " GMT", "")])
-    time_s, zoned = rows.times("time", zone=options.zone)
+    time_s, zoned = rows.times_of_part("time", zone=options.zone)
     if np.isfinite(time_s).any():
         clocks.add(zoned)
     operator = _values(some, _WORD, "Operator").dictionary_encode()

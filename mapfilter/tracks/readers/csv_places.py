@@ -75,8 +75,9 @@ def add_places(
         columns[field] = _signed(mapped, reading, columns[field], field, column)
     if mapped.has("accuracy_m"):
         _note_hdop(mapped, reading, columns["accuracy_m"])
-    elif mapped.has("hdop"):
-        columns["accuracy_m"] = UERE_M * mapped.number("hdop")
+    if mapped.has("hdop"):
+        stated_m, by_hdop_m = columns["accuracy_m"], UERE_M * mapped.number("hdop")
+        columns["accuracy_m"] = np.where(np.isnan(stated_m), by_hdop_m, stated_m)
     columns["course_deg"] = _within_turn(columns["course_deg"])
     there = np.isfinite(columns["lat_deg"]) | np.isfinite(columns["lon_deg"])
     columns |= {"time_s": time_s, "speed_mps": speeds_of(mapped, "speed")}

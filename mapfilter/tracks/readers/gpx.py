@@ -63,7 +63,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     clocks: set[bool] = set()
     for points, lines in _points(data, kind.encode(), reading):
         rows = _columns(points, lines, reading)
-        time_s, zoned = rows.times("time", zone=options.zone)
+        time_s, zoned = rows.times_of_part("time", zone=options.zone)
         if np.isfinite(time_s).any():
             clocks.add(zoned)
         reading.clock = Clock("local", options.zone) if False in clocks else Clock("utc")

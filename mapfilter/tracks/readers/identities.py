@@ -73,7 +73,7 @@ def cell_names(mcc: Floats, mnc: Floats, lac: Floats, ci: Floats) -> np.ndarray:
 def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) -> None:
     """Add reported cells, with names of those identified, and codes checked by technology.
 
-    Rows without any of an identity, a carrier, a code and a level are refused.
+    Rows without any of an identity, a level and a timing advance are refused.
     """
     line = np.asarray(lines, dtype=np.int64)
     count = len(line)

@@ -122,9 +122,10 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         if midnight_s is not None:
             events.time_s[:] += midnight_s
             if zone:
-                utc_s = utc_from_local_s(events.time_s, zone)
-                for note in change_notes(events.time_s, utc_s, zone):
+                utc_s = utc_from_local_s(events.time_s, zone, reading.passed_s)
+                for note in change_notes(events.time_s, utc_s, zone, reading.passed_s):
                     reading.note(note)
+                reading.passed_s = max([reading.passed_s, *utc_s[np.isfinite(utc_s)][-1:]])
                 events.time_s[:] = utc_s
         _add_positions(events, reading)
         known = {

@@ -154,9 +154,10 @@ def _add_courses(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     add_rows(reading, "compass", columns, mapped.rows, np.isfinite(magnetic))
     turn = mapped.radians("turn")
     rate = mapped.radians("yaw_rate", "ps")
-    # A row with steps alone has an unknown turn; one without either is none of motion.
-    turned = np.isfinite(turn) | np.isfinite(rate)
-    there = turned | (np.isfinite(mapped.number("steps")) & turned.any())
+    # A row with steps alone has an unknown turn, unless turns have rows of their own; one without
+    # either is none of motion.
+    turned, stepped = np.isfinite(turn) | np.isfinite(rate), np.isfinite(mapped.number("steps"))
+    there = turned | (stepped & (stepped & turned).any())
     columns = {"time_s": time_s, "turn_rad": turn, "yaw_rate_radps": rate}
     add_rows(reading, "turns", columns, mapped.rows, there)
 

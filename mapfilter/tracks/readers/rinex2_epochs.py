@@ -18,7 +18,8 @@ from mapfilter.tracks.readers.rinex_epochs import Observations, Records, Wanted,
 _DATE = re.compile(
     rb"(\d{1,4})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2}(?:\.\d*)?)"
 )
-_MEASURED = (b"0", b"1", b" ", b"")
+_MEASURED, _SLIPS = (b"0", b"1", b" ", b""), b"6"
+"""Flags of epochs; slips of cycles are written as observations are."""
 _NAMES_OF_LINE, _VALUES_OF_LINE = 12, 5
 _MOST_TYPES = 100
 
@@ -88,11 +89,14 @@ def _epochs(lines: Sequence[bytes], lines_of_one: int, *, last: bool) -> _Epochs
         count = int(number) if number.isdigit() else 0
         measured = line[28:29] in _MEASURED
         begin = at + 1 + (count - 1) // _NAMES_OF_LINE
-        end = begin + lines_of_one * count if measured else at + 1 + count
+        slips = line[28:29] == _SLIPS
+        end = begin + lines_of_one * count if measured or slips else at + 1 + count
         if count and end > size and not last:
             return found
         found.rows += 1
-        if np.isnan(gps_s) or not count:
+        # Events need no time.
+        timeless = np.isnan(gps_s) and (measured or bool(line[:26].strip()))
+        if timeless or not count:
             found.no_epoch.append(at)
             at += 1
             continue

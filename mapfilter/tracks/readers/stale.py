@@ -22,6 +22,17 @@ def repeated_readings(state: Ints, time_s: Floats, lat_deg: Floats, lon_deg: Flo
     ----------
     state : (N,) array of int
         Equal numbers where all that was measured is equal.
+    time_s, lat_deg, lon_deg : (N,) array
+        NaN where missing.
+
+    Examples
+    --------
+    >>> lat_deg, lon_deg = 50.0 + np.arange(4) / 2000, np.full(4, 8.0)
+    >>> state = np.zeros(4, dtype=np.int64)
+    >>> repeated_readings(state, np.array([0.0, np.nan, 2.0, 31.0]), lat_deg, lon_deg).tolist()
+    [False, True, True, True]
+    >>> repeated_readings(state, np.array([0.0, np.nan, 2.0, 3.0]), lat_deg, lon_deg).tolist()
+    [False, False, False, False]
     """
     repeated = np.zeros(len(state), dtype=bool)
     if not len(state):
@@ -32,7 +43,8 @@ def repeated_readings(state: Ints, time_s: Floats, lat_deg: Floats, lon_deg: Flo
         rows = slice(first, last)
         lat, lon = lat_deg[rows], lon_deg[rows]
         known = np.isfinite(lat) & np.isfinite(lon)
-        if not known.any() or np.ptp(time_s[rows]) <= _LONG_S:
+        timed_s = time_s[rows][np.isfinite(time_s[rows])]
+        if not known.any() or not timed_s.size or np.ptp(timed_s) <= _LONG_S:
             continue
         east_m, north_m = metres_about_middle(lon[known], lat[known])
         if np.hypot(np.ptp(east_m), np.ptp(north_m)) > _FAR_M:
