@@ -169,7 +169,8 @@ class PointReader:
                 ]
                 if np.all(away_px[inner] < _seen_px(window, outer, lattice)):
                     break
-                margin = max(2 * margin, int(away_px[inner].max()) + 2)
+                # All that may be nearer lies within.
+                margin = int(away_px[inner].max())
             elif outer == (0, 0, lattice.rows, lattice.cols):
                 where, expected = "whole lattice", "points of the database"
                 raise fail(StoreError, where, expected, "none", "a database without ways")
