@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mapfilter._code import code_digest
 from mapfilter._types import Floats, Floats32, Ints, Ints32
-from mapfilter.database.floor import FLOOR_DBM
+from mapfilter.database.floor import DECIMALS, FLOOR_DBM
 from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
 from mapfilter.lattice import Lattice
@@ -21,8 +21,6 @@ from mapfilter.rasters.sampling import Places, levels_at
 from mapfilter.roads.index import load_kernel
 from mapfilter.roads.lattice import RouteLattice
 
-_DECIMALS = 2
-"""Levels are kept to 0.01 dB."""
 _MAX_TILES = 64
 """Tiles of a group, however few cells reach them."""
 _AT_POINTS = ("best", "best_level_dbm", "margin_db")
@@ -197,7 +195,7 @@ def received_levels(level_dbm: Floats, floor_dbm: float, layer: Ints | None = No
     >>> received.best.tolist(), received.margin_db.tolist()
     ([1, 0], [9.5, nan])
     """
-    level = np.round(level_dbm, _DECIMALS)
+    level = np.round(level_dbm, DECIMALS)
     strength = np.where(level >= floor_dbm, level, -np.inf)
     if not len(strength):
         strength = np.full((1, *strength.shape[1:]), -np.inf)
@@ -220,11 +218,11 @@ def received_levels(level_dbm: Floats, floor_dbm: float, layer: Ints | None = No
     return TileLevels(
         np.where(received, best, -1).astype(np.int32),
         strongest_dbm.astype(np.float32),
-        np.round(margin, _DECIMALS).astype(np.float32),
+        np.round(margin, DECIMALS).astype(np.float32),
         cell.astype(np.int32),
         which.astype(np.int32),
         kept_dbm.astype(np.float32),
-        np.round(leading_dbm - kept_dbm, _DECIMALS).astype(np.float32),
+        np.round(leading_dbm - kept_dbm, DECIMALS).astype(np.float32),
     )
 
 

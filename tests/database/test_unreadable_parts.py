@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -133,6 +134,15 @@ def test_a_database_that_is_replaced_without_pause_is_given_up(copy, monkeypatch
     monkeypatch.setattr(store, "_open", unlike)
     with pytest.raises(StoreError, match="a database that stays, found ever another"):
         open_database(copy)
+
+
+def test_points_of_other_cells(database):
+    other = replace(database, plan=make_plan(("X", "Y", "S1.A")))
+    with pytest.raises(
+        StoreError, match=r"best servers among the cells, found .*mixed up"
+    ) as caught:
+        other.points()
+    assert only(caught).where == str(database.path / "points.parquet")
 
 
 def test_a_cell_table_with_a_wrong_value(tmp_path):
