@@ -92,10 +92,10 @@ def read_input(
         with open_input(path, kind) as stream:
             # A read of N bytes takes memory for N, however short the file is.
             held_bytes = os.fstat(stream.fileno()).st_size
-            data = stream.read(min(held_bytes, largest_bytes) + 1)
+            data = stream.read(held_bytes + 1) if held_bytes <= largest_bytes else b""
     except OSError as error:
         raise _unreadable(path, error, kind) from error
-    if len(data) > largest_bytes:
+    if max(held_bytes, len(data)) > largest_bytes:
         kib = largest_bytes >> 10
         size = f"{kib >> 10} MiB" if kib >= 1024 else f"{kib} KiB"
         raise fail(kind, str(path), f"{what} of at most {size}", "a larger file")

@@ -9,6 +9,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.database.checked import Part
+from mapfilter.database.floor import DECIMALS
 from mapfilter.database.parquet import Window, WindowReader, opened, part_ranges, read_columns
 from mapfilter.database.points import way_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -169,7 +170,8 @@ class PointReader:
                 ]
                 if np.all(away_px[inner] < _seen_px(window, outer, lattice)):
                     break
-                margin = max(2 * margin, int(away_px[inner].max()) + 2)
+                # All that may be nearer lies within.
+                margin = int(away_px[inner].max())
             elif outer == (0, 0, lattice.rows, lattice.cols):
                 where, expected = "whole lattice", "points of the database"
                 raise fail(StoreError, where, expected, "none", "a database without ways")
@@ -182,8 +184,7 @@ class PointReader:
         away_m = away_px[inner] * lattice.resolution_m + on_way_m.astype(np.float64)[nearest]
         best_dbm = points["best_level_dbm"][order][used]
         margin_db = points["margin_db"][order][used].astype(np.float64)
-        # Levels and margins are kept to 0.01 dB.
-        second_dbm = np.round(best_dbm.astype(np.float64) - margin_db, 2)
+        second_dbm = np.round(best_dbm.astype(np.float64) - margin_db, DECIMALS)
         return NearestPoints(
             window,
             near.reshape(rows, cols).astype(np.int32),
@@ -204,7 +205,7 @@ def _grown(window: Window, margin: int, lattice: Lattice) -> Window:
 
 def _seen_px(window: Window, outer: Window, lattice: Lattice) -> Ints:
     """Return how far from each pixel of a window the nearest pixel beyond another one lies."""
-    far = 2 * (lattice.rows + lattice.cols)
+    far = lattice.rows + lattice.cols
     (top, left, rows, cols), (low, west, high, wide) = window, outer
     row, col = np.arange(top, top + rows), np.arange(left, left + cols)
     above = row - low + 1 if low > 0 else np.full(rows, far)

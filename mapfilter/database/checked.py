@@ -131,9 +131,9 @@ class _CheckedFile(io.RawIOBase):
     """Gives out bytes of blocks whose checksums are right."""
 
     def __init__(self, stream: BinaryIO, part: Part) -> None:
-        super().__init__()
         self._stream, self._part = stream, part
-        self._at, self._held = 0, (-1, b"")
+        self._at = 0
+        self._held: tuple[int | None, bytes] = None, b""
 
     def readable(self) -> bool:
         return True
@@ -149,7 +149,7 @@ class _CheckedFile(io.RawIOBase):
         self._at = base + offset
         return self._at
 
-    def read(self, size: int | None = -1) -> bytes:
+    def read(self, size: int | None = None) -> bytes:
         left = max(self._part.size - self._at, 0)
         end = self._at + (left if size is None or size < 0 else min(size, left))
         found = []

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from mapfilter._types import Floats
+from mapfilter._types import Floats, Ints
 from mapfilter.database.build import check_parameters
 from mapfilter.database.build_job import BuildJob
 from mapfilter.database.defaults import MARGIN_DB, TILE_PX
@@ -33,6 +33,8 @@ from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 _SAMPLED_TILES = 16
+_LEAST_SHARE = 0.01
+"""Of the mean weight, for each tile: a way outside it may reach points in it."""
 _BYTES_PER_LEVEL_IN_MEMORY = 40
 _BYTES_OF_A_PROCESS = 350 << 20
 
@@ -83,16 +85,8 @@ def dry_run(
     floor_dbm = floor_of(plan, floor_dbm)
     check_parameters(margin_db, floor_dbm, tile_px)
     job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
-    # Some weight for each, as a way outside a tile may reach points in it.
     weight = np.array([job.routes.weight(job.covered(window)) for window in job.windows])
-    share = weight + 0.01 * weight.mean() + 1e-9
-    share /= share.sum()
-    if len(share) <= _SAMPLED_TILES:
-        drawn, scale = np.arange(len(share)), np.ones(len(share))
-    else:
-        middle = (np.arange(_SAMPLED_TILES) + 0.5) / _SAMPLED_TILES
-        drawn = share.cumsum().searchsorted(middle).clip(max=len(share) - 1)
-        scale = 1 / share[drawn] / _SAMPLED_TILES
+    drawn, scale = drawn_tiles(weight)
     # The first read opens files and compiles, which is not part of a tile's work.
     read_tile(job.task(int(drawn[0])))
     found = [_sample(job, number) for number in drawn.tolist()]
@@ -103,7 +97,7 @@ def dry_run(
     began_s = time.perf_counter()
     size = _bytes(found, scale, job.plan)
     writing_s = time.perf_counter() - began_s
-    of_levels = levels / max(sum(tile.levels for tile in found), 1)
+    of_levels = _ratio(levels, sum(tile.levels for tile in found))
     waiting = min(levels, ROWS_IN_MEMORY + max(tile.levels for tile in found))
     return BuildEstimate(
         round(points),
@@ -112,6 +106,20 @@ def dry_run(
         round(peak_memory_bytes() + waiting * _BYTES_PER_LEVEL_IN_MEMORY),
         float(scale @ [tile.seconds for tile in found]) + writing_s * of_levels,
     )
+
+
+def drawn_tiles(weight: Floats) -> tuple[Ints, Floats]:
+    """Return which tiles stand for all, given the points expected in each, and for how many.
+
+    Of up to sixteen tiles that is each, for itself; of more, sixteen, some of them several times.
+    """
+    if len(weight) <= _SAMPLED_TILES:
+        return np.arange(len(weight)), np.ones(len(weight))
+    share = weight + _LEAST_SHARE * max(weight.mean(), 1.0)
+    share /= share.sum()
+    middle = (np.arange(_SAMPLED_TILES) + 0.5) / _SAMPLED_TILES
+    drawn = share.cumsum().searchsorted(middle)
+    return drawn, 1 / share[drawn] / _SAMPLED_TILES
 
 
 def peak_memory_bytes() -> int:
@@ -156,17 +164,27 @@ def _bytes(found: list[_Sample], scale: Floats, plan: CellPlan) -> float:
         for cell, rows in tile.levels_rows.items():
             by_cell.setdefault(cell, []).append(rows)
     points = pa.concat_tables([tile.points_rows for tile in found]).unify_dictionaries()
-    part = _parquet_bytes(points.slice(0, 1))
+    footer, rows_bytes = _part_bytes(points)
     all_rows = float(scale @ [tile.points_rows.num_rows for tile in found])
-    size = part + (_parquet_bytes(points) - part) * all_rows / max(points.num_rows, 1)
+    size = footer + rows_bytes * _ratio(all_rows, points.num_rows)
     size += _parquet_bytes(cells_table(plan)) + len(geo_metadata(plan.crs, None))
-    rows_bytes, drawn = 0.0, sum(tile.levels for tile in found)
-    for cell, some in by_cell.items():
-        table = levels_table(plan.ids[cell], some)
-        part = _parquet_bytes(table.slice(0, 1))
-        rows_bytes += _parquet_bytes(table) - part
     all_rows = float(scale @ [tile.levels for tile in found])
-    return float(size + part * len(plan.ids) + rows_bytes * all_rows / max(drawn, 1))
+    more = _ratio(all_rows, sum(tile.levels for tile in found))
+    for cell, some in by_cell.items():
+        footer, rows_bytes = _part_bytes(levels_table(plan.ids[cell], some))
+        size += rows_bytes * more
+    # Cells that no drawn tile receives may have a part all the same.
+    return size + footer * len(plan.ids)
+
+
+def _part_bytes(table: pa.Table) -> tuple[int, int]:
+    """Return the size of a part with one row, and what the other rows take."""
+    footer = _parquet_bytes(table.slice(length=1))
+    return footer, _parquet_bytes(table) - footer
+
+
+def _ratio(whole: float, of_drawn: int) -> float:
+    return whole / of_drawn if of_drawn else 0.0
 
 
 def _parquet_bytes(table: pa.Table) -> int:

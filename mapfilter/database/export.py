@@ -56,7 +56,7 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
     with new_geotiff(Path(path), lattice, BANDS, tags) as target:
         for window in tile_windows(lattice, _TILE_PX):
             found = reader.read(window)
-            if not found or not len(found["row"]):
+            if not found:
                 continue
             row, col, rows, cols = window
             values = np.full((len(BANDS), rows, cols), np.nan, dtype=np.float32)
@@ -128,7 +128,7 @@ def _points(database: RadioRouteDatabase) -> gpd.GeoDataFrame:
         table[name] = table[name].astype(str)
     place = gpd.GeoSeries.from_wkb(table["geometry"])
     frame = gpd.GeoDataFrame(table, geometry=place, crs=database.lattice.crs)
-    return frame.sort_values("point", ignore_index=True)
+    return frame.sort_values("point")
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""The weakest level that a database keeps."""
+"""The weakest level that a database keeps, and how finely levels are kept."""
 
 from __future__ import annotations
 
@@ -21,6 +21,9 @@ FLOORS_DBM: Final[Mapping[str, float]] = {
 The latter three are of a part of the carrier (:mod:`mapfilter.radio.reported_power`), and as much
 weaker where the carrier is as strong.
 """
+
+DECIMALS: Final = 2
+"""Levels and margins are kept to 0.01 dB."""
 
 _WEAK_SHARE = 0.05
 

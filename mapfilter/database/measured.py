@@ -141,7 +141,7 @@ def merged_parts(
     numbers = {cell_id: number for number, cell_id in enumerate(cell_ids)}
 
     def renamed(names: Sequence[str], cell: Ints32) -> Ints32:
-        own = np.array([numbers.get(name, -1) for name in names] or [-1], dtype=np.int32)
+        own = np.array([numbers.get(name, -1) for name in names], dtype=np.int32)
         return np.asarray(own[cell], dtype=np.int32)
 
     given = [p.readings for p in parts]

@@ -90,7 +90,7 @@ def merge(
     attribution = "; ".join(dict.fromkeys(filter(None, (d.attribution for d in databases))))
     with atomic_dir(out) as folder:
         tiles = _tiles(databases, lattice, plan, windows)
-        written = write_parts(folder, lattice.crs, plan.ids, tiles, len(windows), 1, progress)
+        written = write_parts(folder, lattice.crs, plan.ids, tiles, len(windows), progress=progress)
         if written.received == 0:
             raise fail(InputError, "merge", "a point with a level of a cell", "none")
         # No database holds points without a level, so they cannot be counted.

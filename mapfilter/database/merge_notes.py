@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
+from itertools import count as counted
 from pathlib import Path
 
 from mapfilter._words import number_of
@@ -30,9 +31,8 @@ def names_apart(paths: Sequence[Path]) -> list[str]:
     """
     parts = [path.absolute().parts for path in paths]
     different = len(set(parts))
-    count = 2 if any(path.name == _USUAL for path in paths) else 1
-    while len({one[-count:] for one in parts}) < different:
-        count += 1
+    least = 2 if any(path.name == _USUAL for path in paths) else 1
+    count = next(n for n in counted(least) if len({one[-n:] for one in parts}) == different)
     return [Path(*one[-count:]).as_posix() for one in parts]
 
 

@@ -145,31 +145,25 @@ def _nearest(
         # Clipped as a float: a position far off the lattice would overflow an integer.
         offset = (north_edge - north) / resolution - 0.5 - first_row
         below = int(min(max(np.ceil(offset), 0.0), float(span)))
-        above = below - 1
         best, best_square = -1, max_distance_m * max_distance_m
-        while below < span or above >= 0:
-            for side in range(2):
-                row = below if side == 0 else above
-                if row < 0 or row >= span:
+        for away in range(span):
+            reached = False
+            for row in (below + away, below - 1 - away):
+                if not 0 <= row < span:
                     continue
                 dy = north - (north_edge - (first_row + row + 0.5) * resolution)
                 if dy * dy > best_square:
-                    # Every row farther out on this side is farther still.
-                    if side == 0:
-                        below = span
-                    else:
-                        above = -1
                     continue
+                reached = True
                 low, high = row_start[row], row_start[row + 1]
                 if low < high:
                     which, dx = _nearest_in_row(east, col, low, high, west, resolution)
                     square = dx * dx + dy * dy
                     if square < best_square or (square == best_square and which > best):
                         best, best_square = which, square
-                if side == 0:
-                    below += 1
-                else:
-                    above -= 1
+            if not reached:
+                # Every row farther out is farther still.
+                break
         if best >= 0:
             index[i], distance[i] = best, np.sqrt(best_square)
     return index, distance

@@ -221,7 +221,7 @@ class WindowReader:
                     ends = [_ends(footer.row_group(group), names[axis]) for axis in ("row", "col")]
                     self._groups.append((part, footer, group))
                     boxes.append((*ends[0], *ends[1]))
-        self._boxes = np.array(boxes, dtype=np.int64).reshape(-1, 4)
+        self._boxes = np.array(boxes, dtype=np.int64).reshape(len(boxes), 4)
 
     def read(self, window: Window) -> dict[str, Any]:
         """Return the rows within a window, column by column: text as Arrow, others as NumPy."""

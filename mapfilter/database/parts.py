@@ -94,7 +94,7 @@ class PartWriter:
     ``below_floor`` those with weaker ones only; ``parts`` are the manifest's entries at the end.
     """
 
-    def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int = 1) -> None:
+    def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int) -> None:
         self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
         self._pool = ThreadPoolExecutor(writers) if writers > 1 else None
         self._writing: list[Future[None]] = []
@@ -143,7 +143,6 @@ class PartWriter:
         geo = geo_metadata(self._crs, np.concatenate(self._bounds).tolist())
         self._points_file.add_key_value_metadata({"geo": geo.decode()})
         self._points_file.close()
-        self._points_file = None
         points = describe_part(self._folder, self._folder / POINTS, self.received)
         every = (self._written[cell] for cell in sorted(self._written))
         self.parts = [points, *(part for parts in every for part in parts)]

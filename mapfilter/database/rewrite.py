@@ -94,7 +94,7 @@ def rewrite(
         layer = layer_numbers(plan.cells)
         tiles = _tiles(database.lattice, windows, routes, level_dbm, database.floor_dbm, layer)
         crs, ids = database.lattice.crs, plan.ids
-        written = write_parts(folder, crs, ids, tiles, len(windows), 1, progress)
+        written = write_parts(folder, crs, ids, tiles, len(windows), progress=progress)
         if written.received == 0:
             raise fail(InputError, str(out), "a level above the floor", "none")
         counts = {

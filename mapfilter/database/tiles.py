@@ -7,20 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
-import shapely
 from numpy.typing import NDArray
 
 from mapfilter._code import code_digest
 from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.database.floor import DECIMALS, FLOOR_DBM
 from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.sampling import Places, levels_at
+from mapfilter.roads.index import load_kernel
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.route_points import RouteSource
-from mapfilter.roads.ways import Ways
 
 _MAX_TILES = 64
 """Tiles of a group, however few cells reach them."""
@@ -145,12 +144,8 @@ def get_ready_to_read() -> None:
     A worker does it when it starts; each process does it once.
     """
     code_digest()
-    lattice = Lattice("EPSG:32632", 0.0, 0.0, 1.0, 1, 1)
-    line = np.array([shapely.LineString([(0, -0.5), (1, -0.5)])])
-    one, code = np.ones(1, np.int64), np.zeros(1, np.int16)
-    ways = Ways(lattice.crs, one, code, ("way",), line, np.zeros(1, bool), np.zeros(1, np.int8))
+    load_kernel()
     read_tiles([])
-    places_table(RouteSource.of(ways, half_width_m=1.0).tile(lattice), lattice)
 
 
 def read_tiles(tasks: Sequence[TileTask]) -> list[bytes]:
@@ -184,7 +179,8 @@ def _laid(task: TileTask) -> tuple[pa.Table, Places]:
 def roads_tile(part: RoutePart, lattice: Lattice) -> TileRows:
     """Return a tile of roads alone, without levels."""
     routes = part if isinstance(part, RouteLattice) else part()
-    return TileRows(places_table(routes, lattice), received_levels(np.empty((0, len(routes))), 0.0))
+    none = np.empty((0, len(routes)))
+    return TileRows(places_table(routes, lattice), received_levels(none, FLOOR_DBM))
 
 
 def received_levels(level_dbm: Floats, floor_dbm: float, layer: Ints | None = None) -> TileLevels:
@@ -199,7 +195,7 @@ def received_levels(level_dbm: Floats, floor_dbm: float, layer: Ints | None = No
     >>> received.best.tolist(), received.margin_db.tolist()
     ([1, 0], [9.5, nan])
     """
-    level = np.round(level_dbm, 2)
+    level = np.round(level_dbm, DECIMALS)
     strength = np.where(level >= floor_dbm, level, -np.inf)
     if not len(strength):
         strength = np.full((1, *strength.shape[1:]), -np.inf)
@@ -222,11 +218,11 @@ def received_levels(level_dbm: Floats, floor_dbm: float, layer: Ints | None = No
     return TileLevels(
         np.where(received, best, -1).astype(np.int32),
         strongest_dbm.astype(np.float32),
-        np.round(margin, 2).astype(np.float32),
+        np.round(margin, DECIMALS).astype(np.float32),
         cell.astype(np.int32),
         which.astype(np.int32),
         kept_dbm.astype(np.float32),
-        np.round(leading_dbm - kept_dbm, 2).astype(np.float32),
+        np.round(leading_dbm - kept_dbm, DECIMALS).astype(np.float32),
     )
 
 

@@ -161,6 +161,12 @@ def _unpacked_index(
     return WayIndex(ways, STRtree(shapely.linestrings(ends_m)), way, ends_m, half_width_m)
 
 
+def load_kernel() -> None:
+    """Load the kernel of :meth:`WayIndex.reaching`, which takes as long as a tile's other work."""
+    segment, distance_m = np.empty((0, 0), dtype=np.int64), np.empty((0, 0))
+    _burn(np.empty((0, 2, 2)), np.empty(0), (0.0, 0.0, 1.0), segment, distance_m)
+
+
 @njit(cache=True)
 def _burn(
     ends_m: Floats,

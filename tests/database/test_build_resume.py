@@ -205,9 +205,14 @@ def test_who_is_ready_lays_the_first_tile_at_once():
     code = (
         "from mapfilter.database.tiles import get_ready_to_read as ready\n"
         "from mapfilter.roads.index import _burn\n"
-        "assert not _burn.signatures\nready()\nassert len(_burn.signatures) == 1"
+        "assert not _burn.signatures\nready()\nassert len(_burn.signatures) == 1\n"
+        "from small_world import make_routes\n"
+        "make_routes()\nassert len(_burn.signatures) == 1"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120,
+        cwd=Path(__file__).parent,
+    )  # fmt: skip
     assert run.returncode == 0, run.stderr
 
 

@@ -82,3 +82,13 @@ def test_layers_that_cannot_be_written_leave_no_file(tmp_path):
         write_layers({"odd": odd}, tmp_path / "odd.gpkg")
     assert not (tmp_path / "odd.gpkg").exists()
     assert pyogrio.get_gdal_config_option("OGR_CURRENT_DATE") == before
+
+
+def test_rows_that_a_geopackage_refuses_are_an_error_of_the_output(tmp_path):
+    """Of two rows with one number."""
+    twice = {"fid": [1, 1], "value": [2.0, 3.0]}
+    layer = geopandas.GeoDataFrame(twice, geometry=[shapely.Point(1.0, 2.0)] * 2, crs=CRS)
+    with pytest.raises(OutputError, match="a place that can be written") as caught:
+        write_layers({"twice": layer}, tmp_path / "twice.gpkg")
+    assert caught.value.faults[0].where == str(tmp_path / "twice.gpkg")
+    assert list(tmp_path.iterdir()) == []

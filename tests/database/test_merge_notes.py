@@ -61,6 +61,16 @@ def test_cells_that_differ_are_noted_with_both_values(built, tmp_path):
     assert names == ["north/database", "south/database"]
 
 
+def test_of_many_cells_that_differ_six_are_named(built):
+    """An empty value is called so."""
+    plan = make_plan(tuple(f"C{number}" for number in range(9)))
+    newer = changed(plan, **{f"cell{number}": {"assumed": "eirp_dbm"} for number in range(1, 9)})
+    (note,) = merge_notes([built("north", plan), built("south", newer)])
+    shown = ", ".join(f"C{number} (assumed none, now eirp_dbm)" for number in range(1, 7))
+    assert note.endswith(f"8 cells differ from an earlier database, and the later entry is kept: "
+                         f"{shown} and 2 more")  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("paths", "names"),
     [

@@ -101,7 +101,7 @@ def test_rows_are_written_as_soon_as_so_many_wait(tmp_path, monkeypatch):
         monkeypatch.setattr(parts, "ROWS_IN_MEMORY", memory)
         folder = tmp_path / str(memory)
         folder.mkdir()
-        with PartWriter(folder, CRS, IDS) as writer:
+        with PartWriter(folder, CRS, IDS, 1) as writer:
             writer.add(first)
             assert (folder / "levels").exists() == flushed
             writer.add(second)

@@ -101,3 +101,11 @@ def test_the_last_groups_are_small_so_that_workers_end_together(tmp_path):
     groups = list(grouped(tasks, 10 * TILE_PX**2, total=len(tasks), shares=4))
     assert [task for group in groups for task in group] == tasks
     assert [len(group) for group in groups] == [10, 10, 10, 9, 7, 5, 4, 3, 2, 1, 1, 1, 1]
+
+
+def test_of_one_worker_the_last_groups_are_as_large_as_all(tmp_path):
+    tasks = tasks_of(tmp_path / "area", [EVERYWHERE])
+    for options in ({}, {"total": 64}, {"total": 64, "shares": 1}):
+        assert [len(group) for group in grouped(tasks, 10**9, **options)] == [64]
+    halves = [len(group) for group in grouped(tasks, 10**9, total=64, shares=2)]
+    assert halves == [32, 16, 8, 4, 2, 1, 1]

@@ -86,3 +86,9 @@ def test_points_that_are_too_weak_for_the_floor_are_noted():
     assert "database.floor_dbm = -104 " in note
     assert "RSRP" in note
     assert weak_points_note(counts | {"points_below_floor": 60}, -104.0) == ()
+
+
+@pytest.mark.parametrize(("weak", "noted"), [(0, False), (5, False), (6, True), (100, True)])
+def test_up_to_five_percent_of_weak_points_are_usual(weak, noted):
+    notes = weak_points_note({"points": 100 - weak, "points_below_floor": weak}, -104.0)
+    assert [note.partition(" left")[0] for note in notes] == [f"{weak} of 100 points"] * noted

@@ -166,6 +166,8 @@ class _Worker:
         text = (workshop.copy / mutant.file).read_text()
         more_s = _PATIENCE_S + (_COMPILING_S if is_inlined(text, mutant) else 0.0)
         limits = {file: _PATIENCE * s + more_s for file, s in seconds.items()}
+        # Examples in docstrings take next to no time.
+        limits[mutant.file] = more_s
         whole = _PATIENCE * sum(seconds.values()) + 4 * more_s
         request = workshop.request(ordered, limits_s=limits, limit_s=whole)
         # Without a file pytest would run all of the repository.
