@@ -128,7 +128,7 @@ def smooth(transition: Floats, process: Floats, means: Floats, covariances: Floa
         scale = np.sqrt(np.maximum(np.diagonal(predicted, axis1=-2, axis2=-1), 1e-300))
         unit = predicted / (scale[:, :, None] * scale[:, None, :])
         cross = (phi[k] @ own) / scale[:, :, None]
-        gain = np.swapaxes(np.linalg.solve(unit, cross), -1, -2) / scale[:, None, :]
+        gain = np.swapaxes(_solved(unit, cross), -1, -2) / scale[:, None, :]
         ahead = smoothed[:, k + 1] - means[:, k] @ phi[k].T
         smoothed[:, k] = means[:, k] + np.einsum("tij,tj->ti", gain, ahead)
         rest = np.eye(n) - gain @ phi[k]
@@ -136,3 +136,11 @@ def smooth(transition: Floats, process: Floats, means: Floats, covariances: Floa
         both = rest @ own @ np.swapaxes(rest, -1, -2) + gain @ later @ np.swapaxes(gain, -1, -2)
         spread[:, k] = 0.5 * (both + np.swapaxes(both, -1, -2))
     return Smoothed(smoothed, spread)
+
+
+def _solved(unit: Floats, cross: Floats) -> Floats:
+    """Solve for the gains of T trials; a component may be known, or follow from others."""
+    try:
+        return np.asarray(np.linalg.solve(unit, cross))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(unit, hermitian=True) @ cross)

@@ -304,3 +304,14 @@ def test_smoothing_of_one_step_changes_nothing():
     still = smooth(np.eye(1), np.zeros((1, 1)), np.ones((1, 2, 1)), np.full((1, 2, 1, 1), 1e-20))
     assert np.isfinite(still.means).all()
     assert sqrt(still.covariances[0, 0, 0, 0]) == pytest.approx(1e-10)
+
+
+@pytest.mark.parametrize("copy", [0.0, 1.0], ids=["known", "a copy"])
+def test_components_that_others_or_nothing_tells_are_smoothed(copy):
+    """Beside a random walk a component that is known, or one that is the same."""
+    means, covariances = np.array([[[1.0], [5.0], [2.0]]]), np.array([[[[4.0]], [[3.0]], [[2.0]]]])
+    alone = smooth(np.eye(1), np.eye(1), means, covariances)
+    both = np.array([[1.0], [copy]])
+    found = smooth(np.eye(2), both @ both.T, means @ both.T, both @ covariances @ both.T)
+    np.testing.assert_allclose(found.means, alone.means @ both.T, rtol=1e-12)
+    np.testing.assert_allclose(found.covariances, both @ alone.covariances @ both.T, rtol=1e-12)

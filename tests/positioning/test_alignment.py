@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.gaussian import EKF, UKF
 from mapfilter.geodesy import wrap_rad
+from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.kalman.alignment import Alignment, Direction
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.filter import KalmanTracker
+from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanTracker
 from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.redirected import turned_to
 from mapfilter.radio.cells import CellPlan
@@ -104,7 +105,7 @@ def test_a_compass_needs_no_alignment():
 
 def test_a_direction_takes_the_place_of_the_error_of_headings():
     belief = SumBelief.start([1.0, 2.0, 0.1, 0.0], np.eye(4) + 0.2)
-    found = turned_to(belief, Direction(2.5, 0.1))
+    found = belief.predict(*turned_to(Direction(2.5, 0.1), StateLayout(4, 0, 1)))
     np.testing.assert_allclose(found.means[0], [1.0, 2.0, 2.5, 0.0])
     expected = np.eye(4) + 0.2
     expected[2] = expected[:, 2] = 0.0
@@ -142,3 +143,27 @@ def test_a_drive_is_reckoned_by_its_turns_where_fixes_end(method):
         error = wrap_rad(headings[0] - turns[0] - state.belief.moments.mean[2])
         assert abs(degrees(error)) < 8.0
         assert state.reckoning.headless_m < inf
+
+
+def test_what_was_before_a_missing_turn_is_smoothed_without_the_direction_after_it():
+    """A corner is missing among the turns; fixes find the direction of those after it."""
+    rng, missing = np.random.default_rng(1), (120, 121)
+    turns = np.zeros(200)
+    turns[40], turns[80], turns[120], turns[160] = 1.5, -1.5, 1.5, -1.5
+    way = np.cumsum(5.0 * np.exp(1j * (0.7 + np.cumsum(turns))))
+    state = (tracker := KalmanTracker(SITES, EKF)).begin(("motion", "gnss"))
+    smoother, off_m = KalmanSmoother(), []
+    for k in range(200):
+        at = way[k] + 5.0 * complex(*rng.normal(0, 1, 2))
+        fix = GnssFix(EAST + at.real, NORTH + at.imag, 25.0, 25.0, 0.0) if k % 4 == 0 else None
+        step = MotionStep(5.0, nan, nan if k in missing else float(turns[k]))
+        before = state
+        state, out = tracker.step(state, Epoch(0.5 * k, (step,), fix=fix), rng)
+        smoother.add(before, state)
+        off_m.append(abs(complex(out.fix.east_m - EAST, out.fix.north_m - NORTH) - way[k]))
+    assert state.reckoning.alignment.known
+    later = np.array([belief.mean[:2] for belief in smoother.history.smoothed()])
+    smoothed = later[:, 0] - EAST + 1j * (later[:, 1] - NORTH)
+    smoothed_m = np.abs(smoothed - way)[60:120]
+    assert smoothed_m.mean() < np.mean(off_m[60:120])
+    assert smoothed_m.max() < 8.0

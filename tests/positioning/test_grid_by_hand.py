@@ -122,6 +122,15 @@ def test_about_a_known_start_ways_make_no_difference():
     np.testing.assert_allclose(off[0], 0.05 * near, rtol=1e-5)
 
 
+@pytest.mark.parametrize("sd_m", [0.0, 1e-30, 1e-3])
+@pytest.mark.parametrize("east_m", [1015.0, 1018.0])
+def test_an_exact_start_is_the_nearest_pixel(east_m, sd_m):
+    on, off = grid_over(bias_sd_rad=0.0).start(prior(None, east_m, 2005.0, sd_m))
+    nearest = np.array([[0, 0, 0], [0, 1, 0]])
+    np.testing.assert_allclose(on[0], 0.95 * nearest, rtol=1e-6)
+    np.testing.assert_allclose(off[0], 0.05 * nearest, rtol=1e-6)
+
+
 def test_pixels_as_states():
     row, col = np.array([0, 1]), np.array([2, 0])
     errors, off = np.array([0.25, -0.5], dtype="f4"), np.array([1.0, 0.0], dtype="f4")

@@ -230,6 +230,20 @@ def test_beliefs_are_kept_every_few_metres_and_at_the_end():
     assert history.moved == [(*moved, 0.5 * k) for k, moved in enumerate(MOVED)]
 
 
+def test_a_grid_that_all_mass_has_left_is_not_kept():
+    """No path goes through it; the next belief is kept in its place."""
+    history, nothing = BayesSmoother(AREA, ERRORS, every_m=1.0), cloud().reshape(5, 0)
+    rival = SimpleNamespace(belief=at(0, nothing).belief, start_m=0.0)
+    main = cloud((20.0, 15.0, 0.0, 0.0))
+    tracks = [at(0, main), at(1, nothing), at(2, main, rival), at(3, main), at(4, nothing)]
+    for before, after in zip([tracks[0], *tracks], tracks, strict=False):
+        history.add(before, after)
+    found = history.smoothed(forward_pass(), np.random.default_rng(2), paths=20, jitter=JITTER)
+    assert [k.epoch for k in history.kept] == [0, 2, 3]
+    assert history.alternative == []
+    assert np.isfinite(places(found)).all()
+
+
 def test_what_leads_on_is_the_lasting_error_with_its_deviation():
     state = np.zeros((STATES, 2), dtype=np.float32)
     state[:5] = cloud((1.0, 2.0, 0.3, 0.1), (3.0, 4.0, -0.2, 0.05))

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from mapfilter.positioning.bayes.device_step import DeviceStep
 
 _CIRCLE_BINS = 72
+_LEAST_START_SD_M = 1e-3
+"""Least deviation of a known start: an exact one is the nearest pixel."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ class StreetGrid:
         if isfinite(prior.east_m):
             west, south = area.origin_m
             dx, dy = state[EAST] - (prior.east_m - west), state[NORTH] - (prior.north_m - south)
-            log_weight -= (dx**2 + dy**2) / (2 * prior.sd_m**2)
+            log_weight -= (dx**2 + dy**2) / (2 * max(prior.sd_m, _LEAST_START_SD_M) ** 2)
             on_map = np.full(on_map.shape, 1 / row.size)
         if prior.reading is not None:
             nothing = np.empty((0, row.size), np.float32)

@@ -112,14 +112,22 @@ class BayesSmoother:
         due = not self.kept or now.travelled_m - self.kept[-1].travelled_m >= self.every_m
         if after.belief is None or not due:
             return
-        self.kept.append(self._keep(after.belief))
-        # A sum over all that is kept, at each epoch, would take longest of all in a long log.
-        self._kept_bytes += _bytes_of(self.kept[-1])
+        self._append(self.kept, after.belief)
         if after.alternative is not None:
-            self.alternative.append(self._keep(after.alternative.belief))
+            self._append(self.alternative, after.alternative.belief)
         if self._kept_bytes > _MAX_BYTES:
             self._keep_only(self.kept[::2])
             self.every_m *= 2
+
+    def _append(self, to: list[Kept], belief: MapBelief) -> None:
+        """Keep a belief, unless all mass of its grid has left the area."""
+        one = self._keep(belief)
+        if not one.log_weight.size:
+            return
+        to.append(one)
+        if to is self.kept:
+            # A sum over all that is kept, at each epoch, would take longest of all in a long log.
+            self._kept_bytes += _bytes_of(one)
 
     def _keep_only(self, kept: list[Kept]) -> None:
         self.kept, self._kept_bytes = kept, sum(map(_bytes_of, kept))
@@ -156,7 +164,7 @@ class BayesSmoother:
         """Keep the last belief, from which paths go back."""
         belief = self.last.belief if self.last is not None else None
         if belief is not None and self.kept and self.kept[-1].epoch < len(self.moved) - 1:
-            self.kept.append(self._keep(belief))
+            self._append(self.kept, belief)
 
     def smoothed(
         self,

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import radians
 
 import numpy as np
 
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.kalman.alignment import Direction
-from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.reckoning import RATE, RECKONED, TURNED, at_rest
 from mapfilter.positioning.kalman.turned import Turn
@@ -60,10 +58,12 @@ def turns_in_doubt(layout: StateLayout) -> Motion:
     return transition, noise, shift
 
 
-def turned_to(belief: SumBelief, direction: Direction) -> SumBelief:
-    """Return a belief with the heading error that turns have, on the ground."""
-    means, covariances = belief.means.copy(), belief.covariances.copy()
-    means[:, TURNED] = direction.turned_rad
-    covariances[:, TURNED] = covariances[:, :, TURNED] = 0.0
-    covariances[:, TURNED, TURNED] = direction.sd_rad**2
-    return replace(belief, means=means, covariances=covariances)
+def turned_to(direction: Direction, layout: StateLayout) -> Motion:
+    """Return the motion to the heading error that turns have, on the ground.
+
+    What the belief had of it is forgotten, and says nothing of the way before.
+    """
+    transition, noise, shift = at_rest(layout)
+    transition[TURNED, TURNED], shift[TURNED] = 0.0, direction.turned_rad
+    noise[TURNED, TURNED] = direction.sd_rad**2
+    return transition, noise, shift

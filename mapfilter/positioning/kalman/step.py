@@ -226,11 +226,12 @@ class KalmanStep:
         if (after.ruling is Ruling.ANEW or again) and self.reckoning.alignment.known:
             doubt = turns_in_doubt(layout)
             self.belief, motion = self.belief.predict(*doubt), after_each_other(motion, doubt)
+        if self.own is RECKONED and isinstance(found, Direction):
+            turned = turned_to(found, layout)
+            self.belief, motion = self.belief.predict(*turned), after_each_other(motion, turned)
         if self.motion is not None:
             self.motion = after_each_other(self.motion, motion)
         self.recent_nis = [] if after.ruling.begins else self._with_nis(after.nis)
-        if self.own is RECKONED and isinstance(found, Direction):
-            self.belief = turned_to(self.belief, found)
         if after.used:
             self.reckoning = self.reckoning.positioned(time_s)
             if after.ruling.begins and not after.drifted:
