@@ -13,6 +13,7 @@ from mapfilter.check.findings import Findings, Severity
 from mapfilter.check.samples import RasterSample
 from mapfilter.errors import listed
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.files import as_stored
 
 _LEAST_SHARE = 0.1
 _TIMES_THE_NEXT = 5.0
@@ -90,30 +91,18 @@ def check_fills(
     elif weakest and level_dbm <= _WEAK_DBM:
         severity = "warning"
     sign = -1.0 if quantity == "loss" else 1.0
-    stored = _as_stored(sign * number / factor)
+    stored = as_stored(sign * number, factor)
     unit = "dB" if quantity == "loss" else "dBm"
     evidence = (
         f"{sign * number:g} {unit} fills up to {share:.0%} of the pixels of {len(having)} of "
         f"{len(samples)} rasters; all other numbers are rare"
     )
     evidence += f". {_MEANING[severity]}"
-    remedy = f"Set rasters.nodata = {stored:.10g}, the stored number, if it means no data"
+    remedy = f"Set rasters.nodata = {stored}, the stored number, if it means no data"
     remedy += ", or export levels without a lower limit." if weakest else "."
     ids = listed([s.cell_id for s in having])
     findings.add("nodata-as-level", f"{where}, cells {ids}", evidence, severity, remedy)
     return [_without(s, number) for s in samples]
-
-
-def _as_stored(number: float) -> float:
-    """Return what a file holds for a number that single precision has rounded.
-
-    Examples
-    --------
-    >>> _as_stored(-601.0000229), _as_stored(-60.5)
-    (-601.0, -60.5)
-    """
-    whole = float(round(number))
-    return whole if abs(number - whole) < 1e-4 * max(1.0, abs(number)) else float(f"{number:.7g}")
 
 
 _MEANING: dict[Severity, str] = {

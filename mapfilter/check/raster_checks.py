@@ -17,7 +17,7 @@ from mapfilter.check.plan_gain import PHONE_M
 from mapfilter.check.samples import RasterSample, sample_raster
 from mapfilter.errors import Fault, InputError, listed
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.files import check_plausible
+from mapfilter.rasters.files import as_stored, check_plausible
 from mapfilter.rasters.raster_set import RxLevRasters, in_other_case
 
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
@@ -171,7 +171,8 @@ def sampled(
         worst = max(nodata, key=lambda one: one[2])
         ids = listed([one[0] for one in nodata])
         share = f"{worst[2]:.1%}" if worst[2] >= 0.01 else f"{100 * worst[2]:.2g} %"
-        evidence = f"{worst[1]:g} stands in up to {share} of the pixels, as a number."
+        number = as_stored(worst[1], rasters.factor)
+        evidence = f"{number} stands in up to {share} of the pixels, as a number."
         findings.add("nodata-as-level", f"{where}, cells {ids}", evidence)
     if empty:
         cells = f"{where}, cells {listed(empty)}"
@@ -244,7 +245,7 @@ def _beyond(sample: RasterSample, rasters: RxLevRasters, kind: Kind, tile_px: in
     tiles = (sample.values[top : top + side, left : left + side] for top in rows for left in cols)
     try:
         for values in (sample.values, *tiles):
-            check_plausible(values, rasters.quantity, rasters.path)
+            check_plausible(values, rasters.quantity, rasters.path, rasters.factor)
     except InputError as error:
         return error.faults[0]
     return None

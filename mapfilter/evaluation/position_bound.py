@@ -109,7 +109,10 @@ def _bounds(  # type: ignore[no-untyped-def]
             s_rc += weight[k] * dr * dc
             s_cc += weight[k] * dc * dc
             for j in range(received):
-                level = level_dbm[near_row[k], near_col[k], cells[j]]
+                # Against the point itself, so that levels that are all the same have no slope.
+                level = (
+                    level_dbm[near_row[k], near_col[k], cells[j]] - level_dbm[row, col, cells[j]]
+                )
                 slope[j, 0] += weight[k] * dr * level
                 slope[j, 1] += weight[k] * dc * level
         # Along the two axes of the window's points, apart from each other.
@@ -134,7 +137,7 @@ def _bounds(  # type: ignore[no-untyped-def]
         street = 0.5 * np.arctan2(2 * axis_rc, axis_rr - axis_cc)
         cos, sin = np.cos(street), np.sin(street)
         gained = j_rr * cos * cos + 2 * j_rc * cos * sin + j_cc * sin * sin
-        if axis_rr + axis_cc > 0 and gained > 0:
+        if axis_rr + axis_cc > 0 and gained > 1e-12 * (j_rr + j_cc):
             along[i] = 1.0 / np.sqrt(gained)
     return plane, along
 

@@ -7,6 +7,7 @@ import io
 import math
 import zipfile
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -149,6 +150,10 @@ def _separator(heads: Sequence[str]) -> str:
     separator = max(_SEPARATORS, key=head.count)
     if separator != ",":
         return separator
+    # What is no CSV is refused when it is read.
+    with suppress(csv.Error):
+        if len({len(row) for row in csv.reader(heads)}) == 1:
+            return separator
     # The commas may be those of a title above a table with another separator.
     for mark in _SEPARATORS[1:]:
         titles = next((n for n, line in enumerate(heads) if mark in line), 0)

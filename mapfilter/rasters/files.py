@@ -117,8 +117,26 @@ def check_file(path: Path) -> None:
         raise fail(InputError, str(path), "a raster file", "an empty file")
 
 
-def check_plausible(values: Floats32, quantity: Quantity, path: Path) -> None:
-    """Check that numbers can be levels, losses or deviations; NaN is ignored."""
+def as_stored(number: float, factor: float) -> str:
+    """Return the stored number that a factor made another, as settings and messages have it.
+
+    Examples
+    --------
+    >>> as_stored(-624.9375, 0.0625), as_stored(np.float32(-999.9), 0.1), as_stored(-60.1, 1.0)
+    ('-9999', '-9999', '-60.1')
+    """
+    exact = float(number) / factor
+    # Single precision has rounded it; adding 0 turns -0 into 0.
+    whole = float(round(exact)) + 0.0
+    is_whole = abs(exact - whole) < 1e-4 * max(1.0, abs(exact))
+    return f"{whole:.10g}" if is_whole else str(np.float32(exact))
+
+
+def check_plausible(values: Floats32, quantity: Quantity, path: Path, factor: float = 1.0) -> None:
+    """Check that numbers, multiplied by a factor, can be levels, losses or deviations.
+
+    NaN is ignored.
+    """
     lowest, highest = (extreme.reduce(values, axis=None) for extreme in (np.fmin, np.fmax))
     if np.isnan(lowest):
         return
@@ -130,7 +148,8 @@ def check_plausible(values: Floats32, quantity: Quantity, path: Path) -> None:
         wrong = known[(known < low) | (known > high)]
         alike = wrong.size < known.size and (wrong == wrong[0]).all()
         if alike and abs(wrong[0]) >= _LEAST_NODATA:
-            hint = f"{wrong[0]:g} means no data, and the file does not state it; set nodata"
+            stored = as_stored(wrong[0], factor)
+            hint = f"{stored} means no data, and the file does not state it; set nodata"
         elif np.abs(wrong).max() > 1000:
             hint = "factor left out, or the wrong byte order"
             if quantity == "level" and low + 65536 <= lowest:

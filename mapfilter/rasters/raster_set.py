@@ -144,7 +144,7 @@ class RxLevRasters:
             found = read_on(file, bands, self.lattice, window, self.resampling)
             if self.factor != 1.0:
                 found = found * np.float32(self.factor)
-            check_plausible(found, self.quantity, file.path)
+            check_plausible(found, self.quantity, file.path, self.factor)
             if len(wanted) == 1:
                 return found
             values[places] = found

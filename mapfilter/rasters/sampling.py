@@ -126,7 +126,7 @@ def _read(
         )
         check_nodata_stated(held, ids, rasters.quantity, rasters.factor, file.path)
         for band in inside:
-            check_plausible(band, rasters.quantity, file.path)
+            check_plausible(band, rasters.quantity, file.path, rasters.factor)
         wanted = [n for n, cell in enumerate(ids) if cell in rows[number]]
         taken = [ids[n] for n in wanted]
         at_points = inside[np.array(wanted, np.intp)[:, None], one.row, one.col]

@@ -11,7 +11,7 @@ import numpy as np
 from mapfilter._types import Floats32
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
-from mapfilter.rasters.files import Quantity
+from mapfilter.rasters.files import Quantity, as_stored
 
 _NO_LEVEL_BELOW = -300.0
 _NO_LEVEL_ABOVE = 60.0
@@ -108,7 +108,8 @@ def check_nodata_stated(
             if share >= _TELLING_SHARE and share * known >= _FEWEST:
                 part = f"{share:.0%} of the pixels"
             got = f"{number:g} in {part} of a tile"
-            hint = f"{number:g} means no data, and the file does not state it; set nodata"
+            stored = as_stored(number, factor)
+            hint = f"{stored} means no data, and the file does not state it; set nodata"
             faults.add(f"{path} pixels, cell {cell_id}", f"a {quantity}, or no data", got, hint)
     faults.raise_if_any(InputError)
 

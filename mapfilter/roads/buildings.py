@@ -25,7 +25,10 @@ _HIGHEST_M = 1000.0
 
 # A roof on posts stops neither walkers nor waves; the others are no buildings any more.
 _NOT_BUILDINGS = frozenset(("no", "roof", "razed", "demolished"))
-_NUMBER = re.compile(r"\s{0,9}([0-9]{1,9}(?:[.,][0-9]{1,30})?)\s{0,9}(m|ft|')?")
+_UNITS_M = {"cm": 0.01, **dict.fromkeys(("ft", "feet", "foot", "'", "′"), FOOT_M)}
+_NUMBER = re.compile(
+    rf"\s{{0,9}}([0-9]{{1,9}}(?:[.,][0-9]{{1,30}})?)\s{{0,9}}({'|'.join(_UNITS_M)})?", re.I
+)
 _BUILDINGS = Query({"building": ()}, ("building", "height", "building:levels", "location"))
 
 
@@ -153,7 +156,7 @@ def _numbers(text: NDArray[np.object_] | None, count: int) -> Floats:
             number = float(entry)
         elif entry is not None and (match := _NUMBER.match(str(entry))):
             number = float(match[1].replace(",", "."))
-            number *= FOOT_M if match[2] in ("ft", "'") else 1.0
+            number *= _UNITS_M.get((match[2] or "").lower(), 1.0)
         if 0 < number < _HIGHEST_M:
             values[i] = number
     return values

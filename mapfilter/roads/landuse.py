@@ -147,20 +147,22 @@ def _read_table(path: Path) -> tuple[dict[int, tuple[str, bool]], bool]:
     try:
         text = read_input(path, _LARGEST_TABLE_BYTES, "a table").decode("utf-8-sig")
         table = without_separator_line(text).lstrip("\r\n")
-        header = 1 + text[: len(text) - len(table)].count("\n")
+        above = text[: len(text) - len(table)].count("\n")
         delimiter = ";" if ";" in table.partition("\n")[0] else ","
-        rows = list(csv.DictReader(io.StringIO(table, newline=""), delimiter=delimiter))
+        reader = csv.DictReader(io.StringIO(table, newline=""), delimiter=delimiter)
+        # Blank lines are no rows.
+        numbered = [(above + reader.line_num, row) for row in reader]
     except (UnicodeDecodeError, csv.Error) as error:
         raise fail(InputError, str(path), "a readable CSV table", error) from error
-    columns = set(rows[0]) if rows else set()
+    columns = set(numbered[0][1]) if numbered else set()
     is_colour = columns.issuperset(_COLOUR)
     if not columns.issuperset(("class", "walkable")) or not (is_colour or "value" in columns):
         expected = "columns class, walkable and value, or class, walkable, r, g, b"
-        got = ", ".join(str(column) for column in rows[0]) if rows else "no rows"
+        got = ", ".join(map(str, numbered[0][1])) if numbered else "no rows"
         raise fail(InputError, str(path), expected, got)
     faults = Faults()
     keys: dict[int, tuple[str, bool]] = {}
-    for line, row in enumerate(rows, start=header + 1):
+    for line, row in numbered:
         code = _code(row, is_colour, f"{path} row {line}", faults)
         if (row["walkable"] or "").strip() not in ("0", "1"):
             faults.add(f"{path} row {line}, walkable", "0 or 1", repr(row["walkable"]))

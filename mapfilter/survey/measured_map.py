@@ -177,7 +177,7 @@ def fit_survey(
     if predicted is not None:
         strange = [cell_id for cell_id in found if cell_id not in predicted]
         example = next(iter(predicted), "none")
-        if len(strange) == len(found):
+        if strange and len(strange) == len(found):
             expected = f"cells of the prediction, such as {example}"
             got = f"none in {number_of(len(found), 'cell')}, such as {strange[0]}"
             raise fail(InputError, "measurements", expected, got, _renamed(strange, predicted))

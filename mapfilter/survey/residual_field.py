@@ -24,6 +24,8 @@ _BOUNDS = np.log([[1.0, 400.0], [10.0, 1000.0], [0.5, 200.0]])
 SOFTENING_M = 20.0
 """Added to distances, over which neighbours are weighed."""
 _PRIOR_WEIGHT = 4.0
+_ROUNDED_DB2 = 1 / 12
+"""Variance of rounding to whole dB, of which levels that are all the same have no less."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +157,8 @@ class NeighbourField:
         own_db2 = np.average(self._squared_db2[index], axis=1, weights=weights)
         count = index.shape[1]
         total_db2 = count * own_db2 + _PRIOR_WEIGHT * self._overall_db2
-        return mean_dbm + near_db, np.sqrt(total_db2 / (count + _PRIOR_WEIGHT))
+        variance_db2 = np.maximum(total_db2 / (count + _PRIOR_WEIGHT), _ROUNDED_DB2)
+        return mean_dbm + near_db, np.sqrt(variance_db2)
 
 
 class _Nearest:

@@ -130,6 +130,17 @@ def test_points_of_a_cell_are_within_the_margin_and_above_the_floor():
     assert len(radio) == 4
 
 
+@pytest.mark.parametrize("across_db", [0.0, 0.3])
+def test_levels_that_do_not_change_along_a_street_tell_no_place_on_it(across_db):
+    row = np.arange(3)[:, None, None]
+    level = np.float32([-70.1, -83.7]) - np.float32(across_db) * row * np.ones((1, 20, 1))
+    on_way, way_id = np.ones((3, 20), dtype=bool), 1 + row[..., 0] * np.ones((1, 20), dtype=int)
+    radio = made_map(level, on_way, [0, 0], way_id=way_id)
+    found = position_bound(radio, ErrorModel(7.0, 30.0, 0.5))
+    assert np.isinf(found.along_m).all()
+    assert np.isinf(found.plane_m).all()
+
+
 @pytest.mark.parametrize("factor", [1e-4, 1e4])
 def test_bounds_are_proportional_to_the_errors(factor):
     rng = np.random.default_rng(2)

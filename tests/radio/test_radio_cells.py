@@ -259,6 +259,14 @@ def test_round_trip(tmp_path_factory: pytest.TempPathFactory, cells: list[Cell])
         assert replace(new, east_m=old.east_m, north_m=old.north_m) == old
 
 
+def test_names_with_semicolons_are_no_other_separator(tmp_path: Path) -> None:
+    ids = ("262;1;1234;1", "262;1;1234;2")
+    plan = CellPlan(CRS, tuple(replace(CELL, id=one, site="North, S1") for one in ids))
+    write_cell_plan(plan, tmp_path / "a.csv")
+    again = read_cell_plan(tmp_path / "a.csv", CRS)
+    assert [(cell.id, cell.site) for cell in again.cells] == [(one, "North, S1") for one in ids]
+
+
 def test_written_bytes_depend_on_the_plan_alone(tmp_path: Path) -> None:
     plan = CellPlan(CRS, (CELL,))
     write_cell_plan(plan, tmp_path / "a.csv")

@@ -156,6 +156,25 @@ def test_a_number_for_no_data_is_an_error_where_it_is_strong(quantity, number, r
         levels_at(places)
 
 
+@pytest.mark.parametrize("number", [-9999, -1, 0])
+@pytest.mark.parametrize("factor", [1 / 16, 0.1, 1.0])
+def test_the_number_for_no_data_in_a_message_is_the_one_to_set(number, factor, tmp_path):
+    def spoilt(values):
+        stored = np.round(values / np.float32(factor))
+        stored[:16, 8:16] = number
+        return stored
+
+    whole = {cell: lambda values: np.round(values / np.float32(factor)) for cell in CUTS}
+    made = rasters_of(tmp_path / "rasters", values=whole | {"D": spoilt}, factor=factor)
+    said = rf"likely: ({number}) means no data, and the file does not state it; set nodata"
+    with pytest.raises(InputError, match=said):
+        levels_at(places_in(made))
+    if number == -9999:
+        with pytest.raises(InputError, match=said):
+            made.read()
+    levels_at(places_in(open_rasters(made.path, factor=factor, nodata=float(number))))
+
+
 @pytest.mark.parametrize(
     ("quantity", "number", "pixels"),
     [("level", 0, "1 pixel"), ("level", -1, "3 pixels"), ("loss", 0, "2 pixels")],

@@ -155,6 +155,7 @@ def test_unknown_values_and_colours_are_listed_with_their_counts(write):
         ("class,value,walkable\nstreet,²,1\n", "row 2, value"),
         (f"class,value,walkable\nstreet,{'9' * 5000},1\n", "row 2, value"),
         ("class,value,walkable\nstreet,1,yes\n", "row 2, walkable"),
+        ("class,value,walkable\npath,2,1\n\n\nstreet,1,yes\n", "row 5, walkable"),
         ("class,value,walkable\nstreet,1,1\npath,1,1\n", "row 3: .*again that of 'street'"),
         ("class,r,g,b,walkable\nstreet,1,2,300,1\n", "row 2, b"),
         (TABLE.replace("1\n", "0\n").replace("park,3,1", "park,3,0"), "wrong table"),
