@@ -118,7 +118,7 @@ __version__: str
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        return import_module(f"{__name__}._io").VERSION
+        return import_module(f"{__name__}._io").program_version()
     home = _HOMES.get(name)
     if home is None:
         message = f"module {__name__!r} has no attribute {name!r}"

@@ -93,7 +93,7 @@ def hashed(key: np.uint64, index: np.uint64) -> np.uint64:
 
 @njit(inline="always")
 def uniforms(bits: np.uint64) -> tuple[np.float32, np.float32]:
-    """Return two numbers in (0, 1) of 24 bits each."""
+    """Return two numbers above 0 and at most 1, of 24 bits each."""
     high = np.int32(bits >> np.uint64(40))
     low = np.int32(bits & np.uint64(0xFFFFFF))
     return _F(high) * _UNIT + _HALF_UNIT, _F(low) * _UNIT + _HALF_UNIT

@@ -11,14 +11,15 @@ Import :func:`check_filter` into a test and give it a filter, a database and a l
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, replace
 from math import isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
 
+from mapfilter._same import same
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import (
@@ -63,24 +64,6 @@ _BELIEF_ORDER = {
 
 class ContractError(AssertionError):
     """A filter breaks its contract; the message names the clause."""
-
-
-def same(a: Any, b: Any) -> bool:
-    """Return whether two beliefs, estimates or outputs are equal to the last bit."""
-    if is_dataclass(a) and not isinstance(a, type):
-        return type(a) is type(b) and all(
-            same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a)
-        )
-    if isinstance(a, tuple | list):
-        pairs = zip(a, b, strict=False) if type(a) is type(b) else ()
-        return type(a) is type(b) and len(a) == len(b) and all(same(*pair) for pair in pairs)
-    if isinstance(a, Mapping):
-        alike = isinstance(b, Mapping) and a.keys() == b.keys()
-        return alike and all(same(a[key], b[key]) for key in a)
-    if isinstance(a, np.ndarray):
-        alike = isinstance(b, np.ndarray) and a.dtype == b.dtype
-        return alike and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
-    return bool(a is b or a == b or (a != a and b != b))
 
 
 def check_filter(

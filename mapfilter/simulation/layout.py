@@ -47,9 +47,10 @@ def lay_out_plan(
     """Lay out sites with sectors, and indoor cells, over an area.
 
     Sites are spread evenly (a centroidal Voronoi tessellation by Lloyd's rounds, which tends to
-    hexagons when there are many), each moved onto the highest roof within 75 m, of at most 45 m,
-    where heights are given. Sectors point in equal steps. Indoor cells hang in the largest
-    buildings that stand apart, or, without heights, where the sites are farthest.
+    hexagons when there are many), each moved onto the highest roof of at most 45 m that is up to
+    75 m away to the east or west and to the north or south, where heights are given. Sectors point
+    in equal steps. Indoor cells hang in the largest buildings that stand apart, or, without
+    heights, where the sites are farthest.
 
     Cells are called S1A, S1B, … from north to south, and I1, I2, … The n-th cell gets carrier
     512 + 3 (n mod 36) and BSIC ⌊n / 36⌋ mod 64: every pair is unique up to 2304 cells, and a

@@ -66,7 +66,7 @@ def run_single_reports(
     data : Path
         Holds the folders ``fingerprint-wifi`` and ``cell-ottawa-lte``.
     out : Path
-        Gets ``table.json`` and a picture of the errors of each set.
+        Gets ``table.json`` and a picture of the errors of each set that has any.
     sets : sequence of str
         Of :data:`SETS`; all when left out.
     methods : sequence of str
@@ -97,10 +97,13 @@ def run_single_reports(
             label = f"{method}, median {rows[-1].median_m:.3g} m"
             known_m = error_m[np.isfinite(error_m)]
             style = "--" if method == AUTO else "-"
-            curves.append(Distribution(label, known_m, _COLOURS[method], style))
+            if known_m.size:
+                curves.append(Distribution(label, known_m, _COLOURS[method], style))
             done += 1
             if progress is not None:
                 progress(done, count)
+        if not curves:
+            continue
         # What "auto" chose lies on that method's curve: dashed, above it.
         curves.sort(key=lambda curve: curve.style == "--")
         title, most_m = f"{name}: errors of single reports", axis_end_m(curves)

@@ -2,10 +2,22 @@
 
 import tomllib
 from fnmatch import fnmatch
+from importlib.metadata import version
 from pathlib import Path
+
+import mapfilter
 
 ROOT = Path(__file__).parents[2]
 SETUPTOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+
+
+def test_the_version_is_that_of_the_installed_package():
+    assert mapfilter.__version__ == version("mapfilter")
+
+
+def test_every_name_of_the_front_door_is_there():
+    for name in dir(mapfilter):
+        assert getattr(mapfilter, name) is not None, name
 
 
 def test_every_package_is_listed():

@@ -1,5 +1,6 @@
 """Sessions of a phone read, turned into steps, and scored: a few rows by hand."""
 
+import itertools
 from math import nan, pi
 from types import SimpleNamespace
 
@@ -70,9 +71,10 @@ def test_rows_are_read_in_order_of_time(tmp_path):
 
 
 def test_rows_that_lack_what_is_needed_are_left_out(tmp_path):
-    for name in ("lat", "lon", "measured_at", "lac", "cellid", "signal"):
+    needed = ("lat", "lon", "measured_at", "mcc", "mnc", "lac", "cellid", "signal")
+    for name, value in itertools.product(needed, ("none", "", "inf")):
         rows = table(((0, 0), (20, 0), (40, 0)), (1.0, 2.0, 3.0)).astype(object)
-        rows.loc[1, name] = "none"
+        rows.loc[1, name] = value
         rows.to_csv(tmp_path / "ride.csv", index=False)
         assert read_session(tmp_path / "ride.csv").time_s.size == 2
     assert session(tmp_path, speed=[nan, 1.0, 2.0]).time_s.size == 3

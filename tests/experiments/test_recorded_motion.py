@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapfilter.errors import InputError
 from mapfilter.evaluation.truth import Truth
-from mapfilter.experiments.recorded import kitti, mountain_view
+from mapfilter.experiments.recorded import kitti, mountain_view, smartloc
 from mapfilter.experiments.recorded.least_squares import least_squares_positions
 from mapfilter.experiments.recorded.outages import (
     HEADING,
@@ -81,6 +82,20 @@ def test_a_later_start_begins_without_motion():
     assert len(log.motion) == len(log.truth) == 150
     assert log.motion["step_m"].iloc[0] == log.motion["turn_rad"].iloc[0] == 0.0
     assert log.motion["step_m"].iloc[1] == pytest.approx(2.0)
+
+
+def test_odometry_has_a_row_for_each_frame(tmp_path):
+    file = tmp_path / "slam-00.csv"
+    kitti.perfect_motion(_curve(count=50)).to_csv(file, index=False)
+    assert len(kitti.read_odometry(file, 50)) == 50
+    with pytest.raises(InputError, match="expected 51 rows, as the truth, found 50"):
+        kitti.read_odometry(file, 51)
+
+
+def test_a_drive_without_an_outage_is_neither_right_nor_wrong():
+    assert smartloc.is_right(np.array([20.0, 24.0, np.inf]), 25.0)
+    assert smartloc.is_right(np.array([26.0]), 25.0) is False
+    assert smartloc.is_right(np.empty(0), 25.0) is None
 
 
 def test_units_are_the_files_of_the_folder(tmp_path):

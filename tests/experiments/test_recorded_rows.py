@@ -149,6 +149,13 @@ def test_found_is_read_back(tmp_path_factory, errors, after_m):
         assert isnan(new.seconds)
 
 
+def test_figures_of_a_baseline_that_are_none_are_read_back(tmp_path):
+    baseline_m = np.array([nan, 2.0, np.inf])
+    write_found([_found(baseline_m=baseline_m)], tmp_path / "unit.json")
+    (back,) = read_found(tmp_path / "unit.json")
+    np.testing.assert_array_equal(back.baseline_m, baseline_m)
+
+
 def test_an_edited_file_is_refused(tmp_path):
     file = tmp_path / "unit.json"
     write_found([_found()], file)

@@ -10,13 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+import shapely
 
 from mapfilter.errors import InputError
 from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded import belgium, denver, mall, mountain_view, smartloc
 from mapfilter.experiments.recorded.benchmark import Task
 from mapfilter.experiments.recorded.rows import table_rows
-from mapfilter.experiments.recorded.street_graph import match_points, read_graph
+from mapfilter.experiments.recorded.street_graph import StreetGraph, match_points, read_graph
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import project
 from mapfilter.positioning.estimate import TrackEstimate
@@ -99,6 +100,19 @@ def test_points_beyond_the_streets_are_matched_to_none(town):
     away = np.array([[0.0, 0.0], [10.0, 0.0]])
     assert match_points(graph, away).tolist() == [-1, -1]
     assert len(denver.clipped(away, graph)) == 0
+
+
+def test_where_no_route_leads_on_each_stretch_has_its_own_most_probable_edges():
+    ends = [((0, 40), (200, 40)), ((0, 0), (200, 0)), ((1000, 0), (1200, 0))]
+    lines = np.array([shapely.LineString(line) for line in ends], dtype=object)
+    node, street = np.arange(6), np.arange(1, 4)
+    graph = StreetGraph(CRS, 6, node[::2], node[1::2], street, lines)
+    near = [[20.0, 1.0], [40.0, 1.0], [60.0, 1.0]]
+    assert match_points(graph, np.array(near)).tolist() == [1, 1, 1]
+    apart = np.array([*near, [1010.0, 1.0], [1030.0, 1.0]])
+    assert match_points(graph, apart).tolist() == [1, 1, 1, 2, 2]
+    away = np.array([*near, [600.0, 500.0]])
+    assert match_points(graph, away).tolist() == [1, 1, 1, -1]
 
 
 @pytest.mark.parametrize("data", [b"no graph", b"<graphml></graphml>"])
@@ -195,6 +209,26 @@ def test_towers_and_their_faults(tmp_path):
         file.write_text(broken)
         with pytest.raises(InputError, match=r"towers\.json"):
             belgium.read_towers(file, "EPSG:32631")
+
+
+def test_a_place_has_two_walks_or_more_and_cells_near_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(belgium, "read_walk", lambda _: _walk())
+    (tmp_path / "walks").mkdir()
+    (tmp_path / "tower_data").mkdir()
+    row = {"enb_id": 7, "latitude": 48.75, "longitude": -105.61, "pci": 3, "earfcn": 1300}
+    row |= {"azimuth": None, "downlink_frequency": "1815 MHz"}
+    (tmp_path / "tower_data" / "towers.json").write_text(json.dumps({"1793": row}))
+    (tmp_path / "walks" / "small_town_1.txt").write_text("")
+    with pytest.raises(InputError, match="two walks of a place or more, found 1"):
+        belgium.prepare(tmp_path, tmp_path / "work")
+    (tmp_path / "walks" / "small_town_2.txt").write_text("")
+    logs, plan = belgium._place_of(tmp_path, "small_town")
+    assert (list(logs), plan.ids) == (["small_town_1", "small_town_2"], ("1793",))
+    (tmp_path / "tower_data" / "towers.json").write_text(
+        json.dumps({"1793": row | {"latitude": 50}})
+    )
+    with pytest.raises(InputError, match="within 5 km of the walks, found none"):
+        belgium.prepare(tmp_path, tmp_path / "work")
 
 
 def _archive(path, files):

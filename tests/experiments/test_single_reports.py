@@ -1,9 +1,11 @@
 """Single reports of published data: accuracy, coverage, and damaged files."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mapfilter.errors import ConfigError, InputError
+from mapfilter.experiments.benchmarks.ottawa import FOLDER
 from mapfilter.experiments.benchmarks.single_reports import read_wifi
 from mapfilter.workflows.evaluate_single_reports import run_single_reports
 
@@ -37,6 +39,24 @@ def test_a_missing_or_damaged_file_is_named(tmp_path):
     (tmp_path / "UJI1.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
     with pytest.raises(InputError, match="fingerprints"):
         read_wifi(tmp_path, "UJI1")
+
+
+def test_sessions_without_a_cell_in_common_are_not_located(tmp_path):
+    folder = tmp_path / FOLDER / "carling"
+    folder.mkdir(parents=True)
+    for number in range(2):
+        rows = pd.DataFrame({"measured_at": 1000 * np.arange(20), "cellid": 7 + number})
+        rows["lat"], rows["lon"] = 45.4 + 1e-4 * np.arange(20), -75.6
+        others = {"mcc": 302, "mnc": 720, "lac": 1, "rating": 5, "speed": 1, "direction": 0}
+        rows.assign(**others, signal=-90, ta=-1).to_csv(folder / f"s{number}.csv", index=False)
+    result = run_single_reports(
+        tmp_path, tmp_path / "out", sets=("carling",), methods=("centroid",)
+    )
+    (row,) = result.rows
+    assert (row.reports, row.located) == (40, 0)
+    figures = (row.mean_m, row.median_m, row.error_95_m, row.within_50, row.within_95)
+    assert np.isnan(figures).all()
+    assert not (tmp_path / "out" / "carling.png").exists()
 
 
 def test_an_unknown_set_is_refused(tmp_path):

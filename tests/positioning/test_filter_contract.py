@@ -4,6 +4,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from cross_world import CROSSING, make_database, walk_log, walk_tables
 
@@ -85,7 +86,27 @@ class Steady:
         return {"steps": state["steps"] + 1}, fix_at(epoch, Status.SEARCHING)
 
 
-@pytest.mark.parametrize("made", [Beliefs, Steady])
+class Held:
+    """A state without an equality of its own, which leads back to itself."""
+
+    def __init__(self, steps):
+        self.steps = pd.DataFrame({"steps": [steps, np.nan]})
+        self.places = np.array([(np.nan, steps)], dtype=[("east_m", float), ("step", int)])
+        self.dice = np.random.default_rng(1)
+        self.own = self
+
+
+class Objects(Steady):
+    """A filter whose states are ordinary objects."""
+
+    def begin(self, kinds):
+        return Held(0)
+
+    def step(self, state, epoch, rng):
+        return Held(int(state.steps["steps"][0]) + 1), fix_at(epoch, Status.SEARCHING)
+
+
+@pytest.mark.parametrize("made", [Beliefs, Steady, Objects])
 def test_custom_filters_of_either_contract_keep_it(made, database):
     check_filter(made, database, walk_log())
 
@@ -93,6 +114,18 @@ def test_custom_filters_of_either_contract_keep_it(made, database):
 class InPlace(Steady):
     def step(self, state, epoch, rng):
         state["steps"] += 1
+        return state, fix_at(epoch, Status.SEARCHING)
+
+
+class ObjectInPlace(Objects):
+    def step(self, state, epoch, rng):
+        state.steps.loc[0, "steps"] += 1
+        return state, fix_at(epoch, Status.SEARCHING)
+
+
+class DiceInPlace(Objects):
+    def step(self, state, epoch, rng):
+        state.dice.random()
         return state, fix_at(epoch, Status.SEARCHING)
 
 
@@ -179,6 +212,8 @@ class Inverted(Beliefs):
     ("made", "clause"),
     [
         (InPlace, "states are never changed in place"),
+        (ObjectInPlace, "states are never changed in place"),
+        (DiceInPlace, "states are never changed in place"),
         (Inverted, "covariance_m2 has no negative eigenvalue"),
         (Jumping, "SEARCHING is not followed by TRACKING"),
         (Narrow, "99 % is not below that for 95 %"),

@@ -105,7 +105,8 @@ def read_session(path: Path) -> Session:
         expected = f"CSV with the columns {', '.join(_COLUMNS)}"
         raise fail(InputError, str(path), expected, error) from error
     numbers = table.apply(pd.to_numeric, errors="coerce")
-    numbers = numbers.dropna(subset=["lat", "lon", "measured_at", "lac", "cellid", "signal"])
+    numbers = numbers.replace([np.inf, -np.inf], np.nan)
+    numbers = numbers.dropna(subset=[*_IDENTITY, "lat", "lon", "measured_at", "signal"])
     numbers = numbers.drop_duplicates("measured_at").sort_values("measured_at", kind="stable")
     if len(numbers) < 2:
         raise fail(InputError, str(path), "two rows or more", len(numbers))

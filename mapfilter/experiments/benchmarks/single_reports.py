@@ -17,7 +17,9 @@ from scipy.io.matlab import MatReadError
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
+from mapfilter.evaluation.accuracy import mean_of
 from mapfilter.evaluation.intervals import share_interval
+from mapfilter.experiments.accuracy_row import median_of, quantile_of
 from mapfilter.experiments.benchmarks.ottawa import GOOD_M, MAP_M
 from mapfilter.experiments.benchmarks.ottawa_sessions import Session
 from mapfilter.positioning.fingerprints.joining import joined_reports
@@ -163,7 +165,8 @@ def row_of(data: str, method: str, parts: Sequence[LocatedReports]) -> SingleRep
     error_m = np.concatenate([part.error_m for part in parts])
     radii_m = np.concatenate([part.radii_m for part in parts])
     known = np.isfinite(error_m)
-    within = [float(np.mean(error_m[known] <= radius_m)) for radius_m in radii_m[known].T]
+    known_m = error_m[known]
+    within = [mean_of(known_m <= radius_m) for radius_m in radii_m[known].T]
     held = [int(np.sum(part.error_m <= part.radii_m[:, 2])) for part in parts]
     low, high = share_interval(held, [int(np.isfinite(part.error_m).sum()) for part in parts])
     chosen = [method_name(part.method) for part in parts]
@@ -174,9 +177,9 @@ def row_of(data: str, method: str, parts: Sequence[LocatedReports]) -> SingleRep
         max(chosen, key=chosen.count) if method == AUTO else "",
         len(error_m),
         int(known.sum()),
-        float(error_m[known].mean()),
-        float(np.median(error_m[known])),
-        float(np.quantile(error_m[known], 0.95)),
+        mean_of(known_m),
+        median_of(known_m),
+        quantile_of(known_m, 0.95),
         within[0],
         within[1],
         within[2],

@@ -60,6 +60,7 @@ HEIGHT_M, CARRIER_DBM = 30.0, 58.0
 """Usual values, the latter of a carrier's EIRP: the table of towers has neither."""
 _TOWERS = "tower_data/towers.json"
 _MARGIN_M, _BOX_MARGIN_M, _BOX_RESOLUTION_M = 300.0, 1500.0, 25.0
+_NEAR_M = 5000.0
 _FLOOR_DBM = -130.0
 """Phones report RSRP down to about this."""
 _LARGEST_BYTES = 10_000_000
@@ -177,10 +178,24 @@ def claimed_wrongly(estimate: TrackEstimate, truth: Truth) -> bool:
 
 
 def _place_of(folder: Path, place: str) -> tuple[dict[str, TrackLog], CellPlan]:
-    """Return the walks of a place, and the cells near them."""
+    """Return the walks of a place, and the cells near them.
+
+    Raises
+    ------
+    InputError
+        There are no other walks to make the map of one of, or no cells within 5 km of them.
+    """
     logs = {file.stem: read_walk(file) for file in _walks(folder) if _place(file) == place}
-    plan = read_towers(folder / _TOWERS, next(iter(logs.values())).crs)
-    return logs, _near(plan, [positions_of(log.truth) for log in logs.values()])
+    where = str(folder / "walks" / f"{place}_*.txt")
+    if len(logs) < 2:
+        hint = "each walk is located on the map of the others"
+        raise fail(InputError, where, "two walks of a place or more", len(logs), hint)
+    towers = read_towers(folder / _TOWERS, next(iter(logs.values())).crs)
+    plan = _near(towers, [positions_of(log.truth) for log in logs.values()])
+    if not len(plan):
+        expected = f"cells of {_TOWERS} within {_NEAR_M / 1000:g} km of the walks"
+        raise fail(InputError, where, expected, "none")
+    return logs, plan
 
 
 def _fresh_reports(task: Task, log: TrackLog, place: Place) -> tuple[Found, WorstReport | None]:
@@ -244,10 +259,10 @@ def _cell(name: str, row: dict[str, Any], crs: str) -> Cell:
 
 
 def _near(plan: CellPlan, tracks: Sequence[Positions]) -> CellPlan:
-    """Return the cells within 5 km of the tracks' middle."""
+    """Return the cells near the tracks' middle."""
     east = float(np.mean(np.concatenate([track.east_m for track in tracks])))
     north = float(np.mean(np.concatenate([track.north_m for track in tracks])))
-    near = [c for c in plan.cells if np.hypot(c.east_m - east, c.north_m - north) < 5000.0]
+    near = [c for c in plan.cells if np.hypot(c.east_m - east, c.north_m - north) < _NEAR_M]
     return CellPlan(plan.crs, tuple(near))
 
 

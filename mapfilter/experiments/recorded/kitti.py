@@ -17,6 +17,7 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
+from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
 from mapfilter.experiments.recorded.locating import OpenMap, locate_log
@@ -79,7 +80,7 @@ def judge(task: Task, over: OpenMap) -> Judged:
         motion = with_drift(perfect_motion(truth), rng)
     else:
         file = task.data / "odometry" / f"{task.unit}.csv"
-        motion = read_recording(file).tables["motion"]
+        motion = read_odometry(file, len(truth))
     first = int(len(truth) * _FIRST_PART * task.run / STARTS)
     log = log_from(truth, motion, first, over.database.lattice.crs)
     located = locate_log(log, over, rng)
@@ -123,6 +124,20 @@ def read_truth(path: Path) -> pd.DataFrame:
     """Read the true track of a drive: time, place and heading of each frame."""
     rows = read_recording(path).tables["places"]
     return rows[["time_s", "east_m", "north_m", "heading_rad"]]
+
+
+def read_odometry(path: Path, frames: int) -> pd.DataFrame:
+    """Read the odometry of a drive, a row for each frame of its truth.
+
+    Raises
+    ------
+    InputError
+        It has more or fewer rows.
+    """
+    motion = read_recording(path).tables["motion"]
+    if len(motion) != frames:
+        raise fail(InputError, str(path), f"{frames} rows, as the truth", len(motion))
+    return motion
 
 
 def perfect_motion(truth: pd.DataFrame) -> pd.DataFrame:

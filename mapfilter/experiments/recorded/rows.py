@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from math import inf, isfinite, nan
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -225,8 +225,8 @@ def _worst_m(one: Found) -> float:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
-        # JSON knows no infinity; numpy reads the word back.
-        return ["inf" if each == inf else each for each in value.tolist()]
+        # JSON knows neither infinity nor NaN; numpy reads the words back.
+        return [each if isfinite(each) else str(each) for each in value.tolist()]
     return None if isinstance(value, float) and not isfinite(value) else value
 
 

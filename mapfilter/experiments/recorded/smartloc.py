@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -122,8 +121,7 @@ def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
         else:
             errors_m, held = errors_between(located.estimate, truth, FIRST_S, end_s)
         missing = int(np.isinf(errors_m).sum())
-        right_m = RIGHT_M.get(task.part, inf)
-        right = bool(np.median(errors_m) <= right_m) if np.isfinite(right_m) else scored.success
+        right = is_right(errors_m, RIGHT_M[task.part]) if task.part in RIGHT_M else scored.success
         found.append(
             replace(
                 scored,
@@ -138,6 +136,11 @@ def judge(task: Task, shared: tuple[TrackLog, OpenMap]) -> Judged:
         if task.part == OUTAGES and method == "bayes":
             found += _from_true_begin(task, located.estimate, truth, spans)
     return Judged(tuple(found), journeys)
+
+
+def is_right(errors_m: Floats, most_m: float) -> bool | None:
+    """Return whether the median error is what is asked for; None of a drive too short for any."""
+    return bool(np.median(errors_m) <= most_m) if errors_m.size else None
 
 
 def located_by(

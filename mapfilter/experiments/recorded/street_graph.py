@@ -104,6 +104,7 @@ def match_points(graph: StreetGraph, places: Floats) -> Ints:
     length = shapely.length(graph.line)
     best: list[Ints] = []
     back: list[Ints] = []
+    scores: list[Floats] = []
     score, before, along_before = np.empty(0), np.empty(0, dtype=np.int64), np.empty(0)
     for i, point in enumerate(points):
         edge = np.sort(tree.query(point, "dwithin", NEAR_M))
@@ -126,24 +127,26 @@ def match_points(graph: StreetGraph, places: Floats) -> Ints:
             came, score = np.full(edge.size, -1), emit
         best.append(edge)
         back.append(came)
+        scores.append(score)
         before, along_before = edge, along
         if not edge.size:
             score = np.empty(0)
-    return _traced(best, back, score)
+    return _traced(best, back, scores)
 
 
-def _traced(best: list[Ints], back: list[Ints], score: Floats) -> Ints:
+def _traced(best: list[Ints], back: list[Ints], scores: list[Floats]) -> Ints:
     """Return the edges of the most probable paths, from the last position backwards."""
     found = np.full(len(best), -1, dtype=np.int64)
-    at = int(score.argmax()) if score.size else -1
+    at = -1
     for i in range(len(best) - 1, -1, -1):
-        if at < 0 and best[i].size:
-            at = 0
-        if at >= 0 and best[i].size:
-            found[i] = best[i][at]
-            at = int(back[i][at])
-        else:
+        if not best[i].size:
             at = -1
+            continue
+        if at < 0:
+            # A path ends where no route leads on.
+            at = int(scores[i].argmax())
+        found[i] = best[i][at]
+        at = int(back[i][at])
     return found
 
 
