@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from grid_town import levels, streets
 
+from mapfilter.errors import InputError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of
 from mapfilter.simulation.journeys import JourneyPlan
@@ -52,6 +53,13 @@ def test_one_walks_800_m_is_carried_and_walks_1_km(walks):
     assert min(carried_m) >= 200.0
     assert max(carried_m) < 1001.4
     assert np.ptp(carried_m) > 200.0
+
+
+def test_a_block_is_too_small_to_be_displaced_in(monkeypatch):
+    monkeypatch.setattr("grid_town.SIZE", 2)
+    monkeypatch.setattr("mapfilter.experiments.benchmarks.journeys._ATTEMPTS", 3)
+    with pytest.raises(InputError, match=r"streets over 200 m and more.*found 1\d\d x 1\d\d m"):
+        displaced_walk(streets(), JourneyPlan(), SEED, 0)
 
 
 def test_displaced_walks_are_drawn_by_number_and_seed(town, walks):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import count
 from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 
 from mapfilter._constants import DAY_S
+from mapfilter.errors import InputError, fail
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.gnss.almanacs import joined, nominal_galileo, nominal_gps
@@ -29,6 +29,7 @@ from mapfilter.tracks.log import TrackLog, make_log
 _BEFORE_M = 800.0
 _AFTER_M = 1000.0
 _NEAREST_M, _FARTHEST_M = 200.0, 1000.0
+_ATTEMPTS = 2000
 START_UTC_S = 1_700_000_000.0
 SPOOFED_M, SPOOFED_S = 500.0, 60.0
 WINDOW_S = 120.0
@@ -78,11 +79,16 @@ def displaced_walk(streets: SweepWorld, plan: JourneyPlan, seed: int, number: in
     """Walk 800 m, be carried 200 m to 1 km away without anything being measured, and walk 1 km.
 
     Both parts lie on one route: the first place behind the cut that is as far away as was drawn.
+
+    Raises
+    ------
+    InputError
+        The streets are too near each other.
     """
     rng = named_rng(seed, "displacement", str(number))
     # Short legs turn back soon; some routes never get as far away as is wanted.
     length_m = _BEFORE_M + 4 * _FARTHEST_M
-    for attempt in count():
+    for attempt in range(_ATTEMPTS):
         along = route(streets.network, length_m, rng)
         walker = named_rng(seed, "displaced walker", str(number), str(attempt))
         whole = journey(along, replace(plan, length_m=length_m), walker, streets.inside)
@@ -95,6 +101,10 @@ def displaced_walk(streets: SweepWorld, plan: JourneyPlan, seed: int, number: in
         end = int(np.searchsorted(walked_m, walked_m[again] + _AFTER_M))
         if away.any() and end < len(walked_m):
             break
+    else:
+        expected = f"streets over {_NEAREST_M:g} m and more, to be displaced on"
+        got = f"{np.ptp(streets.network.east_m):.0f} x {np.ptp(streets.network.north_m):.0f} m"
+        raise fail(InputError, "street network", expected, got, "a small area")
     kept = pd.concat([whole.iloc[: cut + 1], whole.iloc[again:end]], ignore_index=True)
     time_s = float(whole["time_s"].iloc[1]) * np.arange(len(kept))
     return Walk(kept.assign(time_s=time_s), float(time_s[cut]))
