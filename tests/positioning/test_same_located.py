@@ -12,6 +12,7 @@ from mapfilter.database.build import build
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
+from mapfilter.tracks.kinds import leave_out
 
 FEW = {"max_particles": 1500, "min_search_particles": 800, "min_particles": 300}
 FILTERS = {
@@ -100,6 +101,18 @@ def test_the_ground_truth_changes_nothing(whole, database, name):
     given = tables()
     del given["truth"]
     pd.testing.assert_frame_equal(located(database, given, name), whole, check_exact=True)
+
+
+@pytest.mark.parametrize("kind", ["gnss", "neighbours"])
+def test_what_is_left_out_might_as_well_not_be_there(database, name, kind):
+    given = tables()
+    left = leave_out(mf.make_log(CRS, **given), [kind])
+    if kind == "gnss":
+        del given["gnss"]
+    else:
+        given["radio"] = given["radio"][given["radio"]["role"] == "serving"]
+    found = mf.locate(left, database, FILTERS[name], seed=SEED).to_dataframe()
+    pd.testing.assert_frame_equal(found, located(database, given, name), check_exact=True)
 
 
 def test_the_clock_may_begin_years_later(whole, database, name):
