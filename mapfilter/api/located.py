@@ -178,7 +178,8 @@ def locate(
     seed : int or numpy.random.Generator
         Equal logs, databases, options and seeds give equal bytes.
     ways : bool
-        Whether positions are matched to ways.
+        Whether positions of the candidate filter and of custom filters are matched to ways. The
+        Bayes and the grid filter always match them, Kalman-type filters never.
     snapshots : bool
         Whether to keep the filter's hypotheses at some epochs, for pictures.
     risk : float

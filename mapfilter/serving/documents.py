@@ -147,7 +147,12 @@ def whole(
     high: int,
     hint: str = "",
 ) -> int | None:
-    """Return a whole number in a range; None, with a fault, for anything else."""
+    """Return a whole number in a range; None, with a fault, for anything else.
+
+    JSON knows one kind of numbers: 7.0 is 7, as some programs write it.
+    """
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
     if isinstance(value, int) and not isinstance(value, bool):
         if low <= value <= high:
             return value

@@ -17,6 +17,7 @@ from mapfilter.tracks.exchanged import sideways_mps2
 from mapfilter.tracks.misplaced import FAR_M, misplaced_by
 from mapfilter.tracks.moved import UNDIRECTED
 from mapfilter.tracks.readers.times import are_days
+from mapfilter.tracks.second_deliveries import once_each
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0
@@ -199,7 +200,7 @@ def _milliseconds(times: Mapping[str, Floats]) -> str:
 
 def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
     """Note steps that are cumulative, backwards or in another unit; return notes on odd ones."""
-    motion = tables["motion"]
+    motion = once_each(tables["motion"])
     motion = motion[np.isfinite(motion["step_m"].to_numpy())]
     time_s, step_m = motion["time_s"].to_numpy(), motion["step_m"].to_numpy()
     if len(step_m) < _FEW_ROWS:

@@ -16,6 +16,7 @@ from mapfilter._types import Bools, Complexes, Floats
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.motion_fault import MotionFault
+from mapfilter.tracks.second_deliveries import once_each
 from mapfilter.tracks.stretches import (
     FEWEST_PLACES,
     Stretches,
@@ -73,6 +74,8 @@ def motion_faults(motion: pd.DataFrame, places: pd.DataFrame) -> dict[str, Motio
     """
     checks: tuple[Callable[[pd.DataFrame, pd.DataFrame], MotionFault | None], ...]
     checks = (heading_fault, turn_fault, step_fault)
+    # What was delivered twice is used once: twice as long steps are no fault then.
+    motion = once_each(motion)
     found = (check(motion, places) for check in checks)
     return {fault.column: fault for fault in found if fault is not None}
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._constants import FOOT_M
+from mapfilter.tracks.second_deliveries import once_each
 
 SLOWEST_MPS, FASTEST_MPS, MOTOR_MPS = 0.6, 2.6, 8.0
 """Bounds of the mean speed of a walker that moves; speed from which on it is not a walker's even if
@@ -56,6 +57,7 @@ def speed_fault(motion: pd.DataFrame) -> str:
     """
     if not motion["heading_rad"].notna().any():
         return ""
+    motion = once_each(motion)
     time_s, step_m = (motion[name].to_numpy(dtype=np.float64) for name in ("time_s", "step_m"))
     lasted_s, length_m = np.diff(time_s), np.abs(step_m[1:])
     known = np.isfinite(length_m) & (lasted_s > 0) & (lasted_s <= _LONGEST_S)

@@ -15,7 +15,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.osm import read_water
 from mapfilter.roads.route_points import route_lattice
-from mapfilter.roads.routes import read_roads
+from mapfilter.roads.routes import read_roads, read_routes
 
 FORMATS = ("roads.shp", "roads.gpkg", "roads.geojson", "roads.fgb", "roads.parquet", "roads.gml",
            "roads.sqlite", "roads.shp.zip")  # fmt: skip
@@ -86,6 +86,20 @@ def test_every_format_in_any_crs(tmp_path, name, crs):
     np.testing.assert_allclose(lengths, [50, 340, 400, 50], atol=0.05)
     assert not len(found.areas)
     assert not found.notes
+
+
+@pytest.mark.parametrize("order", [[3, 1, 0, 2], [2, 3, 1, 0]])
+def test_lines_may_come_in_any_order_and_direction(order):
+    turned = ROADS.iloc[order]
+    turned = turned.set_geometry(turned.geometry.reverse())
+    lattice, columns = (
+        Lattice.covering(*AREA, 5.0),
+        {"class_column": "fclass", "id_column": "osm_id"},
+    )
+    usual, found = (read_routes(one, lattice, **columns) for one in (ROADS, turned))
+    assert len(usual) > 300
+    for name in ("row", "col", "way_id", "distance_to_way_m"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(usual, name))
 
 
 def test_features_are_numbered_when_nobody_names_them(tmp_path):

@@ -137,6 +137,23 @@ def test_values_beyond_their_range_name_the_likely_mistake(cross, body, mistake)
         read_epochs(body, PlanNames(cross.plan), nan)
 
 
+@pytest.mark.parametrize(
+    "whole", [{"arfcn": 10, "bsic": 0}, {"timing_advance": 3}, {"censored": -1}], ids=str
+)
+def test_whole_numbers_may_have_a_point(cross, whole):
+    """As columns of a data frame are written that has rows without them; a log takes them, too."""
+    names = PlanNames(cross.plan)
+    pointed = {name: float(value) for name, value in whole.items()}
+    found = [
+        read_epochs(json.loads(json.dumps(epoch(radio=[{**SERVING, **one}]))), names, nan)
+        for one in (whole, pointed)
+    ]
+    assert found[0] == found[1]
+    motion = pd.DataFrame({"time_s": [0.0, 1.0], "step_m": [1.4, 1.4]})
+    log = make_log(CRS, motion=motion, radio=pd.DataFrame([{"time_s": 1.0, **SERVING, **pointed}]))
+    assert log.radio.iloc[0][[*whole]].to_dict() == whole
+
+
 def test_positions_may_be_as_phones_give_them(cross):
     row = {"lat_deg": 41.15, "lon_deg": -8.62, "accuracy_m": 7.575}
     fix = read_epochs(epoch(gnss=[row]), PlanNames(cross.plan), nan)[0].fix
