@@ -100,9 +100,8 @@ def reckon_counted(
     if "steps" not in sensors:
         return None, None, ()
     rows = sensors["steps"].sort_values("time_s", kind="stable")
-    rows = rows.drop_duplicates("time_s", keep="last")
-    time_s = rows["time_s"].to_numpy(dtype=np.float64)
-    counted, how = counted_steps(time_s, rows["count"].to_numpy(dtype=np.float64))
+    columns = (rows[name].to_numpy(dtype=np.float64) for name in ("time_s", "count"))
+    time_s, counted, how = counted_steps(*columns)
     counted, batches = spread(time_s, counted)
     time_s, counted = parted(time_s, counted, _times_of_directions(sensors))
     unknown = int(np.isnan(counted).sum())
