@@ -157,6 +157,15 @@ def test_yaw_rates_beside_steps_of_known_lengths_are_their_turns(read, field):
     assert not [note for note in log.notes if "not used" in note or "unknown" in note]
 
 
+@pytest.mark.parametrize("field", ["compass_deg", "heading_rad", "turn_rad"])
+def test_yaw_rates_of_steps_beside_an_empty_column(read, field):
+    """They were not used: the column counted as their direction."""
+    given = {"step_m": 0.3, field: np.nan, "yaw_rate_radps": RATE_RADPS}
+    log = read(walk={"time": TIME_S, **given})
+    np.testing.assert_allclose(turned_rad(log), TURNED_RAD, atol=1e-6)
+    assert not [note for note in log.notes if "yaw_rate" in note or "unknown" in note]
+
+
 @pytest.mark.parametrize("field", ["compass_deg", "heading_rad", "heading_deg", "turn_rad"])
 def test_directions_in_rows_of_their_own_are_those_of_steps(read, field):
     """They were not used, with a note that there are none."""

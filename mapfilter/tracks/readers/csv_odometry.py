@@ -72,8 +72,11 @@ def has_turns_of_wheels(mapped: Mapped) -> bool:
 
 def has_rates_of_steps(mapped: Mapped) -> bool:
     """Return whether steps of known lengths have a yaw rate, and no other direction."""
+    if not mapped.has("step_m") or not _is_turned(mapped):
+        return False
     others = ("heading_rad", "compass_deg", *_TURNS)
-    return mapped.has("step_m") and _is_turned(mapped) and not any(map(mapped.has, others))
+    # Columns of logs with fixed ones may be empty.
+    return not any(np.isfinite(mapped.number(name)).any() for name in filter(mapped.has, others))
 
 
 def add_turns(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
