@@ -244,6 +244,8 @@ def _by_speed(
     if one is None or other is None or len(one[0]) < 10 or len(other[0]) < 10:
         return 0.0, 0.0
     lengths = [min(float(np.ptp(time)), 6 * 3600.0) for time, _ in (one, other)]
+    if not min(lengths) > 0:
+        return 0.0, 0.0
     grids = [np.arange(0.0, length, 1 / _RATE_HZ) for length in lengths]
     a, b = (
         np.interp(grid + track[0][0], *track)

@@ -188,7 +188,9 @@ def _truth(
             east, north = frame.east_north(rows, recording.crs)
             place = {"time_s": rows["time_s"], "east_m": east, "north_m": north}
             parts.append(pd.DataFrame(place))
-    return pd.concat(parts, ignore_index=True).sort_values("time_s") if parts else None
+    return (
+        pd.concat(parts, ignore_index=True).sort_values("time_s", kind="stable") if parts else None
+    )
 
 
 def _satellites(
@@ -245,4 +247,6 @@ def _velocity(recordings: Sequence[Recording], frame: Frame) -> pd.DataFrame | N
         heading = heading_from_azimuth_rad(rows["course_deg"], frame.convergence_rad)
         columns = {"time_s": rows["time_s"], "speed_mps": rows["speed_mps"]}
         parts.append(pd.DataFrame({**columns, "heading_rad": heading}))
-    return pd.concat(parts, ignore_index=True).sort_values("time_s") if parts else None
+    return (
+        pd.concat(parts, ignore_index=True).sort_values("time_s", kind="stable") if parts else None
+    )

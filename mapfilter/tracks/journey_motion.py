@@ -31,9 +31,6 @@ from mapfilter.tracks.position_motion import motion_from_positions
 from mapfilter.tracks.position_sources import measured_positions
 from mapfilter.tracks.readers.recording import Recording
 
-_LONGEST_GAP_S = 3600.0
-_SUMMER_HOURS = 1.1
-_FEWEST = 3
 OF_RECEIVER = "motion comes from GNSS"
 
 
@@ -133,7 +130,8 @@ def _recorded(
         directions = moved["heading_rad"], moved["turn_rad"].iloc[1:]
         undirected = not any(known.notna().any() for known in directions)
         if undirected and (turning := own_turning(having[0])) is not None:
-            notes.append(f"{having[0].path.name}: turns are those of {turning.source}")
+            of = "rows beside those of steps" if turning.source == "turns" else turning.source
+            notes.append(f"{having[0].path.name}: turns are those of {of}")
             moved = moved.assign(turn_rad=turning.between(moved["time_s"].to_numpy(np.float64)))
         elif undirected:
             lacking = "no headings and no turns (a column compass_deg, heading_rad or turn_rad)"

@@ -22,6 +22,7 @@ from mapfilter.tracks.stretches import (
     Stretches,
     known_places,
     motion_values,
+    rows_apart_s,
     steady_values,
     stretches,
 )
@@ -141,7 +142,7 @@ def step_fault(
     off = _matching(_UNITS, factor)
     speeds = _matching(_SPEEDS, of_speeds)
     times = dict(_UNITS)
-    apart_s = float(np.median(lasted_s[1:]))
+    apart_s = rows_apart_s(time_s)
     if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
         named = {unit: f"speeds in {unit}, rows {apart_s:.2g} s apart" for unit in speeds}
         off |= {named[unit]: by for unit, by in speeds.items()}

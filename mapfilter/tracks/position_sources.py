@@ -33,7 +33,7 @@ def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
     rows = recording.tables.get("positions", recording.tables.get("places"))
     if rows is None or "provider" not in rows or rows["provider"].isna().all():
         return rows, ""
-    named = rows["provider"].fillna("").str.lower()
+    named = rows["provider"].astype(object).fillna("").str.lower()
     found = [name for name in PROVIDERS if (named == name).any()]
     if not found or (named == found[0]).all():
         return rows, ""
@@ -94,7 +94,7 @@ def fixes_of(
         fixes, note = without_held(fixes, motion, rounded_m[id(recording)], driven=driven)
         notes += [f"{recording.path.name}: {note}"] if note else []
         parts.append(fixes)
-    return pd.concat(parts, ignore_index=True).sort_values("time_s")
+    return pd.concat(parts, ignore_index=True).sort_values("time_s", kind="stable")
 
 
 def of_one_receiver(placed: Sequence[Placed]) -> tuple[list[Placed], tuple[str, ...]]:

@@ -42,7 +42,8 @@ def scan_of_rows(radio: pd.DataFrame) -> Ints:
         return np.asarray(moment, dtype=np.int64)
     names = radio[["cell", "arfcn", "bsic"]].astype(object)
     code = pd.MultiIndex.from_frame(names.where(names.notna(), "")).factorize()[0]
-    again = ~advertised(radio)
+    # Neighbours that are known by their level alone are no cell twice.
+    again = ~advertised(radio) & names.notna().any(axis=1).to_numpy(dtype=bool)
     family = radio["technology"] if "technology" in radio else pd.Series("", radio.index)
     serving = (radio["role"] == SERVING).to_numpy(dtype=bool)
     # Serving cells of a technology are one more code, below 0.

@@ -186,3 +186,15 @@ def steady_values(motion: pd.DataFrame, name: str) -> Floats:
     values = np.nan_to_num(motion_values(motion, name), nan=0.0)
     values[:1] = 0.0
     return values
+
+
+def rows_apart_s(time_s: Floats) -> float:
+    """Return the usual time from row to row; the mean where most rows have that of another one.
+
+    Examples
+    --------
+    >>> rows_apart_s(np.array([0.0, 1.0, 2.0, 9.0])), rows_apart_s(np.repeat(np.arange(3.0), 3))
+    (1.0, 0.25)
+    """
+    lasted_s = np.diff(time_s)
+    return float(np.median(lasted_s)) or float(np.mean(lasted_s))

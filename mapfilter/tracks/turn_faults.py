@@ -12,6 +12,7 @@ from mapfilter.tracks.stretches import (
     Stretches,
     motion_values,
     reckoned_m,
+    rows_apart_s,
     steady_values,
     stretches,
 )
@@ -73,7 +74,7 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
         return None
     turn_rad = steady_values(motion, "turn_rad")
     lasted_s = np.diff(time_s, prepend=time_s[:1])
-    apart_s = float(np.median(lasted_s[1:]))
+    apart_s = rows_apart_s(time_s)
     units: dict[str, Floats | float] = {"": 1.0, **_UNITS}
     if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
         units[f"rates (rad/s) in rows {apart_s:.2g} s apart"] = lasted_s
@@ -94,7 +95,8 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
     words += ["run clockwise"] if sign < 0 else []
     found = f"turns {' and '.join(words)} by the course of the positions"
     mirrored = "" if unit or sign > 0 else "latitude and longitude of the positions are swapped"
-    factor = sign * float(np.median(units[unit]))
+    # Of rows that mostly have the time of another one, the median is 0.
+    factor = sign * float(np.median(units[unit]) or np.mean(units[unit]))
     return MotionFault("turn_rad", found, "radians counter-clockwise", factor, otherwise=mirrored)
 
 

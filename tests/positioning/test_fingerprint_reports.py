@@ -91,6 +91,13 @@ def test_readings_a_few_milliseconds_apart_are_one_report():
     assert "readings of one scan, less than 1 s apart, are one report" in reports.notes
 
 
+def test_neighbours_without_an_identity_begin_no_report():
+    """The second one was taken for a cell that is reported again."""
+    rows = [(10.0, "a", -70.0, "serving"), (10.01, None, -80.0), (10.02, None, -85.0)]
+    rows += [(10.03, "b", -75.0), (10.48, "a", -70.0, "serving"), (10.49, None, -80.0)]
+    assert scan_of_rows(make_log(CRS, radio=radio_rows(*rows)).radio).tolist() == [0] * 4 + [1] * 2
+
+
 def test_a_cell_that_is_reported_again_begins_a_report():
     rows = [(0.48 * i, name, -70.0 - i) for i in range(4) for name in "ab"]
     reports = reports_of_log(make_log(CRS, radio=radio_rows(*rows)))

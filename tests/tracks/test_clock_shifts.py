@@ -97,3 +97,13 @@ def test_an_offset_moves_that_recording_alone(tmp_path, of, name):
     late_s = log.gnss["time_s"].iloc[0] - log.motion["time_s"].iloc[0]
     assert late_s == (5.0 if name == "fixes.csv" else -5.0)
     assert [note for note in log.notes if "speeds" in note] == []
+
+
+def test_recordings_of_one_moment_each_are_refused(tmp_path):
+    """Of speeds that last no time a traceback told so."""
+    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for path, time_s in zip(paths, (5.0, 7.0), strict=True):
+        rows = pd.DataFrame({"time": time_s, "wheel_speed_mps": np.arange(12.0)})
+        rows.to_csv(path, index=False)
+    with pytest.raises(InputError, match="positions or speeds in common"):
+        mf.read_log(paths)

@@ -360,3 +360,18 @@ def test_positions_that_are_mirrored_do_not_blame_the_turns(tmp_path):
     assert told(latitude=lat, longitude=lon) == (False, False)
     assert told(latitude=lat, longitude=lon, turn_rad=-rows["turn_rad"]) == (True, False)
     assert told(latitude=lon, longitude=lat) == (False, True)
+
+
+def test_rows_of_which_three_have_one_time_have_a_factor():
+    """Rows 0 s apart: a traceback, and a factor of 0 for turns."""
+    time_s, of_row = np.arange(300.0), np.repeat(np.arange(300), 3)
+    heading = np.where((time_s // 60) % 2 == 0, 0.0, np.pi / 2)
+    east_m, north_m = (np.cumsum(10 * f(heading)) for f in (np.cos, np.sin))
+    truth = pd.DataFrame({"time_s": time_s, "east_m": east_m, "north_m": north_m})
+    rows = pd.DataFrame({"time_s": time_s[of_row], "step_m": 10.0, "heading_rad": heading[of_row]})
+    fault = step_fault(rows.assign(turn_rad=np.nan), truth)
+    assert "speeds in m/s, rows 0.33 s apart" in fault.found
+    assert fault.factor == pytest.approx(1 / 3, rel=0.01)
+    rates = np.diff(heading, prepend=0.0)[of_row]
+    turned = turn_fault(rows.assign(step_m=10 / 3, turn_rad=rates), truth)
+    assert turned.factor == pytest.approx(1 / 3, rel=0.01)

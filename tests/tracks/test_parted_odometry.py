@@ -157,6 +157,47 @@ def test_yaw_rates_beside_steps_of_known_lengths_are_their_turns(read, field):
     assert not [note for note in log.notes if "not used" in note or "unknown" in note]
 
 
+@pytest.mark.parametrize("field", ["compass_deg", "heading_rad", "turn_rad"])
+def test_yaw_rates_of_steps_beside_an_empty_column(read, field):
+    """They were not used: the column counted as their direction."""
+    given = {"step_m": 0.3, field: np.nan, "yaw_rate_radps": RATE_RADPS}
+    log = read(walk={"time": TIME_S, **given})
+    np.testing.assert_allclose(turned_rad(log), TURNED_RAD, atol=1e-6)
+    assert not [note for note in log.notes if "yaw_rate" in note or "unknown" in note]
+
+
+@pytest.mark.parametrize("field", ["compass_deg", "heading_rad", "heading_deg", "turn_rad"])
+def test_directions_in_rows_of_their_own_are_those_of_steps(read, field):
+    """They were not used, with a note that there are none."""
+    compass_deg = np.degrees(np.pi / 2 - TURNED_RAD - 3.0) % 360
+    turn = np.diff(TURNED_RAD, prepend=0.0)
+    given = {"heading_rad": wrap_rad(TURNED_RAD + 3.0), "turn_rad": turn}.get(field, compass_deg)
+    steps = pd.DataFrame({"time": TIME_S[2::4] + 0.01, "step_m": 0.7})
+    rows = pd.concat([pd.DataFrame({"time": TIME_S, field: given}), steps])
+    log = read(walk=rows.sample(frac=1.0, random_state=3))
+    assert log.motion["step_m"].sum() == pytest.approx(0.7 * len(steps))
+    if field == "turn_rad":
+        own = turned_rad(log) + TURNED_RAD[2]
+        np.testing.assert_allclose(own, np.interp(steps["time"], TIME_S, TURNED_RAD), atol=1e-3)
+        assert "walk.csv: turns are those of rows beside those of steps" in log.notes
+    else:
+        off = wrap_rad(log.motion["heading_rad"] - TURNED_RAD[2::4] - 3.0)
+        assert np.ptp(off) < 0.1
+        assert np.abs(off).max() < 0.15
+        assert f"walk.csv: {field}: of rows beside those of steps" in log.notes
+    assert not [note for note in log.notes if "no headings" in note]
+
+
+@pytest.mark.parametrize("steps", ["steps", "step_m"])
+def test_speeds_and_a_yaw_rate_beside_steps_are_a_walkers(read, steps):
+    """They were taken for a vehicle's."""
+    of_steps = {"steps": np.arange(TIME_S.size) // 3, "step_m": 0.23}[steps]
+    log = read(walk={"time": TIME_S, steps: of_steps, "speed_mps": 1.2, "yaw_rate": RATE_RADPS})
+    assert not log.vehicle
+    assert not [note for note in log.notes if "vehicle" in note]
+    assert turned_rad(log)[-1] == pytest.approx(TURNED_RAD[-1], abs=0.05)
+
+
 def test_headings_of_steps_go_before_their_yaw_rates(read):
     given = {"step_m": 0.3, "heading_rad": 1.0 + TURNED_RAD, "yaw_rate_radps": RATE_RADPS}
     log = read(walk={"time": TIME_S, **given})

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import mapfilter as mf
 from mapfilter.errors import InputError
 
 COUNT = 300
@@ -172,3 +173,33 @@ def test_few_positions_of_round_trips_are_not_held(read):
     lat, lon = 60 + rng.normal(0, 3e-6, 40), 25 + rng.normal(0, 5e-6, 40)
     log = read(depot=table(time_s, lat=lat, lon=lon), wheels=way)
     assert len(log.gnss) == 40
+
+
+def test_fixes_of_one_time_stay_in_order(read):
+    """Of two parts, the later one given first, those of each second were shuffled."""
+    rows = table(TIME_S[0] + np.arange(COUNT) // 5, lat=LAT, lon=LON)
+    assert (np.diff(read(b=rows[150:], a=rows[:150]).gnss["north_m"]) > 0).all()
+
+
+def test_the_truth_of_one_time_stays_in_order(tmp_path):
+    """It was two and a half times as long."""
+    rows = table(TIME_S[0] + np.arange(COUNT) // 5, lat=LAT, lon=LON)
+    paths = [tmp_path / "b.csv", tmp_path / "a.csv"]
+    for path, part in zip(paths, (rows[150:], rows[:150]), strict=True):
+        part.to_csv(path, index=False)
+    log = mf.read_log(paths, truth=paths)
+    assert log.truth_length_m == pytest.approx(np.ptp(log.truth["north_m"]), rel=0.01)
+
+
+def test_fixes_whose_provider_is_missing_in_some_rows(tmp_path):
+    """They ended in a traceback."""
+    head = "Provider,LatitudeDegrees,LongitudeDegrees,SpeedMps,AccuracyMeters,UnixTimeMillis"
+    rows = [
+        f"Fix,{('GPS', 'FLP', '')[k % 3]},{lat:.5f},25,1,5,{1e3 * TIME_S[k]:.0f}"
+        for k, lat in enumerate(LAT[:30])
+    ]
+    path = tmp_path / "gnss_log.txt"
+    path.write_text("\n".join(["# Version: v3.0.5.6 Platform: 12", f"# Fix,{head}", *rows]) + "\n")
+    log = mf.read_log(path)
+    assert len(log.gnss) == 10
+    assert "gnss_log.txt: 20 fixes of other providers than gps left out" in log.notes

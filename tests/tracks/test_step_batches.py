@@ -131,3 +131,35 @@ def test_rows_given_twice_are_dropped_still(tmp_path):
     once["heading_rad"] = 0.1
     log = read(tmp_path, pd.concat([once, once]))
     assert log.motion["step_m"].sum() == pytest.approx(once["step_m"].sum())
+
+
+@pytest.mark.parametrize("kind", ["counts", "single", "lengths"])
+def test_equal_rows_of_one_whole_second_are_steps_of_their_own(kind, tmp_path):
+    """Every second of two was dropped as a row given twice."""
+    number = np.diff(np.searchsorted(STEPS_S, np.arange(0, 600, 0.5), side="right"), prepend=0)
+    second_s = np.arange(number.size) // 2
+    if kind != "counts":
+        second_s = np.floor(STEPS_S)
+    rows = {"time": START_S + second_s}
+    if kind == "lengths":
+        columns = rows | {"step_m": STEP_M, "compass_deg": 0.0}
+    else:
+        columns = beside_a_compass(rows | {"steps": number if kind == "counts" else 1})
+    log = read(tmp_path, columns)
+    assert log.motion["step_m"].sum() == pytest.approx(STEP_M * STEPS_S.size, abs=2)
+    (note,) = [note for note in log.notes if "same second" in note]
+    assert "spread over it" in note
+    # A listener that is registered twice from some time on.
+    twice = pd.DataFrame(columns).drop_duplicates()
+    twice = pd.concat([twice[:200], *[twice[200:]] * 2])
+    assert "duplicate rows dropped" in " ".join(read(tmp_path, twice).notes)
+    once = read(tmp_path, pd.DataFrame(columns).drop_duplicates()).motion
+    if kind == "lengths":
+        assert read(tmp_path, twice).motion["step_m"].sum() == once["step_m"].sum()
+
+
+def test_different_counts_of_one_time_add_up(tmp_path):
+    """Of two in each second the second one counted: no step at all."""
+    rows = {"time": START_S + np.repeat(SECONDS, 2), "steps": np.tile([1, 0], SECONDS.size)}
+    motion = read(tmp_path, beside_a_compass(rows)).motion
+    assert motion["step_m"].sum() == pytest.approx(STEP_M * SECONDS.size)

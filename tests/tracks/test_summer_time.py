@@ -48,7 +48,12 @@ def test_the_first_pass_where_nothing_tells():
     np.testing.assert_array_equal(utc_from_local_s(given, BERLIN), times)
 
 
-@pytest.mark.parametrize(("begin_s", "end_s"), [(-1800, 600), (-1800, 3000), (-6000, 9000)])
+PARTS = [(-1800, 600), (-1800, 3000), (-6000, 9000), (600, 6000), (3000, 4000)]
+"""Begin and end of files; the last two begin within the second pass."""
+NO_PASS = "passes twice"
+
+
+@pytest.mark.parametrize(("begin_s", "end_s"), PARTS)
 def test_parts_of_a_large_file_follow_each_other(tmp_path, monkeypatch, begin_s, end_s):
     """Parts within the second pass were an hour early, and rows lost as duplicates."""
     monkeypatch.setattr(text, "_PART_BYTES", 1 << 14)
@@ -58,6 +63,7 @@ def test_parts_of_a_large_file_follow_each_other(tmp_path, monkeypatch, begin_s,
     rows.to_csv(tmp_path / "phone.csv", index=False)
     found = read_recording(tmp_path / "phone.csv", options=ReadOptions(zone=BERLIN))
     np.testing.assert_array_equal(found.tables["barometer"]["time_s"], utc_s)
+    assert not [note for note in found.notes if NO_PASS in note]
 
 
 def exported(name, utc_s):
@@ -89,7 +95,7 @@ def exported(name, utc_s):
 
 
 @pytest.mark.parametrize("name", ["tems", "gnettrack", "towercollector", "opencellid"])
-@pytest.mark.parametrize(("begin_s", "end_s"), [(-1800, 600), (-1800, 3000), (-6000, 9000)])
+@pytest.mark.parametrize(("begin_s", "end_s"), PARTS)
 def test_parts_of_large_drive_tests_follow_each_other(tmp_path, monkeypatch, name, begin_s, end_s):
     """Parts within the second pass were an hour early."""
     monkeypatch.setattr(text, "_PART_BYTES", 1 << 14)
@@ -100,6 +106,7 @@ def test_parts_of_large_drive_tests_follow_each_other(tmp_path, monkeypatch, nam
     assert found.format == name
     for table in ("positions", "radio"):
         np.testing.assert_array_equal(found.tables[table]["time_s"].unique(), utc_s)
+    assert not [note for note in found.notes if NO_PASS in note]
 
 
 def written_in_blocks(name, utc_s):
@@ -120,7 +127,7 @@ def written_in_blocks(name, utc_s):
 
 
 @pytest.mark.parametrize("name", ["nemo", "gpx"])
-@pytest.mark.parametrize(("begin_s", "end_s"), [(-1800, 600), (-1800, 3000), (-6000, 9000)])
+@pytest.mark.parametrize(("begin_s", "end_s"), PARTS)
 def test_blocks_of_a_large_file_follow_each_other(tmp_path, monkeypatch, name, begin_s, end_s):
     """Blocks within the second pass were an hour early."""
     monkeypatch.setattr(lines, "_BLOCK_BYTES", 1 << 14)
@@ -131,6 +138,7 @@ def test_blocks_of_a_large_file_follow_each_other(tmp_path, monkeypatch, name, b
     found = read_recording(path, options=ReadOptions(zone=BERLIN))
     assert found.format == name
     np.testing.assert_array_equal(found.tables["positions"]["time_s"], utc_s)
+    assert not [note for note in found.notes if NO_PASS in note]
 
 
 def test_times_with_a_zone_among_local_ones_are_no_fall():
@@ -218,6 +226,12 @@ def test_a_walk_within_the_hour_that_comes_twice_is_noted(tmp_path, begin_s):
     (note,) = notes_of(tmp_path, local_s(BACK_S + begin_s + np.arange(300.0)))
     assert "a clock of Europe/Berlin passes twice; taken for the first time, UTC+02:00" in note
     assert "--zone +01:00, or times with their offset" in note
+
+
+def test_parts_that_all_are_within_that_hour_are_noted(tmp_path, monkeypatch):
+    monkeypatch.setattr(text, "_PART_BYTES", 1 << 12)
+    (note,) = notes_of(tmp_path, local_s(BACK_S - 2000 + np.arange(1000.0)))
+    assert NO_PASS in note
 
 
 @pytest.mark.parametrize(("begin_s", "end_s"), [(-6000, -3300), (-600, 600), (3000, 4200)])

@@ -9,22 +9,21 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._constants import MAD_TO_SD
-from mapfilter._types import Floats, Ints
+from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.batches import parted, spread
 from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS
+from mapfilter.tracks.pdr.mean_direction import NEAR_S, mean_direction
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.orientation import compass_of_orientation, turning_of_orientation
-from mapfilter.tracks.pdr.step_counts import LATE_S, PAUSE_S, STEPS_PER_S, counted_steps
+from mapfilter.tracks.pdr.step_counts import PAUSE_S, STEPS_PER_S, counted_steps
 from mapfilter.tracks.pdr.turns import turning_of
 from mapfilter.tracks.pdr.walk import DECLINATION_SD_RAD
 from mapfilter.tracks.pdr.walk_noise import SCALE, STEP_SHARE
 
-_NEAR_S = 2.0
-_TURNED = 0.9
 _COUNTED_LATE = 0.5
 _LEAST_HEADING_DEG, _MOST_HEADING_DEG = 3.0, 45.0
 _CARRIED_SD_DEG = 15.0
@@ -100,9 +99,8 @@ def reckon_counted(
     if "steps" not in sensors:
         return None, None, ()
     rows = sensors["steps"].sort_values("time_s", kind="stable")
-    rows = rows.drop_duplicates("time_s", keep="last")
-    time_s = rows["time_s"].to_numpy(dtype=np.float64)
-    counted, how = counted_steps(time_s, rows["count"].to_numpy(dtype=np.float64))
+    columns = (rows[name].to_numpy(dtype=np.float64) for name in ("time_s", "count"))
+    time_s, counted, how = counted_steps(*columns)
     counted, batches = spread(time_s, counted)
     time_s, counted = parted(time_s, counted, _times_of_directions(sensors))
     unknown = int(np.isnan(counted).sum())
@@ -176,7 +174,10 @@ def _by_compass(
     convergence_rad: float,
 ) -> tuple[_Course | None, str]:
     """Return headings, or why there are none."""
-    magnetic_deg, chord = _mean_direction(time_s, sensors["compass"])
+    compass = sensors["compass"]
+    magnetic_deg, chord = mean_direction(
+        time_s, *(compass[name].to_numpy(np.float64) for name in ("time_s", "magnetic_deg"))
+    )
     if np.isnan(magnetic_deg).all():
         return None, "compass and step counter have no time in common: no motion"
     notes = []
@@ -190,7 +191,7 @@ def _by_compass(
     azimuth_deg = magnetic_deg + (options.declination_deg or 0.0)
     heading = heading_from_azimuth_rad(azimuth_deg, convergence_rad)
     nothing = np.full(len(time_s), np.nan)
-    unknown = f"no compass within {_NEAR_S:g} s of"
+    unknown = f"no compass within {NEAR_S:g} s of"
     return _Course(heading, nothing, chord, 0.0, "with a compass", unknown, tuple(notes)), ""
 
 
@@ -214,40 +215,6 @@ def _by_turns(time_s: Floats, sensors: Mapping[str, pd.DataFrame]) -> tuple[_Cou
     nothing, whole = np.full(len(time_s), np.nan), np.ones(len(time_s))
     source, walk_rad = f"with {turning.source}", turning.walk_rad_per_sqrt_s
     return _Course(nothing, turn, whole, walk_rad, source, "no turn known in", notes), ""
-
-
-def _mean_direction(time_s: Floats, compass: pd.DataFrame) -> tuple[Floats, Floats]:
-    """Return the mean azimuth of each row (degrees), and the chord of its way over its length.
-
-    The mean is that of the time since the row before, of at most 30 s, or the nearest azimuth
-    within 2 s; NaN without one. Where the walker turned, the chord is shorter than the way.
-    """
-    known = compass.dropna(subset=["magnetic_deg"]).sort_values("time_s", kind="stable")
-    at_s = known["time_s"].to_numpy(dtype=np.float64)
-    if not at_s.size:
-        return np.full(len(time_s), np.nan), np.ones(len(time_s))
-    turn = np.radians(known["magnetic_deg"].to_numpy(dtype=np.float64))
-    sums = np.concatenate([np.zeros((1, 2)), np.cumsum([np.cos(turn), np.sin(turn)], axis=1).T])
-    begin_s = np.concatenate([time_s[:1] - _NEAR_S, time_s[:-1]])
-    lasted_s = time_s - begin_s
-    begin_s = np.where(lasted_s > PAUSE_S, time_s - LATE_S, begin_s)
-    first, last = (np.searchsorted(at_s, edge_s, side="right") for edge_s in (begin_s, time_s))
-    inside = sums[last] - sums[first]
-    mean = np.degrees(np.arctan2(inside[:, 1], inside[:, 0]))
-    chord = np.hypot(inside[:, 0], inside[:, 1]) / np.maximum(last - first, 1)
-    nearest = _nearest(at_s, time_s)
-    near = np.abs(at_s[nearest] - time_s) <= _NEAR_S
-    alone = np.where(near, np.degrees(turn[nearest]), np.nan)
-    # Noise of the compass shortens a mean vector, too.
-    turned = (last - first > 2) & (chord < _TURNED)
-    return np.where(last > first, mean, alone), np.where(turned, chord, 1.0)
-
-
-def _nearest(known_s: Floats, time_s: Floats) -> Ints:
-    after = np.minimum(np.searchsorted(known_s, time_s), len(known_s) - 1)
-    before = np.maximum(after - 1, 0)
-    is_before = np.abs(known_s[before] - time_s) <= np.abs(known_s[after] - time_s)
-    return np.where(is_before, before, after)
 
 
 def _errors(motion: pd.DataFrame, options: WalkOptions, walk_rad: float) -> ImuNoise:

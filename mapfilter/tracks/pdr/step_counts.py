@@ -41,20 +41,34 @@ def are_own_counts(time_s: Floats, count: Floats) -> bool:
     return bool(count.max() <= most or (batches and count.mean() <= most))
 
 
-def counted_steps(time_s: Floats, count: Floats) -> tuple[Floats, str]:
-    """Return the steps of each row, NaN where unknown, and what the counts were taken for."""
-    lasted_s = np.diff(time_s)
+def counted_steps(time_s: Floats, count: Floats) -> tuple[Floats, Floats, str]:
+    """Return different times, the steps of each (NaN where unknown), and what the counts are.
+
+    Parameters
+    ----------
+    time_s, count : (N,) array
+        In the order of times. Of one time counts of each row add up; a counter's last one is taken.
+
+    Examples
+    --------
+    >>> counted_steps(np.array([0.0, 0.0, 1.0, 1.0]), np.array([1.0, 0.0, 1.0, 0.0]))
+    (array([0., 1.]), array([1., 1.]), 'counted in each row')
+    """
     is_own = are_own_counts(time_s, count)
+    time_s, first = np.unique(time_s, return_index=True)
     if is_own:
+        count = np.add.reduceat(count, first)
         change, how = count[1:], _OWN_COUNTS
     else:
+        count = count[np.append(first[1:], count.size) - 1]
         # A counter begins anew when a phone is started.
         change, how = np.diff(_without_jitter(count)), "by a counter"
+    lasted_s = np.diff(time_s)
     walkable = (change >= 0) & (change <= STEPS_PER_S * np.maximum(lasted_s, LATE_S))
     # Where a counter is written only when it grows, a few steps end a long rest.
     paused = (lasted_s > PAUSE_S) & (change > _JITTER)
     steps = np.where(walkable & ~paused, change, np.nan)
-    return np.concatenate([count[:1] if is_own else [0.0], steps]), how
+    return time_s, np.concatenate([count[:1] if is_own else [0.0], steps]), how
 
 
 def _without_jitter(count: Floats) -> Floats:

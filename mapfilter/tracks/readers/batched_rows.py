@@ -1,16 +1,22 @@
-"""Rows of steps that were delivered many at one time: given the times at which they were walked."""
+"""Rows of steps of one time, delivered late or cut to its second: given times of their own."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
+from mapfilter._words import number_of
+from mapfilter.tracks.pdr.step_counts import STEPS_PER_S, are_own_counts
+from mapfilter.tracks.readers.recorded_values import duplicates
 
 _ROWS, _LEAST_S, _LEAST_TIMES = 3.0, 2.0, 3
 _SLOWEST_S, _FASTEST_S = 1.0, 0.2
 """Longest time of a step, and the shortest: others are no steps."""
 _MOSTLY, _REPEATED = 0.9, 0.5
+_FEWEST_CHANGES, _CHANGING = 5.0, 0.05
+"""Least number, and share of all times, of changes between times given once and those given twice:
+a part that was delivered twice begins and ends but once."""
 
 
 def times_of_batches(time_s: Floats) -> Floats:
@@ -48,10 +54,52 @@ def times_of_batches(time_s: Floats) -> Floats:
     return spread
 
 
-def without_batches(table: str, rows: pd.DataFrame, *, repeated: bool) -> tuple[pd.DataFrame, str]:
-    """Return counted steps or motion with rows that came in batches apart, and a note.
+def times_of_cut_seconds(time_s: Floats, equal: Bools) -> Floats:
+    """Return times of rows cut to whole seconds, spread over these, where equal ones are several.
 
-    Rows that all count one step become a counter.
+    Two steps of one second may be equal rows. Those that were delivered twice are so in all of a
+    file, or in a part; where times with equal rows alone and others alternate they are of moments
+    of their own.
+
+    Parameters
+    ----------
+    time_s : (N,) array
+        In rising order.
+    equal : (N,) array of bool
+        Which rows equal an earlier one.
+
+    Returns
+    -------
+    (N,) array
+        The same object where there are none.
+
+    Examples
+    --------
+    >>> time_s = np.repeat(np.arange(12.0), [1, 2] * 6)
+    >>> times_of_cut_seconds(time_s, np.diff(time_s, prepend=-1) == 0)[:6].tolist()
+    [0.0, 1.0, 1.5, 2.0, 3.0, 3.5]
+    >>> twice = np.repeat(np.arange(12.0), 2)
+    >>> times_of_cut_seconds(twice, np.diff(twice, prepend=-1) == 0) is twice
+    True
+    """
+    if not equal.any() or (time_s != np.round(time_s)).any():
+        return time_s
+    times, first, count = np.unique(time_s, return_index=True, return_counts=True)
+    doubled = 2 * np.add.reduceat(equal.astype(np.int64), first) >= count
+    changes = np.count_nonzero(np.diff(doubled))
+    if changes < max(_FEWEST_CHANGES, _CHANGING * times.size) or count.max() > STEPS_PER_S:
+        return time_s
+    spread: Floats = time_s + (np.arange(time_s.size) - np.repeat(first, count)) / np.repeat(
+        count, count
+    )
+    return spread
+
+
+def without_batches(table: str, rows: pd.DataFrame, *, repeated: bool) -> tuple[pd.DataFrame, str]:
+    """Return counted steps or motion with rows of one time apart, and a note.
+
+    They came in batches, or lost the fraction of their second. Rows that all count one step become
+    a counter.
 
     Parameters
     ----------
@@ -65,13 +113,37 @@ def without_batches(table: str, rows: pd.DataFrame, *, repeated: bool) -> tuple[
     time_s = rows["time_s"].to_numpy()
     spread = times_of_batches(time_s)
     if spread is time_s or (repeated and rows.duplicated().mean() > _REPEATED):
-        return rows, ""
+        return (rows, "") if repeated else _apart_in_seconds(table, rows)
     times, count = np.unique(time_s, return_counts=True)
-    rows = rows.assign(time_s=spread)
-    if table == "steps" and (rows["count"] == 1).all():
-        rows = rows.assign(count=np.arange(1.0, len(rows) + 1))
+    rows = _as_counter(table, rows.assign(time_s=spread))
     note = (
         f"{table}: {len(rows)} rows came in {len(times)} batches of {np.median(count):.3g} or so, "
         f"{np.median(np.diff(times)):.3g} s apart: spread over the time since the batch before"
     )
     return rows, note
+
+
+def _apart_in_seconds(table: str, rows: pd.DataFrame) -> tuple[pd.DataFrame, str]:
+    """Return steps of each row, cut to whole seconds, spread over these; and a note."""
+    time_s = rows["time_s"].to_numpy()
+    if not (np.diff(time_s) == 0).any():
+        return rows, ""
+    if table == "steps":
+        count = rows["count"].to_numpy()
+        # Of a counter the last row of a second has all its steps.
+        if not ((count == 1).all() or are_own_counts(time_s, count)):
+            return rows, ""
+    equal = duplicates(rows)
+    spread = times_of_cut_seconds(time_s, equal)
+    if spread is time_s:
+        return rows, ""
+    some = number_of(int(equal.sum()), "row equals", "rows equal")
+    note = f"{table}: {some} another one of the same second, as stamps are whole seconds: kept, and"
+    return _as_counter(table, rows.assign(time_s=spread)), f"{note} spread over it"
+
+
+def _as_counter(table: str, rows: pd.DataFrame) -> pd.DataFrame:
+    """Return rows that all count one step as those of a counter."""
+    if table == "steps" and (rows["count"] == 1).all():
+        return rows.assign(count=np.arange(1.0, len(rows) + 1))
+    return rows

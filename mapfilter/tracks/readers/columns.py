@@ -14,7 +14,8 @@ import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.tracks.readers.local_times import change_notes, is_beside_change, utc_from_local_s
+from mapfilter.tracks.readers.local_parts import note_changes
+from mapfilter.tracks.readers.local_times import is_beside_change, utc_from_local_s
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.times import LEAST_UNIX_S, parse_times, seconds_of_day, unix_seconds
 
@@ -105,8 +106,7 @@ class Columns:
         if zone and is_beside_change(time_s, zone):
             one_s, other_s = (self._times(names, z, layout, nan)[0] for z in ("+00:00", "+01:00"))
             local_s = np.where(one_s == other_s, np.nan, one_s)
-            for note in change_notes(local_s, time_s, zone, after_s):
-                self.reading.note(note)
+            note_changes(self.reading, local_s, time_s, zone, after_s)
         return time_s, zoned
 
     def _times(

@@ -16,7 +16,8 @@ from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
 _NEAR_S, _COARSE_M, _COURSE_MPS = 1.0, 0.5, 1.0
 _SPEEDS = ("speed_mps", "speed_kmh")
 _WHEELS, _ODOMETERS = ("wheel_speed_mps", "wheel_speed_kmh"), ("odometer_m", "odometer_km")
-_OF_PHONES = ("steps", "step_m", "level_dbm", "bars", "cell", "ci", "cgi", "acc_x")
+_STEPS = ("steps", "step_m")
+_OF_PHONES = (*_STEPS, "level_dbm", "bars", "cell", "ci", "cgi", "acc_x")
 _TURNS = ("turn_rad", "turn_deg")
 _FEWEST_ALONE, _ALONE_SHARE = 10, 0.1
 
@@ -25,11 +26,11 @@ def has_odometry(mapped: Mapped) -> bool:
     """Return whether a file has the speed of a vehicle.
 
     It is that of the wheels, or by their odometer; else any speed, where there are no positions
-    whose receiver measured it, and besides a yaw rate nothing of a walk or a phone.
+    whose receiver measured it, no steps, and without a yaw rate nothing of a phone.
     """
     if any(map(mapped.has, (*_WHEELS, *_ODOMETERS))):
         return True
-    if not any(map(mapped.has, _SPEEDS)) or _is_placed(mapped):
+    if not any(map(mapped.has, _SPEEDS)) or _is_placed(mapped) or any(map(mapped.has, _STEPS)):
         return False
     return _is_turned(mapped) or not any(map(mapped.has, _OF_PHONES))
 
@@ -56,10 +57,9 @@ def heading_of_wheels(mapped: Mapped) -> str:
     Beside positions a heading may be the course of their receiver, which ends with them, and beside
     steps it is a walker's. A course that is alone with a speed goes on as that does.
     """
-    others = ("steps", "step_m")
     if not has_odometry(mapped) or _is_turned(mapped) or _is_placed(mapped):
         return ""
-    if any(map(mapped.has, others)):
+    if any(map(mapped.has, _STEPS)):
         return ""
     return next(filter(mapped.has, ("heading_rad", "compass_deg", "course_deg")), "")
 
@@ -72,8 +72,11 @@ def has_turns_of_wheels(mapped: Mapped) -> bool:
 
 def has_rates_of_steps(mapped: Mapped) -> bool:
     """Return whether steps of known lengths have a yaw rate, and no other direction."""
+    if not mapped.has("step_m") or not _is_turned(mapped):
+        return False
     others = ("heading_rad", "compass_deg", *_TURNS)
-    return mapped.has("step_m") and _is_turned(mapped) and not any(map(mapped.has, others))
+    # Columns of logs with fixed ones may be empty.
+    return not any(np.isfinite(mapped.number(name)).any() for name in filter(mapped.has, others))
 
 
 def add_turns(mapped: Mapped, reading: Reading, time_s: Floats) -> None:

@@ -21,7 +21,8 @@ from mapfilter.tracks.readers.csv_weeks import (
     weeks_of,
 )
 from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.local_times import change_notes, utc_from_local_s
+from mapfilter.tracks.readers.local_parts import note_changes
+from mapfilter.tracks.readers.local_times import utc_from_local_s
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.times import (
@@ -151,8 +152,7 @@ def _local(reading: Reading, local_s: Floats, zone: str) -> Floats:
     if not zone:
         return local_s
     utc_s = utc_from_local_s(local_s, zone, reading.last_s)
-    for note in change_notes(local_s, utc_s, zone, reading.last_s):
-        reading.note(note)
+    note_changes(reading, local_s, utc_s, zone, reading.last_s)
     return utc_s
 
 

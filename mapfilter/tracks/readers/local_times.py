@@ -15,6 +15,8 @@ from mapfilter._words import number_of
 from mapfilter.errors import ConfigError, fail
 
 _QUARTER_S = 900.0
+LONGEST_STEP_S = 900.0
+"""Between rows that go on without a gap."""
 _FAR_QUARTERS = 6e7
 """Quarters of an hour, 1700 years from 1970; datetime ends soon after."""
 _OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?", re.ASCII)
@@ -74,12 +76,12 @@ def change_notes(local_s: Floats, utc_s: Floats, zone: str, after_s: float = nan
     >>> change_notes(local, utc_from_local_s(local, zone), zone)[0][:53]
     'time: 1 time is not of Europe/Berlin, from 2026-03-29'
     """
-    local, utc = local_s[np.isfinite(local_s)], utc_s[np.isfinite(local_s)]
+    local = local_s[np.isfinite(local_s)]
     if not local.size:
         return []
     shift, of = _shifts_s(local, zone)
     # The offset before a change is the first one, that after it the second one.
-    skipped, twice = (sign * (shift[of, 0] - shift[of, 1]) > 0 for sign in (-1, 1))
+    skipped = shift[of, 0] < shift[of, 1]
     notes = []
     if skipped.any():
         at = int(np.flatnonzero(skipped)[0])
@@ -90,7 +92,7 @@ def change_notes(local_s: Floats, utc_s: Floats, zone: str, after_s: float = nan
             f"leaves out; taken for UTC{before} (likely: a clock that was not set, --zone {before};"
             " or a wrong zone)"
         )
-    if twice.all() and (utc == local - shift[of, 0]).all() and not isfinite(after_s):
+    if doubled_s(local_s, utc_s, zone) and not isfinite(after_s):
         first, second = (_offset(one) for one in shift[of[0]].tolist())
         notes.append(
             f"time: all times, from {_minute(local[0])} on, lie in the hour that a clock of {zone} "
@@ -98,6 +100,30 @@ def change_notes(local_s: Floats, utc_s: Floats, zone: str, after_s: float = nan
             "or times with their offset)"
         )
     return notes
+
+
+def doubled_s(local_s: Floats, utc_s: Floats, zone: str) -> float:
+    """Return by how much later times are if an hour that comes twice is the second.
+
+    It is 0 where they are not all of such an hour, taken for the first time.
+
+    Parameters
+    ----------
+    local_s, utc_s, zone
+        As of :func:`change_notes`.
+
+    Examples
+    --------
+    >>> local = np.array([datetime(2026, 10, 25, 2, 30, tzinfo=UTC).timestamp()])
+    >>> doubled_s(local, utc_from_local_s(local, "Europe/Berlin"), "Europe/Berlin")
+    3600.0
+    """
+    known = np.isfinite(local_s)
+    if not known.any():
+        return 0.0
+    shift, of = _shifts_s(local_s[known], zone)
+    first = utc_s[known] == local_s[known] - shift[of, 0]
+    return max(float((shift[:, 0] - shift[:, 1]).min()), 0.0) if first.all() else 0.0
 
 
 def is_beside_change(utc_s: Floats, zone: str) -> bool:
@@ -160,7 +186,7 @@ def _second_pass_s(local_s: Floats, later_s: Floats, behind_s: float) -> Floats:
     edges = np.diff((later_s > 0).astype(np.int8), prepend=0, append=0)
     begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
     steps = np.diff(local_s)
-    near = (steps >= 0) & (steps <= _QUARTER_S)
+    near = (steps >= 0) & (steps <= LONGEST_STEP_S)
     for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
         falls = np.flatnonzero(steps[begin : end - 1] < -later_s[begin] / 2)
         comes = begin > 0 and near[begin - 1]

@@ -41,7 +41,8 @@ from mapfilter.tracks.readers.columns import only
 from mapfilter.tracks.readers.events import Events, read_events
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
-from mapfilter.tracks.readers.local_times import change_notes, utc_from_local_s
+from mapfilter.tracks.readers.local_parts import note_changes
+from mapfilter.tracks.readers.local_times import utc_from_local_s
 from mapfilter.tracks.readers.nemo_identities import (
     Identities,
     context_size,
@@ -123,8 +124,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
             events.time_s[:] += midnight_s
             if zone:
                 utc_s = utc_from_local_s(events.time_s, zone, reading.passed_s)
-                for note in change_notes(events.time_s, utc_s, zone, reading.passed_s):
-                    reading.note(note)
+                note_changes(reading, events.time_s, utc_s, zone, reading.passed_s)
                 reading.passed_s = max([reading.passed_s, *utc_s[np.isfinite(utc_s)][-1:]])
                 events.time_s[:] = utc_s
         _add_positions(events, reading)

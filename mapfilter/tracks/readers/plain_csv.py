@@ -18,6 +18,7 @@ from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows, mapped_columns, with_dates
 from mapfilter.tracks.readers.csv_odometry import add_odometry, add_turns
 from mapfilter.tracks.readers.csv_places import add_places, hemisphere_columns
+from mapfilter.tracks.readers.csv_steps import add_steps
 from mapfilter.tracks.readers.csv_times import times_of
 from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
 from mapfilter.tracks.readers.csv_weeks import week_column
@@ -101,11 +102,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
         there = np.isfinite(columns["east_m"])
         add_rows(reading, "places", {"time_s": time_s, **columns}, rows, there)
     elif mapped.has("step_m"):
-        moved = ("step_m", "heading_rad", "turn_rad", "compass_deg")
-        columns = {name: mapped.number(name) for name in moved}
-        columns["turn_rad"] = mapped.radians("turn")
-        there = np.isfinite(columns["step_m"])
-        add_rows(reading, "motion", {"time_s": time_s, **columns}, rows, there)
+        add_steps(mapped, reading, time_s)
     add_odometry(mapped, reading, time_s)
     add_turns(mapped, reading, time_s)
     _add_sensors(mapped, reading, time_s)

@@ -52,7 +52,8 @@ class Reading:
 
     ``last_s`` is the last time of the file's rows, used or not, and ``passed_s`` that of the parts
     read so far, of formats without ``last_s``; ``columns`` are the names in the file of columns
-    without a usual name, by field.
+    without a usual name, by field. ``doubled`` is by how much all times so far may be later, as of
+    :func:`mapfilter.tracks.readers.local_times.doubled_s`, and the note on it.
     """
 
     path: Path
@@ -69,6 +70,7 @@ class Reading:
     tallies: Tallies = field(default_factory=Tallies)
     last_s: float = -inf
     passed_s: float = -inf
+    doubled: tuple[float, str] = (0.0, "")
     columns: dict[str, str] = field(default_factory=dict)
     _firsts: dict[str, str] = field(default_factory=dict)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
@@ -129,6 +131,11 @@ class Reading:
             why = f" (likely: {cause})" if cause else ""
             self.note(f"{table}: times go backwards in {number_of(back, 'place')}; sorted{why}")
         self.tables.setdefault(table, []).append(rows)
+
+    def shift(self, later_s: float) -> None:
+        """Make the times of all rows so far later."""
+        for parts in self.tables.values():
+            parts[:] = [part.assign(time_s=part["time_s"] + later_s) for part in parts]
 
     def _check(
         self, table: str, known: Field, checked: dict[str, Any], line: Ints, good: Bools
