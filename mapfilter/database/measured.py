@@ -93,6 +93,11 @@ class Deviations:
     def __len__(self) -> int:
         return len(self.cell)
 
+    def some(self, kept: Bools) -> Deviations:
+        """Return some of the rows."""
+        cell, row, col = (one[kept] for one in (self.cell, self.row, self.col))
+        return Deviations(self.cell_ids, cell, row, col, self.deviation_db[kept])
+
     def spread(self, cell_ids: Sequence[str], on_way: Bools) -> Floats32:
         """Return the deviation at every pixel, shape (C, P), NaN where a cell was not measured.
 
@@ -131,14 +136,20 @@ class MeasuredParts:
 
 
 def merged_parts(
-    parts: Sequence[MeasuredParts], shifts: Sequence[tuple[int, int]], cell_ids: Sequence[str]
+    parts: Sequence[MeasuredParts],
+    shifts: Sequence[tuple[int, int]],
+    cell_ids: Sequence[str],
+    left_out: Sequence[str] = (),
 ) -> MeasuredParts:
     """Return the parts of several surveys together, of some cells.
 
     ``shifts`` are the rows and columns that each survey's lattice lies below and right of the new
-    one's corner. Of a deviation given twice the last counts.
+    one's corner. Of a deviation given twice the last counts. Readings of further cells, received
+    too rarely for a map, stay beside those of ``cell_ids``, unless they are ``left_out``.
     """
-    numbers = {cell_id: number for number, cell_id in enumerate(cell_ids)}
+    every = {name for one in parts for name in one.readings.cell_ids}
+    names_read = (*cell_ids, *sorted(every.difference(cell_ids, left_out)))
+    numbers = {name: number for number, name in enumerate(names_read)}
 
     def renamed(names: Sequence[str], cell: Ints32) -> Ints32:
         own = np.array([numbers.get(name, -1) for name in names], dtype=np.int32)
@@ -154,7 +165,7 @@ def merged_parts(
     table = np.column_stack([cell, row, col])[::-1]
     _, last = np.unique(table, axis=0, return_index=True)
     kept = len(cell) - 1 - last
-    kept = kept[cell[kept] >= 0]
+    kept = kept[(cell[kept] >= 0) & (cell[kept] < len(cell_ids))]
     columns = {
         name: _joined([getattr(one, name) for one in readings], kind)
         for name, kind in _READINGS.items()
@@ -164,9 +175,11 @@ def merged_parts(
         counts = [int(getattr(one, name).max(initial=-1)) + 1 for one in readings]
         sizes = [len(one) for one in readings]
         columns[name] += np.repeat(np.cumsum([0, *counts[:-1]]), sizes).astype(np.int32)
-    rows = Readings(tuple(cell_ids), **columns)
+    rows = Readings(names_read, **columns)
     deviations = Deviations(tuple(cell_ids), cell[kept], row[kept], col[kept], value[kept])
-    return MeasuredParts(rows.some(rows.cell >= 0), deviations)
+    # Rare cells alone would be the readings of another database.
+    mapped = (rows.cell >= 0) & (rows.cell < len(cell_ids))
+    return MeasuredParts(rows.some(rows.cell >= 0 if mapped.any() else mapped), deviations)
 
 
 def deviations_at_points(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -96,21 +96,43 @@ def merge(
         # No database holds points without a level, so they cannot be counted.
         counts = dict.fromkeys(("points", "points_below_floor", "points_off_rasters"))
         counts["points"] = written.received
-        measured = _measured(databases, lattice, plan)
+        measured = _measured(databases, lattice, plan, without)
         head = Head(lattice, plan, parameters, attribution, inputs, counts, measured)
         head.write(folder, written.parts)
     return open_database(out)
 
 
 def _measured(
-    databases: Sequence[RadioRouteDatabase], lattice: Lattice, plan: CellPlan
+    databases: Sequence[RadioRouteDatabase],
+    lattice: Lattice,
+    plan: CellPlan,
+    without: Sequence[str],
 ) -> MeasuredParts | None:
     """Return what the surveys measured; None where one of the databases has no survey."""
     parts = [found for database in databases if (found := database.measured()) is not None]
     if len(parts) < len(databases):
         return None
     shifts = [pixels_between(lattice, database.lattice) for database in databases]
-    return merged_parts(parts, shifts, plan.ids)
+    parts = [
+        _not_overridden(part, database.lattice, databases[number:])
+        for number, (part, database) in enumerate(zip(parts, databases, strict=True), start=1)
+    ]
+    return merged_parts(parts, shifts, plan.ids, without)
+
+
+def _not_overridden(
+    part: MeasuredParts, lattice: Lattice, later: Sequence[RadioRouteDatabase]
+) -> MeasuredParts:
+    """Return what a survey measured without the deviations of levels that later ones override."""
+    found = part.deviations
+    kept = np.ones(len(found), dtype=np.bool_)
+    for other in later:
+        top, left = pixels_between(lattice, other.lattice)
+        inside = (found.row >= top) & (found.row < top + other.lattice.rows)
+        inside &= (found.col >= left) & (found.col < left + other.lattice.cols)
+        known = np.array([name in other.plan for name in found.cell_ids], dtype=np.bool_)
+        kept &= ~(inside & known[found.cell])
+    return replace(part, deviations=found.some(kept))
 
 
 @dataclass(frozen=True)

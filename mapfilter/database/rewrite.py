@@ -105,7 +105,7 @@ def rewrite(
         }
         measured = database.measured()
         if measured is not None:
-            measured = merged_parts([measured], [(0, 0)], plan.ids)
+            measured = merged_parts([measured], [(0, 0)], plan.ids, database.plan.ids)
         head = Head(
             database.lattice,
             plan,

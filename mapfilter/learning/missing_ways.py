@@ -122,6 +122,9 @@ def off_map_pieces(
             at = np.arange(0.0, length[-1], _STEP_M)
             even = np.column_stack([np.interp(at, length, axis) for axis in joined.T])
             near = _sampled(away_m, field, even) > _OFF_M
+            if not near.any():
+                # It cuts corners of pixels only.
+                continue
             # With what lies just before and after, so that the way joins the map.
             grown = np.convolve(near, np.ones(5), "same") > 0
             yield even[grown]

@@ -1,13 +1,14 @@
 """Levels that cells would have with another azimuth, or in another place.
 
 A database holds levels, not the path loss beneath them. The loss from a mast to a place is known
-from that sector of the mast which points there best; with another azimuth a cell has the same loss
-and another gain. Elsewhere than planned a cell is expected as the database's own levels fall off
-with distance.
+from that sector of the mast and the band which points there best; with another azimuth a cell has
+the same loss and another gain. Elsewhere than planned a cell is expected as the database's own
+levels fall off with distance.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,6 +22,8 @@ from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
 
 _SAME_MAST_M = 1.0
+_SAME_BAND = 1.05
+"""Largest ratio of two frequencies of a band: their losses differ by less than a decibel."""
 _LEAST_POINTS = 30
 
 
@@ -47,7 +50,7 @@ class Patterns:
     def turned(self, cell: int, azimuth_deg: float) -> Floats:
         """Return the levels of a cell with another azimuth, shape (M,)."""
         one = self.plan.cells[cell]
-        loss = self._loss_db[self._mast_of[cell]]
+        loss = self._loss_db[cell]
         level = one.eirp_dbm - loss + self.gain_db(one, azimuth_deg)
         return np.where(np.isnan(loss), self.level_dbm[:, cell], level)
 
@@ -83,31 +86,38 @@ class Patterns:
         return tuple(tuple(cells) for cells in found.values())
 
     @cached_property
-    def _mast_of(self) -> dict[int, int]:
-        return {cell: n for n, mast in enumerate(self.masts) for cell in mast}
-
-    @cached_property
     def _convergence_rad(self) -> float:
         cell = self.plan.cells[0]
         lon_deg, lat_deg = unproject(self.plan.crs, cell.east_m, cell.north_m)
         return grid_convergence_rad(self.plan.crs, float(lon_deg), float(lat_deg))
 
     @cached_property
-    def _loss_db(self) -> tuple[Floats, ...]:
-        """Loss from each mast to the places; NaN where no sector of it has a level."""
-        found = []
-        for mast in self.masts:
-            loss = np.full((len(mast), self.east_m.size), np.nan)
+    def _loss_db(self) -> dict[int, Floats]:
+        """Loss of each cell's band from its mast to the places; NaN where no sector has a level."""
+        found: dict[int, Floats] = {}
+        for band in (band for mast in self.masts for band in self._bands(mast)):
+            loss = np.full((len(band), self.east_m.size), np.nan)
             gain = np.full(loss.shape, -np.inf)
-            for i, c in enumerate(mast):
+            for i, c in enumerate(band):
                 cell, level = self.plan.cells[c], self.level_dbm[:, c]
                 known = level >= self.floor_dbm
                 pattern = self.gain_db(cell, cell.azimuth_deg or 0.0)
                 loss[i, known] = (cell.eirp_dbm + pattern - level)[known]
                 gain[i, known] = pattern[known]
             best = gain.argmax(axis=0)
-            found.append(loss[best, np.arange(self.east_m.size)])
-        return tuple(found)
+            found |= dict.fromkeys(band, loss[best, np.arange(self.east_m.size)])
+        return found
+
+    def _bands(self, mast: Sequence[int]) -> list[list[int]]:
+        """Return the cells of a mast by band, in which sectors may have carriers of their own."""
+        frequency_mhz = {cell: self.plan.cells[cell].frequency_mhz for cell in mast}
+        ordered = sorted(mast, key=lambda cell: frequency_mhz[cell])
+        bands = [ordered[:1]]
+        for last, cell in itertools.pairwise(ordered):
+            if frequency_mhz[cell] > _SAME_BAND * frequency_mhz[last]:
+                bands.append([])
+            bands[-1].append(cell)
+        return [sorted(band) for band in bands]
 
     @cached_property
     def _fall_off(self) -> dict[bool, tuple[float, float]]:

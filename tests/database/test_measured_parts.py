@@ -155,7 +155,7 @@ def test_parts_of_several_surveys_have_the_rows_of_all():
     one = parts_of(("A", "B"), (0, 0, 0, 1.0), (1, 2, 3, 2.0), seed=1)
     other = parts_of(("B", "Z", "A"), (0, 1, 1, 3.0), (1, 0, 0, 4.0), (2, 0, 2, 5.0), seed=2)
     cells = ("A", "B")
-    found = merged_parts([one, other], [(0, 0), (2, 4)], cells)
+    found = merged_parts([one, other], [(0, 0), (2, 4)], cells, ("Z",))
     # Z is no cell of the result.
     assert named(found.deviations) == {
         ("A", 0, 0): 1.0, ("B", 2, 3): 2.0, ("B", 3, 5): 3.0, ("A", 2, 6): 5.0,

@@ -1,5 +1,8 @@
 """Merged databases of surveys keep what was measured, each at its place on the merged lattice."""
 
+import sys
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
@@ -7,9 +10,12 @@ from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, ma
 from mapfilter.database.build import build
 from mapfilter.database.measured import Readings
 from mapfilter.database.merge import merge
+from mapfilter.database.rewrite import levels_of, rewrite, routes_of
+from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 
+LOST = {"old": (), "new": (1,)}
 WINDOWS = {"west": (0, 0, 40, 22), "east": (4, 22, 36, 28)}
 
 
@@ -28,14 +34,17 @@ def world(tmp_path_factory):
     return make_world(tmp_path_factory.mktemp("rasters"))
 
 
-def surveyed(world, folder, name, *, measured=True):
+def surveyed(world, folder, name, *, measured=True, lost=()):
     """Build a database of a part of the area; the deviation is that of the pixel in the whole."""
+    folder.mkdir(exist_ok=True)
     row, col, rows, cols = WINDOWS[name]
     lattice, made = LATTICE.window(*WINDOWS[name]), {}
-    level = world.levels_dbm[:, row : row + rows, col : col + cols]
+    level = world.levels_dbm[:, row : row + rows, col : col + cols].copy()
+    level[list(lost)] = np.nan
     number = np.arange(LATTICE.rows * LATTICE.cols).reshape(LATTICE.rows, LATTICE.cols)
     sd = 1 + 0.001 * number[row : row + rows, col : col + cols]
-    bands = {"level": level, "deviation": np.stack([sd, sd + 3, sd + 6]).astype(np.float32)}
+    deviation = np.where(np.isnan(level), np.nan, np.stack([sd, sd + 3, sd + 6]))
+    bands = {"level": level, "deviation": deviation.astype(np.float32)}
     for quantity, values in bands.items():
         file = folder / f"{name}-{quantity}.tif"
         write_rasters(file, lattice, zip(IDS, values, strict=True), IDS, {}, quantity=quantity)
@@ -79,3 +88,39 @@ def test_beside_a_database_without_a_survey_nothing_is_kept(world, tmp_path):
     plain = surveyed(world, tmp_path, "east", measured=False)
     for order in ([west, plain], [plain, west]):
         assert merge(order, tmp_path / "mixed").measured() is None
+
+
+def test_readings_of_cells_without_a_map_are_kept(world, tmp_path, monkeypatch):
+    """At times they serve, and single reports are compared with them."""
+    plain = readings(6, 4)
+    cell = np.array([0, 3, 2, 0, 1, 2], dtype=np.int32)
+    rare = replace(plain, cell_ids=(*IDS, "rare"), cell=cell)
+    monkeypatch.setattr(sys.modules[__name__], "readings", lambda *_: rare)
+    west = surveyed(world, tmp_path, "west")
+    for name, merged in (
+        ("merged", merge([west], tmp_path / "merged", without=[IDS[1]])),
+        ("rewritten", rewrite(west, tmp_path / "rewritten", *without(west, IDS[1]))),
+    ):
+        found = merged.measured().readings
+        names = [found.cell_ids[number] for number in found.cell]
+        assert names == [IDS[0], "rare", IDS[2], IDS[0], IDS[2]], name
+
+
+def without(database, cell_id):
+    kept = [number for number, one in enumerate(database.cell_ids) if one != cell_id]
+    plan = CellPlan(CRS, tuple(database.plan.cells[number] for number in kept))
+    return plan, routes_of(database), levels_of(database)[kept]
+
+
+def test_deviations_of_levels_that_are_overridden_are_not_kept(world, tmp_path):
+    """A later survey covers all of the east, and did not receive the second cell there."""
+    old, new = (surveyed(world, tmp_path / name, "east", lost=lost) for name, lost in LOST.items())
+    given = new.measured().deviations
+    assert 0 < len(given) < len(old.measured().deviations)
+    found = merge([old, new], tmp_path / "all").measured().deviations
+    for name in ("row", "col", "deviation_db"):
+        assert sorted(getattr(found, name)) == sorted(getattr(given, name))
+    assert set(found.cell.tolist()) == {0, 2}
+    # The other way round the survey that received it is the later one.
+    found = merge([new, old], tmp_path / "other").measured().deviations
+    assert len(found) == len(old.measured().deviations)

@@ -147,3 +147,20 @@ def test_of_a_line_that_returns_to_the_map_only_the_stretch_beside_it_is_propose
     line = np.array(one.line_m) - [EAST, NORTH]
     assert 180.0 < line[:, 0].min() < line[:, 0].max() < 380.0
     assert line[:, 1].max() == pytest.approx(140.0, abs=8.0)
+
+
+def test_a_path_that_only_cuts_corners_of_pixels_proposes_nothing():
+    """Two steps lie in pixels off the map, between which there is none of every five metres."""
+    begins = np.arange(100.0, 108.0, 0.5)
+    corners = []
+    for east in begins:
+        across = [(0, 0), (13, 13), (26, 0), (66, 0), (79, 13), (92, 0)]
+        path = np.array([(20.0, 102.5), *(np.add((east, 102.5), across)), (400.0, 102.5)])
+        log, track = journey(np.random.default_rng(0), path, blind=False, heading_sd=0.0)
+        hidden = (track.east_m - EAST > east - 5) & (track.east_m - EAST < east + 97)
+        track = JourneyTrack(track.time_s, track.east_m, track.north_m, np.where(hidden, 80.0, 8.0))
+        corners.append((log, track))
+    rng = np.random.default_rng(0)
+    walks = [journey(rng) for _ in range(4)]
+    (one,) = found([*walks, *corners])
+    assert one.journeys == 4

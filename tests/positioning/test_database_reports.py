@@ -209,6 +209,11 @@ def test_the_readings_of_a_survey_are_reports_themselves():
     without = reports_of_database(survey_of(alone))
     assert without.serving.tolist() == [-1, -1, -1]
     assert np.isnan(without.timing_advance).all()
+    several = surveyed()
+    several.serving[:] = True
+    first = reports_of_database(survey_of(several))
+    assert [first.cell_ids[n] for n in first.serving] == ["B", "B", "B"]
+    assert first.timing_advance.tolist() == [99.0, 99.0, 99.0]
 
 
 @pytest.mark.parametrize(("most", "kept"), [(5, [0, 1, 2, 3, 4]), (3, [0, 2, 4]), (2, [0, 4])])

@@ -179,6 +179,15 @@ def test_only_counts_of_what_was_left_out_are_added_up():
     assert joined.notes == ("3 dB steps", "4 readings left out: cell unknown")
 
 
+def test_a_single_reading_that_was_left_out_is_added_to_those_of_other_logs():
+    notes = ["1 reading left out: cell unknown", "3 readings left out: cell unknown", "steps"]
+    parts = [make_reports(CRS, [0], ["a"], [-60.0], count=1, notes=[one]) for one in notes]
+    of_four = "4 readings left out: cell unknown"
+    assert joined_reports(parts).notes == (of_four, "steps")
+    assert joined_reports([parts[0]] * 2).notes == ("2 readings left out: cell unknown",)
+    assert joined_reports([parts[0]]).notes == ("1 reading left out: cell unknown",)
+
+
 def test_logs_of_two_zones_are_not_joined():
     one = make_reports("EPSG:32635", [0], ["a"], [-60.0], count=1)
     other = make_reports("EPSG:32636", [0], ["a"], [-60.0], count=1)

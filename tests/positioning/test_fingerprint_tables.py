@@ -37,6 +37,15 @@ def test_degrees_are_projected(tmp_path):
     assert np.diff(reports.first).tolist() == [1, 0]
 
 
+@pytest.mark.parametrize("header", ["x,y,lon,lat", "east_m,north_m,longitude,latitude"])
+def test_degrees_beside_metres_are_no_levels(tmp_path, header):
+    """West of Greenwich a longitude could be a level in dBm."""
+    reports = read(tmp_path, f"{header},AP1\n440000,4474000,-3.7,40.4,-60\n", "EPSG:32630")
+    assert reports.cell_ids == ("AP1",)
+    assert reports.notes == ()
+    assert reports.places.tolist() == [[440_000.0, 4_474_000.0]]
+
+
 def test_metres_of_a_frame_of_its_own_need_a_crs(tmp_path):
     text = "x,y,ap\n1,2,-70\n"
     with pytest.raises(InputError, match="--crs"):

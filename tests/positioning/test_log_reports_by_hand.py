@@ -90,3 +90,18 @@ def test_levels_that_fill_in_for_cells_that_were_not_received_are_none():
     for kept in (near, few):
         found = reports_of_log(log(times_s, [], level_dbm=kept, **columns))
         np.testing.assert_array_equal(np.sort(found.level_dbm), np.sort(kept))
+
+
+def test_of_several_serving_cells_of_a_report_the_first_counts():
+    """A phone with cells of two technologies has the timing advance of the first."""
+    found = reports_of_log(
+        log(
+            [0.0, 0.0, 0.0, 5.0, 5.0], [],
+            cell=["lte", "nr", "far", None, "nr"],
+            role=["serving", "serving", "neighbour", "serving", "serving"],
+            technology=["LTE", "NR", "LTE", "LTE", "NR"],
+            timing_advance=pd.array([5, None, None, 7, 3], dtype="Int64"),
+        )
+    )  # fmt: skip
+    assert [found.cell_ids[number] for number in found.serving] == ["lte", "nr"]
+    assert found.timing_advance.tolist() == [5.0, 3.0]

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 
-_COUNTED = re.compile(r"(\d{1,18}) ((?:readings|reports|rows) left out: .*)", re.DOTALL)
+_COUNTED = re.compile(r"(\d{1,18}) (reading|report|row)s?( left out: .*)", re.DOTALL)
 
 
 def joined_reports(parts: Sequence[Reports]) -> Reports:
@@ -59,9 +60,12 @@ def joined_reports(parts: Sequence[Reports]) -> Reports:
 
 def _joined_notes(parts: Sequence[Reports]) -> tuple[str, ...]:
     """Return the notes of all parts, each once; counts of what was left out are added up."""
-    counts: dict[str, int] = {}
+    counts: dict[tuple[str, str], int] = {}
     for note in (note for part in parts for note in part.notes):
         found = _COUNTED.fullmatch(note)
-        text, count = (found[2], int(found[1])) if found else (note, 0)
-        counts[text] = counts.get(text, 0) + count
-    return tuple(f"{count} {text}" if count else text for text, count in counts.items())
+        (what, text), count = ((found[2], found[3]), int(found[1])) if found else (("", note), 0)
+        counts[what, text] = counts.get((what, text), 0) + count
+    return tuple(
+        f"{number_of(count, what)}{text}" if what else text
+        for (what, text), count in counts.items()
+    )

@@ -46,11 +46,13 @@ def reports_of_log(log: TrackLog, block: int = -1) -> Reports:
         )
     cell = radio["cell"].to_numpy(object)
     is_serving = known & (radio["role"] == SERVING).to_numpy(np.bool_)
+    # Of several serving cells of a report the first counts.
+    served, first = np.unique(report[is_serving], return_index=True)
     serving = np.full(count, "", dtype=object)
-    serving[report[is_serving]] = cell[is_serving]
+    serving[served] = cell[is_serving][first]
     advance = np.full(count, np.nan)
     steps = pd.to_numeric(radio["timing_advance"]).to_numpy(np.float64, na_value=np.nan)
-    advance[report[is_serving]] = steps[is_serving]
+    advance[served] = steps[is_serving][first]
     return make_reports(
         log.crs,
         report[known],

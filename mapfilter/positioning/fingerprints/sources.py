@@ -123,11 +123,13 @@ def _reports_of_survey(readings: Readings, crs: str) -> Reports:
     """Return the readings of a survey as reports; each session is a block of its own."""
     _, first, report = np.unique(readings.report, return_index=True, return_inverse=True)
     names = np.array(readings.cell_ids, dtype=str)[readings.cell]
-    served = np.flatnonzero(readings.serving)
+    # Of several serving cells of a report the first counts.
+    of_report, leading = np.unique(report[readings.serving], return_index=True)
+    served = np.flatnonzero(readings.serving)[leading]
     serving = np.full(len(first), "", dtype=names.dtype)
-    serving[report[served]] = names[served]
+    serving[of_report] = names[served]
     advance = np.full(len(first), np.nan)
-    advance[report[served]] = readings.timing_advance[served]
+    advance[of_report] = readings.timing_advance[served]
     found = make_reports(
         crs,
         report,

@@ -30,6 +30,8 @@ NOT_RECEIVED_DBM = 100.0
 
 _METRES = (("east_m", "north_m"), ("x_m", "y_m"), ("x", "y"))
 _DEGREES = (("lon_deg", "lat_deg"), ("longitude", "latitude"), ("lon", "lat"))
+_PLACES = frozenset(name for pair in (*_METRES, *_DEGREES) for name in pair)
+"""Columns of positions; of several pairs the first is used."""
 _OTHER = frozenset(
     (
         *("floor", "building", "buildingid", "spaceid", "relativeposition", "userid", "phoneid"),
@@ -48,8 +50,9 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
     """Read a table of fingerprints.
 
     Columns ``east_m, north_m`` (or ``x, y``) hold metres, ``lon, lat`` (or ``longitude, latitude``)
-    degrees, or metres where they cannot be degrees. Columns such as ``floor`` and ``userid`` are
-    not used; all others are transmitters. Levels that are none are left out and counted.
+    degrees, or metres where they cannot be degrees; metres are used where a table has both. Columns
+    such as ``floor`` and ``userid`` are not used; all others are transmitters. Levels that are none
+    are left out and counted.
 
     Parameters
     ----------
@@ -78,8 +81,7 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
     places = np.full((len(table), 2), np.nan)
     if used is not None:
         places = np.column_stack([_numbers(table[lower[name]]) for name in used])
-    taken = set(used or ())
-    cells = [name for text, name in lower.items() if text not in taken | _OTHER]
+    cells = [name for text, name in lower.items() if text not in _PLACES | _OTHER]
     if not cells:
         expected = "a column for each transmitter"
         raise fail(InputError, f"{path}, header", expected, listed(list(names.values())))
