@@ -76,6 +76,7 @@
       return MF.lastAt(belief.epoch.raw, i);
     };
     run.frameKey = (frame) => frame;
+    run.momentKey = (i) => i;
     run.squares = (frame) => ({ from: belief.first.raw[frame], to: belief.first.raw[frame + 1], col: belief.col.raw, row: belief.row.raw,
       mass: belief.mass.raw, step: belief.step.at(frame), peak: belief.peak.at(frame) });
     run.truthAt = (i) => ({ east: epochs.truth_east?.[i], north: epochs.truth_north?.[i] });
