@@ -5,7 +5,11 @@ import numpy as np
 import pytest
 from page_scripts import ran
 
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.radio.cells import CellPlan
 from mapfilter.viewing.arrays import packed, places, unpacked
+from mapfilter.viewing.readings import report_rows
 from mapfilter.viewing.runs import _share
 
 SIDE = 'const side = () => MF.byId("side").textContent;'
@@ -192,3 +196,25 @@ def test_charts_show_no_value_before_the_first_one():
     before, after = ran(task, bundle=bundle)
     assert "95 % radius–" in before
     assert "95 % radius20\u202fm" in after
+
+
+def test_why_not_here_counts_a_cell_once_and_no_end_of_the_scale():
+    bundle = made.replay_bundle()
+    size = 4 * made.EPOCHS
+    rows = {
+        "cell": np.tile([0, 0, 1, 0], made.EPOCHS),
+        "use": np.zeros(size, np.int64),
+        "censored": np.tile([0, 0, -1, 0], made.EPOCHS),
+    }
+    packed_rows = {name: packed(one, "i1") for name, one in rows.items()}
+    bundle["runs"][0]["readings"] |= packed_rows
+    task = "MF.start(bundle); return MF.reportOf(MF.page, MF.page.runs[0], 0);"
+    assert ran(task, bundle=bundle) == {"serving": 0, "bands": [0], "levels": [-61.5]}
+
+
+def test_rows_of_a_report_tell_which_levels_are_ends_of_the_scale():
+    ends = (0, -1, 1)
+    report = tuple(ReportRow("neighbour", "A", None, None, -110.0, end) for end in ends)
+    plan = CellPlan("EPSG:32635", ())
+    rows = report_rows(Epoch(0.0, (), report), Reason.USED, ({}, frozenset()), plan, {})
+    assert tuple(row.censored for row in rows) == ends

@@ -33,7 +33,8 @@
         const cell = readings.cell.raw[r];
         const reason = bundle.reasons[readings.use.raw[r]];
         list.push({ cell, role: data.roles[readings.role.raw[r]], what: data.whats[readings.what.raw[r]],
-          level: readings.level.at(r), predicted: readings.predicted.at(r), reason, used: reason === "used" });
+          level: readings.level.at(r), predicted: readings.predicted.at(r), reason, used: reason === "used",
+          censored: readings.censored?.raw[r] ?? 0 });
       }
       return list;
     };

@@ -41,7 +41,7 @@
       const { detail } = fix;
       const other = detail?.alternative;
       const known = (detail?.readings ?? []).map((one) => ({ cell: one.cell, role: one.role, what: one.name, level: one.level_dbm ?? NaN,
-        predicted: one.predicted_dbm ?? NaN, reason: one.use, used: one.use === "used" }));
+        predicted: one.predicted_dbm ?? NaN, reason: one.use, used: one.use === "used", censored: one.censored ?? 0 }));
       came += 1;
       const values = { came, number: fix.number, time: fix.time_s, east: fix.east_m - west, north: fix.north_m - south, status: bundle.statuses.indexOf(fix.status),
         reason: bundle.reasons.indexOf(fix.reason), r50: fix.radius_50_m, r95: fix.radius_95_m, r99: fix.radius_99_m, protection: fix.protection_m,
