@@ -218,3 +218,12 @@ def test_rows_of_a_report_tell_which_levels_are_ends_of_the_scale():
     plan = CellPlan("EPSG:32635", ())
     rows = report_rows(Epoch(0.0, (), report), Reason.USED, ({}, frozenset()), plan, {})
     assert tuple(row.censored for row in rows) == ends
+
+
+def test_a_narrow_scale_in_the_legend_has_three_numbers():
+    bundle = made.database_bundle()
+    task = """MF.start(bundle); const legend = new Node("details");
+    const layer = { title: "b", unit: "m", range: [0.4, 1.3] };
+    MF.fillLegend(legend, { bundle, run: null, layer, store: MF.page.store });
+    return legend.all("span").slice(0, 3).map((one) => one.textContent);"""
+    assert ran(task, bundle=bundle) == ["0.4", "0.9", "1.3"]
