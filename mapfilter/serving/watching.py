@@ -78,6 +78,7 @@ class Watcher:
                     "level_dbm": _known(row.level_dbm),
                     "predicted_dbm": _known(level_dbm),
                     "use": row.use.value,
+                    "censored": row.censored,
                 }
                 for row, level_dbm in zip(rows, levels, strict=True)
             ],

@@ -6,15 +6,25 @@ import itertools
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from mapfilter.errors import Faults, InputError
+from mapfilter.viewing.arrays import packed, unpacked
 
 _SAME = ("database", "frame")
+_NUMBERED = {
+    "statuses": (("epochs", "status"),),
+    "reasons": (("epochs", "reason"), ("readings", "use"), ("unused", "reason")),
+}
+"""Lists of a view, and the columns of a run that are numbers in them."""
 
 
 def side_by_side(views: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
     """Return a view with the runs of all.
 
-    Levels are those of the first view that has them; names that occur twice get the number of their
+    Levels are those of the view whose levels reach farthest, of one with the filter's constants
+    where there is one; statuses and reasons are those of all views, which other versions of
+    mapfilter may have numbered in another way; names that occur twice get the number of their
     view, or the next number with which they are unlike all others.
 
     Parameters
@@ -40,17 +50,38 @@ def side_by_side(views: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, An
     having = [view for _, view in views if view.get("levels")]
     best = max(having, key=_reach, default=first)
     found["levels"], found["why"] = best.get("levels"), best.get("why")
+    for listed in _NUMBERED:
+        found[listed] = list(
+            dict.fromkeys(one for _, view in views for one in view.get(listed, ()))
+        )
+    found["words"] = {key: text for _, view in views for key, text in view.get("words", {}).items()}
     names: set[str] = set()
     runs: list[dict[str, Any]] = []
     for number, (_, view) in enumerate(views, start=1):
         for run in view["runs"]:
             name = _unlike(str(run["name"]), names, number)
             names.add(name)
-            runs.append({**run, "name": name})
+            runs.append({**_renumbered(run, view, found), "name": name})
     found["runs"] = runs
     found["title"] = " | ".join(dict.fromkeys(str(view["title"]) for _, view in views))
     found["notes"] = list(dict.fromkeys(note for _, view in views for note in view["notes"]))
     return found
+
+
+def _renumbered(
+    run: Mapping[str, Any], view: Mapping[str, Any], found: Mapping[str, Any]
+) -> Mapping[str, Any]:
+    """Return a run of a view with the numbers of another one's statuses and reasons."""
+    for listed, columns in _NUMBERED.items():
+        old, new = view.get(listed, []), found[listed]
+        if old == new[: len(old)]:
+            continue
+        number = np.array([new.index(one) for one in old], dtype=np.int64)
+        for table, column in columns:
+            if run.get(table):
+                values = number.take(unpacked(run[table][column]), mode="clip")
+                run = {**run, table: {**run[table], column: packed(values, "u1")}}
+    return run
 
 
 def _unlike(name: str, others: Collection[str], number: int) -> str:

@@ -43,7 +43,8 @@ class NumberedTexts(dict[str, int]):
 class ReadingRow(NamedTuple):
     """A row of a radio report.
 
-    ``cell`` is its number in the plan, -1 for none; ``known`` its id there.
+    ``cell`` is its number in the plan, -1 for none; ``known`` its id there; ``censored`` whether
+    the level lies at an end of the scale: -1 below it, 1 above it, else 0.
     """
 
     cell: int
@@ -52,6 +53,7 @@ class ReadingRow(NamedTuple):
     role: str
     level_dbm: float
     use: Reason
+    censored: int
 
 
 def unused_of(readings: Iterable[UnusedReading]) -> tuple[Unused, frozenset[str]]:
@@ -94,7 +96,7 @@ def report_rows(
             use = reason
         if row.role == SERVING and serving < 0:
             serving = cell
-        found.append(ReadingRow(cell, name, known, row.role, row.level_dbm, use))
+        found.append(ReadingRow(cell, name, known, row.role, row.level_dbm, use, row.censored))
     return found
 
 
@@ -140,6 +142,7 @@ class Readings:
             "role": packed(np.array([ROLES.index(one.role) for one in rows], np.int64), "u1"),
             "level": dbm(level),
             "predicted": dbm(predicted),
+            "censored": packed(np.array([one.censored for one in rows], np.int64), "i1"),
             "use": packed(np.array([REASONS.index(one.use) for one in rows], np.int64), "u1"),
         }
 

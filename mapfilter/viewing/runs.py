@@ -103,7 +103,7 @@ def run_of(
 
 
 def _share(values: Any) -> dict[str, Any]:
-    return packed(values, "u1", scale=1 / 250, none=255)
+    return packed(values, "u2", scale=1 / 50_000, none=65_535)
 
 
 def _epochs(

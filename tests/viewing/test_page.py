@@ -4,9 +4,11 @@ import re
 from base64 import b64decode, b64encode
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
 from mapfilter.errors import InputError, StoreError
+from mapfilter.viewing.arrays import packed, unpacked
 from mapfilter.viewing.bundle import FORMAT, VERSION
 from mapfilter.viewing.merge import side_by_side
 from mapfilter.viewing.notebook import View
@@ -137,3 +139,32 @@ def test_side_by_side_names_and_databases():
     with pytest.raises(InputError) as raised:
         side_by_side([("a", first), *faults])
     assert [fault.where for fault in raised.value.faults] == ["c", "d"]
+
+
+def test_side_by_side_with_a_page_whose_reasons_are_numbered_in_another_way():
+    """A later version of the program may know more of them."""
+    old = view_of(statuses=["A", "B"], reasons=["used", "stale"], words={"stale": "old words"})
+    new = view_of(statuses=["A", "C", "B"], reasons=["used", "twice", "stale"], words={"used": "u"})
+    for view in (old, new):
+        count = len(view["reasons"])
+        numbers = packed(np.arange(count), "u1")
+        view["runs"] = [
+            {
+                "name": "walk",
+                "epochs": {"status": numbers, "reason": numbers, "count": count},
+                "readings": {"use": numbers},
+                "unused": {"reason": numbers},
+            }
+        ]
+    for views in ((old, new), (new, old)):
+        both = side_by_side([("x", one) for one in views])
+        assert both["words"] == {"stale": "old words", "used": "u"}
+        for run, view in zip(both["runs"], views, strict=True):
+            for listed, table, column in (
+                ("statuses", "epochs", "status"),
+                ("reasons", "epochs", "reason"),
+                ("reasons", "readings", "use"),
+                ("reasons", "unused", "reason"),
+            ):
+                numbers = unpacked(run[table][column])
+                assert [both[listed][one] for one in numbers] == view[listed]

@@ -21,13 +21,15 @@
     if (!Number.isFinite(value)) return dash;
     if (value > 0.999) return "> 99.9\u202f%";
     if (value > 0 && value < 0.001) return "< 0.1\u202f%";
-    return MF.number(100 * value, value < 0.1 ? 1 : 0, "%");
+    return MF.number(100 * value, value < 0.1 || value > 0.99 ? 1 : 0, "%");
   };
   // Seconds since the start as h:mm:ss or m:ss.
   MF.clock = (seconds, digits = 0) => {
     if (!Number.isFinite(seconds)) return dash;
     const sign = seconds < 0 ? "−" : "";
-    const all = Math.abs(seconds);
+    // Differences of times fall short of whole seconds by rounding.
+    const most = 10 ** (digits || 3);
+    const all = Math.round(Math.abs(seconds) * most) / most;
     const h = Math.floor(all / 3600);
     const m = Math.floor((all % 3600) / 60);
     const s = (digits ? (all % 60).toFixed(digits) : String(Math.floor(all % 60))).padStart(digits ? 3 + digits : 2, "0");

@@ -33,7 +33,8 @@
         const cell = readings.cell.raw[r];
         const reason = bundle.reasons[readings.use.raw[r]];
         list.push({ cell, role: data.roles[readings.role.raw[r]], what: data.whats[readings.what.raw[r]],
-          level: readings.level.at(r), predicted: readings.predicted.at(r), reason, used: reason === "used" });
+          level: readings.level.at(r), predicted: readings.predicted.at(r), reason, used: reason === "used",
+          censored: readings.censored?.raw[r] ?? 0 });
       }
       return list;
     };
@@ -76,6 +77,7 @@
       return MF.lastAt(belief.epoch.raw, i);
     };
     run.frameKey = (frame) => frame;
+    run.momentKey = (i) => i;
     run.squares = (frame) => ({ from: belief.first.raw[frame], to: belief.first.raw[frame + 1], col: belief.col.raw, row: belief.row.raw,
       mass: belief.mass.raw, step: belief.step.at(frame), peak: belief.peak.at(frame) });
     run.truthAt = (i) => ({ east: epochs.truth_east?.[i], north: epochs.truth_north?.[i] });

@@ -1,6 +1,8 @@
 "use strict";
 // The area: streets, buildings, best server, predicted levels, and what they are at a place.
 (() => {
+  // Margin that stands for "no second cell", dB.
+  const ALONE_DB = 63;
   const pixel = (grid, east, north) => {
     const col = Math.floor((east - grid.west) / grid.step);
     const row = Math.floor((grid.north - north) / grid.step);
@@ -64,7 +66,8 @@
       if (!one) return null;
       const at = pixel(one.grid, east, north);
       if (at < 0 || one.server.raw[at] < 0) return null;
-      return { cell: one.server.raw[at], level: one.level.at(at), margin: one.margin.at(at) };
+      const margin = one.margin.at(at);
+      return { cell: one.server.raw[at], level: one.level.at(at), margin: margin < ALONE_DB ? margin : Infinity };
     };
     // What the bounds say of a place.
     ground.boundsAt = (east, north) => ground.bounds.map((one) => ({ ...one, at: one.value.at(pixel(one.grid, east, north)) }))

@@ -3,7 +3,7 @@
 (() => {
   const [MOST_EPOCHS, DROPPED, MOST_FRAMES] = [20000, 5000, 300];
   const NAMES = ["number", "time", "east", "north", "status", "reason", "r50", "r95", "r99", "protection", "mass", "entropy", "log_evidence",
-    "hypotheses", "runner_east", "runner_north", "runner_mass", "way", "way_p", "doubt", "alt_east", "alt_north", "alt_lead", "alt_mass", "serving"];
+    "hypotheses", "runner_east", "runner_north", "runner_mass", "way", "way_p", "doubt", "alt_east", "alt_north", "alt_lead", "alt_mass", "serving", "came"];
   const column = () => ({ raw: [], at(i) { return this.raw[i] ?? NaN; } });
   const table = (names) => Object.fromEntries(names.map((name) => [name, column()]));
 
@@ -12,7 +12,7 @@
     const ways = new Map((bundle.background?.ways ?? []).map((way, i) => [way.id, i + 1]));
     const epochs = Object.fromEntries(NAMES.map((one) => [one, []]));
     const readings = { first: { raw: [0] }, ...table(["cell", "level", "predicted"]) };
-    let [rows, unused, frames, reasons] = [[], [], [], []];
+    let [rows, unused, frames, reasons, came] = [[], [], [], [], 0];
     const run = { index: 0, bundle, name, epochs, readings, live: true, count: 0, start: 0, end: 0, last: 0, missed: 0, belief: null, explained: null,
       truth: null, hasTruth: false, reports: [], reportEpochs: [], data: { name, thresholds: bundle.thresholds, notes: [], figures: {} } };
 
@@ -41,8 +41,9 @@
       const { detail } = fix;
       const other = detail?.alternative;
       const known = (detail?.readings ?? []).map((one) => ({ cell: one.cell, role: one.role, what: one.name, level: one.level_dbm ?? NaN,
-        predicted: one.predicted_dbm ?? NaN, reason: one.use, used: one.use === "used" }));
-      const values = { number: fix.number, time: fix.time_s, east: fix.east_m - west, north: fix.north_m - south, status: bundle.statuses.indexOf(fix.status),
+        predicted: one.predicted_dbm ?? NaN, reason: one.use, used: one.use === "used", censored: one.censored ?? 0 }));
+      came += 1;
+      const values = { came, number: fix.number, time: fix.time_s, east: fix.east_m - west, north: fix.north_m - south, status: bundle.statuses.indexOf(fix.status),
         reason: bundle.reasons.indexOf(fix.reason), r50: fix.radius_50_m, r95: fix.radius_95_m, r99: fix.radius_99_m, protection: fix.protection_m,
         mass: fix.mass_50m, entropy: fix.entropy_bits, log_evidence: fix.log_evidence, hypotheses: fix.hypotheses,
         runner_east: fix.runner_up_east_m - west, runner_north: fix.runner_up_north_m - south, runner_mass: fix.runner_up_mass,
@@ -94,6 +95,8 @@
     run.reportAt = (i) => MF.lastReport(run, i);
     run.frameAt = (i) => (frames.length && frames[0].epoch <= i ? frames.findLastIndex((one) => one.epoch <= i) : -1);
     run.frameKey = (frame) => frames[frame];
+    // What comes at the place of another fix is another moment; -1 before the first one.
+    run.momentKey = (i) => epochs.came[i] ?? -1;
     run.squares = (frame) => frames[frame];
     run.truthAt = () => ({});
     return run;

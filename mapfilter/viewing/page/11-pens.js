@@ -96,14 +96,16 @@
         const parts = [];
         for (let l = 0; l + 1 < set.first.length; l += 1) {
           const points = [];
-          let inside = false;
+          let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
           for (let i = set.first[l]; i < set.first[l + 1]; i += 1) {
             const x = camera.x(set.east[i], view);
             const y = camera.y(set.north[i], view);
-            inside ||= x > -50 && y > -50 && x < view.width + 50 && y < view.height + 50;
+            [x0, x1, y0, y1] = [Math.min(x0, x), Math.max(x1, x), Math.min(y0, y), Math.max(y1, y)];
             points.push(`${f(x)} ${f(y)}`);
           }
-          if (inside && points.length > 1) parts.push(`M${points.join("L")}${closed ? "Z" : ""}`);
+          // Also a line that crosses the frame with all its corners outside.
+          const seen = x1 > -50 && y1 > -50 && x0 < view.width + 50 && y0 < view.height + 50;
+          if (seen && points.length > 1) parts.push(`M${points.join("L")}${closed ? "Z" : ""}`);
         }
         out.push(`<path fill-rule="evenodd" d="${parts.join("")}" ${looks(s)}/>`);
       },

@@ -84,7 +84,7 @@
     const canvas = canvasOf(grid.cols, grid.rows, (pixels) => {
       for (let i = 0; i < pixels.length; i += 1) {
         const value = array.at(from + i);
-        if (Number.isFinite(value)) pixels[i] = table[Math.round(255 * MF.clamp((value - low) / (high - low), 0, 1))];
+        if (Number.isFinite(value)) pixels[i] = table[high > low ? Math.round(255 * MF.clamp((value - low) / (high - low), 0, 1)) : 128];
       }
     });
     return placed(canvas, grid);

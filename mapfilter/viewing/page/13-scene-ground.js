@@ -45,10 +45,12 @@
 
   // A track as pieces of one status, each with a dash of its own: status is not told by color alone.
   const DASHES = { SEARCHING: [1.5, 4], UNCERTAIN: [12, 3], LOST: [6, 4], OUTSIDE: [2, 2, 6, 2] };
+  // No more than this is gone in a second.
+  const LEAP_M = 40;
   MF.dashOf = (status) => DASHES[status] ?? null;
   MF.drawTrack = (pen, run, from, to, style) => {
     const { camera, view } = pen;
-    const { east, north, status } = run.epochs;
+    const { east, north, status, time } = run.epochs;
     // Points closer than half a pixel add nothing.
     let points = [];
     let code = -1;
@@ -61,7 +63,7 @@
       if (!Number.isFinite(east[i]) || !Number.isFinite(north[i])) { flush(); points = []; code = -1; last = null; continue; }
       const point = [camera.x(east[i], view), camera.y(north[i], view)];
       // A leap of the estimate is no movement: the line is cut.
-      const leap = last !== null && Math.hypot(east[i] - east[i - 1], north[i] - north[i - 1]) > 40;
+      const leap = last !== null && Math.hypot(east[i] - east[i - 1], north[i] - north[i - 1]) > LEAP_M * Math.max(time[i] - time[i - 1], 1);
       if (status[i] !== code || leap) {
         flush();
         points = leap || !points.length ? [] : [points[points.length - 1]];

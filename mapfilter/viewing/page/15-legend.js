@@ -66,7 +66,7 @@
       if (layer.range) {
         const { range } = layer;
         parts.push(MF.h("div", { class: "ramp", style: { background: MF.VIRIDIS_CSS } }),
-          MF.h("div", { class: "ramp-words" }, [range[0], (range[0] + range[1]) / 2, range[1]].map((value) => MF.h("span", {}, MF.number(value, 0)))));
+          MF.h("div", { class: "ramp-words" }, [range[0], (range[0] + range[1]) / 2, range[1]].map((value) => MF.h("span", {}, MF.number(value, range[1] - range[0] < 4 ? 1 : 0)))));
       }
       if (layer.swatches) {
         parts.push(MF.h("div", { class: "swatches" }, layer.swatches.map(({ name, color }) =>

@@ -20,7 +20,7 @@
     const best = ground.bestAt(east, north);
     if (best) {
       add(`best server ${ground.cellName(best.cell)}`, MF.dbm(best.level));
-      add("margin over the second", MF.number(best.margin, 1, "dB"));
+      add("margin over the second", best.margin === Infinity ? "no second cell" : MF.number(best.margin, 1, "dB"));
     }
     const levels = ground.levelsAt(east, north);
     const { layer, layerCell } = page.store.state;

@@ -56,6 +56,8 @@
       camera.zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0016)), spot(event).x, spot(event).y, map.view);
     }, { passive: false });
     sheet.addEventListener("keydown", (event) => {
+      // Those with other modifiers are the browser's, as its own zoom.
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
       const { width, height } = map.view;
       const pans = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] };
       if (pans[event.key] && (event.shiftKey || !map.run)) camera.pan(...pans[event.key]);

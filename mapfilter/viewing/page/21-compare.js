@@ -34,10 +34,14 @@
   const reportOf = (page, run, i) => {
     const { band } = page.ground.levels;
     const used = run.readingsOf(i).filter((one) => one.used && band.has(one.cell));
-    const heard = used.filter((one) => Number.isFinite(one.level));
+    // As the filter takes levels: those at an end of the scale are bounds, and of one cell's the first counts.
+    const level = new Map();
+    for (const one of used) {
+      if (Number.isFinite(one.level) && !one.censored && !level.has(one.cell)) level.set(one.cell, one.level);
+    }
     const serving = used.find((one) => one.role === "serving");
-    return { serving: serving ? band.get(serving.cell) : -1, bands: heard.map((one) => band.get(one.cell)),
-      levels: heard.map((one) => one.level) };
+    return { serving: serving ? band.get(serving.cell) : -1, bands: [...level.keys()].map((cell) => band.get(cell)),
+      levels: [...level.values()] };
   };
   MF.reportOf = reportOf;
 

@@ -59,7 +59,7 @@
     element.refresh = (run, i) => {
       const { against, place } = page.store.state;
       const x = run.explained ? run.reportAt(i) : -1;
-      const key = JSON.stringify([run.index, x < 0 ? i : x, against, place, MF.themeName]);
+      const key = JSON.stringify([run.index, x, run.momentKey(x < 0 ? i : run.explained.epoch.raw[x]), against, place, MF.themeName]);
       if (key === shown) return;
       shown = key;
       const result = MF.compare(page, run, i, against, place);

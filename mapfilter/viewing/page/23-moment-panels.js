@@ -5,8 +5,9 @@
   const once = (build) => {
     let last = [null, -1];
     return (run, i) => {
-      if (last[0] === run && last[1] === i) return;
-      last = [run, i];
+      const key = run.momentKey(i);
+      if (last[0] === run && last[1] === key) return;
+      last = [run, key];
       build(run, i);
     };
   };

@@ -29,7 +29,7 @@
       const lines = list.map(({ cell, level }) => MF.h("tr", {}, MF.h("td", {}, ground.cellName(cell)), MF.h("td", {}, MF.dbm(level)),
         MF.h("td", {}, MF.h("span", { class: "meter", "aria-hidden": "true", style: { width: `${MF.clamp(1.2 * (level + 115), 1, 90)}px` } }))));
       body.replaceChildren(MF.h("p", { class: "quiet number" }, spot ? MF.degrees(spot.lat, spot.lon) : ""),
-        best ? MF.h("p", {}, `Best server ${ground.cellName(best.cell)}, ${MF.dbm(best.level)}; ${MF.number(best.margin, 1, "dB")} above the second.`) : MF.h("p", { class: "empty" }, "No point of the database here."),
+        best ? MF.h("p", {}, `Best server ${ground.cellName(best.cell)}, ${MF.dbm(best.level)}; ${best.margin === Infinity ? "no second cell" : `${MF.number(best.margin, 1, "dB")} above the second`}.`) : MF.h("p", { class: "empty" }, "No point of the database here."),
         lines.length ? MF.h("table", {}, MF.h("tbody", {}, lines)) : "");
     };
     return { elements: [here, cells], refresh: here.refresh };

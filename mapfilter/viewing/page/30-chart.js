@@ -18,7 +18,7 @@
     let plot = null;
     let series = [];
     let times = [];
-    let shown = -1;
+    let shown = null;
     let plotted = [];
 
     const marks = (u) => {
@@ -60,7 +60,7 @@
     };
     const build = () => {
       plot?.destroy();
-      [series, times, shown] = [[], [], -1];
+      [series, times, shown] = [[], [], null];
       const made = spec.data();
       if (!made || !made.series.length) {
         plot = null;
@@ -81,7 +81,8 @@
     };
     const refresh = (time) => {
       if (!plot) { keys.replaceChildren(); return; }
-      const i = MF.lastAt(times, time);
+      // Before the first value there is none.
+      const i = time < times[0] ? -1 : MF.lastAt(times, time);
       head.style.transform = `translateX(${plot.valToPos(time, "x")}px)`;
       head.hidden = time < plot.scales.x.min || time > plot.scales.x.max;
       if (i === shown) return;
@@ -96,7 +97,7 @@
       const { min, max } = plot.scales.x;
       const zoomed = min > plotted[0] || max < plotted[1];
       ({ series, times } = made);
-      shown = -1;
+      shown = null;
       plot.setData(columns(), !zoomed);
       if (zoomed) plot.redraw();
     };

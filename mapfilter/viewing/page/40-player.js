@@ -63,7 +63,7 @@
       follow?.setAttribute("aria-pressed", String(store.state.follow));
       const since = time - page.start;
       slider.setAttribute("aria-valuetext", `${MF.clock(since)} of ${MF.clock(page.end - page.start)}, ${run.status(i).toLowerCase()}`);
-      const utc = Number.isFinite(run.data.start_utc_s ?? NaN) ? ` · ${new Date(1000 * (run.data.start_utc_s + time - run.start)).toISOString().slice(11, 19)} UTC` : "";
+      const utc = Number.isFinite(run.data.start_utc_s ?? NaN) ? ` · ${new Date(Math.round(1000 * (run.data.start_utc_s + time))).toISOString().slice(11, 19)} UTC` : "";
       clock.replaceChildren(`${MF.clock(since)} `, MF.h("small", {}, `/ ${MF.clock(page.end - page.start)}${utc}`));
       if (drawn !== playing) {
         drawn = playing;
@@ -92,7 +92,7 @@
     document.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
       const typed = event.target.closest?.("select, dialog, summary");
-      if (typed || (event.key === " " && event.target.closest?.("button"))) return;
+      if (typed || (event.key === " " && event.target.closest?.("button, [type=checkbox]"))) return;
       const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
       const action = always[key] ?? (page.runs.length ? timed[key] : undefined);
       if (action) { action(); event.preventDefault(); return; }

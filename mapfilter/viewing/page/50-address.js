@@ -18,7 +18,7 @@
 
   MF.addressOf = (page) => {
     const { time, run, place } = page.store.state;
-    const parts = page.runs.length ? [`t=${Math.round(time * 1000) / 1000}`] : [];
+    const parts = page.runs.length ? [`t=${time}`] : [];
     if (run) parts.push(`run=${run}`);
     if (place) parts.push(`at=${place.east.toFixed(1)},${place.north.toFixed(1)}`);
     return `#${parts.join("&")}`;

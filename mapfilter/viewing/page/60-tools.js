@@ -29,6 +29,7 @@
     select.value = page.store.state.second;
     select.addEventListener("change", () => page.store.set({ second: Number(select.value) }));
     const first = MF.h("select", { id: "run", "aria-label": "Run" }, page.runs.map((run) => MF.h("option", { value: run.index }, run.name)));
+    first.value = page.store.state.run;
     first.addEventListener("change", () => page.store.set({ run: Number(first.value) }));
     page.store.listen((changed, state) => {
       if (changed.has("run")) first.value = state.run;
@@ -45,6 +46,7 @@
     return dialog;
   };
 
+  const LINK = "Link";
   const copyLink = async (page, button) => {
     MF.writeAddress(page);
     const address = window.location.href.split("#")[0] + MF.addressOf(page);
@@ -54,10 +56,9 @@
     } catch {
       words = window.top === window ? "In the address bar" : "Not in a frame";
     }
-    const before = button.textContent;
     button.textContent = words;
     MF.say(`Link to this moment: ${words.toLowerCase()}`);
-    setTimeout(() => { button.textContent = before; }, 1600);
+    setTimeout(() => { button.textContent = LINK; }, 1600);
   };
 
   MF.makeTools = (page, host) => {
@@ -67,7 +68,7 @@
     const theme = button("◐", "Dark or light (D)", () => MF.toggleTheme());
     theme.id = "theme";
     host.replaceChildren(...[layerField(page), ...(page.runs.length > 1 ? runField(page) : []),
-      page.live ? null : button("Link", "Copy a link to this moment", (one) => copyLink(page, one)), button("PNG", "Save the frame as PNG", () => MF.exportPng(page)),
+      page.live ? null : button(LINK, "Copy a link to this moment", (one) => copyLink(page, one)), button("PNG", "Save the frame as PNG", () => MF.exportPng(page)),
       button("SVG", "Save the frame as SVG", () => MF.exportSvg(page)), button("Print", "Print this moment", () => window.print()),
       theme, button("?", "Keys (?)", page.help)].filter(Boolean));
   };

@@ -29,6 +29,7 @@
     page.step = (by) => {
       const { time } = page.store.state;
       const run = page.active();
+      if (!run.count) return;
       page.store.set({ playing: false });
       page.seek(run.epochs.time[MF.clamp(run.at(time) + by, 0, run.count - 1)]);
     };
@@ -44,6 +45,7 @@
       if (follow) page.seek(page.end);
     };
     page.play = (playing) => {
+      if (!page.active().count) return;
       if (playing && page.store.state.time >= page.end) page.seek(page.start);
       page.store.set(playing ? { playing, follow: false } : { playing });
     };
