@@ -154,3 +154,37 @@ def test_names_of_a_plan_in_a_file_read_in_parts(read, monkeypatch):
     assert radio["cell"].dropna().tolist() == ["S1"] * 15 + ["12"] * 10
     assert notes.count("cell_id: taken for the plan's names of cells") == 1
     assert "ci" not in radio
+
+
+def test_cells_of_several_technologies_in_columns_of_their_own(read):
+    """What a row had in the second of two columns was lost: identities, codes, carriers, levels."""
+    lte = np.arange(COUNT) % 2 == 0
+    table = {
+        "radio": np.where(lte, "LTE", "GSM"),
+        "mcc": 244,
+        "mnc": 91,
+        "lac": np.where(lte, np.nan, 311),
+        "tac": np.where(lte, 2048, np.nan),
+        "cid": np.where(lte, np.nan, 4711),
+        "eci": np.where(lte, 123_456, np.nan),
+        "bsic": np.where(lte, np.nan, 21),
+        "pci": np.where(lte, 333, -1),
+        "arfcn": np.where(lte, np.nan, 62),
+        "earfcn": np.where(lte, 1300, np.nan),
+    }
+    radio, _ = read(**table)
+    names = np.where(lte, "244-91-2048-123456", "244-91-311-4711")
+    assert radio["cell"].tolist() == names.tolist()
+    assert radio["bsic"].tolist() == np.where(lte, 333, 21).tolist()
+    assert radio["arfcn"].tolist() == np.where(lte, 1300, 62).tolist()
+
+
+def test_levels_of_several_technologies_in_columns_of_their_own(tmp_path):
+    """Those of UMTS were lost beside a column of LTE."""
+    lte = np.arange(COUNT) % 2 == 0
+    table = {"time": 1_778_666_400.0 + np.arange(COUNT), "mcc": 244, "mnc": 91, "lac": 3}
+    levels = {"rsrp": np.where(lte, -97, np.nan), "rscp": np.where(lte, np.nan, -81)}
+    table |= {"ci": 100_000, "radio": np.where(lte, "LTE", "UMTS"), **levels}
+    pd.DataFrame(table).to_csv(tmp_path / "phone.csv", index=False)
+    radio = mf.read_log(tmp_path / "phone.csv").radio
+    assert radio["level_dbm"].tolist() == np.where(lte, -97.0, -81.0).tolist()

@@ -26,7 +26,8 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     columns = {
         **identity,
         "time_s": time_s,
-        **{name: mapped.number(name) for name in ("level_dbm", "level_step_db")},
+        "level_dbm": _levels(mapped),
+        "level_step_db": mapped.number("level_step_db"),
         **{name: mapped.whole(name) for name in ("arfcn", "bsic", "timing_advance")},
     }
     if mapped.has("technology"):
@@ -42,6 +43,14 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         columns["cell"] = cell
     columns["role"] = roles(mapped, identified)
     add_radio(reading, *only(columns, mapped.rows.line, there))
+
+
+def _levels(mapped: Mapped) -> Floats:
+    """Return levels, those of some technologies from columns of their own."""
+    level = mapped.number("level_dbm")
+    for name in mapped.columns("level_dbm")[1:]:
+        level = np.where(np.isnan(level), mapped.rows.number(name), level)
+    return level
 
 
 def _implied(mapped: Mapped) -> np.ndarray | None:

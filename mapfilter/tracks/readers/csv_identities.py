@@ -68,16 +68,16 @@ def _without_hexadecimals(mapped: Mapped) -> Mapped:
     """Return columns whose hexadecimal numbers without a mark have one."""
     rows = mapped.rows
     for field in ("lac", "ci"):
-        name = rows.find(*mapped.names(field))
-        words = {} if name is None else {word.strip() for word in set(rows.texts(name))} - {""}
-        if name is None or not words or not all(map(_HEX.fullmatch, words)):
-            continue
-        note = f"{name}: taken for hexadecimal numbers"
-        letters = sum(not word.isdigit() for word in words)
-        # Later parts of a large file may hold few of them.
-        if letters >= _LEAST_LETTERS * len(words) or note in rows.reading.notes:
-            rows = rows.rewritten(r"^\s*([0-9A-Fa-f]+)\s*$", r"0x\1", name)
-            rows.reading.note(note)
+        for name in mapped.columns(field):
+            words = {word.strip() for word in set(rows.texts(name))} - {""}
+            if not words or not all(map(_HEX.fullmatch, words)):
+                continue
+            note = f"{name}: taken for hexadecimal numbers"
+            letters = sum(not word.isdigit() for word in words)
+            # Later parts of a large file may hold few of them.
+            if letters >= _LEAST_LETTERS * len(words) or note in rows.reading.notes:
+                rows = rows.rewritten(r"^\s*([0-9A-Fa-f]+)\s*$", r"0x\1", name)
+                rows.reading.note(note)
     return replace(mapped, rows=rows)
 
 

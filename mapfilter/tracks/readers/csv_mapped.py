@@ -31,6 +31,14 @@ _DECIMAL = re.compile(r"-?[0-9]{1,20}(\.0*)?|0x[0-9a-f]{1,9}", re.ASCII | re.IGN
 _HEXADECIMAL = re.compile(r"[0-9a-f]{4,9}", re.ASCII | re.IGNORECASE)
 _CELLS = ("cell", "cgi", "ci", "level_dbm", "bars")
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
+_OF_TECHNOLOGIES: Mapping[str, tuple[str, ...]] = {
+    "lac": ("lac", "tac"),
+    "ci": ("ci", "cid", "eci", "nci"),
+    "bsic": ("bsic", "psc", "pci"),
+    "arfcn": FIELDS["arfcn"],
+    "level_dbm": ("rsrp", "rscp", "ss_rsrp", "ssrsrp"),
+}
+"""Columns of one field that each hold the cells of some technologies."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,19 @@ class Mapped:
         """Return whether there are columns of all these fields."""
         return all(self.rows.find(*self.names(field)) is not None for field in fields)
 
+    def holds(self, *fields: str) -> bool:
+        """Return whether there are numbers in the columns of all these fields.
+
+        Columns of logs with fixed ones may be empty.
+        """
+        return self.has(*fields) and all(
+            bool(np.isfinite(self.rows.number(*self.names(field))).any()) for field in fields
+        )
+
+    def prefers(self, field: str, other: str) -> bool:
+        """Return whether a field is read before another of the same quantity: if it holds some."""
+        return self.has(field) and (not self.has(other) or self.holds(field))
+
     def number(self, field: str) -> Floats:
         """Return a field's numbers, NaN where missing; by the unit in the column's name."""
         values = self.rows.number(*self.names(field))
@@ -97,13 +118,22 @@ class Mapped:
 
     def radians(self, name: str, per: str = "") -> Floats:
         """Return a field that may be in degrees as radians."""
-        if self.has(f"{name}_deg{per}"):
+        if self.prefers(f"{name}_deg{per}", f"{name}_rad{per}"):
             return np.radians(self.number(f"{name}_deg{per}"))
         return self.number(f"{name}_rad{per}")
 
     def whole(self, field: str) -> Floats:
-        """Return a field's whole numbers, NaN where missing."""
-        return available(*self.rows.whole(*self.names(field)))
+        """Return a field's whole numbers, NaN where missing in the columns of all technologies."""
+        values = np.full(len(self.rows), np.nan)
+        for name in self.columns(field):
+            values = np.where(np.isnan(values), available(*self.rows.whole(name)), values)
+        return values
+
+    def columns(self, field: str) -> list[str]:
+        """Return the column of a field, and those of it for cells of other technologies."""
+        there = [name for name in self.names(field) if self.rows.has(name)]
+        own = _OF_TECHNOLOGIES.get(field, ())
+        return there[:1] + [name for name in there[1:] if name in own]
 
     def texts(self, field: str) -> np.ndarray:
         """Return a field's texts, "" where missing."""

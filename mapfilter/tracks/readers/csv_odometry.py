@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mapfilter._constants import KMH_MPS
@@ -9,6 +11,7 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
+from mapfilter.tracks.readers.csv_steps import are_counted
 from mapfilter.tracks.readers.odometer_counts import counted_way
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.tables import FASTEST_TURN_RADPS
@@ -18,7 +21,7 @@ _SPEEDS = ("speed_mps", "speed_kmh")
 _WHEELS, _ODOMETERS = ("wheel_speed_mps", "wheel_speed_kmh"), ("odometer_m", "odometer_km")
 _STEPS = ("steps", "step_m")
 _OF_PHONES = (*_STEPS, "level_dbm", "bars", "cell", "ci", "cgi", "acc_x")
-_TURNS = ("turn_rad", "turn_deg")
+_TURNS, _RATES = ("turn_rad", "turn_deg"), ("yaw_rate_radps", "yaw_rate_degps")
 _FEWEST_ALONE, _ALONE_SHARE = 10, 0.1
 
 
@@ -57,26 +60,27 @@ def heading_of_wheels(mapped: Mapped) -> str:
     Beside positions a heading may be the course of their receiver, which ends with them, and beside
     steps it is a walker's. A course that is alone with a speed goes on as that does.
     """
-    if not has_odometry(mapped) or _is_turned(mapped) or _is_placed(mapped):
+    if not has_odometry(mapped) or any(map(mapped.holds, _RATES)) or _is_placed(mapped):
         return ""
     if any(map(mapped.has, _STEPS)):
         return ""
-    return next(filter(mapped.has, ("heading_rad", "compass_deg", "course_deg")), "")
+    return _first_held(mapped, ("heading_rad", "compass_deg", "course_deg"))
 
 
 def has_turns_of_wheels(mapped: Mapped) -> bool:
     """Return whether a vehicle with neither a yaw rate nor headings has turns from row to row."""
-    directed = _is_turned(mapped) or heading_of_wheels(mapped)
-    return has_odometry(mapped) and not directed and any(map(mapped.has, _TURNS))
+    if not has_odometry(mapped) or any(map(mapped.holds, _RATES)):
+        return False
+    heading = heading_of_wheels(mapped)
+    directed = bool(heading) and mapped.holds(heading)
+    return not directed and any(map(mapped.has, _TURNS))
 
 
 def has_rates_of_steps(mapped: Mapped) -> bool:
     """Return whether steps of known lengths have a yaw rate, and no other direction."""
-    if not mapped.has("step_m") or not _is_turned(mapped):
+    if not mapped.has("step_m") or are_counted(mapped) or not _is_turned(mapped):
         return False
-    others = ("heading_rad", "compass_deg", *_TURNS)
-    # Columns of logs with fixed ones may be empty.
-    return not any(np.isfinite(mapped.number(name)).any() for name in filter(mapped.has, others))
+    return not any(map(mapped.holds, ("heading_rad", "compass_deg", *_TURNS)))
 
 
 def add_turns(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
@@ -135,9 +139,9 @@ def _between_rows(time_s: Floats, speed: Floats) -> Floats:
 
 def _speeds(mapped: Mapped, reading: Reading, time_s: Floats) -> tuple[Floats, float]:
     """Return speeds of the wheels, else by their odometer, else any; and their deviation."""
-    odometer = next(filter(mapped.has, _ODOMETERS), "")
+    odometer = _first_held(mapped, _ODOMETERS)
     by_wheels = any(map(mapped.has, _WHEELS))
-    if odometer and not by_wheels:
+    if odometer and not any(map(mapped.holds, _WHEELS)):
         return _counted(mapped, reading, time_s, odometer)
     if odometer:
         column = mapped.rows.find(*mapped.names(odometer))
@@ -165,9 +169,15 @@ def _counted(mapped: Mapped, reading: Reading, time_s: Floats, field: str) -> tu
 
 def speeds_of(mapped: Mapped, name: str) -> Floats:
     """Return a speed in m/s, of a field for m/s or one for km/h; NaN where missing."""
-    if mapped.has(f"{name}_kmh"):
+    if mapped.prefers(f"{name}_kmh", f"{name}_mps"):
         return KMH_MPS * mapped.number(f"{name}_kmh")
     return mapped.number(f"{name}_mps")
+
+
+def _first_held(mapped: Mapped, fields: Sequence[str]) -> str:
+    """Return the first of some fields with numbers, else the first with a column; "" for none."""
+    there = [field for field in fields if mapped.has(field)]
+    return next(filter(mapped.holds, there), there[0] if there else "")
 
 
 def _is_placed(mapped: Mapped) -> bool:
@@ -175,7 +185,7 @@ def _is_placed(mapped: Mapped) -> bool:
 
 
 def _is_turned(mapped: Mapped) -> bool:
-    return mapped.has("yaw_rate_radps") or mapped.has("yaw_rate_degps")
+    return any(map(mapped.has, _RATES))
 
 
 def _note_units(mapped: Mapped, reading: Reading) -> None:

@@ -13,6 +13,11 @@ from mapfilter.tracks.readers.tables import RECORDED
 _DIRECTIONS = ("heading_rad", "compass_deg", "turn_rad")
 
 
+def are_counted(mapped: Mapped) -> bool:
+    """Return whether steps are counted, and have no lengths."""
+    return mapped.has("steps") and not mapped.holds("step_m")
+
+
 def add_steps(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     """Add the rows with lengths of steps; where they have no direction, with one of other rows."""
     columns = {name: mapped.number(name) for name in ("step_m", "heading_rad", "compass_deg")}

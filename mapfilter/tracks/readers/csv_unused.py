@@ -19,6 +19,7 @@ from mapfilter.tracks.readers.csv_odometry import (
     turns_alone,
 )
 from mapfilter.tracks.readers.csv_speed_units import speed_unit
+from mapfilter.tracks.readers.csv_steps import are_counted
 
 _OF_PLACES = ("altitude_m", "accuracy_m", "hdop", "course_deg", "speed_mps", "speed_kmh")
 _OF_TURNS, _OF_RATES = ("turn_rad", "turn_deg"), ("yaw_rate_radps", "yaw_rate_degps")
@@ -107,7 +108,7 @@ def _useful(mapped: Mapped) -> set[str]:
         useful.update(_OF_PLACES)
     if mapped.has("east_m", "north_m"):
         useful.add("heading_rad")
-    elif mapped.has("step_m"):
+    if mapped.has("step_m") and not mapped.holds("east_m", "north_m"):
         useful.update(("heading_rad", *_OF_STEPS))
     if has_odometry(mapped) or has_unused_odometry(mapped) or turns_alone(mapped):
         useful.update(_OF_ODOMETRY)
@@ -117,6 +118,6 @@ def _useful(mapped: Mapped) -> set[str]:
         useful.update(_OF_RATES)
     if heading := heading_of_wheels(mapped):
         useful.add(heading)
-    if mapped.has("steps") and not mapped.has("step_m"):
+    if are_counted(mapped):
         useful.update(_OF_COUNTED_STEPS)
     return useful

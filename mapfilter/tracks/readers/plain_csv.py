@@ -18,7 +18,7 @@ from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows, mapped_columns, with_dates
 from mapfilter.tracks.readers.csv_odometry import add_odometry, add_turns
 from mapfilter.tracks.readers.csv_places import add_places, hemisphere_columns
-from mapfilter.tracks.readers.csv_steps import add_steps
+from mapfilter.tracks.readers.csv_steps import add_steps, are_counted
 from mapfilter.tracks.readers.csv_times import times_of
 from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
 from mapfilter.tracks.readers.csv_weeks import week_column
@@ -101,7 +101,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
         columns = {name: mapped.number(name) for name in ("east_m", "north_m", "heading_rad")}
         there = np.isfinite(columns["east_m"])
         add_rows(reading, "places", {"time_s": time_s, **columns}, rows, there)
-    elif mapped.has("step_m"):
+    if mapped.has("step_m") and not (are_counted(mapped) or mapped.holds("east_m", "north_m")):
         add_steps(mapped, reading, time_s)
     add_odometry(mapped, reading, time_s)
     add_turns(mapped, reading, time_s)
@@ -138,7 +138,7 @@ def _add_sensors(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
             value = mapped.number(field)
             columns = {"time_s": time_s, column: value}
             add_rows(reading, table, columns, mapped.rows, np.isfinite(value))
-    if mapped.has("steps") and not mapped.has("step_m"):
+    if are_counted(mapped):
         _add_courses(mapped, reading, time_s)
 
 
