@@ -6,6 +6,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.formats import read_recording
 
 COUNT = 300
@@ -19,10 +20,10 @@ LAT, LON = 60 + NORTH_M / METRES_PER_DEGREE, 25 + 2 * EAST_M / METRES_PER_DEGREE
 
 @pytest.fixture
 def read(tmp_path):
-    def of(rows=None, text="", **columns):
+    def of(rows=None, written="", **columns):
         path = tmp_path / "a.csv"
-        path.write_text(text)
-        if not text:
+        path.write_text(written)
+        if not written:
             (pd.DataFrame(columns) if rows is None else rows).to_csv(path, index=False)
         return read_recording(path)
 
@@ -154,11 +155,26 @@ def test_a_date_that_stays_over_midnight(read):
     assert any("the date stays the same over midnight" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("rows", [20, 100, 150])
+def test_a_date_that_stays_over_midnight_in_a_file_read_in_parts(read, monkeypatch, rows):
+    """Parts after that of midnight were a day early."""
+    time_s = 50_250 + np.arange(COUNT)
+    times = [(START + pd.Timedelta(at, "s")).strftime("%H:%M:%S") for at in time_s.tolist()]
+    lines = [f"2026-05-13,{at},{60 + i / 1e5:.5f},25.0" for i, at in enumerate(times)]
+    monkeypatch.setattr(text, "_PART_BYTES", rows * (len(lines[0]) + 1))
+    found = read(written="\n".join(["date,time,lat,lon", *lines]))
+    np.testing.assert_allclose(places(found)["time_s"], START.timestamp() + time_s)
+    dates = np.where(np.arange(COUNT) < 150, "2026-05-13", "2026-05-14")
+    lines = [f"{date}{line[10:]}" for date, line in zip(dates, lines, strict=True)]
+    found = read(written="\n".join(["date,time,lat,lon", *lines]))
+    np.testing.assert_allclose(places(found)["time_s"], START.timestamp() + time_s)
+
+
 @pytest.mark.parametrize("line", ["s,deg,deg", "time,lat,lon"])
 def test_a_line_of_units_or_a_second_header_leaves_unix_times_utc(read, line):
     lines = pd.DataFrame({"time": TIME_S, "lat": LAT, "lon": LON}).to_csv(index=False).splitlines()
     at = 1 if line.startswith("s") else 100
-    found = read(text="\n".join([*lines[:at], line, *lines[at:]]))
+    found = read(written="\n".join([*lines[:at], line, *lines[at:]]))
     assert found.clock.kind == "utc"
     np.testing.assert_allclose(places(found)["time_s"], TIME_S)
 
@@ -172,13 +188,13 @@ def test_utc_written_behind_times(read):
 
 def test_unix_times_with_decimal_commas(read):
     rows = pd.DataFrame({"time": TIME_S + 0.5, "lat": LAT, "lon": LON})
-    found = read(text=rows.to_csv(index=False, sep=";", decimal=","))
+    found = read(written=rows.to_csv(index=False, sep=";", decimal=","))
     np.testing.assert_allclose(places(found)["time_s"], TIME_S + 0.5)
 
 
 def test_columns_of_one_name_are_noted(read):
     lines = pd.DataFrame({"time": TIME_S, "lat": LAT, "lon": LON}).to_csv(index=False).splitlines()
-    found = read(text="\n".join([f"{lines[0]},lat", *(f"{line},0" for line in lines[1:])]))
+    found = read(written="\n".join([f"{lines[0]},lat", *(f"{line},0" for line in lines[1:])]))
     np.testing.assert_allclose(places(found)["lat_deg"], LAT)
     assert "several columns lat: the first one is read" in found.ignored
 

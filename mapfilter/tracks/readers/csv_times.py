@@ -45,6 +45,8 @@ _LEAST_DIFFERENT = 0.5
 _NUMBER = re.compile(r"\d+(?:\.\d*)?")
 _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
 """Unix times of 1998, 2020 and 2039."""
+_SAME_DATE = "time: the date stays the same over midnight: times go on with the next day"
+_PAUSE_S = 600.0
 
 
 def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
@@ -174,10 +176,16 @@ def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
     """Return times that go on after midnight where a column of dates keeps the day of the start."""
     if DATE not in mapped.beside or mapped.rows.changes(DATE).any():
         return time_s
-    if not (np.diff(time_s[np.isfinite(time_s)]) < -DAY_S / 2).any():
+    known_s = time_s[np.isfinite(time_s)]
+    before_s = [reading.last_s] if np.isfinite(reading.last_s) else []
+    steps_s = np.diff(np.concatenate([before_s, known_s]))
+    # Between parts the date may change, too: then times fall by less, or more, than a day.
+    if before_s and _SAME_DATE not in reading.notes:
+        steps_s[:1][(steps_s[:1] < -DAY_S) | (steps_s[:1] > _PAUSE_S - DAY_S)] = 0.0
+    if not (steps_s < -DAY_S / 2).any():
         return time_s
-    counted = without_midnights(time_s, reading.last_s if np.isfinite(reading.last_s) else np.nan)
-    reading.note("time: the date stays the same over midnight: times go on with the next day")
+    counted = without_midnights(time_s, before_s[0] if before_s else np.nan)
+    reading.note(_SAME_DATE)
     return counted
 
 
