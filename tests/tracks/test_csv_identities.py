@@ -188,3 +188,19 @@ def test_levels_of_several_technologies_in_columns_of_their_own(tmp_path):
     pd.DataFrame(table).to_csv(tmp_path / "phone.csv", index=False)
     radio = mf.read_log(tmp_path / "phone.csv").radio
     assert radio["level_dbm"].tolist() == np.where(lte, -97.0, -81.0).tolist()
+
+
+@pytest.mark.parametrize("empty", ["mnc", "cell", "radio"])
+def test_identities_beside_an_empty_column(read, empty):
+    """Networks were no MCC, or cells had no name or technology: the empty column was read."""
+    given = {"mcc": 24_491, "tac": 2048, "eci": 123_456, "earfcn": 1300}
+    radio, notes = read(**given, **{empty: np.nan})
+    assert set(radio["cell"]) == {"244-91-2048-123456"}
+    assert set(radio["technology"]) == {"LTE"}
+    assert "ignored" not in notes
+
+
+def test_networks_in_one_number_beside_a_column_of_technologies(read):
+    """A column ``net`` of words counted as that of network codes."""
+    radio, _ = read(plmn=24_491, net="LTE", tac=2048, eci=123_456)
+    assert set(radio["cell"]) == {"244-91-2048-123456"}

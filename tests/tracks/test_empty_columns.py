@@ -1,9 +1,11 @@
 """Columns that are empty beside others of their quantity, as in logs with fixed ones."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.readers.formats import read_recording
 
 START_S = 1_778_666_400.0
 TIME_S = START_S + np.arange(0.0, 120.0, 0.5)
@@ -85,3 +87,11 @@ def test_turns_of_steps_in_radians_beside_an_empty_column_of_degrees(read):
     columns = {"step_m": 0.35, "turn_rad": given("turn_rad"), "turn_deg": NONE}
     log = read(walk={"time": TIME_S, **columns})
     assert turned_rad(log) == pytest.approx(TURNED_RAD[-1], abs=0.01)
+
+
+def test_rotation_vectors_beside_an_empty_column_of_their_scalar_part(tmp_path):
+    """There was no usable row."""
+    path = tmp_path / "phone.csv"
+    pd.DataFrame({"time": TIME_S, "qx": 0.0, "qy": 0.0, "qz": 0.6, "qw": NONE}).to_csv(path)
+    rows = read_recording(path).tables["orientation"]
+    np.testing.assert_allclose(rows["qw"], 0.8)

@@ -22,7 +22,7 @@ def add_attitude(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         Most of the quaternions are none of length 1.
     """
     x, y, z = (mapped.number(axis) for axis in _AXES)
-    if mapped.has("qw"):
+    if mapped.holds("qw"):
         w = mapped.number("qw")
     else:
         reading.note("qx, qy, qz without qw: the scalar part of a rotation vector, not negative")

@@ -30,7 +30,7 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         "level_step_db": mapped.number("level_step_db"),
         **{name: mapped.whole(name) for name in ("arfcn", "bsic", "timing_advance")},
     }
-    if mapped.has("technology"):
+    if (mapped.texts("technology") != "").any():
         columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
     elif (implied := _implied(mapped)) is not None:
         columns["technology"] = implied
@@ -39,7 +39,7 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     cell = mapped.texts("cell")
     identified = (cell != "") | ~np.isnan(identity["ci"])
     there = identified | ~np.isnan(columns["level_dbm"])
-    if mapped.has("cell"):
+    if (cell != "").any():
         columns["cell"] = cell
     columns["role"] = roles(mapped, identified)
     add_radio(reading, *only(columns, mapped.rows.line, there))

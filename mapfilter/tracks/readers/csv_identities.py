@@ -28,8 +28,7 @@ def cell_identities(mapped: Mapped) -> dict[str, Floats]:
     """
     mapped = _without_hexadecimals(mapped)
     identity = {name: mapped.whole(name) for name in IDENTITY}
-    if not mapped.has("mnc"):
-        identity |= _networks(identity["mcc"])
+    identity |= _networks(identity["mcc"], identity["mnc"])
     if mapped.has("enodeb"):
         identity["ci"] = _of_nodes(mapped, identity["ci"])
     if mapped.has("cgi"):
@@ -81,11 +80,12 @@ def _without_hexadecimals(mapped: Mapped) -> Mapped:
     return replace(mapped, rows=rows)
 
 
-def _networks(number: Floats) -> dict[str, Floats]:
+def _networks(number: Floats, mnc: Floats) -> dict[str, Floats]:
     """Return mcc and mnc of numbers that hold both: five digits, or six with an mnc of three."""
-    both, digits = number > _LARGEST_MCC, np.where(number >= 100_000, 1000.0, 100.0)
+    both = np.isnan(mnc) & (number > _LARGEST_MCC)
+    digits = np.where(number >= 100_000, 1000.0, 100.0)
     network = {"mcc": np.where(both, number // digits, number)}
-    return network | {"mnc": np.where(both, number % digits, np.nan)}
+    return network | {"mnc": np.where(both, number % digits, mnc)}
 
 
 def _of_nodes(mapped: Mapped, ci: Floats) -> Floats:
