@@ -179,15 +179,18 @@ def test_cells_of_several_technologies_in_columns_of_their_own(read):
     assert radio["arfcn"].tolist() == np.where(lte, 1300, 62).tolist()
 
 
-def test_levels_of_several_technologies_in_columns_of_their_own(tmp_path):
-    """Those of UMTS were lost beside a column of LTE."""
-    lte = np.arange(COUNT) % 2 == 0
+@pytest.mark.parametrize(("family", "column"), [("UMTS", "rscp"), ("GSM", "rssi")])
+def test_levels_of_several_technologies_in_columns_of_their_own(tmp_path, family, column):
+    """Those of UMTS and GSM were lost beside a column of LTE; an RSSI of LTE is no RSRP."""
+    lte, missing = np.arange(COUNT) % 2 == 0, np.arange(COUNT) % 10 == 0
     table = {"time": 1_778_666_400.0 + np.arange(COUNT), "mcc": 244, "mnc": 91, "lac": 3}
-    levels = {"rsrp": np.where(lte, -97, np.nan), "rscp": np.where(lte, np.nan, -81)}
-    table |= {"ci": 100_000, "radio": np.where(lte, "LTE", "UMTS"), **levels}
+    table |= {"rsrp": np.where(lte & ~missing, -97, np.nan), "rssi": -60}
+    table |= {column: np.where(lte, np.nan if column == "rscp" else -60, -81)}
+    table |= {"ci": 10_000, "radio": np.where(lte, "LTE", family)}
     pd.DataFrame(table).to_csv(tmp_path / "phone.csv", index=False)
     radio = mf.read_log(tmp_path / "phone.csv").radio
-    assert radio["level_dbm"].tolist() == np.where(lte, -97.0, -81.0).tolist()
+    expected = np.where(missing, np.nan, np.where(lte, -97.0, -81.0))
+    np.testing.assert_array_equal(radio["level_dbm"], expected)
 
 
 @pytest.mark.parametrize("empty", ["mnc", "cell", "radio"])

@@ -34,6 +34,10 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
         columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
     elif (implied := _implied(mapped)) is not None:
         columns["technology"] = implied
+    if "rssi" in mapped.names("level_dbm") and "technology" in columns:
+        # Of GSM it is the level, of others a sum over all cells.
+        gsm = np.isnan(columns["level_dbm"]) & (columns["technology"] == "GSM")
+        columns["level_dbm"] = np.where(gsm, mapped.rows.number("rssi"), columns["level_dbm"])
     if mapped.has("bars"):
         _add_bars(mapped, columns)
     cell = mapped.texts("cell")
