@@ -230,3 +230,27 @@ def test_forces_of_physics_toolbox_are_in_g(tmp_path):
     own = ReadOptions(columns={f"acc_{axis}": f"gF{axis}" for axis in "xyz"})
     named = read_recording(tmp_path / "a.csv", options=own)
     assert named.tables["accelerometer"]["z_mps2"].iloc[1] == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize("none", ["", "0.0"])
+@pytest.mark.parametrize("raw", [False, True])
+def test_sensors_of_sensorlog_whose_columns_hold_nothing_leave_it_to_the_others(
+    tmp_path, raw, none
+):
+    """Empty columns of Core Motion took the place of the gyroscope, and those of raw ones its."""
+    sensors = {
+        "accelerometerAcceleration": ("0", "0", "-1") if raw else (none,) * 3,
+        "motionGravity": (none,) * 3 if raw else ("0", "0", "-1"),
+        "motionUserAcceleration": (none,) * 3 if raw else ("0", "0", "0"),
+        "gyroRotation": ("0.1", "0.2", "0.3") if raw else (none,) * 3,
+        "motionRotationRate": (none,) * 3 if raw else ("0.1", "0.2", "0.3"),
+    }
+    names = [f"{sensor}{axis}" for sensor in sensors for axis in "XYZ"]
+    values = ",".join(value for axes in sensors.values() for value in axes)
+    rows = [f"2026-05-01T10:00:0{i}.000+00:00,{values}" for i in range(5)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([",".join(["loggingTime(txt)", *names]), *rows]) + "\n")
+    tables = read_recording(path).tables
+    rates = tables["gyroscope"][["x_radps", "y_radps", "z_radps"]]
+    assert rates.to_numpy().tolist() == [[0.1, 0.2, 0.3]] * 5
+    assert tables["accelerometer"]["z_mps2"].tolist() == pytest.approx([9.80665] * 5)

@@ -186,3 +186,21 @@ def test_a_gap_of_the_sensors_loses_no_motion_but_its_own():
     assert np.degrees(np.abs(apart)).max() < 6
     assert errors.turns == "headings"
     assert notes[-1] == "2 gaps of the sensors, over which motion is not known"
+
+
+def test_steps_are_not_known_where_a_receiver_loses_its_fix_while_it_moves():
+    """A tunnel was one straight step of three kilometres."""
+    time_s = np.arange(0.0, 400.0, 0.02)
+    second = np.concatenate([np.arange(1.0, 100.0), np.arange(301.0, 399.0)])
+    course = {"speed_mps": 15.0, "heading_rad": 0.3 + 0.001 * second}
+    sensors = receiver_and_gyroscope(time_s, np.full(time_s.size, 0.001), second, **course)
+    motion, _, notes = reckon_velocity(sensors)
+    unknown = motion["step_m"].isna()
+    assert motion.loc[unknown, "time_s"].tolist() == [301.0]
+    assert motion.loc[unknown, "turn_rad"].item() == pytest.approx(0.202, abs=0.02)
+    assert notes[-1] == "1 gap of speeds (longest 202.0 s), over which turns alone are known"
+    parked = np.where((second > 95) & (second < 305), 0.0, 15.0)
+    sensors["velocity"]["speed_mps"] = parked
+    motion, _, notes = reckon_velocity(sensors)
+    assert motion["step_m"].notna().all()
+    assert not any("gap" in note for note in notes)

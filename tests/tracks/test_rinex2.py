@@ -164,3 +164,29 @@ def test_times_are_those_of_the_time_system(tmp_path, version, constellation, sy
     ]
     utc = system == "GLO" or (constellation, system.strip()) == ("R", "")
     assert recording.clock.kind == ("utc" if utc else "gps")
+
+
+@pytest.mark.parametrize(
+    ("version", "event"),
+    [
+        *((2, f" 26  5  1 10  0  0.5000000  {end}") for end in ("5  0", "5", "2  0")),
+        (2, f"{'':28}3  0"),
+        (3, "> 2026 05 01 10 00  0.5000000  5  0"),
+        (3, f"{'>':31}4  0"),
+    ],
+)
+def test_events_without_lines_or_a_time_are_no_bad_epochs(tmp_path, version, event):
+    """Marks of a camera were noted as epochs that cannot be read."""
+    types = ["G    1 C1C", "SYS / # / OBS TYPES"]
+    lines = ["> 2026 05 01 10 00  {}.0000000  0  1", "G07  22000000.000"]
+    if version == 2:
+        types = ["     1    C1", "# / TYPES OF OBSERV"]
+        lines = [" 26  5  1 10  0  {}.0000000  0  1G07", "  22000000.000"]
+    kind = [f"     {version}.00           OBSERVATION DATA    G", "RINEX VERSION / TYPE"]
+    head = [f"{a:<60}{b}" for a, b in (kind, types, ["", "END OF HEADER"])]
+    body = [lines[0].format(0), lines[1], event, lines[0].format(1), lines[1]]
+    path = tmp_path / "made.26o"
+    path.write_text("\n".join([*head, *body]) + "\n")
+    recording = read_recording(path)
+    assert np.diff(recording.tables["satellites"]["time_s"]).tolist() == [1.0]
+    assert recording.losses == ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry
+from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry, odometry_gaps
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.gyroscope import (
     MOST_BIAS_RADPS,
@@ -113,8 +113,8 @@ def reckon_velocity(
     """Return the motion of a vehicle by the speed of a receiver and a gyroscope in any pose.
 
     Headings are the gyroscope's; the receiver's course, where it drives faster than 2 m/s, gives
-    their offset, and standing the gyroscope's bias. Over gaps of the sensors motion is not known;
-    its errors are those of the longest part between them.
+    their offset, and standing the gyroscope's bias. Over gaps of the sensors motion is not known,
+    over those of the speeds steps are not; errors are those of the longest part between the first.
 
     Parameters
     ----------
@@ -138,6 +138,7 @@ def reckon_velocity(
     if not parts:
         return None
     motion, imu, notes = max(parts, key=lambda part: len(part[0]))
+    notes += _unknown_steps([part[0] for part in parts])
     if gaps := len(parts) - 1:
         for later, _, _ in parts[1:]:
             later.loc[0, ["step_m", "turn_rad"]] = np.nan
@@ -162,6 +163,7 @@ def _driven(signals: Signals, rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNois
     heading = yaw + np.interp(time_s, found.time_s, found.offset_rad)
     lasted_s = np.diff(time_s)
     step = np.concatenate([[0.0], lasted_s * (speed[1:] + speed[:-1]) / 2])
+    step[odometry_gaps(time_s, speed)] = np.nan
     middle = np.concatenate([heading[:1], (heading[1:] + heading[:-1]) / 2])
     motion = pd.DataFrame(
         {
@@ -173,6 +175,15 @@ def _driven(signals: Signals, rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNois
     )
     notes = (*_notes(found, stood, standing, has_rate=True), *error_notes(walk_rad))
     return motion, _noise(found, walk_rad, speed_errors(rows[["time_s"]])), notes
+
+
+def _unknown_steps(parts: Sequence[pd.DataFrame]) -> tuple[str, ...]:
+    """Return a note on steps that are not known, as a receiver moved without speeds."""
+    gap_s = pd.concat([part["time_s"].diff()[part["step_m"].isna()] for part in parts])
+    if gap_s.empty:
+        return ()
+    gaps = f"{number_of(len(gap_s), 'gap')} of speeds (longest {gap_s.max():.1f} s)"
+    return (f"{gaps}, over which turns alone are known",)
 
 
 def _dense_turning(rows: pd.DataFrame) -> Turning | None:

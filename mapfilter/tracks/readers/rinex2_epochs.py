@@ -18,7 +18,7 @@ from mapfilter.tracks.readers.rinex_epochs import Observations, Records, Wanted,
 _DATE = re.compile(
     rb"(\d{1,4})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2}(?:\.\d*)?)"
 )
-_MEASURED, _SLIPS = (b"0", b"1", b" ", b""), b"6"
+_MEASURED, _EVENTS, _SLIPS = (b"0", b"1", b" ", b""), (b"2", b"3", b"4", b"5"), b"6"
 """Flags of epochs; slips of cycles are written as observations are."""
 _NAMES_OF_LINE, _VALUES_OF_LINE = 12, 5
 _MOST_TYPES = 100
@@ -94,9 +94,10 @@ def _epochs(lines: Sequence[bytes], lines_of_one: int, *, last: bool) -> _Epochs
         if count and end > size and not last:
             return found
         found.rows += 1
-        # Events need no time.
+        # Events need neither a time nor lines of their own.
         timeless = np.isnan(gps_s) and (measured or bool(line[:26].strip()))
-        if timeless or not count:
+        event = line[28:29] in _EVENTS and number in (b"", b"0")
+        if timeless or not (count or event):
             found.no_epoch.append(at)
             at += 1
             continue

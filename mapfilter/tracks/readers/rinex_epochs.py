@@ -100,11 +100,16 @@ def read_epochs(
         blank = _bools(pc.equal(pc.utf8_trim_whitespace(texts), ""))
         reading.rows += int((~blank).sum())
         begins = texts.filter(pa.array(epoch))
-        seconds = _seconds(pc.utf8_slice_codeunits(begins, 1, 29))
-        reading.refuse(number[epoch][np.isnan(seconds)], "epoch: no date and time")
-        # Flags from 2 on are events: header lines follow, no observations.
+        stamp = pc.utf8_slice_codeunits(begins, 1, 29)
+        seconds = _seconds(stamp)
+        # Flags from 2 on are events: header lines follow, no observations. They need no time.
         flag = pc.utf8_slice_codeunits(begins, 31, 32)
-        seconds[~_bools(pc.is_in(flag, pa.array(["0", "1", " ", ""])))] = np.nan
+        event = ~_bools(pc.is_in(flag, pa.array(["0", "1", " ", ""])))
+        timed = _bools(pc.not_equal(pc.utf8_trim_whitespace(stamp), ""))
+        reading.refuse(
+            number[epoch][np.isnan(seconds) & (timed | ~event)], "epoch: no date and time"
+        )
+        seconds[event] = np.nan
         time_s = np.concatenate([[last_s], seconds])[np.cumsum(epoch)]
         last_s = float(time_s[-1]) if len(time_s) else last_s
         rows = np.flatnonzero(~epoch & ~blank & np.isfinite(time_s))

@@ -53,9 +53,14 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     _add_positions(rows, reading, names, time_s, zoned=zoned)
     _add_forces(rows, reading, names, time_s)
     for sensor, unit, some in (("gyroscope", "radps", _RATES), ("magnetometer", "ut", _FIELDS)):
-        of = next((_axes(one) for one in some if set(_axes(one)) <= names.keys()), ())
-        if of:
-            _add_axes(rows, reading, sensor, unit, time_s, [rows.number(names[one]) for one in of])
+        named = [_axes(one) for one in some if set(_axes(one)) <= names.keys()]
+        found = [[rows.number(names[axis]) for axis in axes] for axes in named]
+        if found:
+            # Columns may be there without values.
+            parts = next(
+                (one for one in found if _holds(one, zeros=sensor != "gyroscope")), found[0]
+            )
+            _add_axes(rows, reading, sensor, unit, time_s, parts)
     for table, column, name, factor in (
         ("barometer", "pressure_hpa", "altimeterpressure", _KPA_HPA),
         ("steps", "count", "pedometernumberofsteps", 1.0),
@@ -111,16 +116,21 @@ def _add_forces(rows: Columns, reading: Reading, names: dict[str, str], time_s: 
     gravity = force(_GRAVITY) if set(_GRAVITY) <= names.keys() else None
     if gravity is not None:
         _add_axes(rows, reading, "gravity", "mps2", time_s, gravity)
-    if set(_ACCELERATION) <= names.keys():
-        total = force(_ACCELERATION)
-    elif gravity is not None and set(_USER) <= names.keys():
+    total = force(_ACCELERATION) if set(_ACCELERATION) <= names.keys() else None
+    measured = total is not None and _holds(total, zeros=False)
+    if not measured and gravity is not None and set(_USER) <= names.keys():
         total = [part + rest for part, rest in zip(gravity, force(_USER), strict=True)]
-    else:
+    if total is None:
         return
     _add_axes(rows, reading, "accelerometer", "mps2", time_s, total)
     reading.note(
         "accelerations in g, turned into m/s², with the sign of Android's (upward at rest)"
     )
+
+
+def _holds(parts: list[Floats], *, zeros: bool) -> bool:
+    """Return whether a sensor has values; ``zeros`` says whether 0 in all rows is one."""
+    return bool((np.isfinite(parts) & (zeros | np.not_equal(parts, 0))).any())
 
 
 def _add_axes(
