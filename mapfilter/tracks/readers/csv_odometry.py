@@ -140,12 +140,16 @@ def _between_rows(time_s: Floats, speed: Floats) -> Floats:
 def _speeds(mapped: Mapped, reading: Reading, time_s: Floats) -> tuple[Floats, float]:
     """Return speeds of the wheels, else by their odometer, else any; and their deviation."""
     odometer = _first_held(mapped, _ODOMETERS)
-    by_wheels = any(map(mapped.has, _WHEELS))
-    if odometer and not any(map(mapped.holds, _WHEELS)):
+    by_wheels = any(map(mapped.holds, _WHEELS))
+    if odometer and not by_wheels:
         return _counted(mapped, reading, time_s, odometer)
     if odometer:
         column = mapped.rows.find(*mapped.names(odometer))
         reading.ignore(f"{column}: not used beside the speeds of the wheels")
+    # Beside positions a speed is the receiver's, and beside steps a walker's.
+    by_wheels |= any(map(mapped.has, _WHEELS)) and (
+        _is_placed(mapped) or any(map(mapped.has, _STEPS))
+    )
     if not by_wheels:
         reading.note("speed: taken for a vehicle's, as there are no positions beside it")
     return speeds_of(mapped, "wheel_speed" if by_wheels else "speed"), float("nan")

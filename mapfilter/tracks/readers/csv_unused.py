@@ -30,7 +30,7 @@ _OF_COUNTED_STEPS = (*_OF_STEPS, *_OF_RATES)
 _LATE_GUESSES = ("altitude_m", "odometer_m")
 _OF_SPEEDS = {"": "", "m/s": "_mps", "km/h": "_kmh"}
 """Endings of fields of speeds by unit; of an unknown one of all."""
-_MEASURED = {*_OF_PLACES, *_OF_ODOMETRY, *_OF_STEPS, "heading_rad"}
+_MEASURED = {*_OF_PLACES, *_OF_ODOMETRY, *_OF_STEPS, "heading_rad", "step_m"}
 """Fields that are of use beside others only."""
 
 
@@ -109,7 +109,7 @@ def _useful(mapped: Mapped) -> set[str]:
     if mapped.has("east_m", "north_m"):
         useful.add("heading_rad")
     if mapped.has("step_m") and not mapped.holds("east_m", "north_m"):
-        useful.update(("heading_rad", *_OF_STEPS))
+        useful.update(("heading_rad", "step_m", *_OF_STEPS))
     if has_odometry(mapped) or has_unused_odometry(mapped) or turns_alone(mapped):
         useful.update(_OF_ODOMETRY)
     if has_turns_of_wheels(mapped):

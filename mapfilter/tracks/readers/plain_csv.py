@@ -126,7 +126,7 @@ def _add_sensors(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     for short, sensor, unit in (*sensors, ("mag", "magnetometer", "ut")):
         if mapped.has(*(f"{short}_{axis}" for axis in "xyz")):
             columns = {f"{axis}_{unit}": mapped.number(f"{short}_{axis}") for axis in "xyz"}
-            there = np.isfinite(columns[f"x_{unit}"])
+            there = np.logical_or.reduce([np.isfinite(one) for one in columns.values()])
             add_rows(reading, sensor, {"time_s": time_s, **columns}, mapped.rows, there)
     if mapped.has("qx", "qy", "qz"):
         add_attitude(mapped, reading, time_s)
