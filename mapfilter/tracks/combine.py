@@ -14,6 +14,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.beyond_crs import within_crs
+from mapfilter.tracks.equal_times import in_order
 from mapfilter.tracks.far_apart import check_far_apart
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.gps_dates import later
@@ -188,9 +189,7 @@ def _truth(
             east, north = frame.east_north(rows, recording.crs)
             place = {"time_s": rows["time_s"], "east_m": east, "north_m": north}
             parts.append(pd.DataFrame(place))
-    return (
-        pd.concat(parts, ignore_index=True).sort_values("time_s", kind="stable") if parts else None
-    )
+    return in_order(parts) if parts else None
 
 
 def _satellites(
@@ -247,6 +246,4 @@ def _velocity(recordings: Sequence[Recording], frame: Frame) -> pd.DataFrame | N
         heading = heading_from_azimuth_rad(rows["course_deg"], frame.convergence_rad)
         columns = {"time_s": rows["time_s"], "speed_mps": rows["speed_mps"]}
         parts.append(pd.DataFrame({**columns, "heading_rad": heading}))
-    return (
-        pd.concat(parts, ignore_index=True).sort_values("time_s", kind="stable") if parts else None
-    )
+    return in_order(parts) if parts else None

@@ -9,6 +9,7 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
+from mapfilter.tracks.equal_times import in_order
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.position_units import RADIUS_68
 from mapfilter.tracks.readers.recording import Recording
@@ -94,7 +95,7 @@ def fixes_of(
         fixes, note = without_held(fixes, motion, rounded_m[id(recording)], driven=driven)
         notes += [f"{recording.path.name}: {note}"] if note else []
         parts.append(fixes)
-    return pd.concat(parts, ignore_index=True).sort_values("time_s", kind="stable")
+    return in_order(parts)
 
 
 def of_one_receiver(placed: Sequence[Placed]) -> tuple[list[Placed], tuple[str, ...]]:
