@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 import rasterio
-from small_world import FLOOR_DBM, IDS, make_routes, make_world
+from small_world import FLOOR_DBM, IDS, make_routes
 
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.export import export_cog
@@ -13,11 +13,6 @@ from mapfilter.database.sources import LatticeRoutes
 from mapfilter.database.store import open_database
 
 OSM = "© OpenStreetMap contributors"
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
 
 
 @pytest.fixture(scope="module")

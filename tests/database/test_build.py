@@ -15,10 +15,8 @@ from small_world import (
     FLOOR_DBM,
     IDS,
     LATTICE,
-    make_database,
     make_plan,
     make_routes,
-    make_world,
 )
 
 from mapfilter._parallel import SerialExecutor, local_executor
@@ -34,16 +32,6 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
-
-
-@pytest.fixture(scope="module")
-def database(world, tmp_path_factory):
-    return make_database(world, tmp_path_factory.mktemp("built"))
 
 
 def contents(folder: Path):

@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 import geopandas
 import numpy as np
 import pytest
-from small_world import LATTICE, make_plan, make_world
+from small_world import LATTICE, make_plan
 
 from mapfilter._parallel import SerialExecutor
 from mapfilter.database.build import build
@@ -16,11 +16,6 @@ from mapfilter.database.manifest import InputFile
 from mapfilter.errors import OutputError
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
 
 
 def contents(folder):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from small_world import CRS, LATTICE, make_routes, make_world
+from small_world import CRS, LATTICE, make_routes
 
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.estimate import dry_run
@@ -13,11 +13,6 @@ from mapfilter.errors import ConfigError, InputError, OutputError
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Ways
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
 
 
 def between_the_centres():

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import shapely
 from killed_worker import KillsOneWorker
-from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
+from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes
 
 from mapfilter._cluster import cluster_executor
 from mapfilter._parallel import SerialExecutor, local_executor
@@ -30,11 +30,6 @@ from mapfilter.roads.ways import Buildings, Squares, Water, Ways
 
 OPTIONS = {"floor_dbm": FLOOR_DBM, "tile_px": 8}
 TILE_PIXELS = 8 * 8 * len(IDS)
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from concurrent.futures import Executor
 
 import numpy as np
 import pytest
-from small_world import CRS, FLOOR_DBM, LATTICE, make_routes, make_world
+from small_world import CRS, FLOOR_DBM, LATTICE, make_routes
 
 from mapfilter._parallel import SerialExecutor
 from mapfilter._resume import FinishedParts
@@ -15,11 +15,6 @@ from mapfilter.database.tiles import tile_windows
 from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
 from mapfilter.roads.lattice import RouteLattice
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
 
 
 def job_of(world, routes, tile_px=8):

@@ -1,33 +1,16 @@
 """Databases whose files are damaged, changed, mixed up or moved aside."""
 
 import json
-import shutil
 
 import pyarrow.parquet
 import pytest
-from small_world import IDS, make_database, make_world
+from small_world import IDS
 
 from mapfilter._json_files import sealed
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import levels_folders
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
-
-
-@pytest.fixture(scope="module")
-def database(world, tmp_path_factory):
-    return make_database(world, tmp_path_factory.mktemp("built"))
-
-
-@pytest.fixture
-def copy(database, tmp_path):
-    shutil.copytree(database.path, tmp_path / "db")
-    return tmp_path / "db"
 
 
 def change_manifest(folder, **changes):

@@ -9,29 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_database, make_plan, make_world
+from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan
 
 from mapfilter._json_files import sealed
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import apart, levels_folders
 from mapfilter.database.store import info, open_database, read_cells, write_cells
 from mapfilter.errors import InputError, OutputError, StoreError
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
-
-
-@pytest.fixture(scope="module")
-def database(world, tmp_path_factory):
-    return make_database(world, tmp_path_factory.mktemp("built"))
-
-
-@pytest.fixture
-def copy(database, tmp_path):
-    shutil.copytree(database.path, tmp_path / "db")
-    return tmp_path / "db"
 
 
 def change_manifest(folder, **changes):

@@ -6,15 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from small_world import FLOOR_DBM, make_world
+from small_world import FLOOR_DBM
 
 from mapfilter.database import estimate
 from mapfilter.database.estimate import drawn_tiles, dry_run, peak_memory_bytes
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
 
 
 def run(world, tile_px=8, **options):

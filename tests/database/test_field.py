@@ -2,19 +2,9 @@
 
 import numpy as np
 import pytest
-from small_world import IDS, LATTICE, make_database, make_world
+from small_world import IDS, LATTICE
 
 from mapfilter.errors import InputError
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
-
-
-@pytest.fixture(scope="module")
-def database(world, tmp_path_factory):
-    return make_database(world, tmp_path_factory.mktemp("built"))
 
 
 @pytest.fixture(scope="module")

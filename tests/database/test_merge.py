@@ -15,7 +15,6 @@ from small_world import (
     make_database,
     make_plan,
     make_routes,
-    make_world,
 )
 
 from mapfilter.database import parts
@@ -28,16 +27,6 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
-
-
-@pytest.fixture(scope="module")
-def database(world, tmp_path_factory):
-    return make_database(world, tmp_path_factory.mktemp("built"))
 
 
 def some(world, folder, ids=IDS, window=(0, 0, 40, 50), levels_dbm=None, **more):

@@ -4,8 +4,7 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
+from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes
 
 from mapfilter.database.build import build
 from mapfilter.database.measured import Readings
@@ -27,11 +26,6 @@ def readings(count, seed):
         IDS, (number % 3).astype(np.int32), number, number // 2, *places,
         -60.0 - number, np.full(count, np.nan), number % 2 == 0,
     )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
 
 
 def surveyed(world, folder, name, *, measured=True, lost=()):

@@ -4,21 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import rasterio
-from small_world import FLOOR_DBM, IDS, LATTICE, levels_of, make_database, make_plan, make_world
+from small_world import FLOOR_DBM, IDS, LATTICE, levels_of, make_plan
 
 from mapfilter.database.build import build
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
-
-
-@pytest.fixture(scope="module")
-def database(world, tmp_path_factory):
-    return make_database(world, tmp_path_factory.mktemp("built"))
 
 
 def built(world, rasters, folder, plan=None):

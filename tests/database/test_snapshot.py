@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from small_world import FLOOR_DBM, IDS, make_database, make_world
+from small_world import FLOOR_DBM, IDS
 
 from mapfilter._io import atomic_dir
 from mapfilter._json_files import sealed
@@ -22,22 +22,6 @@ from mapfilter.database.checked import Part, checksums, generation_of
 from mapfilter.database.parquet import WindowReader, read_columns, write_columns
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
-
-
-@pytest.fixture(scope="module")
-def database(world, tmp_path_factory):
-    return make_database(world, tmp_path_factory.mktemp("built"))
-
-
-@pytest.fixture
-def copy(database, tmp_path):
-    shutil.copytree(database.path, tmp_path / "db")
-    return tmp_path / "db"
 
 
 def digits(text):

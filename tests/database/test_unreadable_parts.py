@@ -3,14 +3,13 @@
 import hashlib
 import io
 import json
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from small_world import CRS, make_database, make_plan, make_world
+from small_world import CRS, make_plan
 
 from mapfilter._json_files import sealed
 from mapfilter.database import store
@@ -28,22 +27,6 @@ from mapfilter.database.parquet import (
 from mapfilter.database.store import open_database, read_cells, write_cells
 from mapfilter.errors import StoreError
 from mapfilter.lattice import Lattice
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    return make_world(tmp_path_factory.mktemp("rasters"))
-
-
-@pytest.fixture(scope="module")
-def database(world, tmp_path_factory):
-    return make_database(world, tmp_path_factory.mktemp("built"))
-
-
-@pytest.fixture
-def copy(database, tmp_path):
-    shutil.copytree(database.path, tmp_path / "db")
-    return tmp_path / "db"
 
 
 def only(caught):
