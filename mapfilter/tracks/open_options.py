@@ -8,6 +8,8 @@ from pathlib import Path
 
 from mapfilter.tracks.pdr.options import WalkOptions
 
+_NO_EFFECT = "options of recordings have no effect on a track log"
+
 
 @dataclass(frozen=True)
 class CombineOptions:
@@ -71,7 +73,7 @@ class OpenOptions:
         Examples
         --------
         >>> OpenOptions(zone="+01:00").unused_by_log()
-        ('--zone has no effect: a track log is read as it is, only recordings with it',)
+        ('options of recordings have no effect on a track log: --zone',)
         """
         combine = self.combine
         given = {
@@ -84,8 +86,4 @@ class OpenOptions:
             "--course-motion": combine.course_motion,
         }
         names = [name for name, value in given.items() if value]
-        if not names:
-            return ()
-        verb, them = ("has", "it") if len(names) == 1 else ("have", "them")
-        why = f"a track log is read as it is, only recordings with {them}"
-        return (f"{', '.join(names)} {verb} no effect: {why}",)
+        return (f"{_NO_EFFECT}: {', '.join(names)}",) if names else ()
