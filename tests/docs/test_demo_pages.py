@@ -16,7 +16,7 @@ TOLD = {
     "switch_distance_m": (r"after\s+about\s+(\d+)\s+m(?:\s+one\s+place\s+is\s+left)?,\s+\d", -1),
     "error_at_switch_m": (r"after\s+about[^,]+,\s+(\d+)\s+m\s+off", 0),
     "error_mean_m": (r"error\s+is\s+(\d+)\s+m\s+on\s+average", 0),
-    "error_95_m": (r"95\s+%\s+of\s+it\s+within\s+(\d+)\s+m", 0),
+    "error_95_m": (r"95\s+%\s+of\s+it\s+within\s+about\s+(\d+)\s+m", 0),
 }
 """Words by the name of the figure, and the digits to which it is rounded there."""
 PAGES = {
