@@ -54,5 +54,43 @@ def test_a_number_that_hardly_a_level_reaches_means_no_data_far_from_all_others(
     usual = np.append(levels, np.float32([-25] * 100))
     near = np.append(np.linspace(-130, -10, 400, dtype=np.float32), np.float32([-1] * 100))
     cut_off = np.minimum(np.linspace(-130, 20, 400, dtype=np.float32), -1)
-    for values in (few, usual, near, cut_off):
+    # The weakest that still is one.
+    weak = np.append(np.linspace(-95, -45, 400, dtype=np.float32), np.float32([-120] * 100))
+    for values in (few, usual, near, cut_off, weak):
         assert nodata_taken_as_level(values) is None
+
+
+@pytest.mark.parametrize("marker", [0, -1, 1])
+@pytest.mark.parametrize("place", [(0, 0), (0, 4), (2, 2), (4, 1)])
+def test_a_single_marker_means_no_data_far_from_all_pixels_beside_it(marker, place):
+    levels = np.full((5, 5), -80, np.float32)
+    levels[place] = marker
+    assert nodata_taken_as_level(levels) == (marker, 1 / 25)
+    # A zero of so many pixels is told by all of them.
+    near = None if marker else (0, 1 / 25)
+    assert nodata_taken_as_level(np.float32(0.2) * levels, 0.2) == near
+    assert nodata_taken_as_level(levels / 2, 0.5) == (marker / 2, 1 / 25)
+    assert nodata_taken_as_level(levels.ravel()) == near
+
+
+@pytest.mark.parametrize("row", range(-2, 3))
+@pytest.mark.parametrize("col", range(-2, 3))
+def test_one_pixel_near_a_marker_tells_that_it_is_a_level_if_it_lies_beside_it(row, col):
+    levels = np.full((7, 7), -80, np.float32)
+    levels[3, 3] = -1
+    levels[3 + row, 3 + col] = -20.5
+    if (row, col) == (0, 0):
+        assert nodata_taken_as_level(levels) is None
+        return
+    beside = max(abs(row), abs(col)) == 1
+    assert nodata_taken_as_level(levels) == (None if beside else (-1, pytest.approx(1 / 49)))
+
+
+def test_a_hole_and_what_lies_beyond_the_edge_are_no_neighbours():
+    levels = np.full((6, 6), np.nan, np.float32)
+    levels[:, 3:] = -70
+    levels[1:3, :4] = 0
+    assert nodata_taken_as_level(levels) == (0, pytest.approx(8 / 24))
+    alone = np.full((3, 3), np.nan, np.float32)
+    alone[1, 1] = -1
+    assert nodata_taken_as_level(alone) is None
