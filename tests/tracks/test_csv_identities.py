@@ -49,6 +49,19 @@ def test_hexadecimal_numbers_beside_rows_without_one(read, mark):
     assert "no numbers" not in notes
 
 
+@pytest.mark.parametrize("missing", ["-", "N/A", "unknown"])
+def test_hexadecimal_numbers_beside_words_for_missing_ones(read, missing):
+    """They were lost, and those of digits alone read as decimal ones."""
+    serves = np.arange(COUNT) % 4 > 0
+    ci = np.where(serves, [f"{one:04X}" for one in 0xA000 + np.arange(COUNT)], missing)
+    lac = np.where(np.arange(COUNT) % 8 == 1, "1234", "1AB4")
+    radio, _ = read(mcc=244, mnc=91, lac=np.where(serves, lac, missing), ci=ci)
+    cells = [
+        f"244-91-{int(a, 16)}-{int(c, 16)}" for a, c in zip(lac[serves], ci[serves], strict=True)
+    ]
+    assert radio.loc[radio["role"] == "serving", "cell"].tolist() == cells
+
+
 def test_hexadecimal_numbers_of_a_later_part_without_letters(read, monkeypatch):
     """Where one stays in a cell for long: it was another one, of a decimal number."""
     monkeypatch.setattr(text, "_PART_BYTES", 1 << 9)
@@ -207,3 +220,9 @@ def test_networks_in_one_number_beside_a_column_of_technologies(read):
     """A column ``net`` of words counted as that of network codes."""
     radio, _ = read(plmn=24_491, net="LTE", tac=2048, eci=123_456)
     assert set(radio["cell"]) == {"244-91-2048-123456"}
+
+
+def test_networks_in_one_number_of_four_digits(read):
+    """262 and 1 without a zero between them were 26 and 21."""
+    radio, _ = read(plmn=np.where(np.arange(COUNT) < 20, 2621, 310_410), lac=7, ci=8)
+    assert radio["cell"].unique().tolist() == ["262-1-7-8", "310-410-7-8"]

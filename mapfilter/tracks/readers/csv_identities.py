@@ -68,7 +68,9 @@ def _without_hexadecimals(mapped: Mapped) -> Mapped:
     rows = mapped.rows
     for field in ("lac", "ci"):
         for name in mapped.columns(field):
-            words = {word.strip() for word in set(rows.texts(name))} - {""}
+            every = {word.strip() for word in set(rows.texts(name))}
+            # Other words stand for missing values.
+            words = {word for word in every if _HEX.fullmatch(word) or re.search(r"\d", word)}
             if not words or not all(map(_HEX.fullmatch, words)):
                 continue
             note = f"{name}: taken for hexadecimal numbers"
@@ -81,9 +83,9 @@ def _without_hexadecimals(mapped: Mapped) -> Mapped:
 
 
 def _networks(number: Floats, mnc: Floats) -> dict[str, Floats]:
-    """Return mcc and mnc of numbers that hold both: five digits, or six with an mnc of three."""
+    """Return mcc and mnc of numbers that hold both: an mcc of three digits, and the others."""
     both = np.isnan(mnc) & (number > _LARGEST_MCC)
-    digits = np.where(number >= 100_000, 1000.0, 100.0)
+    digits = np.select([number >= 100_000, number >= 10_000], [1000.0, 100.0], 10.0)
     network = {"mcc": np.where(both, number // digits, number)}
     return network | {"mnc": np.where(both, number % digits, mnc)}
 
