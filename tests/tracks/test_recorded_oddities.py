@@ -100,6 +100,14 @@ def test_hemispheres_in_columns_of_their_own(read):
     np.testing.assert_allclose(places(found)["lat_deg"], -LAT)
 
 
+def test_hemispheres_of_a_receiver_without_a_fix_for_long(read):
+    """Behind 1000 rows without a letter they did not count: west of Greenwich was east."""
+    rows = pd.DataFrame({"time": TIME_S, "lat": LAT, "ns": "N", "lon": LON, "ew": "W"})
+    before = pd.DataFrame({"time": TIME_S[0] - np.arange(1200.0, 0.0, -1.0)})
+    found = read(pd.concat([before, rows]))
+    np.testing.assert_allclose(places(found)["lon_deg"], -LON)
+
+
 @pytest.mark.parametrize("names", [("platform", ""), ("relation", ""), ("serving", "mode")])
 def test_letters_of_another_meaning_are_no_hemispheres(read, names):
     letters = np.where(np.arange(COUNT) % 3 == 0, "S", "N")
@@ -168,6 +176,48 @@ def test_a_date_that_stays_over_midnight_in_a_file_read_in_parts(read, monkeypat
     lines = [f"{date}{line[10:]}" for date, line in zip(dates, lines, strict=True)]
     found = read(written="\n".join(["date,time,lat,lon", *lines]))
     np.testing.assert_allclose(places(found)["time_s"], START.timestamp() + time_s)
+
+
+def parted_drive(read, monkeypatch, rows, kept=(), **columns):
+    """Read a drive over parts of some rows; in rows 100 to 199 most columns are empty."""
+    fixed = (np.arange(COUNT) < 100) | (np.arange(COUNT) >= 200)
+    table = pd.DataFrame({**columns, "lat": LAT.round(5), "lon": LON.round(5)}).astype(object)
+    table.loc[~fixed, table.columns.drop(list(kept))] = np.nan
+    written = table.to_csv(index=False)
+    sizes = np.cumsum([len(line) + 1 for line in written.splitlines()[1:]])
+    monkeypatch.setattr(text, "_PART_BYTES", int(sizes[rows - 1]) - 1)
+    return read(written=written)
+
+
+@pytest.mark.parametrize("rows", [COUNT, 60])
+def test_a_receivers_times_that_a_later_part_lacks(read, monkeypatch, rows):
+    """That part had the seconds of another column: a log of 56 years."""
+    columns = {"time": 100.0 + np.arange(COUNT), "utc": TIME_S}
+    fixed = np.r_[0:100, 200:COUNT]
+    found = parted_drive(read, monkeypatch, rows, ("time",), **columns)
+    assert found.clock.kind == "utc"
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S[fixed])
+
+
+@pytest.mark.parametrize("form", ["unix", "seconds", "dates"])
+@pytest.mark.parametrize("rows", [COUNT, 5])
+def test_a_part_without_a_time_loses_no_other_one(read, monkeypatch, rows, form):
+    """The whole file was refused."""
+    stamps = START + pd.to_timedelta(np.arange(COUNT), "s")
+    columns = {
+        "unix": {"time": TIME_S},
+        "seconds": {"time": 100.5 + np.arange(COUNT)},
+        "dates": {"date": stamps.strftime("%Y-%m-%d"), "time": stamps.strftime("%H:%M:%S")},
+    }[form]
+    found = parted_drive(read, monkeypatch, rows, **columns)
+    assert len(places(found)) == 200
+    assert found.clock.kind == {"unix": "utc", "seconds": "monotonic", "dates": "local"}[form]
+
+
+def test_seconds_in_fewer_than_half_of_the_rows(read):
+    """The file was refused, as if these were no numbers."""
+    time = np.where(np.arange(COUNT) % 3, np.nan, np.arange(COUNT))
+    assert len(places(read(time=time, lat=LAT, lon=LON))) == COUNT / 3
 
 
 @pytest.mark.parametrize("line", ["s,deg,deg", "time,lat,lon"])

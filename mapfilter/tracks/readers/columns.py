@@ -21,11 +21,11 @@ from mapfilter.tracks.readers.times import LEAST_UNIX_S, parse_times, seconds_of
 
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
-_FIRST_ROWS = 1000
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
 _WHOLE = r"^(?:[-+]?(\d{1,18}|[0-8]\d{18})|0[xX][0-9a-fA-F]{1,15})$"
-_MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
+MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
+"""Texts of missing values."""
 
 
 @dataclass(eq=False)
@@ -188,8 +188,12 @@ class Columns:
     def first_text(self, name: str) -> str:
         """Return the first text of a column that is not blank; "" where there is none."""
         column = self._raw(name)
-        texts = () if column is None else pc.utf8_trim_whitespace(column[:_FIRST_ROWS]).to_pylist()
-        return next((text for text in texts if text), "")
+        if column is None:
+            return ""
+        # A receiver without a fix may leave a column blank for long.
+        trimmed = pc.utf8_trim_whitespace(column)
+        at = pc.index(pc.not_equal(trimmed, ""), value=True).as_py()
+        return "" if at < 0 else str(trimmed[at].as_py())
 
     def joined(self, before: str, name: str) -> Columns:
         """Return columns in which the texts of one follow those of another, after a blank."""
@@ -240,7 +244,7 @@ class Columns:
             self.reading.tallies.add_texts(name, part, pc.sum(given).as_py() or 0)
             return numbers
         column = pc.utf8_trim_whitespace(column)
-        missing = pc.is_in(column, pa.array(_MISSING))
+        missing = pc.is_in(column, pa.array(MISSING))
         good = pc.match_substring_regex(column, pattern)
         wrong = pc.and_not(pc.invert(good), missing)
         bad = pc.sum(wrong).as_py()

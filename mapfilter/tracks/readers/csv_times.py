@@ -12,6 +12,7 @@ from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.columns import MISSING, Columns
 from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
 from mapfilter.tracks.readers.csv_weeks import (
     over_days,
@@ -57,11 +58,15 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     # Dates are no numbers; notes on them may be of the columns that are looked at, too.
     as_numbers = tuple(f"{name}: " for name in mapped.names("time"))
     mapped = _best_column(mapped, reading)
+    missing = mapped.rows.flags(*mapped.names("time"), true=MISSING)
+    if missing.size and missing.all():
+        # A part of a large file, as of a receiver without a fix: the clock is that of the others.
+        return np.full(missing.size, np.nan)
     number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
     known = number[np.isfinite(number)]
     usual_s = abs(float(np.median(known))) if known.size else np.inf
     _check_digits(mapped, reading, known)
-    if known.size >= 0.5 * len(number) and usual_s < LEAST_UNIX_S:
+    if known.size >= 0.5 * np.count_nonzero(~missing) and usual_s < LEAST_UNIX_S:
         if are_days(known):
             reading.note("time: days since 1900, as a spreadsheet writes them")
             return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)
@@ -98,12 +103,18 @@ def _best_column(mapped: Mapped, reading: Reading) -> Mapped:
     """Return columns with the times of the one that says most, and tells rows apart.
 
     A start of the recording that stands in each row, or times in whole minutes, do not replace
-    others that can be read.
+    others that can be read. Later parts of a large file are read as the first one.
     """
-    rows = mapped.rows
-    there = [name for name in mapped.names("time") if name in rows.names]
+    there = [name for name in mapped.names("time") if name in mapped.rows.names]
     if len(there) < 2 or "time" in mapped.own:
         return mapped
+    if "time" not in reading.columns:
+        reading.columns["time"] = _best_of(there, mapped.rows, reading)
+    best = reading.columns["time"]
+    return mapped if best == there[0] else replace(mapped, stated={**mapped.stated, "time": best})
+
+
+def _best_of(there: list[str], rows: Columns, reading: Reading) -> str:
     certain = {name: _certainty(name, rows.first_text(name)) for name in there}
     better = [name for name in there if certain[name] > certain[there[0]]]
     if better and certain[there[0]]:
@@ -113,10 +124,7 @@ def _best_column(mapped: Mapped, reading: Reading) -> Mapped:
             times = number_of(count[name], "different time")
             reading.note(f"{name}: {times} in {number_of(len(rows), 'row')}, not used")
         better = [name for name in better if name not in coarse]
-    if not better:
-        return mapped
-    best = max(better, key=certain.__getitem__)
-    return replace(mapped, stated={**mapped.stated, "time": best})
+    return max(better, key=certain.__getitem__, default=there[0])
 
 
 def _certainty(name: str, text: str) -> int:
