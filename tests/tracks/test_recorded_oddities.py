@@ -7,6 +7,7 @@ import pytest
 import mapfilter as mf
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers import text
+from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 
 COUNT = 300
@@ -331,3 +332,13 @@ def test_ticks_since_a_phone_was_started_need_their_unit(read, unit, scale):
     found = read(**{f"timestamp_{unit}": ticks, "lat": LAT, "lon": LON})
     assert found.clock.kind == "monotonic"
     np.testing.assert_allclose(places(found)["time_s"], 123_456 + np.arange(COUNT))
+
+
+@pytest.mark.parametrize("other", ["", "2026-05-13T07:00:00Z"])
+def test_whole_hours_of_a_zone_beside_a_time_of_another_form(read, tmp_path, other):
+    """As databases write them; they were local times, and shifted once more."""
+    texts = [f"{START + pd.Timedelta(i, 's')}+03" for i in range(COUNT)]
+    read(time=[other, *texts[1:]], lat=LAT, lon=LON)
+    found = read_recording(tmp_path / "a.csv", options=ReadOptions("Europe/Helsinki"))
+    assert found.clock.kind == "utc"
+    np.testing.assert_allclose(places(found)["time_s"][-COUNT + 1 :], TIME_S[1:] - 3 * 3600)
