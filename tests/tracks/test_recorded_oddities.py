@@ -109,6 +109,15 @@ def test_hemispheres_of_a_receiver_without_a_fix_for_long(read):
     np.testing.assert_allclose(places(found)["lon_deg"], -LON)
 
 
+@pytest.mark.parametrize("mark", ["-", "N/A"])
+def test_hemispheres_beside_marks_of_missing_ones(read, mark):
+    """One mark among them, and they did not count."""
+    letters = np.where(np.arange(COUNT) < 20, mark, "W")
+    lon = np.where(np.arange(COUNT) < 10, np.nan, LON)
+    found = read(time=TIME_S, lat=LAT, lon=lon, ew=letters)
+    np.testing.assert_allclose(places(found)["lon_deg"][-COUNT + 20 :], -LON[20:])
+
+
 @pytest.mark.parametrize("names", [("platform", ""), ("relation", ""), ("serving", "mode")])
 def test_letters_of_another_meaning_are_no_hemispheres(read, names):
     letters = np.where(np.arange(COUNT) % 3 == 0, "S", "N")
@@ -219,6 +228,34 @@ def test_seconds_in_fewer_than_half_of_the_rows(read):
     """The file was refused, as if these were no numbers."""
     time = np.where(np.arange(COUNT) % 3, np.nan, np.arange(COUNT))
     assert len(places(read(time=time, lat=LAT, lon=LON))) == COUNT / 3
+
+
+@pytest.mark.parametrize("mark", ["", "-"])
+def test_a_date_beside_no_time_of_day_is_no_midnight(read, mark):
+    """Rows of a receiver without a fix were some hours before the others."""
+    times = (START + pd.to_timedelta(np.arange(COUNT), "s")).strftime("%H:%M:%S").to_numpy(object)
+    times[:20] = mark
+    found = read(date="2026-05-13", time=times, lat=LAT, lon=LON)
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S[20:])
+
+
+def test_a_date_that_stays_over_midnight_beside_rows_without_one(read):
+    """Rows after midnight were a day early."""
+    times = START + pd.to_timedelta(50_300 + np.arange(COUNT), "s")
+    given = np.arange(COUNT) % 10 > 0
+    date = np.where(given, "2026-05-13", "")
+    time = np.where(given, times.strftime("%H:%M:%S"), "")
+    found = read(date=date, time=time, lat=LAT, lon=LON)
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S[given] + 50_300)
+
+
+def test_days_of_a_spreadsheet_whose_last_part_is_a_row(read, monkeypatch):
+    """It counted as seconds, and so the whole file."""
+    lines = [f"{day:.8f},{60 + i / 1e5:.5f},25.0" for i, day in enumerate(TIME_S / 86_400 + 25_569)]
+    monkeypatch.setattr(text, "_PART_BYTES", (COUNT - 1) * (len(lines[0]) + 1) - 1)
+    found = read(written="\n".join(["time,lat,lon", *lines, ""]))
+    assert found.clock.kind == "local"
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S, atol=2e-3)
 
 
 @pytest.mark.parametrize("line", ["s,deg,deg", "time,lat,lon"])

@@ -186,21 +186,26 @@ class Columns:
         return pc.fill_null(column.take(pa.array(index, mask=index < 0)), "")
 
     def first_text(self, name: str) -> str:
-        """Return the first text of a column that is not blank; "" where there is none."""
+        """Return the first text of a column that is no missing value; "" where there is none."""
         column = self._raw(name)
         if column is None:
             return ""
         # A receiver without a fix may leave a column blank for long.
         trimmed = pc.utf8_trim_whitespace(column)
-        at = pc.index(pc.not_equal(trimmed, ""), value=True).as_py()
+        at = pc.index(pc.is_in(trimmed, pa.array(MISSING)), value=False).as_py()
         return "" if at < 0 else str(trimmed[at].as_py())
 
     def joined(self, before: str, name: str) -> Columns:
-        """Return columns in which the texts of one follow those of another, after a blank."""
+        """Return columns in which the texts of one follow those of another, after a blank.
+
+        Where that is blank, it stays so.
+        """
         first, second = self._raw(before), self._raw(name)
         if first is None or second is None:
             return self
-        both = pc.binary_join_element_wise(*map(pc.utf8_trim_whitespace, (first, second)), " ")
+        first, second = map(pc.utf8_trim_whitespace, (first, second))
+        both = pc.binary_join_element_wise(first, second, " ")
+        both = pc.if_else(pc.equal(second, ""), "", both)
         return replace(self, _columns={**self._columns, self.names.index(name): both})
 
     def number(self, *names: str) -> Floats:

@@ -48,6 +48,7 @@ _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
 """Unix times of 1998, 2020 and 2039."""
 _SAME_DATE = "time: the date stays the same over midnight: times go on with the next day"
 _PAUSE_S = 600.0
+_DAYS = "time: days since 1900, as a spreadsheet writes them"
 
 
 def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
@@ -67,8 +68,8 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     usual_s = abs(float(np.median(known))) if known.size else np.inf
     _check_digits(mapped, reading, known)
     if known.size >= 0.5 * np.count_nonzero(~missing) and usual_s < LEAST_UNIX_S:
-        if are_days(known):
-            reading.note("time: days since 1900, as a spreadsheet writes them")
+        if are_days(known) or (in_days(known) and _DAYS in reading.notes):
+            reading.note(_DAYS)
             return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)
         if week := week_column(mapped):
             reading.clock = Clock("gps")
@@ -182,7 +183,9 @@ def _note_gps(reading: Reading, name: str, known: Floats) -> None:
 
 def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
     """Return times that go on after midnight where a column of dates keeps the day of the start."""
-    if DATE not in mapped.beside or mapped.rows.changes(DATE).any():
+    dates = mapped.rows.texts(DATE)
+    dates = dates[~mapped.rows.flags(DATE, true=MISSING)]
+    if DATE not in mapped.beside or (dates[1:] != dates[:-1]).any():
         return time_s
     known_s = time_s[np.isfinite(time_s)]
     before_s = [reading.last_s] if np.isfinite(reading.last_s) else []
