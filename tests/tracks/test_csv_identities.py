@@ -226,3 +226,18 @@ def test_networks_in_one_number_of_four_digits(read):
     """262 and 1 without a zero between them were 26 and 21."""
     radio, _ = read(plmn=np.where(np.arange(COUNT) < 20, 2621, 310_410), lac=7, ci=8)
     assert radio["cell"].unique().tolist() == ["262-1-7-8", "310-410-7-8"]
+
+
+def test_small_numbers_of_cells_beside_those_of_nodes(read, monkeypatch):
+    """They were names, and those of all nodes the same ones."""
+    nodes, cells = 4571 + np.arange(COUNT) // 20, 1 + np.arange(COUNT) % 3
+    for size in (1 << 24, 1 << 9):
+        monkeypatch.setattr(text, "_PART_BYTES", size)
+        radio, notes = read(enb=nodes, cell=cells, tac=7, mcc=244, mnc=91)
+        assert radio["cell"].tolist() == [
+            f"244-91-7-{256 * node + cell}" for node, cell in zip(nodes, cells, strict=True)
+        ]
+        assert "cell: taken for the numbers of cells within their nodes" in notes
+    # Names of a plan stay.
+    radio, _ = read(enb=nodes, cell=[f"N{cell}" for cell in cells], tac=7, mcc=244, mnc=91)
+    assert set(radio["cell"]) == {"N1", "N2", "N3"}

@@ -405,3 +405,20 @@ def test_parts_of_quaternions_are_in_the_order_of_the_header(read, header):
     assert rows.loc[0, ["qx", "qy", "qz", "qw"]].tolist() == (
         [0.8, 0, 0, 0.6] if header == "t x y z" else [0, 0, 0.6, 0.8]
     )
+
+
+@pytest.mark.parametrize("rows", [COUNT, 200])
+def test_times_of_day_in_one_number(read, monkeypatch, rows):
+    """They were seconds, with 40 of them between minutes."""
+    second = 86_400 - 200 + np.arange(COUNT)
+    texts = [f"{at // 3600 % 24:02d}{at // 60 % 60:02d}{at % 60:02d}.50" for at in second.tolist()]
+    lines = [f"{at},{60 + i / 1e5:.5f},25.0" for i, at in enumerate(texts)]
+    monkeypatch.setattr(text, "_PART_BYTES", rows * (len(lines[0]) + 1) - 1)
+    found = read(written="\n".join(["utc,lat,lon", *lines, ""]))
+    np.testing.assert_allclose(places(found)["time_s"], second + 0.5)
+
+
+@pytest.mark.parametrize("step", [0.5, 1, 7, 20])
+def test_seconds_are_no_times_of_day_in_one_number(read, step):
+    time = 100_000 + step * np.arange(COUNT)
+    np.testing.assert_allclose(places(read(time=time, lat=LAT, lon=LON))["time_s"], time)

@@ -48,6 +48,9 @@ _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
 """Unix times of 1998, 2020 and 2039."""
 _SAME_DATE = "time: the date stays the same over midnight: times go on with the next day"
 _PAUSE_S = 600.0
+_OF_DAY = "time: taken for hours, minutes and seconds of the day in one number, as 101530"
+_LONG, _SHORT = 300.0, 20.0
+"""Of times, and of their usual steps, to tell them from seconds."""
 _DAYS = "time: days since 1900, as a spreadsheet writes them"
 
 
@@ -77,7 +80,7 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             counted_s = utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
             return over_stuck_weeks(reading, counted_s, week)
         reading.clock = Clock("monotonic")
-        return over_days(reading, over_weeks(reading, number))
+        return over_days(reading, over_weeks(reading, _without_digits(reading, number)))
     reading.notes[:] = [
         note
         for note in reading.notes
@@ -136,6 +139,28 @@ def _certainty(name: str, text: str) -> int:
         return 3 if _EARLY_S < unix_seconds([float(number)])[0] < _LATEST_S else 1
     time_s, zoned = parse_times(np.array([text], dtype=object), "UTC" if "utc" in name else "")
     return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
+
+
+def _without_digits(reading: Reading, number: Floats) -> Floats:
+    """Return seconds of the day for times of day in one number: 36930.25 for 101530.25.
+
+    Of seconds some would end in 60 to 99.
+    """
+    known = np.isfinite(number)
+    hours, rest = np.divmod(number[known], 10_000.0)
+    minutes, seconds = np.divmod(rest, 100.0)
+    if not hours.size or hours.min() < 0 or hours.max() >= 24:
+        return number
+    if minutes.max() >= 60 or seconds.max() >= 60:
+        return number
+    steps = np.diff(np.unique(number[known]))
+    long = steps.sum() > _LONG and np.median(steps) <= _SHORT
+    if not (long or _OF_DAY in reading.notes):
+        return number
+    reading.note(_OF_DAY)
+    counted = number.copy()
+    counted[known] = 3600 * hours + 60 * minutes + seconds
+    return counted
 
 
 def _check_digits(mapped: Mapped, reading: Reading, known: Floats) -> None:
