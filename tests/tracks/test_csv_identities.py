@@ -192,6 +192,21 @@ def test_cells_of_several_technologies_in_columns_of_their_own(read):
     assert radio["arfcn"].tolist() == np.where(lte, 1300, 62).tolist()
 
 
+@pytest.mark.parametrize("missing", ["", "-", "2147483647"])
+@pytest.mark.parametrize("of", ["carriers", "identities", "both"])
+def test_technologies_by_columns_of_several(read, of, missing):
+    """Where a file had columns of two technologies, cells of neither had one."""
+    lte = np.arange(COUNT) % 2 == 0
+    carriers = {
+        "earfcn": np.where(lte, "1300", missing),
+        "nr_arfcn": np.where(lte, missing, "634000"),
+    }
+    identities = {"eci": np.where(lte, "1234", missing), "nci": np.where(lte, missing, "5678")}
+    given = {"carriers": carriers, "identities": identities, "both": carriers | identities}[of]
+    radio, _ = read(mcc=244, mnc=91, tac=2048, pci=7, **given)
+    assert radio["technology"].tolist() == np.where(lte, "LTE", "NR").tolist()
+
+
 @pytest.mark.parametrize(("family", "column"), [("UMTS", "rscp"), ("GSM", "rssi")])
 def test_levels_of_several_technologies_in_columns_of_their_own(tmp_path, family, column):
     """Those of UMTS and GSM were lost beside a column of LTE; an RSSI of LTE is no RSRP."""
@@ -241,3 +256,11 @@ def test_small_numbers_of_cells_beside_those_of_nodes(read, monkeypatch):
     # Names of a plan stay.
     radio, _ = read(enb=nodes, cell=[f"N{cell}" for cell in cells], tac=7, mcc=244, mnc=91)
     assert set(radio["cell"]) == {"N1", "N2", "N3"}
+
+
+@pytest.mark.parametrize("name", ["eci", "nci"])
+def test_a_whole_identity_beside_a_cell_of_its_node(read, name):
+    """The first column that has a number counted: all nodes were one."""
+    whole = 256 * (4571 + np.arange(COUNT) // 20) + 1
+    radio, _ = read(mcc=244, mnc=91, tac=7, cid=1, **{name: whole})
+    assert radio["cell"].tolist() == [f"244-91-7-{one}" for one in whole]

@@ -12,7 +12,7 @@ from mapfilter._words import number_of
 from mapfilter.radio.identities import IDENTITY
 from mapfilter.radio.transmitter_lists import CELLS_OF_NODE
 from mapfilter.tracks.readers.csv_mapped import Mapped
-from mapfilter.tracks.readers.identities import parse_identities
+from mapfilter.tracks.readers.identities import available, parse_identities
 
 _HEX = re.compile(r"[0-9A-F]{1,9}", re.ASCII | re.IGNORECASE)
 _LEAST_LETTERS = 0.5
@@ -29,6 +29,11 @@ def cell_identities(mapped: Mapped) -> dict[str, Floats]:
     mapped = _without_hexadecimals(mapped)
     identity = {name: mapped.whole(name) for name in IDENTITY}
     identity |= _networks(identity["mcc"], identity["mnc"])
+    for name in {"eci", "nci"}.intersection(mapped.columns("ci")[1:]):
+        # Beside a whole identity a small number is that of the cell within its node.
+        whole = available(*mapped.rows.whole(name))
+        small = (identity["ci"] < CELLS_OF_NODE) & (whole >= CELLS_OF_NODE)
+        identity["ci"] = np.where(small, whole, identity["ci"])
     if mapped.has("enodeb"):
         identity["ci"] = _of_nodes(mapped, identity["ci"])
     if mapped.has("cgi"):
