@@ -265,6 +265,15 @@ def test_an_older_log_of_gnettrack_has_no_raw_identity(written):
     assert set(serving["ci"]) == {401 * 256 + 141}
 
 
+@pytest.mark.parametrize("mark", ["", "-", "2147483647"])
+def test_a_row_of_gnettrack_without_a_raw_identity(written, mark):
+    """Its cell had no identity."""
+    rows = read_recording(written("gnettrack", gnettrack().replace("102764173", mark)))
+    serving = rows.tables["radio"].query("role == 'serving'")
+    assert len(serving) == COUNT
+    assert set(serving["ci"]) == {401 * 256 + 141}
+
+
 def test_a_cell_id_of_0_is_no_identity_for_gnettrack(written):
     text = gnettrack().replace("\t102764173\t", "\t0\t", 3)
     recording = read_recording(written("gnettrack", text))
