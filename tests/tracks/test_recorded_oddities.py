@@ -381,20 +381,6 @@ def test_whole_hours_of_a_zone_beside_a_time_of_another_form(read, tmp_path, oth
     np.testing.assert_allclose(places(found)["time_s"][-COUNT + 1 :], TIME_S[1:] - 3 * 3600)
 
 
-@pytest.mark.parametrize("placed", ["none", "late", "first"])
-def test_a_phone_with_an_attitude_makes_no_poses(read, placed):
-    """Eight numbers in a row were those of a trajectory: accelerations were places in metres."""
-    rows = {f"acc_{axis}": value for axis, value in zip("xyz", (0.1, 0.2, 9.8), strict=True)}
-    rows |= {f"q{axis}": value for axis, value in zip("xyzw", (0.0, 0.0, 0.6, 0.8), strict=True)}
-    late = np.arange(COUNT) >= 100
-    places = {"lat": np.where(late, LAT, np.nan), "lon": np.where(late, LON, np.nan)}
-    columns = {"none": rows, "late": rows | places, "first": places | rows}[placed]
-    found = read(time=TIME_S, **columns)
-    assert found.format == "csv"
-    assert len(found.tables["accelerometer"]) == len(found.tables["orientation"]) == COUNT
-    assert len(found.tables.get("positions", ())) == (0 if placed == "none" else 200)
-
-
 @pytest.mark.parametrize(
     "header", ["# timestamp tx ty tz qw qx qy qz", "time,x,y,z,q_w,q_x,q_y,q_z", "t x y z"]
 )

@@ -29,7 +29,6 @@ from mapfilter.tracks.readers import (
     tems,
     wigle,
 )
-from mapfilter.tracks.readers.csv_fields import usual_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Recording
@@ -66,8 +65,6 @@ FORMATS: tuple[Format, ...] = (
 )
 """All formats, in the order in which a file is compared with them."""
 
-_POSES, _OF_OTHERS = (poses.KITTI, poses.TUM), ("lat_", "lon_", "acc_", "gyr_", "mag_")
-"""Lines of so many numbers, and beginnings of fields that none of these has in its header."""
 _PEEKED_BYTES = 1 << 18
 
 
@@ -84,10 +81,7 @@ def find_format(text: Text) -> Format | None:
     """Return the format that a file looks like, or None."""
     if text.first_line.lstrip().startswith(JSON):
         return None
-    names = header_names(text.first_line, likely_separator(text.first_line))
-    measured = any(field.startswith(_OF_OTHERS) for field in usual_fields(names))
-    formats = [known for known in FORMATS if not (measured and known in _POSES)]
-    return next((known for known in formats if known.matches(text)), None)
+    return next((known for known in FORMATS if known.matches(text)), None)
 
 
 def format_of(path: str | Path) -> Format | None:

@@ -22,8 +22,6 @@ from mapfilter.tracks.readers.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.zipped import has_recording
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)
-_QUATERNION = ("qx", "qy", "qz", "qw")
-_QUATERNION_PART = re.compile(r"\bq_?([wxyz])\b")
 _FRAME_S = 0.1
 _CROOKED = 0.05
 
@@ -121,10 +119,10 @@ def _frame_times(text: Text, reading: Reading) -> Floats | None:
 
 
 def _read_tum(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
-    names = ["time", "x", "y", "z", *_quaternion_names(text)]
+    names = ["time", "x", "y", "z", *_quaternion(text)]
     reading.program, reading.clock = "TUM trajectory", Clock(_tum_clock(text))
     for rows, values in _parts(text, reading, names):
-        quaternion = np.stack([values[name] for name in _QUATERNION], axis=1)
+        quaternion = np.stack([values[f"q{axis}"] for axis in "xyzw"], axis=1)
         norm = np.linalg.norm(quaternion, axis=1)
         good = ~(np.abs(norm - 1.0) > _CROOKED)
         reading.refuse(rows.line[~good], "pose: no unit quaternion")
@@ -132,13 +130,10 @@ def _read_tum(text: Text, reading: Reading, options: ReadOptions) -> None:  # no
         _add_poses(reading, values["time"][good], place[good], quaternion[good], rows.line[good])
 
 
-def _quaternion_names(text: Text) -> tuple[str, ...]:
-    """Return the order of the parts of quaternions by the header: the scalar may be the first."""
-    for line in text.head[:30]:
-        found = tuple(f"q{axis}" for axis in _QUATERNION_PART.findall(line.lower()))
-        if sorted(found) == sorted(_QUATERNION):
-            return found
-    return _QUATERNION
+def _quaternion(text: Text) -> list[str]:
+    """Return the parts of quaternions in the order of the header: the scalar may be the first."""
+    heads = (re.findall(r"\bq_?([wxyz])\b", line.lower()) for line in text.head[:30])
+    return [f"q{axis}" for axis in next((head for head in heads if sorted(head) == [*"wxyz"]), "xyzw")]
 
 
 def _tum_clock(text: Text) -> Literal["utc", "monotonic"]:
