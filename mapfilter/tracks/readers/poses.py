@@ -133,7 +133,8 @@ def _read_tum(text: Text, reading: Reading, options: ReadOptions) -> None:  # no
 def _quaternion(text: Text) -> list[str]:
     """Return the parts of quaternions in the order of the header: the scalar may be the first."""
     heads = (re.findall(r"\bq_?([wxyz])\b", line.lower()) for line in text.head[:30])
-    return [f"q{axis}" for axis in next((head for head in heads if sorted(head) == [*"wxyz"]), "xyzw")]
+    order = next((head for head in heads if sorted(head) == [*"wxyz"]), "xyzw")
+    return [f"q{axis}" for axis in order]
 
 
 def _tum_clock(text: Text) -> Literal["utc", "monotonic"]:
