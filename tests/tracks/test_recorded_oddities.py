@@ -408,3 +408,11 @@ def test_times_of_day_in_one_number(read, monkeypatch, rows):
 def test_seconds_are_no_times_of_day_in_one_number(read, step):
     time = 100_000 + step * np.arange(COUNT)
     np.testing.assert_allclose(places(read(time=time, lat=LAT, lon=LON))["time_s"], time)
+
+
+@pytest.mark.parametrize("odd", ["", "-", "unknown"])
+def test_unix_times_with_decimal_commas_beside_a_row_without_one(read, odd):
+    """The file was refused."""
+    lines = [f"{time:.2f};{60 + i / 1e5:.5f};25,0" for i, time in enumerate(TIME_S + 0.25)]
+    written = "\n".join(["time;lat;lon", f"{odd};60,1;25,0", *lines, ""]).replace(".", ",")
+    np.testing.assert_allclose(places(read(written=written))["time_s"], TIME_S + 0.25)

@@ -112,10 +112,11 @@ class Columns:
     def _times(
         self, names: Sequence[str], zone: str, layout: str, after_s: float
     ) -> tuple[Floats, bool]:
-        column = self._raw(*names)
+        rows = self
+        if self.decimal_comma and layout == "ISO8601":
+            rows = self.rewritten(r"^(\s*\d+),(\d+\s*)$", r"\1.\2", *names)
+        column = rows._raw(*names)
         if column is not None and layout == "ISO8601":
-            if self.decimal_comma:
-                column = pc.replace_substring_regex(column, r"^(\s*\d+),(\d+\s*)$", r"\1.\2")
             try:
                 number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
             except pa.ArrowInvalid:
@@ -127,7 +128,7 @@ class Columns:
             and (found := _plain_times(column, zone, layout, after_s)) is not None
         ):
             return found
-        return parse_times(self.texts(*names), zone, layout, after_s)
+        return parse_times(rows.texts(*names), zone, layout, after_s)
 
     def times_of_part(
         self, *names: str, zone: str = "", layout: str = "ISO8601"
