@@ -49,6 +49,19 @@ def test_hexadecimal_numbers_beside_rows_without_one(read, mark):
     assert "no numbers" not in notes
 
 
+@pytest.mark.parametrize("missing", ["-", "N/A", "unknown"])
+def test_hexadecimal_numbers_beside_words_for_missing_ones(read, missing):
+    """They were lost, and those of digits alone read as decimal ones."""
+    serves = np.arange(COUNT) % 4 > 0
+    ci = np.where(serves, [f"{one:04X}" for one in 0xA000 + np.arange(COUNT)], missing)
+    lac = np.where(np.arange(COUNT) % 8 == 1, "1234", "1AB4")
+    radio, _ = read(mcc=244, mnc=91, lac=np.where(serves, lac, missing), ci=ci)
+    cells = [
+        f"244-91-{int(a, 16)}-{int(c, 16)}" for a, c in zip(lac[serves], ci[serves], strict=True)
+    ]
+    assert radio.loc[radio["role"] == "serving", "cell"].tolist() == cells
+
+
 def test_hexadecimal_numbers_of_a_later_part_without_letters(read, monkeypatch):
     """Where one stays in a cell for long: it was another one, of a decimal number."""
     monkeypatch.setattr(text, "_PART_BYTES", 1 << 9)
@@ -179,6 +192,21 @@ def test_cells_of_several_technologies_in_columns_of_their_own(read):
     assert radio["arfcn"].tolist() == np.where(lte, 1300, 62).tolist()
 
 
+@pytest.mark.parametrize("missing", ["", "-", "2147483647"])
+@pytest.mark.parametrize("of", ["carriers", "identities", "both"])
+def test_technologies_by_columns_of_several(read, of, missing):
+    """Where a file had columns of two technologies, cells of neither had one."""
+    lte = np.arange(COUNT) % 2 == 0
+    carriers = {
+        "earfcn": np.where(lte, "1300", missing),
+        "nr_arfcn": np.where(lte, missing, "634000"),
+    }
+    identities = {"eci": np.where(lte, "1234", missing), "nci": np.where(lte, missing, "5678")}
+    given = {"carriers": carriers, "identities": identities, "both": carriers | identities}[of]
+    radio, _ = read(mcc=244, mnc=91, tac=2048, pci=7, **given)
+    assert radio["technology"].tolist() == np.where(lte, "LTE", "NR").tolist()
+
+
 @pytest.mark.parametrize(("family", "column"), [("UMTS", "rscp"), ("GSM", "rssi")])
 def test_levels_of_several_technologies_in_columns_of_their_own(tmp_path, family, column):
     """Those of UMTS and GSM were lost beside a column of LTE; an RSSI of LTE is no RSRP."""
@@ -207,3 +235,32 @@ def test_networks_in_one_number_beside_a_column_of_technologies(read):
     """A column ``net`` of words counted as that of network codes."""
     radio, _ = read(plmn=24_491, net="LTE", tac=2048, eci=123_456)
     assert set(radio["cell"]) == {"244-91-2048-123456"}
+
+
+def test_networks_in_one_number_of_four_digits(read):
+    """262 and 1 without a zero between them were 26 and 21."""
+    radio, _ = read(plmn=np.where(np.arange(COUNT) < 20, 2621, 310_410), lac=7, ci=8)
+    assert radio["cell"].unique().tolist() == ["262-1-7-8", "310-410-7-8"]
+
+
+def test_small_numbers_of_cells_beside_those_of_nodes(read, monkeypatch):
+    """They were names, and those of all nodes the same ones."""
+    nodes, cells = 4571 + np.arange(COUNT) // 20, 1 + np.arange(COUNT) % 3
+    for size in (1 << 24, 1 << 9):
+        monkeypatch.setattr(text, "_PART_BYTES", size)
+        radio, notes = read(enb=nodes, cell=cells, tac=7, mcc=244, mnc=91)
+        assert radio["cell"].tolist() == [
+            f"244-91-7-{256 * node + cell}" for node, cell in zip(nodes, cells, strict=True)
+        ]
+        assert "cell: taken for the numbers of cells within their nodes" in notes
+    # Names of a plan stay.
+    radio, _ = read(enb=nodes, cell=[f"N{cell}" for cell in cells], tac=7, mcc=244, mnc=91)
+    assert set(radio["cell"]) == {"N1", "N2", "N3"}
+
+
+@pytest.mark.parametrize("name", ["eci", "nci"])
+def test_a_whole_identity_beside_a_cell_of_its_node(read, name):
+    """The first column that has a number counted: all nodes were one."""
+    whole = 256 * (4571 + np.arange(COUNT) // 20) + 1
+    radio, _ = read(mcc=244, mnc=91, tac=7, cid=1, **{name: whole})
+    assert radio["cell"].tolist() == [f"244-91-7-{one}" for one in whole]

@@ -52,6 +52,17 @@ def test_a_row_for_each_value_is_the_table_that_it_would_make(tmp_path):
     assert "a row for each value: 6 columns made of the names in name" in long.notes
 
 
+@pytest.mark.parametrize("time", ["Time [s]", "Timestamp (ms)", "Elapsed time (s)"])
+def test_times_whose_header_states_their_unit(tmp_path, time):
+    """Such a table was of no known format."""
+    scale = 1000 if "ms" in time else 1
+    rows = [f"{scale * i / 4};Vehicle speed [km/h];{30 + i % 3}" for i in range(40)]
+    (tmp_path / "bus.csv").write_text("\n".join([f"{time};Name;Value", *rows, ""]))
+    found = read_recording(tmp_path / "bus.csv")
+    assert found.format == "long"
+    np.testing.assert_allclose(found.tables["odometry"]["time_s"], np.arange(40) / 4)
+
+
 def test_units_of_a_column_of_their_own_count(tmp_path):
     rows = [(t, "Vehicle speed", v, "mph") for t, v in zip(range(90), SPEED_MPS, strict=True)]
     rows += [(t + 0.5, "Engine RPM", 1500, "rpm") for t in range(90)]

@@ -7,6 +7,7 @@ import pytest
 import mapfilter as mf
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers import text
+from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 
 COUNT = 300
@@ -100,6 +101,23 @@ def test_hemispheres_in_columns_of_their_own(read):
     np.testing.assert_allclose(places(found)["lat_deg"], -LAT)
 
 
+def test_hemispheres_of_a_receiver_without_a_fix_for_long(read):
+    """Behind 1000 rows without a letter they did not count: west of Greenwich was east."""
+    rows = pd.DataFrame({"time": TIME_S, "lat": LAT, "ns": "N", "lon": LON, "ew": "W"})
+    before = pd.DataFrame({"time": TIME_S[0] - np.arange(1200.0, 0.0, -1.0)})
+    found = read(pd.concat([before, rows]))
+    np.testing.assert_allclose(places(found)["lon_deg"], -LON)
+
+
+@pytest.mark.parametrize("mark", ["-", "N/A"])
+def test_hemispheres_beside_marks_of_missing_ones(read, mark):
+    """One mark among them, and they did not count."""
+    letters = np.where(np.arange(COUNT) < 20, mark, "W")
+    lon = np.where(np.arange(COUNT) < 10, np.nan, LON)
+    found = read(time=TIME_S, lat=LAT, lon=lon, ew=letters)
+    np.testing.assert_allclose(places(found)["lon_deg"][-COUNT + 20 :], -LON[20:])
+
+
 @pytest.mark.parametrize("names", [("platform", ""), ("relation", ""), ("serving", "mode")])
 def test_letters_of_another_meaning_are_no_hemispheres(read, names):
     letters = np.where(np.arange(COUNT) % 3 == 0, "S", "N")
@@ -168,6 +186,76 @@ def test_a_date_that_stays_over_midnight_in_a_file_read_in_parts(read, monkeypat
     lines = [f"{date}{line[10:]}" for date, line in zip(dates, lines, strict=True)]
     found = read(written="\n".join(["date,time,lat,lon", *lines]))
     np.testing.assert_allclose(places(found)["time_s"], START.timestamp() + time_s)
+
+
+def parted_drive(read, monkeypatch, rows, kept=(), **columns):
+    """Read a drive over parts of some rows; in rows 100 to 199 most columns are empty."""
+    fixed = (np.arange(COUNT) < 100) | (np.arange(COUNT) >= 200)
+    table = pd.DataFrame({**columns, "lat": LAT.round(5), "lon": LON.round(5)}).astype(object)
+    table.loc[~fixed, table.columns.drop(list(kept))] = np.nan
+    written = table.to_csv(index=False)
+    sizes = np.cumsum([len(line) + 1 for line in written.splitlines()[1:]])
+    monkeypatch.setattr(text, "_PART_BYTES", int(sizes[rows - 1]) - 1)
+    return read(written=written)
+
+
+@pytest.mark.parametrize("rows", [COUNT, 60])
+def test_a_receivers_times_that_a_later_part_lacks(read, monkeypatch, rows):
+    """That part had the seconds of another column: a log of 56 years."""
+    columns = {"time": 100.0 + np.arange(COUNT), "utc": TIME_S}
+    fixed = np.r_[0:100, 200:COUNT]
+    found = parted_drive(read, monkeypatch, rows, ("time",), **columns)
+    assert found.clock.kind == "utc"
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S[fixed])
+
+
+@pytest.mark.parametrize("form", ["unix", "seconds", "dates"])
+@pytest.mark.parametrize("rows", [COUNT, 5])
+def test_a_part_without_a_time_loses_no_other_one(read, monkeypatch, rows, form):
+    """The whole file was refused."""
+    stamps = START + pd.to_timedelta(np.arange(COUNT), "s")
+    columns = {
+        "unix": {"time": TIME_S},
+        "seconds": {"time": 100.5 + np.arange(COUNT)},
+        "dates": {"date": stamps.strftime("%Y-%m-%d"), "time": stamps.strftime("%H:%M:%S")},
+    }[form]
+    found = parted_drive(read, monkeypatch, rows, **columns)
+    assert len(places(found)) == 200
+    assert found.clock.kind == {"unix": "utc", "seconds": "monotonic", "dates": "local"}[form]
+
+
+def test_seconds_in_fewer_than_half_of_the_rows(read):
+    """The file was refused, as if these were no numbers."""
+    time = np.where(np.arange(COUNT) % 3, np.nan, np.arange(COUNT))
+    assert len(places(read(time=time, lat=LAT, lon=LON))) == COUNT / 3
+
+
+@pytest.mark.parametrize("mark", ["", "-"])
+def test_a_date_beside_no_time_of_day_is_no_midnight(read, mark):
+    """Rows of a receiver without a fix were some hours before the others."""
+    times = (START + pd.to_timedelta(np.arange(COUNT), "s")).strftime("%H:%M:%S").to_numpy(object)
+    times[:20] = mark
+    found = read(date="2026-05-13", time=times, lat=LAT, lon=LON)
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S[20:])
+
+
+def test_a_date_that_stays_over_midnight_beside_rows_without_one(read):
+    """Rows after midnight were a day early."""
+    times = START + pd.to_timedelta(50_300 + np.arange(COUNT), "s")
+    given = np.arange(COUNT) % 10 > 0
+    date = np.where(given, "2026-05-13", "")
+    time = np.where(given, times.strftime("%H:%M:%S"), "")
+    found = read(date=date, time=time, lat=LAT, lon=LON)
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S[given] + 50_300)
+
+
+def test_days_of_a_spreadsheet_whose_last_part_is_a_row(read, monkeypatch):
+    """It counted as seconds, and so the whole file."""
+    lines = [f"{day:.8f},{60 + i / 1e5:.5f},25.0" for i, day in enumerate(TIME_S / 86_400 + 25_569)]
+    monkeypatch.setattr(text, "_PART_BYTES", (COUNT - 1) * (len(lines[0]) + 1) - 1)
+    found = read(written="\n".join(["time,lat,lon", *lines, ""]))
+    assert found.clock.kind == "local"
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S, atol=2e-3)
 
 
 @pytest.mark.parametrize("line", ["s,deg,deg", "time,lat,lon"])
@@ -281,3 +369,50 @@ def test_ticks_since_a_phone_was_started_need_their_unit(read, unit, scale):
     found = read(**{f"timestamp_{unit}": ticks, "lat": LAT, "lon": LON})
     assert found.clock.kind == "monotonic"
     np.testing.assert_allclose(places(found)["time_s"], 123_456 + np.arange(COUNT))
+
+
+@pytest.mark.parametrize("other", ["", "2026-05-13T07:00:00Z"])
+def test_whole_hours_of_a_zone_beside_a_time_of_another_form(read, tmp_path, other):
+    """As databases write them; they were local times, and shifted once more."""
+    texts = [f"{START + pd.Timedelta(i, 's')}+03" for i in range(COUNT)]
+    read(time=[other, *texts[1:]], lat=LAT, lon=LON)
+    found = read_recording(tmp_path / "a.csv", options=ReadOptions("Europe/Helsinki"))
+    assert found.clock.kind == "utc"
+    np.testing.assert_allclose(places(found)["time_s"][-COUNT + 1 :], TIME_S[1:] - 3 * 3600)
+
+
+@pytest.mark.parametrize(
+    "header", ["# timestamp tx ty tz qw qx qy qz", "time,x,y,z,q_w,q_x,q_y,q_z", "t x y z"]
+)
+def test_parts_of_quaternions_are_in_the_order_of_the_header(read, header):
+    """The scalar that is first by it was that of x."""
+    lines = [f"{time} {i} 0 0 0.8 0 0 0.6" for i, time in enumerate(TIME_S)]
+    rows = read(written="\n".join([header, *lines])).tables["poses"]
+    assert rows.loc[0, ["qx", "qy", "qz", "qw"]].tolist() == (
+        [0.8, 0, 0, 0.6] if header == "t x y z" else [0, 0, 0.6, 0.8]
+    )
+
+
+@pytest.mark.parametrize("rows", [COUNT, 200])
+def test_times_of_day_in_one_number(read, monkeypatch, rows):
+    """They were seconds, with 40 of them between minutes."""
+    second = 86_400 - 200 + np.arange(COUNT)
+    texts = [f"{at // 3600 % 24:02d}{at // 60 % 60:02d}{at % 60:02d}.50" for at in second.tolist()]
+    lines = [f"{at},{60 + i / 1e5:.5f},25.0" for i, at in enumerate(texts)]
+    monkeypatch.setattr(text, "_PART_BYTES", rows * (len(lines[0]) + 1) - 1)
+    found = read(written="\n".join(["utc,lat,lon", *lines, ""]))
+    np.testing.assert_allclose(places(found)["time_s"], second + 0.5)
+
+
+@pytest.mark.parametrize("step", [0.5, 1, 7, 20])
+def test_seconds_are_no_times_of_day_in_one_number(read, step):
+    time = 100_000 + step * np.arange(COUNT)
+    np.testing.assert_allclose(places(read(time=time, lat=LAT, lon=LON))["time_s"], time)
+
+
+@pytest.mark.parametrize("odd", ["", "-", "unknown"])
+def test_unix_times_with_decimal_commas_beside_a_row_without_one(read, odd):
+    """The file was refused."""
+    lines = [f"{time:.2f};{60 + i / 1e5:.5f};25,0" for i, time in enumerate(TIME_S + 0.25)]
+    written = "\n".join(["time;lat;lon", f"{odd};60,1;25,0", *lines, ""]).replace(".", ",")
+    np.testing.assert_allclose(places(read(written=written))["time_s"], TIME_S + 0.25)

@@ -207,6 +207,8 @@ TIMES = [
     ["2026-05-01T10:00:00Z", "2026-05-01T10:00:00"],
     ["2026-05-01T10:00Z", "2026-13-01T10:00Z"],
     ["2026-05-01T10:00:00Z", ""],
+    ["2026-05-01 10:00:00+03", "2026-05-01T10:00:01.5-03"],
+    ["2026-05-01 10:00:00 +03", ""],
 ]
 
 
@@ -260,6 +262,15 @@ def test_an_older_log_of_gnettrack_has_no_raw_identity(written):
     rows = read_recording(written("gnettrack", text)).tables["radio"]
     serving = rows[rows["role"] == "serving"]
     # Base station 401, its cell 141; the network is LTE.
+    assert set(serving["ci"]) == {401 * 256 + 141}
+
+
+@pytest.mark.parametrize("mark", ["", "-", "2147483647"])
+def test_a_row_of_gnettrack_without_a_raw_identity(written, mark):
+    """Its cell had no identity."""
+    rows = read_recording(written("gnettrack", gnettrack().replace("102764173", mark)))
+    serving = rows.tables["radio"].query("role == 'serving'")
+    assert len(serving) == COUNT
     assert set(serving["ci"]) == {401 * 256 + 141}
 
 

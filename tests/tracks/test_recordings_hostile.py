@@ -268,6 +268,19 @@ def test_a_quote_that_is_never_closed_ends_with_its_line(read):
     assert len(recording.tables["radio"]) == 2 * COUNT
 
 
+@pytest.mark.parametrize("name", COMMA)
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_a_separator_at_the_end_of_the_header_alone(name, quote, read):
+    """All rows were refused, as if they were cut off."""
+    plain = read(name, MADE[name][1].encode())
+    head, *lines = MADE[name][1].splitlines()
+    lines[0] = lines[0].replace("P", f"{quote}P{quote}")
+    found = read(name, "\n".join([head + ",", *lines, ""]).encode())
+    assert not found.unusable
+    for table, rows in plain.tables.items():
+        assert found.tables[table].equals(rows), table
+
+
 def test_a_quoted_separator_does_not_stand_for_a_field_that_is_missing(read):
     """Counted with it, the line has all its fields, each but the first ones of its neighbour."""
     lines = MADE["opencellid"][1].splitlines()

@@ -21,11 +21,11 @@ from mapfilter.tracks.readers.times import LEAST_UNIX_S, parse_times, seconds_of
 
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
-_FIRST_ROWS = 1000
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
 _WHOLE = r"^(?:[-+]?(\d{1,18}|[0-8]\d{18})|0[xX][0-9a-fA-F]{1,15})$"
-_MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
+MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
+"""Texts of missing values."""
 
 
 @dataclass(eq=False)
@@ -112,10 +112,11 @@ class Columns:
     def _times(
         self, names: Sequence[str], zone: str, layout: str, after_s: float
     ) -> tuple[Floats, bool]:
-        column = self._raw(*names)
+        rows = self
+        if self.decimal_comma and layout == "ISO8601":
+            rows = self.rewritten(r"^(\s*\d+),(\d+\s*)$", r"\1.\2", *names)
+        column = rows._raw(*names)
         if column is not None and layout == "ISO8601":
-            if self.decimal_comma:
-                column = pc.replace_substring_regex(column, r"^(\s*\d+),(\d+\s*)$", r"\1.\2")
             try:
                 number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
             except pa.ArrowInvalid:
@@ -127,7 +128,7 @@ class Columns:
             and (found := _plain_times(column, zone, layout, after_s)) is not None
         ):
             return found
-        return parse_times(self.texts(*names), zone, layout, after_s)
+        return parse_times(rows.texts(*names), zone, layout, after_s)
 
     def times_of_part(
         self, *names: str, zone: str = "", layout: str = "ISO8601"
@@ -186,17 +187,26 @@ class Columns:
         return pc.fill_null(column.take(pa.array(index, mask=index < 0)), "")
 
     def first_text(self, name: str) -> str:
-        """Return the first text of a column that is not blank; "" where there is none."""
+        """Return the first text of a column that is no missing value; "" where there is none."""
         column = self._raw(name)
-        texts = () if column is None else pc.utf8_trim_whitespace(column[:_FIRST_ROWS]).to_pylist()
-        return next((text for text in texts if text), "")
+        if column is None:
+            return ""
+        # A receiver without a fix may leave a column blank for long.
+        trimmed = pc.utf8_trim_whitespace(column)
+        at = pc.index(pc.is_in(trimmed, pa.array(MISSING)), value=False).as_py()
+        return "" if at < 0 else str(trimmed[at].as_py())
 
     def joined(self, before: str, name: str) -> Columns:
-        """Return columns in which the texts of one follow those of another, after a blank."""
+        """Return columns in which the texts of one follow those of another, after a blank.
+
+        Where that is blank, it stays so.
+        """
         first, second = self._raw(before), self._raw(name)
         if first is None or second is None:
             return self
-        both = pc.binary_join_element_wise(*map(pc.utf8_trim_whitespace, (first, second)), " ")
+        first, second = map(pc.utf8_trim_whitespace, (first, second))
+        both = pc.binary_join_element_wise(first, second, " ")
+        both = pc.if_else(pc.equal(second, ""), "", both)
         return replace(self, _columns={**self._columns, self.names.index(name): both})
 
     def number(self, *names: str) -> Floats:
@@ -240,7 +250,7 @@ class Columns:
             self.reading.tallies.add_texts(name, part, pc.sum(given).as_py() or 0)
             return numbers
         column = pc.utf8_trim_whitespace(column)
-        missing = pc.is_in(column, pa.array(_MISSING))
+        missing = pc.is_in(column, pa.array(MISSING))
         good = pc.match_substring_regex(column, pattern)
         wrong = pc.and_not(pc.invert(good), missing)
         bad = pc.sum(wrong).as_py()

@@ -7,7 +7,7 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.radio.cell_layouts import OF_CARRIERS
 from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
-from mapfilter.tracks.readers.columns import only
+from mapfilter.tracks.readers.columns import MISSING, only
 from mapfilter.tracks.readers.csv_fields import FIELDS
 from mapfilter.tracks.readers.csv_identities import cell_identities, roles
 from mapfilter.tracks.readers.csv_mapped import Mapped
@@ -16,6 +16,8 @@ from mapfilter.tracks.readers.reading import Reading
 
 _IMPLIED = {**OF_CARRIERS, **dict.fromkeys(("eci", *FIELDS["enodeb"]), "LTE"), "nci": "NR"}
 """Technologies of columns: the carrier, or the identity, has a name of its own in each."""
+_NONE = (*MISSING, "-1", "2147483647", "9223372036854775807")
+"""Texts of columns of other technologies than a row's: missing ones, and Android's marks."""
 
 
 def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
@@ -58,17 +60,27 @@ def _levels(mapped: Mapped) -> Floats:
 
 
 def _implied(mapped: Mapped) -> np.ndarray | None:
-    """Return the technology of each row by its columns' names; None if they state none, or several.
+    """Return the technology of each row by its columns' names; None if they state none.
 
-    That of a row in which such a column holds something; None for the others.
+    That of a row in which such a column holds something; None for the others, and where columns of
+    several technologies do.
     """
-    columns = [mapped.rows.find(*mapped.names(field)) for field in ("arfcn", "ci", "enodeb")]
+    columns = [name for field in ("arfcn", "ci", "enodeb") for name in mapped.columns(field)]
     stating = [name for name in columns if name in _IMPLIED]
-    if len({_IMPLIED[name] for name in stating}) != 1:
+    if not stating:
         return None
-    held = np.any([mapped.rows.texts(name) != "" for name in stating], axis=0)
-    families = np.array([None, _IMPLIED[stating[0]]], dtype=object)
-    return np.asarray(families[held.astype(np.int64)])
+    held = {
+        family: np.any(
+            [~mapped.rows.flags(name, true=_NONE) for name in stating if _IMPLIED[name] == family],
+            axis=0,
+        )
+        for family in dict.fromkeys(_IMPLIED[name] for name in stating)
+    }
+    single = np.sum(list(held.values()), axis=0) == 1
+    families = np.full(len(mapped.rows), None, dtype=object)
+    for family, rows in held.items():
+        families[rows & single] = family
+    return families
 
 
 def _add_bars(mapped: Mapped, columns: dict[str, np.ndarray]) -> None:

@@ -12,7 +12,7 @@ from mapfilter._words import number_of
 from mapfilter.radio.identities import IDENTITY
 from mapfilter.radio.transmitter_lists import CELLS_OF_NODE
 from mapfilter.tracks.readers.csv_mapped import Mapped
-from mapfilter.tracks.readers.identities import parse_identities
+from mapfilter.tracks.readers.identities import available, parse_identities
 
 _HEX = re.compile(r"[0-9A-F]{1,9}", re.ASCII | re.IGNORECASE)
 _LEAST_LETTERS = 0.5
@@ -29,6 +29,11 @@ def cell_identities(mapped: Mapped) -> dict[str, Floats]:
     mapped = _without_hexadecimals(mapped)
     identity = {name: mapped.whole(name) for name in IDENTITY}
     identity |= _networks(identity["mcc"], identity["mnc"])
+    for name in {"eci", "nci"}.intersection(mapped.columns("ci")[1:]):
+        # Beside a whole identity a small number is that of the cell within its node.
+        whole = available(*mapped.rows.whole(name))
+        small = (identity["ci"] < CELLS_OF_NODE) & (whole >= CELLS_OF_NODE)
+        identity["ci"] = np.where(small, whole, identity["ci"])
     if mapped.has("enodeb"):
         identity["ci"] = _of_nodes(mapped, identity["ci"])
     if mapped.has("cgi"):
@@ -68,7 +73,9 @@ def _without_hexadecimals(mapped: Mapped) -> Mapped:
     rows = mapped.rows
     for field in ("lac", "ci"):
         for name in mapped.columns(field):
-            words = {word.strip() for word in set(rows.texts(name))} - {""}
+            every = {word.strip() for word in set(rows.texts(name))}
+            # Other words stand for missing values.
+            words = {word for word in every if _HEX.fullmatch(word) or re.search(r"\d", word)}
             if not words or not all(map(_HEX.fullmatch, words)):
                 continue
             note = f"{name}: taken for hexadecimal numbers"
@@ -81,9 +88,9 @@ def _without_hexadecimals(mapped: Mapped) -> Mapped:
 
 
 def _networks(number: Floats, mnc: Floats) -> dict[str, Floats]:
-    """Return mcc and mnc of numbers that hold both: five digits, or six with an mnc of three."""
+    """Return mcc and mnc of numbers that hold both: an mcc of three digits, and the others."""
     both = np.isnan(mnc) & (number > _LARGEST_MCC)
-    digits = np.where(number >= 100_000, 1000.0, 100.0)
+    digits = np.select([number >= 100_000, number >= 10_000], [1000.0, 100.0], 10.0)
     network = {"mcc": np.where(both, number // digits, number)}
     return network | {"mnc": np.where(both, number % digits, mnc)}
 

@@ -11,7 +11,7 @@ import numpy as np
 from mapfilter._header_units import HeaderUnit, header_unit
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
-from mapfilter.tracks.readers.columns import Columns, only
+from mapfilter.tracks.readers.columns import MISSING, Columns, only
 from mapfilter.tracks.readers.csv_fields import FIELDS, check_fields
 from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.format import ReadOptions
@@ -29,6 +29,7 @@ _USUAL_DBM, _MOSTLY = (-150.0, -20.0), 0.9
 _OF_CELLS = ("cell_id", "cellid")
 _DECIMAL = re.compile(r"-?[0-9]{1,20}(\.0*)?|0x[0-9a-f]{1,9}", re.ASCII | re.IGNORECASE)
 _HEXADECIMAL = re.compile(r"[0-9a-f]{4,9}", re.ASCII | re.IGNORECASE)
+_OF_NODE = re.compile(r"(?:\d|[1-9]\d|1\d\d|2[0-4]\d|25[0-5])(?:\.0*)?", re.ASCII)
 _CELLS = ("cell", "cgi", "ci", "level_dbm", "bars")
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 _OF_TECHNOLOGIES: Mapping[str, tuple[str, ...]] = {
@@ -187,7 +188,8 @@ def mapped_columns(rows: Columns, reading: Reading, options: ReadOptions) -> Map
         hint = "--column time=COLUMN"
         faults.add(where, "a column of times", present, hint)
     faults.raise_if_any(InputError)
-    return _with_names(_with_signals(_with_azimuths(mapped, reading), reading), reading)
+    mapped = _with_sectors(_with_signals(_with_azimuths(mapped, reading), reading), reading)
+    return _with_names(mapped, reading)
 
 
 def _with_azimuths(mapped: Mapped, reading: Reading) -> Mapped:
@@ -230,6 +232,23 @@ def _with_signals(mapped: Mapped, reading: Reading) -> Mapped:
         return mapped
     reading.note(f"{name}: taken for levels in dBm, by its values")
     return replace(mapped, stated={**mapped.stated, "level_dbm": name})
+
+
+def _with_sectors(mapped: Mapped, reading: Reading) -> Mapped:
+    """Return columns with small numbers of cells beside those of nodes as cells of these."""
+    name = "cell"
+    others = any(map(mapped.has, ("sector", "ci")))
+    if mapped.rows.names.count(name) != 1 or not mapped.has("enodeb") or others:
+        return mapped
+    if name in {column.lower() for column in mapped.own.values()}:
+        return mapped
+    texts = mapped.rows.texts(name)
+    known = np.unique(texts[~mapped.rows.flags(name, true=MISSING)])
+    small = known.size and all(_OF_NODE.fullmatch(str(text)) for text in known)
+    if not (small or reading.columns.get("sector") == name):
+        return mapped
+    reading.note(f"{name}: taken for the numbers of cells within their nodes")
+    return replace(mapped, stated={**mapped.stated, "sector": name})
 
 
 def _with_names(mapped: Mapped, reading: Reading) -> Mapped:

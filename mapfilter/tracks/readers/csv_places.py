@@ -10,7 +10,7 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.position_units import UERE_M
-from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.columns import MISSING, Columns
 from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.csv_odometry import speeds_of
@@ -48,12 +48,10 @@ def hemisphere_columns(rows: Columns, taken: frozenset[str] = frozenset()) -> di
     for name in rows.names:
         if not _NAMED.fullmatch(name) or name in taken or rows.names.count(name) > 1:
             continue
-        first = rows.first_text(name).upper()
+        texts = {str(text).upper() for text in np.unique(rows.texts(name)) if text not in MISSING}
         for field, letters in _HEMISPHERES.items():
-            if field not in found and first in letters:
-                texts = {str(text).upper() for text in np.unique(rows.texts(name))}
-                if texts <= {*letters, ""}:
-                    found[field] = name
+            if field not in found and texts and texts.issubset(letters):
+                found[field] = name
     return found
 
 
@@ -124,7 +122,7 @@ def _check_steady(
     mapped: Mapped, reading: Reading, degrees: Floats, letters: np.ndarray, column: str
 ) -> None:
     """Refuse letters that change from row to row where the degrees do not."""
-    at = np.flatnonzero((letters != "") & (degrees > 0))
+    at = np.flatnonzero(np.isin(letters.astype(str), list("NSEW")) & (degrees > 0))
     far = np.minimum(degrees[at[1:]], degrees[at[:-1]]) > _FAR_DEG
     steady = far & (np.abs(np.diff(degrees[at])) < _FAR_DEG)
     jumps = at[1:][steady & (letters[at[1:]] != letters[at[:-1]])]

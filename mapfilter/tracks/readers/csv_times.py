@@ -12,6 +12,7 @@ from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.columns import MISSING, Columns
 from mapfilter.tracks.readers.csv_mapped import DATE, Mapped
 from mapfilter.tracks.readers.csv_weeks import (
     over_days,
@@ -47,6 +48,10 @@ _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
 """Unix times of 1998, 2020 and 2039."""
 _SAME_DATE = "time: the date stays the same over midnight: times go on with the next day"
 _PAUSE_S = 600.0
+_OF_DAY = "time: taken for hours, minutes and seconds of the day in one number, as 101530"
+_LONG, _SHORT = 300.0, 20.0
+"""Of times, and of their usual steps, to tell them from seconds."""
+_DAYS = "time: days since 1900, as a spreadsheet writes them"
 
 
 def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
@@ -57,13 +62,17 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     # Dates are no numbers; notes on them may be of the columns that are looked at, too.
     as_numbers = tuple(f"{name}: " for name in mapped.names("time"))
     mapped = _best_column(mapped, reading)
+    missing = mapped.rows.flags(*mapped.names("time"), true=MISSING)
+    if missing.size and missing.all():
+        # A part of a large file, as of a receiver without a fix: the clock is that of the others.
+        return np.full(missing.size, np.nan)
     number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
     known = number[np.isfinite(number)]
     usual_s = abs(float(np.median(known))) if known.size else np.inf
     _check_digits(mapped, reading, known)
-    if known.size >= 0.5 * len(number) and usual_s < LEAST_UNIX_S:
-        if are_days(known):
-            reading.note("time: days since 1900, as a spreadsheet writes them")
+    if known.size >= 0.5 * np.count_nonzero(~missing) and usual_s < LEAST_UNIX_S:
+        if are_days(known) or (in_days(known) and _DAYS in reading.notes):
+            reading.note(_DAYS)
             return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)
         if week := week_column(mapped):
             reading.clock = Clock("gps")
@@ -71,7 +80,7 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             counted_s = utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
             return over_stuck_weeks(reading, counted_s, week)
         reading.clock = Clock("monotonic")
-        return over_days(reading, over_weeks(reading, number))
+        return over_days(reading, over_weeks(reading, _without_digits(reading, number)))
     reading.notes[:] = [
         note
         for note in reading.notes
@@ -98,12 +107,18 @@ def _best_column(mapped: Mapped, reading: Reading) -> Mapped:
     """Return columns with the times of the one that says most, and tells rows apart.
 
     A start of the recording that stands in each row, or times in whole minutes, do not replace
-    others that can be read.
+    others that can be read. Later parts of a large file are read as the first one.
     """
-    rows = mapped.rows
-    there = [name for name in mapped.names("time") if name in rows.names]
+    there = [name for name in mapped.names("time") if name in mapped.rows.names]
     if len(there) < 2 or "time" in mapped.own:
         return mapped
+    if "time" not in reading.columns:
+        reading.columns["time"] = _best_of(there, mapped.rows, reading)
+    best = reading.columns["time"]
+    return mapped if best == there[0] else replace(mapped, stated={**mapped.stated, "time": best})
+
+
+def _best_of(there: list[str], rows: Columns, reading: Reading) -> str:
     certain = {name: _certainty(name, rows.first_text(name)) for name in there}
     better = [name for name in there if certain[name] > certain[there[0]]]
     if better and certain[there[0]]:
@@ -113,10 +128,7 @@ def _best_column(mapped: Mapped, reading: Reading) -> Mapped:
             times = number_of(count[name], "different time")
             reading.note(f"{name}: {times} in {number_of(len(rows), 'row')}, not used")
         better = [name for name in better if name not in coarse]
-    if not better:
-        return mapped
-    best = max(better, key=certain.__getitem__)
-    return replace(mapped, stated={**mapped.stated, "time": best})
+    return max(better, key=certain.__getitem__, default=there[0])
 
 
 def _certainty(name: str, text: str) -> int:
@@ -127,6 +139,28 @@ def _certainty(name: str, text: str) -> int:
         return 3 if _EARLY_S < unix_seconds([float(number)])[0] < _LATEST_S else 1
     time_s, zoned = parse_times(np.array([text], dtype=object), "UTC" if "utc" in name else "")
     return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
+
+
+def _without_digits(reading: Reading, number: Floats) -> Floats:
+    """Return seconds of the day for times of day in one number: 36930.25 for 101530.25.
+
+    Of seconds some would end in 60 to 99.
+    """
+    known = np.isfinite(number)
+    hours, rest = np.divmod(number[known], 10_000.0)
+    minutes, seconds = np.divmod(rest, 100.0)
+    if not hours.size or hours.min() < 0 or hours.max() >= 24:
+        return number
+    if minutes.max() >= 60 or seconds.max() >= 60:
+        return number
+    steps = np.diff(np.unique(number[known]))
+    long = steps.sum() > _LONG and np.median(steps) <= _SHORT
+    if not (long or _OF_DAY in reading.notes):
+        return number
+    reading.note(_OF_DAY)
+    counted = number.copy()
+    counted[known] = 3600 * hours + 60 * minutes + seconds
+    return counted
 
 
 def _check_digits(mapped: Mapped, reading: Reading, known: Floats) -> None:
@@ -174,7 +208,9 @@ def _note_gps(reading: Reading, name: str, known: Floats) -> None:
 
 def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
     """Return times that go on after midnight where a column of dates keeps the day of the start."""
-    if DATE not in mapped.beside or mapped.rows.changes(DATE).any():
+    dates = mapped.rows.texts(DATE)
+    dates = dates[~mapped.rows.flags(DATE, true=MISSING)]
+    if DATE not in mapped.beside or (dates[1:] != dates[:-1]).any():
         return time_s
     known_s = time_s[np.isfinite(time_s)]
     before_s = [reading.last_s] if np.isfinite(reading.last_s) else []

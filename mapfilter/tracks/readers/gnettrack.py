@@ -79,11 +79,12 @@ def _serving(rows: Columns, reading: Reading) -> dict[str, Floats]:
     if not rows.has("lac"):
         lac = _hexadecimal(rows.texts("lachex"))
     ci = available(*rows.whole("rawcellid"))
-    if not rows.has("rawcellid"):
-        node, ci = available(*rows.whole("node")), available(*rows.whole("cellid"))
+    if np.isnan(ci).any():
+        node, cell = available(*rows.whole("node")), available(*rows.whole("cellid"))
         # A base station of LTE has 256 cells; GSM and UMTS have none, or that of a controller.
         lte = (rows.mapped(technology, "networkmode", "networktech") == "LTE") & (node > 0)
-        ci = np.where(lte, node * _LTE_CELLS + ci, ci)
+        ci = np.where(np.isnan(ci) & lte, node * _LTE_CELLS + cell, ci)
+        ci = ci if rows.has("rawcellid") else np.where(lte, ci, cell)
     # The program writes 0 where the phone does not know its cell.
     unknown = ci == 0
     if unknown.any():

@@ -62,6 +62,7 @@ class _Layout:
 def _layout(names: Sequence[str]) -> _Layout | None:
     """Return the columns of a table with a row for each value; None for another table."""
     time = next((name for name in _TIMES if name in names), "")
+    time = time or stated_fields(names, (), ()).get("time", "")
     kind = next((name for name in _KINDS if name in names), "")
     single = next((name for name in _VALUES if name in names), "")
     values = {"": single}

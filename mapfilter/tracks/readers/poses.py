@@ -119,15 +119,22 @@ def _frame_times(text: Text, reading: Reading) -> Floats | None:
 
 
 def _read_tum(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
-    names = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"]
+    names = ["time", "x", "y", "z", *_quaternion(text)]
     reading.program, reading.clock = "TUM trajectory", Clock(_tum_clock(text))
     for rows, values in _parts(text, reading, names):
-        quaternion = np.stack([values[name] for name in names[4:]], axis=1)
+        quaternion = np.stack([values[f"q{axis}"] for axis in "xyzw"], axis=1)
         norm = np.linalg.norm(quaternion, axis=1)
         good = ~(np.abs(norm - 1.0) > _CROOKED)
         reading.refuse(rows.line[~good], "pose: no unit quaternion")
         place = np.stack([values[name] for name in names[1:4]], axis=1)
         _add_poses(reading, values["time"][good], place[good], quaternion[good], rows.line[good])
+
+
+def _quaternion(text: Text) -> list[str]:
+    """Return the parts of quaternions in the order of the header: the scalar may be the first."""
+    heads = (re.findall(r"\bq_?([wxyz])\b", line.lower()) for line in text.head[:30])
+    order = next((head for head in heads if sorted(head) == [*"wxyz"]), "xyzw")
+    return [f"q{axis}" for axis in order]
 
 
 def _tum_clock(text: Text) -> Literal["utc", "monotonic"]:

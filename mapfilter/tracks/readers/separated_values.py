@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import operator
 import re
 from collections.abc import Sequence
+from itertools import takewhile
 
 import numpy as np
 import pyarrow as pa
@@ -41,6 +43,9 @@ def header_columns(
                 reading.rows += 1
                 reading.refuse(first_line + data.count(b"\n", start), cut)
             rest = _without_headers(data[start:], header, separator, reading)
+            # The header may end with a separator where rows do not.
+            unnamed = sum(1 for _ in takewhile(operator.not_, reversed(names)))
+            ragged = ragged or max(len(names) - unnamed, 1)
             return value_columns(
                 memoryview(rest), reading, names, separator, first_line, ragged=ragged
             )

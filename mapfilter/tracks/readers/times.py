@@ -41,6 +41,8 @@ _LEAP = r"(?:\d:[0-5]\d:|_\d\d\.[0-5]\d\.|\dT\d\d[0-5]\d)60(?:\D|$)"
 _LEAP_60 = re.compile(r"(?:(?<=\d:[0-5]\d:)|(?<=_\d\d\.\d\d\.)|(?<=\dT\d{4}))60(?=\D|$)")
 """Second 60 of a time of day: hours and minutes before it."""
 _UTC = re.compile(r"\s{0,3}\b(?:UTC|GMT)\s{0,3}$")
+_ZONED = r"(?:Z|z|[+-]\d\d:?\d\d|(?::\d\d|T\d{4,6})(?:[.,]\d{1,9})?\s?[+-]\d\d)\s*$"
+"""Ends of times that state their zone: whole hours only after a time of day, not after a month."""
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
 _TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
 
@@ -140,7 +142,7 @@ def parse_times(
     leap = rest.str.contains(_LEAP, regex=True).to_numpy()
     plain = rest.str.replace(_LEAP_60, "59", regex=True) if leap.any() else rest
     plain = plain.str.replace(_UTC, "Z", regex=True) if layout == "ISO8601" else plain
-    aware = plain.str.contains(r"(?:Z|z|[+-]\d\d:?\d\d)\s*$", regex=True).to_numpy()
+    aware = plain.str.contains(_ZONED, regex=True).to_numpy()
     # Other years are beyond the range of timestamps, or no dates.
     if layout == "ISO8601":
         plain = plain.str.replace(",", ".", regex=False)
