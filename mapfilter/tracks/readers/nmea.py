@@ -66,6 +66,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     parts = [_gga(known[0], dates, reading), _rmc(known[1], dates, reading)]
     rows = pd.concat(parts, ignore_index=True)
     rows = rows[rows["valid"]].sort_values("line", kind="stable")
+    reading.refuse(rows["line"][rows["time_s"].isna()], "positions: no usable time")
     if rows.empty:
         return
     first = rows.groupby("time_s", sort=True).first().reset_index()
