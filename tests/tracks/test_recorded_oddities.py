@@ -281,3 +281,15 @@ def test_ticks_since_a_phone_was_started_need_their_unit(read, unit, scale):
     found = read(**{f"timestamp_{unit}": ticks, "lat": LAT, "lon": LON})
     assert found.clock.kind == "monotonic"
     np.testing.assert_allclose(places(found)["time_s"], 123_456 + np.arange(COUNT))
+
+
+@pytest.mark.parametrize("comments", [[0], [0, 3, 8]], ids=str)
+def test_poses_below_comments_have_the_times_of_their_frames(comments, tmp_path):
+    poses = [f"1 0 0 0 0 1 0 0 0 0 1 {k}" for k in range(12)]
+    for line in comments:
+        poses.insert(line, "# left camera")
+    (tmp_path / "00.txt").write_text("\n".join(poses))
+    (tmp_path / "times.txt").write_text("\n".join(f"{0.25 * k}" for k in range(12)))
+    found = read_recording(tmp_path / "00.txt")
+    assert found.notes == ("times by times.txt",)
+    assert found.tables["poses"]["time_s"].tolist() == (0.25 * np.arange(12)).tolist()

@@ -84,7 +84,8 @@ def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # 
 
     reading.program, reading.clock = "KITTI poses", Clock("monotonic")
     names = [f"r{i}{j}" for i in range(3) for j in range(4)]
-    times = _frame_times(text, reading)
+    comments = _comments(text.data)
+    times = _frame_times(text, reading, comments.size)
     for rows, values in _parts(text, reading, names):
         matrix = np.stack([values[name] for name in names], axis=1).reshape(-1, 3, 4)
         turn = matrix[:, :, :3]
@@ -96,12 +97,19 @@ def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # 
         reading.refuse(rows.line[~good], "pose: no rotation matrix")
         if good.any():
             quaternion = Rotation.from_matrix(turn[good]).as_quat()
-            frame = rows.line[good] - 1
+            frame = rows.line[good] - 1 - np.searchsorted(comments, rows.line[good])
             time_s = _FRAME_S * frame if times is None else times[frame]
             _add_poses(reading, time_s, matrix[good][:, :, 3], quaternion, rows.line[good])
 
 
-def _frame_times(text: Text, reading: Reading) -> Floats | None:
+def _comments(data: bytes) -> Ints:
+    """Return the numbers of lines that are comments."""
+    begins = [found.start() for found in re.finditer(rb"^[ \t]*#", data, re.MULTILINE)]
+    feeds = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
+    return np.searchsorted(feeds, begins) + 1
+
+
+def _frame_times(text: Text, reading: Reading, comments: int) -> Floats | None:
     """Return times by ``times.txt`` beside the file, as in KITTI's odometry; None without it."""
     path = Path(reading.path).parent / "times.txt"
     if has_recording(path):
@@ -109,7 +117,7 @@ def _frame_times(text: Text, reading: Reading) -> Floats | None:
             aside = Reading(path)
             rows = value_columns(memoryview(split_blanks(read_text(path).data)), aside, ["t"], " ")
             times = rows.number("t")
-            if len(times) > text.data.rstrip().count(b"\n"):
+            if len(times) > text.data.rstrip().count(b"\n") - comments:
                 reading.note("times by times.txt")
                 return np.asarray(times)
         except MapfilterError:
