@@ -104,7 +104,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     midnight_s = _midnight_s(head)
     ahead_s = _ahead_s(head)
     zone = options.zone if ahead_s is None else ""
-    reading.clock = Clock("monotonic")
+    reading.clock = Clock("monotonic", from_midnight=True)
     if midnight_s is None:
         reading.note("no date in #START: times count from an unknown day")
     elif ahead_s is None:

@@ -61,7 +61,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
             reading.note("dates are those of the time stamps before the sentences")
     if dates.empty:
         reading.note("no date in the file (neither RMC nor ZDA): times count from a midnight")
-        reading.clock = Clock("monotonic")
+        reading.clock = Clock("monotonic", from_midnight=True)
     known = tables[b"GGA"], tables[b"RMC"]
     parts = [_gga(known[0], dates, reading), _rmc(known[1], dates, reading)]
     rows = pd.concat(parts, ignore_index=True)

@@ -134,7 +134,7 @@ def _times(rows: Columns, reading: Reading, options: ReadOptions) -> Floats:
         return np.zeros(0)
     day_s = rows.seconds_of_day(*_TIMES)
     if np.isfinite(day_s).sum() > 0.5 * (rows.texts(*_TIMES) != "").sum():
-        reading.clock = Clock("monotonic")
+        reading.clock = Clock("monotonic", from_midnight=True)
         reading.note("times of day without a date: they count from an unknown day")
         before_s = max((p[-1]["time_s"].iloc[-1] for p in reading.tables.values()), default=np.nan)
         return without_midnights(day_s, float(before_s))
