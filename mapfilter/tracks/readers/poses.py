@@ -12,11 +12,18 @@ import numpy as np
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import MapfilterError
 from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.csv_fields import usual_fields
+from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import split_blanks, value_columns
+from mapfilter.tracks.readers.separated_values import (
+    header_names,
+    likely_separator,
+    split_blanks,
+    value_columns,
+)
 from mapfilter.tracks.readers.text import Text, read_text
 from mapfilter.tracks.readers.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.zipped import has_recording
@@ -29,6 +36,7 @@ _CROOKED = 0.05
 _NAMES = frozenset(
     ["x", "y", "z", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "x_m", "y_m", "z_m", "r11", "r00"]
 )
+_OF_POSES = frozenset(["time", "qx", "qy", "qz", "qw"])
 
 
 def _count(text: Text, count: int) -> bool:
@@ -38,9 +46,15 @@ def _count(text: Text, count: int) -> bool:
 
 
 def _names_others(line: str) -> bool:
-    """Return whether a header names columns none of which is of a pose."""
+    """Return whether a header names columns none of which is of a pose, or fields of a plain CSV.
+
+    Attitudes are of both.
+    """
     words = {word.strip().lower() for word in re.split(r"[,;\s]+", line) if word.strip()}
-    return bool(words) and all(word[0].isalpha() for word in words) and not words & _NAMES
+    if words and all(word[0].isalpha() for word in words) and not words & _NAMES:
+        return True
+    names = header_names(line, likely_separator(line))
+    return bool({*usual_fields(names), *stated_fields(names, (), ())} - _OF_POSES)
 
 
 def _numbers(line: str, count: int) -> bool:
