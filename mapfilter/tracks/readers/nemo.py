@@ -51,8 +51,10 @@ from mapfilter.tracks.readers.nemo_identities import (
     nothing_known,
     of_systems,
 )
+from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import header_names, likely_separator
 from mapfilter.tracks.readers.text import Text
 
 _BEGIN = re.compile(r"#(?:PRODUCT|FF|ID|START)[,;\t]")
@@ -88,6 +90,9 @@ _SYSTEMS = {
 
 
 def _matches(text: Text) -> bool:
+    if has_content(header_names(text.first_line, likely_separator(text.first_line))):
+        # A table may have a column of such a name.
+        return False
     lines = [line.lstrip() for line in text.head[:200]]
     return any(_BEGIN.match(line) or _EVENT.match(line) for line in lines)
 
