@@ -12,11 +12,18 @@ import numpy as np
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import MapfilterError
 from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.csv_fields import usual_fields
+from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import split_blanks, value_columns
+from mapfilter.tracks.readers.separated_values import (
+    header_names,
+    likely_separator,
+    split_blanks,
+    value_columns,
+)
 from mapfilter.tracks.readers.text import Text, read_text
 from mapfilter.tracks.readers.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.zipped import has_recording
@@ -29,6 +36,7 @@ _CROOKED = 0.05
 _NAMES = frozenset(
     ["x", "y", "z", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "x_m", "y_m", "z_m", "r11", "r00"]
 )
+_OF_POSES = frozenset(["time", "qx", "qy", "qz", "qw"])
 
 
 def _count(text: Text, count: int) -> bool:
@@ -38,9 +46,15 @@ def _count(text: Text, count: int) -> bool:
 
 
 def _names_others(line: str) -> bool:
-    """Return whether a header names columns none of which is of a pose."""
+    """Return whether a header names columns none of which is of a pose, or fields of a plain CSV.
+
+    Attitudes are of both.
+    """
     words = {word.strip().lower() for word in re.split(r"[,;\s]+", line) if word.strip()}
-    return bool(words) and all(word[0].isalpha() for word in words) and not words & _NAMES
+    if words and all(word[0].isalpha() for word in words) and not words & _NAMES:
+        return True
+    names = header_names(line, likely_separator(line))
+    return bool({*usual_fields(names), *stated_fields(names, (), ())} - _OF_POSES)
 
 
 def _numbers(line: str, count: int) -> bool:
@@ -84,7 +98,8 @@ def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # 
 
     reading.program, reading.clock = "KITTI poses", Clock("monotonic")
     names = [f"r{i}{j}" for i in range(3) for j in range(4)]
-    times = _frame_times(text, reading)
+    comments = _comments(text.data)
+    times = _frame_times(text, reading, comments.size)
     for rows, values in _parts(text, reading, names):
         matrix = np.stack([values[name] for name in names], axis=1).reshape(-1, 3, 4)
         turn = matrix[:, :, :3]
@@ -96,12 +111,19 @@ def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # 
         reading.refuse(rows.line[~good], "pose: no rotation matrix")
         if good.any():
             quaternion = Rotation.from_matrix(turn[good]).as_quat()
-            frame = rows.line[good] - 1
+            frame = rows.line[good] - 1 - np.searchsorted(comments, rows.line[good])
             time_s = _FRAME_S * frame if times is None else times[frame]
             _add_poses(reading, time_s, matrix[good][:, :, 3], quaternion, rows.line[good])
 
 
-def _frame_times(text: Text, reading: Reading) -> Floats | None:
+def _comments(data: bytes) -> Ints:
+    """Return the numbers of lines that are comments."""
+    begins = [found.start() for found in re.finditer(rb"^[ \t]*#", data, re.MULTILINE)]
+    feeds = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
+    return np.searchsorted(feeds, begins) + 1
+
+
+def _frame_times(text: Text, reading: Reading, comments: int) -> Floats | None:
     """Return times by ``times.txt`` beside the file, as in KITTI's odometry; None without it."""
     path = Path(reading.path).parent / "times.txt"
     if has_recording(path):
@@ -109,7 +131,7 @@ def _frame_times(text: Text, reading: Reading) -> Floats | None:
             aside = Reading(path)
             rows = value_columns(memoryview(split_blanks(read_text(path).data)), aside, ["t"], " ")
             times = rows.number("t")
-            if len(times) > text.data.rstrip().count(b"\n"):
+            if len(times) > text.data.rstrip().count(b"\n") - comments:
                 reading.note("times by times.txt")
                 return np.asarray(times)
         except MapfilterError:
