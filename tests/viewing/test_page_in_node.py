@@ -63,6 +63,17 @@ def test_the_first_fix_is_shown_and_what_replaces_it():
     assert again.startswith("This momentlost")
 
 
+@pytest.mark.parametrize(("radius_m", "shown"), [(80.0, "unavailable"), (None, "–")])
+def test_a_protection_level_that_is_infinite_is_unavailable(radius_m, shown):
+    """As in a replay; without a position there is none."""
+    task = """live.run.push({ number: 1, time_s: 1, status: "TRACKING", reason: "used",
+      hypotheses: 9, way_id: 0, unused: [], east_m: null, runner_up_east_m: null,
+      radius_99_m: radius, protection_m: null });
+    for (const one of live.listeners) one("live"); draw(); draw(); return side();"""
+    found = ran(LIVE + SIDE + task, bundle=live_bundle(), radius=radius_m)
+    assert f"Protection level{shown}Error" in found
+
+
 @pytest.mark.parametrize("key", ["ArrowLeft", "ArrowRight", " "])
 def test_keys_before_the_first_fix_leave_the_page_at_the_newest_one(key):
     task = """press(key); draw(); fix(1, "SEARCHING"); fix(2, "SEARCHING");
