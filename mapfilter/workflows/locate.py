@@ -195,7 +195,8 @@ def _check_near(log: Path, reports: Reports, known: Reports, faults: Faults) -> 
 
 
 def _extent(values: Floats) -> tuple[float, float]:
-    return float(values.min()), float(values.max())
+    # Those of one place have an extent, too.
+    return float(values.min()) - _AREA_M, float(values.max()) + _AREA_M
 
 
 def _centroid_errors_m(fitted: ReportLocator, reports: Reports) -> Floats:

@@ -42,6 +42,23 @@ def test_sensors_are_read_as_they_were_written(form, log, sensors, tmp_path):
     assert not (folder / "sensors").exists()
 
 
+@pytest.mark.parametrize(
+    ("sensors", "told"),
+    [
+        ({"barometr": {"time_s": [0.0], "pressure_hpa": [1e3]}}, "'barometr' .likely: barometer"),
+        ({"barometer": {"time_s": [0.0]}}, "sensors, barometer: .* found no pressure_hpa"),
+        ({"barometer": {"time_s": ["x"], "pressure_hpa": [1e3]}}, "barometer, time_s: .* numbers"),
+        ({"barometer": {"time_s": pd.to_datetime(["2026-05-01 12:00Z"])}}, "barometer, time_s: "),
+    ],
+)
+def test_sensors_that_are_no_tables_of_a_log_are_refused(log, tmp_path, sensors, told):
+    """One of another name was not written, others ended in a traceback."""
+    tables = {name: pd.DataFrame(rows) for name, rows in sensors.items()}
+    with pytest.raises(InputError, match=told):
+        write_log(log, tmp_path / "log", sensors=tables)
+    assert not (tmp_path / "log").exists()
+
+
 def test_a_log_without_sensors_has_none(log, tmp_path):
     write_log(log, tmp_path / "log")
     assert read_sensors(tmp_path / "log") == {}
