@@ -26,6 +26,7 @@ from mapfilter.radio.layers import layer_numbers
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.coverage import plot_point_values, plot_twins
 from mapfilter.report.saving import save
+from mapfilter.workflows.apart import check_out_apart
 
 NOTES = (
     "exact for the error model: the bound from given gradients; bits by the serving cell",
@@ -98,6 +99,7 @@ def run_bound(
 ) -> BoundResult:
     """Compute bounds on positioning by a database; write a raster, tables by way and of twins."""
     began_s = time.perf_counter()
+    check_out_apart(out, [path])
     database = open_database(path)
     if not database.cell_ids:
         raise fail(InputError, str(path), "cells", "none", "a database of roads alone")
