@@ -15,6 +15,7 @@ from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.merging import epoch_columns, make_epoch
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.radio.identities import IDENTITY, LIMITS, TIMING_STEP_M
+from mapfilter.radio.identities import technology as technology_of
 from mapfilter.radio.plan_names import PlanNames, ReportedCell
 from mapfilter.serving.documents import (
     RequestError,
@@ -156,6 +157,9 @@ def _rows(
             name: _value(column, row.get(name), f"{place}.{name}", faults)
             for name, column in _COLUMNS[table].items()
         }
+        if table == "radio" and values["technology"]:
+            # 4G is LTE, as in a log.
+            values["technology"] = technology_of(values["technology"]) or values["technology"]
         _CHECKS.get(table, _nothing)(values, place, faults)
         if table == "radio" and technology:
             _check_steps(values, technology, place, faults)
