@@ -17,7 +17,6 @@ from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.database.export import write_layers
 from mapfilter.database.store import open_database
-from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, bound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel
@@ -101,8 +100,6 @@ def run_bound(
     began_s = time.perf_counter()
     check_out_apart(out, [path])
     database = open_database(path)
-    if not database.cell_ids:
-        raise fail(InputError, str(path), "cells", "none", "a database of roads alone")
     with nothing_left(out):
         ensure_writable_folder(out)
         found = bound(database, errors=errors, options=options, seed=seed, progress=progress)
