@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -29,6 +29,7 @@ from mapfilter.tracks.readers.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.zipped import has_recording
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)
+_PLACE = re.compile(r"(t|p|pos|position)?[_ .]?x([_ ]?m| ?[\[(].*)?")
 _FRAME_S = 0.1
 _CROOKED = 0.05
 
@@ -39,10 +40,18 @@ _NAMES = frozenset(
 _OF_POSES = frozenset(["time", "qx", "qy", "qz", "qw"])
 
 
-def _count(text: Text, count: int) -> bool:
-    lines = [line for line in text.head[:30] if line.strip() and not line.startswith("#")][:20]
-    right = sum(_numbers(line, count) for line in lines)
-    return bool(lines) and right > 0.5 * len(lines) and not _names_others(lines[0])
+def _count(text: Text, count: int, is_pose: Callable[[Floats], bool]) -> bool:
+    """Return whether most lines have so many numbers and, where the first has others, are poses."""
+    lines = _body(text)
+    rows = [numbers for line in lines if (numbers := _numbers(line, count)) is not None]
+    if len(rows) <= 0.5 * len(lines) or _names_others(lines[0]):
+        return False
+    # A table of as many other numbers has a header.
+    return _numbers(text.first_line, count) is not None or any(map(is_pose, rows))
+
+
+def _body(text: Text) -> list[str]:
+    return [line for line in text.head[:30] if line.strip() and not line.startswith("#")][:20]
 
 
 def _names_others(line: str) -> bool:
@@ -57,26 +66,45 @@ def _names_others(line: str) -> bool:
     return bool({*usual_fields(names), *stated_fields(names, (), ())} - _OF_POSES)
 
 
-def _numbers(line: str, count: int) -> bool:
-    """Return whether a line has so many numbers; commas separate, or are decimal ones."""
-    return any(
-        len(words) == count and all(map(_NUMBER.fullmatch, words))
-        for words in (line.replace(",", other).replace(";", " ").split() for other in " .")
-    )
+def _numbers(line: str, count: int) -> Floats | None:
+    """Return the numbers of a line with so many; commas separate, or are decimal ones."""
+    for other in " .":
+        words = line.replace(",", other).replace(";", " ").split()
+        if len(words) == count and all(map(_NUMBER.fullmatch, words)):
+            return np.array(words, dtype=float)
+    return None
+
+
+def _has_quaternion(row: Floats) -> bool:
+    return bool(abs(np.linalg.norm(row[4:]) - 1.0) <= _CROOKED)
+
+
+def _has_rotation(row: Floats) -> bool:
+    lengths = np.linalg.norm(row.reshape(3, 4)[:, :3], axis=1)
+    return bool((np.abs(lengths - 1.0) <= _CROOKED).all())
 
 
 def _comma(text: Text, count: int) -> bytes:
     """Return what a comma stands for: a blank, or a decimal point."""
     lines = (line.replace(",", ".").replace(";", " ") for line in text.head[:30] if "," in line)
-    return b"." if any(_numbers(line, count) for line in lines) else b" "
+    return b"." if any(_numbers(line, count) is not None for line in lines) else b" "
 
 
 def _is_kitti(text: Text) -> bool:
-    return _count(text, 12)
+    return _count(text, 12, _has_rotation)
 
 
 def _is_tum(text: Text) -> bool:
-    return _count(text, 8)
+    return _count(text, 8, _has_quaternion) and _names_place(_body(text)[0])
+
+
+def _names_place(line: str) -> bool:
+    """Return whether a line is no header, or its second column one of positions."""
+    if _numbers(line, 8) is not None:
+        return True
+    separator = likely_separator(line)
+    names = line.split(separator) if separator in line else line.split()
+    return bool(_PLACE.fullmatch(names[min(1, len(names) - 1)].strip(' "').lower()))
 
 
 def _parts(
